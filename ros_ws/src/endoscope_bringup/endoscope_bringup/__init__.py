@@ -1,0 +1,1 @@
+"""Command line, configuration and launch files of the endoscope."""

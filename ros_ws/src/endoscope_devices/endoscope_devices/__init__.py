@@ -1,0 +1,1 @@
+"""Servo, load-cell and tracker protocols with their emulators, free of ROS."""

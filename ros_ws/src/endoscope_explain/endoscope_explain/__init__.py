@@ -1,0 +1,1 @@
+"""Locates, names and models the physics that a simulation has left out."""

@@ -1,0 +1,1 @@
+"""The rclpy nodes of the master-slave endoscope."""
