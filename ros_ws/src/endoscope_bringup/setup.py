@@ -17,5 +17,5 @@ setup(
     maintainer_email='founders@endoscope.invalid',
     description='Command line, configuration and launch files of the endoscope.',
     license='Apache-2.0',
-    entry_points={'console_scripts': []},
+    entry_points={'console_scripts': ['endoscope = endoscope_bringup.cli:main']},
 )

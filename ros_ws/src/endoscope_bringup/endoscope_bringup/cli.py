@@ -1,0 +1,74 @@
+"""The program `endoscope`: parses the command line, runs one subcommand, turns errors into one line."""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+
+from endoscope_bringup.commands import COMMANDS
+from endoscope_bringup.subcommands import OneLineParser, add_subcommands, run_chosen
+from endoscope_core.errors import EndoscopeError
+
+EXIT_UNUSABLE_INPUT = 2
+EXIT_INTERRUPTED = 130
+EXIT_TERMINATED = 143
+
+
+def build_parser() -> OneLineParser:
+    """Return the parser of `endoscope` with all subcommands."""
+    parser = OneLineParser(
+        prog='endoscope',
+        description='Compensation of hysteresis in a flexible endoscope, on ROS 2 Jazzy.',
+    )
+    add_subcommands(parser, 'endoscope_bringup.commands', COMMANDS, dest='command')
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run `endoscope` with `argv` (default: the command line) and return its exit status.
+
+    0 on success, 2 on wrong usage or unusable input with one line on stderr, 130 when interrupted,
+    143 when terminated. An exception that is not the user's to act on keeps its traceback.
+    """
+    args = build_parser().parse_args(argv)
+    try:
+        with _cleanup_on_sigterm():
+            return run_chosen(args, dest='command')
+    except EndoscopeError as error:
+        return _refuse(str(error))
+    except BrokenPipeError:
+        # The reader of a pipe has seen enough; python's own flush at exit must not complain.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        if error.filename is None:
+            raise
+        return _refuse(f'{error.filename}: {error.strerror}')
+    except KeyboardInterrupt:
+        print('endoscope: interrupted', file=sys.stderr)
+        return EXIT_INTERRUPTED
+
+
+def _refuse(message: str) -> int:
+    print(f'endoscope: {" ".join(message.split())}', file=sys.stderr)
+    return EXIT_UNUSABLE_INPUT
+
+
+@contextmanager
+def _cleanup_on_sigterm() -> Iterator[None]:
+    """Let SIGTERM unwind the stack, so that half-written outputs are removed."""
+
+    def unwind(_signum: int, _frame: FrameType | None) -> None:
+        raise SystemExit(EXIT_TERMINATED)
+
+    previous = signal.signal(signal.SIGTERM, unwind)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

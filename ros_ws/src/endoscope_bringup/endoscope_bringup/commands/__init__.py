@@ -1,0 +1,8 @@
+"""The subcommands of `endoscope`, one module each, in the order that `endoscope --help` lists them.
+
+A module offers ``add_parser(subparsers)``, which adds one parser, and ``run(args) -> int``, which
+gives the exit status. It imports nothing heavy at module level: every start of `endoscope` imports
+all of them.
+"""
+
+COMMANDS: tuple[str, ...] = ('bench',)

@@ -1,0 +1,46 @@
+"""Turns a package of subcommand modules into argparse subparsers."""
+
+import argparse
+import importlib
+from collections.abc import Iterable
+from typing import NoReturn
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """An `ArgumentParser` whose errors are one line instead of a usage text and a line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Exit 2 with `message` and where to find the usage, in one line on stderr."""
+        one_line = ' '.join(message.split())
+        self.exit(2, f'{self.prog}: {one_line} (see {self.prog} --help)\n')
+
+
+def add_subcommands(
+    parser: argparse.ArgumentParser, package: str, names: Iterable[str], *, dest: str
+) -> None:
+    """Add one subparser to `parser` for each module.
+
+    Parameters
+    ----------
+    parser
+        The parser whose first positional argument shall choose the subcommand.
+    package
+        Package that holds the modules, for example ``'endoscope_bringup.commands'``.
+    names
+        Names of the modules, in the order of the help. A trailing underscore (for names that are
+        taken in Python) does not show on the command line.
+    dest
+        Attribute of the parsed arguments that will hold the choice; see `run_chosen`.
+    """
+    subparsers = parser.add_subparsers(dest=dest, metavar=dest.upper(), required=True)
+    for name in names:
+        module = importlib.import_module(f'{package}.{name}')
+        known = set(subparsers.choices)
+        module.add_parser(subparsers)
+        for added in set(subparsers.choices) - known:
+            subparsers.choices[added].set_defaults(**{f'run_{dest}': module.run})
+
+
+def run_chosen(args: argparse.Namespace, *, dest: str) -> int:
+    """Run the module that `add_subcommands` with the same `dest` chose; return its exit status."""
+    return int(getattr(args, f'run_{dest}')(args))

@@ -1,0 +1,121 @@
+"""Output files and folders that appear whole or not at all."""
+
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from endoscope_core.errors import EndoscopeError
+
+
+class OutputExistsError(EndoscopeError, FileExistsError):
+    """The place that an output should go to is taken."""
+
+
+@contextmanager
+def atomic_file(path: str | Path, *, overwrite: bool = True) -> Iterator[Path]:
+    """Write a file under a temporary name; it takes its own name when the block ends well.
+
+    Parameters
+    ----------
+    path
+        Where the file shall be. Missing parent folders are made.
+    overwrite
+        Whether a file that is there already is replaced.
+
+    Yields
+    ------
+    Path
+        A hidden sibling of `path` with the same suffix, not yet existing; the block creates it.
+
+    Raises
+    ------
+    OutputExistsError
+        `path` is a folder, or it exists and `overwrite` is false.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise OutputExistsError(f'{target} is a folder: name a file')
+    if target.exists() and not overwrite:
+        raise OutputExistsError(f'{target} exists already: remove it or name another file')
+    partial = _partial_sibling(target)
+    try:
+        yield partial
+        _flush_to_disk(partial)
+        partial.replace(target)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_directory(path: str | Path) -> Iterator[Path]:
+    """Fill a folder under a temporary name; it takes its own name when the block ends well.
+
+    Parameters
+    ----------
+    path
+        Where the folder shall be; it may exist if it is empty. Missing parent folders are made.
+
+    Yields
+    ------
+    Path
+        An empty folder, a hidden sibling of `path`.
+
+    Raises
+    ------
+    OutputExistsError
+        `path` is a file or a folder with something in it.
+    """
+    target = Path(path).resolve()
+    require_free_directory(target)
+    partial = _partial_sibling(target)
+    partial.mkdir()
+    try:
+        yield partial
+        partial.replace(target)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def require_free_directory(path: str | Path) -> None:
+    """Check, before long work, that a folder can be written at `path`.
+
+    Raises
+    ------
+    OutputExistsError
+        `path` is a file or a folder with something in it.
+    """
+    target = Path(path)
+    if target.is_dir():
+        if any(target.iterdir()):
+            raise OutputExistsError(f'{target} is not empty: remove it or name another folder')
+    elif target.exists():
+        raise OutputExistsError(f'{target} is a file: name a folder')
+
+
+def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
+    """Write `text` as UTF-8 to `path`, whole or not at all; errors as in `atomic_file`."""
+    with atomic_file(path, overwrite=overwrite) as partial:
+        partial.write_text(text, encoding='utf-8')
+
+
+def write_bytes(path: str | Path, content: bytes, *, overwrite: bool = True) -> None:
+    """Write `content` to `path`, whole or not at all; errors as in `atomic_file`."""
+    with atomic_file(path, overwrite=overwrite) as partial:
+        partial.write_bytes(content)
+
+
+def _partial_sibling(target: Path) -> Path:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    # The suffix stays last because several writers choose their format by it.
+    return target.with_name(f'.partial-{secrets.token_hex(4)}-{target.name}')
+
+
+def _flush_to_disk(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

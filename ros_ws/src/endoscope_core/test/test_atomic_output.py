@@ -1,0 +1,85 @@
+"""Outputs appear whole or not at all, and never over something that is there."""
+
+from pathlib import Path
+
+import pytest
+
+from endoscope_core.atomic_output import (
+    OutputExistsError,
+    atomic_directory,
+    atomic_file,
+    require_free_directory,
+    write_bytes,
+    write_text,
+)
+
+
+def test_file_takes_its_name_only_when_the_block_ends(tmp_path: Path) -> None:
+    target = tmp_path / 'made' / 'report.json'
+    with atomic_file(target) as partial:
+        partial.write_text('whole')
+        assert not target.exists()
+        assert partial.suffix == '.json'
+    assert target.read_text() == 'whole'
+    assert list(target.parent.iterdir()) == [target]
+
+
+@pytest.mark.parametrize('error', [RuntimeError, KeyboardInterrupt, SystemExit])
+def test_failed_block_keeps_the_old_file_and_leaves_nothing(
+    tmp_path: Path, error: type[BaseException]
+) -> None:
+    target = tmp_path / 'plant.yaml'
+    target.write_text('old')
+    with pytest.raises(error), atomic_file(target) as partial:
+        partial.write_text('half')
+        raise error
+    assert target.read_text() == 'old'
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_file_is_not_overwritten_when_that_is_refused(tmp_path: Path) -> None:
+    target = tmp_path / 'a.bin'
+    write_bytes(target, b'old')
+    with pytest.raises(OutputExistsError, match=r'a\.bin exists already'):
+        write_bytes(target, b'new', overwrite=False)
+    assert target.read_bytes() == b'old'
+    write_bytes(target, b'new')
+    assert target.read_bytes() == b'new'
+
+
+def test_folder_in_place_of_a_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(OutputExistsError, match='is a folder'):
+        write_text(tmp_path, 'text')
+
+
+def test_text_is_written_as_utf8(tmp_path: Path) -> None:
+    write_text(tmp_path / 'a.html', 'τ = µ θ')
+    assert (tmp_path / 'a.html').read_bytes().decode('utf-8') == 'τ = µ θ'
+
+
+@pytest.mark.parametrize('exists', [False, True])
+def test_directory_appears_whole(tmp_path: Path, exists: bool) -> None:
+    target = tmp_path / 'bag'
+    if exists:
+        target.mkdir()
+    with atomic_directory(target) as partial:
+        (partial / 'metadata.yaml').write_text('x')
+        assert not (target / 'metadata.yaml').exists()
+    assert (target / 'metadata.yaml').read_text() == 'x'
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_failed_directory_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError), atomic_directory(tmp_path / 'bag') as partial:
+        (partial / 'half').write_text('x')
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_taken_folder_is_refused_and_kept(tmp_path: Path) -> None:
+    (tmp_path / 'kept').write_text('x')
+    with pytest.raises(OutputExistsError, match='is not empty'), atomic_directory(tmp_path):
+        pytest.fail('the block must not run')
+    with pytest.raises(OutputExistsError, match='is a file'):
+        require_free_directory(tmp_path / 'kept')
+    assert (tmp_path / 'kept').read_text() == 'x'
