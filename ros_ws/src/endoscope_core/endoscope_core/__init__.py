@@ -1,1 +1,5 @@
-"""Plant, effects, hysteresis models, controllers, classifier and identification of a tendon-sheath endoscope, free of ROS."""
+"""Plant, effects, hysteresis models, controllers, classifier, identification; free of ROS."""
+
+from endoscope_core.compiled_cache import use_cache_of_these_sources
+
+use_cache_of_these_sources()

@@ -1,0 +1,142 @@
+"""From a plant description to the flat arrays that the compiled physics works on."""
+
+import difflib
+import math
+from collections.abc import Iterable
+from dataclasses import astuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.effects import CATALOGUE, EffectDefinition
+from endoscope_core.effects.slots import (
+    HISTORY,
+    JOINT,
+    MOTOR,
+    PRETENSION,
+    PULLEY,
+    SLOTS,
+    TENSION_A,
+    TENSION_B,
+)
+from endoscope_core.plant.parameters import EffectSpec, PlantDescription
+
+
+class UnknownEffectError(ValueError):
+    """An effect, its joint or one of its parameters that the catalogue does not have."""
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """A hint that names the valid name nearest to a wrong one, and else all of them."""
+    valid = list(valid)
+    close = difflib.get_close_matches(name, valid, n=1, cutoff=0.5)
+    return f'did you mean {close[0]}?' if close else 'valid are ' + ', '.join(valid)
+
+
+def effect_definition(effect_id: str) -> EffectDefinition:
+    """The catalogue's definition of an effect.
+
+    Raises
+    ------
+    UnknownEffectError
+        If the catalogue has no such id.
+    """
+    if effect_id not in CATALOGUE:
+        raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, CATALOGUE)}')
+    return CATALOGUE[effect_id]
+
+
+def effect_values(spec: EffectSpec) -> NDArray[np.float64]:
+    """Values of an effect's parameters in slot order, typical where the spec gives none.
+
+    Raises
+    ------
+    UnknownEffectError
+        If the effect or one of its parameters is unknown.
+    ValueError
+        If a value is not finite or outside the parameter's bounds.
+    """
+    definition = effect_definition(spec.id)
+    names = [parameter.name for parameter in definition.parameters]
+    for name in spec.parameters:
+        if name not in names:
+            raise UnknownEffectError(
+                f'effect {spec.id} has no parameter {name}: {nearest(name, names)}')
+    values = np.array([
+        float(spec.parameters.get(parameter.name, parameter.typical))
+        for parameter in definition.parameters
+    ])
+    for parameter, value in zip(definition.parameters, values, strict=True):
+        if not math.isfinite(value) or not parameter.low <= value <= parameter.high:
+            raise ValueError(
+                f'effect {spec.id}: {parameter.name} is {value:g}, it must be between '
+                f'{parameter.low:g} and {parameter.high:g} {parameter.unit}')
+    return values
+
+
+def pack(plant: PlantDescription) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Parameter and flag arrays of a plant.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+
+    Returns
+    -------
+    parameters : array (J, parameters)
+    flags : array (J, flags) of bool
+
+    Raises
+    ------
+    UnknownEffectError, ValueError
+        If an effect is unknown, on an unknown joint, given twice, or out of bounds.
+    """
+    names = plant.joint_names()
+    parameters = np.zeros((len(names), SLOTS.parameters))
+    flags = np.zeros((len(names), SLOTS.flags), dtype=np.bool_)
+    for row, joint in zip(parameters, plant.joints.values(), strict=True):
+        nominal = astuple(joint)
+        row[:len(nominal)] = nominal
+        for definition in CATALOGUE.values():
+            for i, parameter in enumerate(definition.parameters):
+                row[definition.first_parameter + i] = parameter.typical
+    for spec in plant.effects:
+        if spec.joint not in names:
+            raise UnknownEffectError(
+                f'effect {spec.id} is on joint {spec.joint}: {nearest(spec.joint, names)}')
+        j = names.index(spec.joint)
+        values = effect_values(spec)
+        definition = CATALOGUE[spec.id]
+        if flags[j, definition.flag]:
+            raise ValueError(f'effect {spec.id} is given twice on joint {spec.joint}')
+        flags[j, definition.flag] = True
+        first = definition.first_parameter
+        parameters[j, first:first + len(values)] = values
+    return parameters, flags
+
+
+def rest_state(
+    parameters: NDArray[np.float64], motor: NDArray[np.float64] | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """States and histories of joints at rest, wires at pretension, not yet slid either way.
+
+    Parameters
+    ----------
+    parameters : array (J, parameters)
+    motor : array (J,), optional
+        Joint-equivalent motor angle in rad at which motor and joint rest; zero if not given.
+
+    Returns
+    -------
+    states : array (J, states)
+    histories : array (J, 2, HISTORY)
+    """
+    joints = len(parameters)
+    states = np.zeros((joints, SLOTS.states))
+    histories = np.zeros((joints, 2, HISTORY))
+    states[:, TENSION_A] = states[:, TENSION_B] = parameters[:, PRETENSION]
+    if motor is not None:
+        for index in (MOTOR, PULLEY, JOINT):
+            states[:, index] = motor
+        histories[:] = motor[:, None, None]
+    return states, histories

@@ -1,0 +1,224 @@
+"""The simulated rig: tick by tick for a node, or a whole command at once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from endoscope_core.plant.kernel import (
+    IN_COMMAND,
+    IN_MOTOR,
+    IN_OTHER_JOINT,
+    INPUTS,
+    OUT_BENDING,
+    OUT_EFFORT,
+    OUT_JOINT,
+    OUT_MOTOR,
+    OUT_MOTOR_SPEED,
+    OUT_TENSION_A,
+    OUT_TENSION_B,
+    OUTPUTS,
+    advance_tick,
+    read_sensors,
+    run_joints,
+)
+from endoscope_core.plant.packing import pack, rest_state
+from endoscope_core.plant.parameters import PlantDescription
+
+TICK = 1.0e-3
+SUBSTEPS = 10
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlantSample:
+    """What the noise-free sensors read at one instant, for J joints.
+
+    Attributes
+    ----------
+    time : float
+        Seconds since the start.
+    shaft_position, shaft_velocity, shaft_effort : array (J,)
+        Motor shaft in rad, rad/s and N m.
+    tension : array (J, 2)
+        Load cells of the positive and the negative wire in N.
+    bending : array (J,)
+        Bending angle in rad as the tracker reads it.
+    bending_true : array (J,)
+        Bending angle in rad of the joint itself.
+    """
+
+    time: float
+    shaft_position: Array
+    shaft_velocity: Array
+    shaft_effort: Array
+    tension: Array
+    bending: Array
+    bending_true: Array
+
+
+@dataclass(frozen=True)
+class PlantTrajectory:
+    """`PlantSample` at N ticks: `time` (N,), the others (N, J) and `tension` (N, J, 2).
+
+    Row k is the state at `time[k]`, before command k acts.
+    """
+
+    time: Array
+    shaft_position: Array
+    shaft_velocity: Array
+    shaft_effort: Array
+    tension: Array
+    bending: Array
+    bending_true: Array
+
+
+class PlantSimulator:
+    """A rig that is advanced tick by tick.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+        The rig, with its effects.
+    tick : float
+        Control period in s.
+    substeps : int
+        Integration steps in a tick.
+
+    Raises
+    ------
+    ValueError
+        If the plant names an unknown effect, joint or parameter, or one out of bounds.
+    """
+
+    def __init__(
+        self, plant: PlantDescription, tick: float = TICK, substeps: int = SUBSTEPS
+    ) -> None:
+        self.joints = plant.joint_names()
+        self.tick = tick
+        self._substeps = substeps
+        self._gear = _gears(plant)
+        self._parameters, self._on = pack(plant)
+        self._states, self._histories = rest_state(self._parameters)
+        self._inputs = np.zeros((len(self.joints), INPUTS))
+        self._inputs[:, IN_MOTOR] = np.nan
+        self._outputs = np.zeros((len(self.joints), OUTPUTS))
+        self._ticks = 0
+        self._read()
+
+    @property
+    def sample(self) -> PlantSample:
+        """What the noise-free sensors read now."""
+        out = self._outputs
+        return PlantSample(
+            self._ticks * self.tick,
+            self._gear * out[:, OUT_MOTOR],
+            self._gear * out[:, OUT_MOTOR_SPEED],
+            out[:, OUT_EFFORT].copy(),
+            out[:, OUT_TENSION_A:OUT_TENSION_B + 1].copy(),
+            out[:, OUT_BENDING].copy(),
+            out[:, OUT_JOINT].copy(),
+        )
+
+    def advance(self, shaft_command: ArrayLike, n_ticks: int = 1) -> PlantSample:
+        """Hold a command for some ticks.
+
+        Parameters
+        ----------
+        shaft_command : array (J,)
+            Motor shaft angle in rad.
+        n_ticks : int
+
+        Returns
+        -------
+        PlantSample
+            At the end of the ticks.
+
+        Raises
+        ------
+        ValueError
+            If the command has another shape or is not finite; the plant stays as it was.
+        """
+        command = np.asarray(shaft_command, dtype=float)
+        if command.shape != self._gear.shape:
+            raise ValueError(f'a command for {self.joints} has shape {command.shape}')
+        if not np.isfinite(command).all():
+            raise ValueError(f'the command {command} is not finite')
+        self._inputs[:, IN_COMMAND] = command / self._gear
+        for _ in range(n_ticks):
+            if len(self.joints) == 2:
+                self._inputs[:, IN_OTHER_JOINT] = self._outputs[::-1, OUT_JOINT]
+            for j, x in enumerate(self._inputs):
+                advance_tick(
+                    self._states[j], self._histories[j], self._parameters[j], self._on[j],
+                    x[IN_COMMAND], x, self.tick, self._substeps)
+            self._ticks += 1
+            self._read()
+        return self.sample
+
+    def _read(self) -> None:
+        for j, out in enumerate(self._outputs):
+            read_sensors(
+                self._states[j], self._histories[j], self._parameters[j], self._on[j],
+                self.tick, out)
+
+
+def simulate(
+    plant: PlantDescription,
+    shaft_command: ArrayLike,
+    tick: float = TICK,
+    substeps: int = SUBSTEPS,
+    start_shaft: ArrayLike | None = None,
+) -> PlantTrajectory:
+    """Answer of a rig, at rest at first, to a whole command.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+    shaft_command : array (N, J)
+        Motor shaft angle in rad, command k in force from tick k to tick k + 1.
+    tick : float
+        In s.
+    substeps : int
+        Integration steps in a tick.
+    start_shaft : array (J,), optional
+        Shaft angle in rad where the rig rests before the first command; zero if not given.
+
+    Returns
+    -------
+    PlantTrajectory
+
+    Raises
+    ------
+    ValueError
+        If the command has the wrong shape or is not finite, or the plant is invalid.
+    """
+    command = np.asarray(shaft_command, dtype=float)
+    gear = _gears(plant)
+    if command.ndim != 2 or command.shape[1] != len(gear) or not len(command):
+        raise ValueError(f'a command for {len(gear)} joints has shape {command.shape}')
+    if not np.isfinite(command).all():
+        raise ValueError('the command is not finite')
+    parameters, on = pack(plant)
+    motor = None if start_shaft is None else np.asarray(start_shaft, dtype=float) / gear
+    states, histories = rest_state(parameters, motor)
+    inputs = np.zeros((len(gear), len(command), INPUTS))
+    inputs[:, :, IN_COMMAND] = (command / gear).T
+    inputs[:, :, IN_MOTOR] = np.nan
+    out = np.empty((len(gear), len(command), OUTPUTS))
+    run_joints(states, histories, parameters, on, inputs, True, tick, substeps, out)
+    by_time = out.transpose(1, 0, 2)
+    return PlantTrajectory(
+        tick * np.arange(len(command)),
+        by_time[:, :, OUT_MOTOR] * gear,
+        by_time[:, :, OUT_MOTOR_SPEED] * gear,
+        by_time[:, :, OUT_EFFORT],
+        by_time[:, :, OUT_TENSION_A:OUT_TENSION_B + 1],
+        by_time[:, :, OUT_BENDING],
+        by_time[:, :, OUT_JOINT],
+    )
+
+
+def _gears(plant: PlantDescription) -> Array:
+    return np.array([joint.gear for joint in plant.joints.values()])
