@@ -7,6 +7,8 @@ from typing import Any
 
 import yaml
 
+from endoscope_core.atomic_output import write_text
+from endoscope_core.errors import EndoscopeError
 from endoscope_core.plant.packing import nearest, pack
 from endoscope_core.plant.parameters import (
     EffectSpec,
@@ -18,7 +20,7 @@ from endoscope_core.plant.parameters import (
 JOINT_NAMES = ('bend_x', 'bend_y')
 
 
-class PlantFileError(ValueError):
+class PlantFileError(EndoscopeError, ValueError):
     """A plant file that cannot be read; the message names the file, the key and what to do."""
 
 
@@ -117,10 +119,7 @@ def save_plant(plant: PlantDescription, path: str | Path) -> None:
     OSError
         If the file cannot be written.
     """
-    path = Path(path)
-    partial = path.with_name(path.name + '.partial')
-    partial.write_text(yaml.safe_dump(plant_to_mapping(plant), sort_keys=False), encoding='utf-8')
-    partial.replace(path)
+    write_text(path, yaml.safe_dump(plant_to_mapping(plant), sort_keys=False))
 
 
 def _section(value: Any, where: str) -> Mapping[str, Any]:
