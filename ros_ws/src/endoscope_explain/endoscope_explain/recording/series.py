@@ -1,0 +1,93 @@
+"""A recording as analysis sees it: one time series for each measured quantity, by joint."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+COMMAND = 'motor/servo_jp'
+MOTOR = 'motor/measured_js'
+WIRES = 'wires/measured_js'
+BENDING = 'slave/measured_js'
+DESIRED = 'slave/servo_jp'
+
+
+@dataclass(frozen=True)
+class Series:
+    """Samples of one quantity.
+
+    Attributes
+    ----------
+    topic : str
+        Topic without namespace that it comes from.
+    time : array (N,)
+        Header stamps in s from the recording's first stamp.
+    values : array (N, J) or (N, J, 2)
+        One column for each joint; tensions have two for each, positive and negative wire.
+    valid : array like values, of bool
+        False where a sample must not be judged: absent, frozen, clipped or wrong.
+    """
+
+    topic: str
+    time: Array
+    values: Array
+    valid: Mask
+
+    def __post_init__(self) -> None:
+        if len(self.time) != len(self.values) or self.valid.shape != self.values.shape:
+            raise ValueError(f'{self.topic}: time, values and valid differ in length')
+
+    @staticmethod
+    def of(topic: str, time: Array, values: Array) -> 'Series':
+        """All samples valid where they are finite."""
+        return Series(topic, time, values, np.isfinite(values))
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was commanded and measured.
+
+    Attributes
+    ----------
+    name : str
+        What to call it in messages.
+    origin : float
+        First stamp of all, in s of the recording's clock.
+    joints : tuple of str
+        Joints in the order of every series' columns.
+    command : Series
+        Motor shaft command in rad, each in force from its stamp until the next one.
+    tension : Series
+        Load cells in N, values (N, J, 2): positive, negative wire.
+    bending : Series
+        Bending angle in rad from the tracker.
+    shaft_position, shaft_velocity, shaft_effort : Series or None
+        Motor shaft in rad, rad/s, N m; None where not recorded.
+    notes : tuple of str
+        What is missing or was taken from elsewhere, in words.
+    """
+
+    name: str
+    origin: float
+    joints: tuple[str, ...]
+    command: Series
+    tension: Series
+    bending: Series
+    shaft_position: Series | None = None
+    shaft_velocity: Series | None = None
+    shaft_effort: Series | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    def measured(self) -> dict[str, Series]:
+        """Measured series by their name in this class; those that were recorded."""
+        names = ('shaft_position', 'shaft_velocity', 'shaft_effort', 'tension', 'bending')
+        return {name: s for name in names if (s := getattr(self, name)) is not None}
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first stamp to the last one of any series."""
+        last = [self.command.time[-1], *(s.time[-1] for s in self.measured().values())]
+        return float(max(last))
