@@ -1,0 +1,212 @@
+"""What `explain_recording` finds out, as plain frozen data that a report is written from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from endoscope_core.plant import PlantDescription
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Verdict(StrEnum):
+    """The one-word answer."""
+
+    CONSISTENT = 'consistent'
+    PARAMETERS_DIFFER = 'parameters_differ'
+    MISSING_PHYSICS = 'missing_physics'
+    SENSOR_FAULT = 'sensor_fault'
+    RECORDING_FAULT = 'recording_fault'
+    UNKNOWN_PHYSICS = 'unknown_physics'
+    INSUFFICIENT_DATA = 'insufficient_data'
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted number with its 90 % interval.
+
+    Attributes
+    ----------
+    value, low, high : float
+        In `unit`; `low <= value <= high`.
+    unit : str
+        SI unit.
+    """
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class NominalEstimate(Estimate):
+    """A refitted parameter of the nominal plant.
+
+    Attributes
+    ----------
+    nominal : float
+        Value in the plant file.
+    in_band : bool
+        Whether the value is within the tolerance by which rigs differ from their description.
+    """
+
+    nominal: float
+    in_band: bool
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """One effect that was left out of the simulation.
+
+    Attributes
+    ----------
+    id, joint, stage : str
+        Catalogue id, joint name and stage of the chain.
+    probability : float
+        Calibrated probability that this effect is present.
+    equation, source : str
+        Of the model that was fitted.
+    parameters : mapping of str to Estimate
+        Fitted parameters by name.
+    alternatives : tuple of str
+        Ids that the data cannot tell from this one, nearest first.
+    evidence : mapping of str to float
+        `margin`: score lost by the best explanation without this effect (half deviance units);
+        `gap`: score lost by the best rival in its place; `share`: part of the excess misfit that
+        this effect removes.
+    """
+
+    id: str
+    joint: str
+    stage: str
+    probability: float
+    equation: str
+    source: str
+    parameters: Mapping[str, Estimate]
+    alternatives: tuple[str, ...] = ()
+    evidence: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """How well one signal is predicted on samples that were not used for fitting.
+
+    Attributes
+    ----------
+    rmse : float
+        In the signal's unit.
+    noise : float
+        Noise of the signal, in the same unit.
+    ratio : float
+        `rmse / noise`; 1 where nothing is left but noise.
+    """
+
+    rmse: float
+    noise: float
+
+    @property
+    def ratio(self) -> float:
+        """Misfit in units of the noise."""
+        return self.rmse / self.noise
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One composition of effects that was tried.
+
+    Attributes
+    ----------
+    effects : tuple of (id, joint)
+    score : float
+        Penalised half deviance in noise units; smaller is better.
+    misfit : float
+        Mean squared residual in noise units over all channels; 1 is noise alone.
+    """
+
+    effects: tuple[tuple[str, str], ...]
+    score: float
+    misfit: float
+
+
+@dataclass(frozen=True)
+class UnknownTerm:
+    """A term that the catalogue does not have, put back into the simulator.
+
+    Attributes
+    ----------
+    joint, node : str
+        Where it acts; the node is `command`, `stretch` or `moment`.
+    unit : str
+        Unit of the term.
+    expression : str
+        Formula in the states named in `states`.
+    states : mapping of str to str
+        Meaning and unit of each state in the formula.
+    coefficients : tuple of Estimate
+    explained : float
+        Share of the excess misfit that the term removes after it was refitted in the simulator.
+    time, push : array (N,)
+        The latent term as estimated without any formula, for plots.
+    formula_push : array (N,)
+        The formula's value along the fitted simulation.
+    siblings : tuple of str
+        Nearest effects of the catalogue, nearest first.
+    """
+
+    joint: str
+    node: str
+    unit: str
+    expression: str
+    states: Mapping[str, str]
+    coefficients: tuple[Estimate, ...]
+    explained: float
+    time: Array
+    push: Array
+    formula_push: Array
+    siblings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Everything the engine says about one recording.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        Without the audit's findings: a caller that found a fault of the recording overrides it.
+    effects : tuple of NamedEffect
+        What was left out, most certain first; empty if nothing was.
+    parameters : mapping of joint name to mapping of parameter name to NominalEstimate
+        Nominal parameters of the final fit.
+    nominal, refitted, augmented : PlantDescription
+        The plant as given, with its parameters refitted, and with the named effects.
+    fit : mapping of 'nominal', 'refitted', 'augmented' to mapping of signal to ChannelFit
+        Signals are written `wires/measured_js:wire_x_pos`.
+    candidates : tuple of Candidate
+        Compositions that were refitted, best first.
+    unknown : UnknownTerm or None
+        The missing term for `unknown_physics`.
+    adequate : bool
+        Whether the augmented plant leaves nothing but noise and small errors of form.
+    adequacy : mapping of str to float
+        Numbers behind `adequate`.
+    baseline_used : bool
+    runtime_s : float
+    """
+
+    verdict: Verdict
+    effects: tuple[NamedEffect, ...]
+    parameters: Mapping[str, Mapping[str, NominalEstimate]]
+    nominal: PlantDescription
+    refitted: PlantDescription
+    augmented: PlantDescription
+    fit: Mapping[str, Mapping[str, ChannelFit]]
+    candidates: tuple[Candidate, ...] = ()
+    unknown: UnknownTerm | None = None
+    adequate: bool = True
+    adequacy: Mapping[str, float] = field(default_factory=dict)
+    baseline_used: bool = False
+    runtime_s: float = 0.0
