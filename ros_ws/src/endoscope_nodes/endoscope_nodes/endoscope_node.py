@@ -1,0 +1,49 @@
+"""What every node of the endoscope has: its runtime, the shared ticker, parameters, diagnostics."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
+
+from rclpy.node import Node
+
+from endoscope_nodes.diagnostics import Diagnostics
+from endoscope_nodes.parameters import declare_parameters
+
+if TYPE_CHECKING:
+    from endoscope_nodes.runtime import Runtime
+
+P = TypeVar('P')
+
+
+class EndoscopeNode(Node):
+    """A node in the ``/endoscope`` namespace that lives in a :class:`Runtime`.
+
+    Parameters
+    ----------
+    name
+        Name of the node, without namespace.
+    runtime
+        The process it lives in.
+
+    Attributes
+    ----------
+    ticker
+        The beat and the time that all nodes of the process share.
+    diagnostics
+        Reports published on ``/diagnostics``.
+    exit_code
+        What the process should say when it ends; 0 unless the node sets it.
+    """
+
+    def __init__(self, name: str, runtime: 'Runtime') -> None:
+        super().__init__(name, context=runtime.context, namespace='endoscope',
+                         parameter_overrides=runtime.overrides_of(name))
+        self.exit_code = 0
+        self.ticker = runtime.ticker_of(self)
+        self.diagnostics = Diagnostics(self, self.ticker)
+
+    def parameters(self, kind: type[P], on_change: Callable[[P], None] | None = None) -> P:
+        """Declare the parameters of the dataclass ``kind``; see :func:`declare_parameters`."""
+        return declare_parameters(self, kind, on_change)
+
+    def close(self) -> None:
+        """Finish what must not be cut off; called once, before the node is destroyed."""

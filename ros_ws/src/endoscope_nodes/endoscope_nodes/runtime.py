@@ -1,0 +1,206 @@
+"""The one place that starts, spins and shuts down ROS, for one node or for many in a process."""
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from types import TracebackType
+from typing import Self, TypeVar
+
+import rclpy
+from rclpy.context import Context
+from rclpy.exceptions import (
+    InvalidNamespaceException,
+    InvalidNodeNameException,
+    InvalidParameterTypeException,
+)
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.parameters import ParameterError, check_overrides
+from endoscope_nodes.stop_signals import StopSignals
+from endoscope_nodes.ticker import Ticker
+
+# An unbounded spin of the EventsExecutor never returns in the Jazzy wheels; a bounded one does.
+# Eleven days.
+FOREVER_S = 1e6
+
+N = TypeVar('N', bound=EndoscopeNode)
+
+
+class Runtime:
+    """Nodes composed in one process around one executor, one ticker and one context.
+
+    Parameters
+    ----------
+    args
+        Command line, ROS arguments included (``sys.argv`` by default).
+    context
+        A context of one's own; by default the process's.
+    domain_id
+        ROS domain; by default that of the environment.
+    overrides
+        Parameter values by node name; they win over the command line's.
+
+    Raises
+    ------
+    ParameterError
+        The ROS arguments cannot be read.
+
+    Examples
+    --------
+    >>> with Runtime() as runtime:            # doctest: +SKIP
+    ...     runtime.add(ConsoleNode)
+    ...     runtime.spin()
+    """
+
+    def __init__(self, args: Sequence[str] | None = None, context: Context | None = None,
+                 domain_id: int | None = None,
+                 overrides: Mapping[str, Mapping[str, object]] | None = None) -> None:
+        self.context = rclpy.get_default_context() if context is None else context
+        try:
+            rclpy.init(args=None if args is None else list(args), context=self.context,
+                       domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+        except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
+            raise ParameterError(str(error).partition(', at /')[0]) from error
+        self.executor = EventsExecutor(context=self.context)
+        self.nodes: list[EndoscopeNode] = []
+        self._ticker: Ticker | None = None
+        self._overrides = overrides or {}
+        self._stop = Future()
+        self._closed = False
+
+    def add(self, factory: Callable[['Runtime'], N]) -> N:
+        """Build a node and let the executor serve it."""
+        node = factory(self)
+        self.nodes.append(node)
+        self.executor.add_node(node)
+        return node
+
+    def overrides_of(self, name: str) -> list[Parameter]:
+        """Parameter values that this process was told to give the node called ``name``."""
+        return [Parameter(key, value=value)
+                for key, value in self._overrides.get(name, {}).items()]
+
+    def ticker_of(self, node: EndoscopeNode) -> Ticker:
+        """Give the process's ticker; the first node to ask decides whether time is simulated.
+
+        Raises
+        ------
+        ParameterError
+            Nodes of one process disagree about ``use_sim_time``.
+        """
+        simulated = node.get_parameter('use_sim_time').value is True
+        if self._ticker is None:
+            self._ticker = Ticker(node, simulated)
+        if self._ticker.simulated != simulated:
+            raise ParameterError(f"{node.get_name()}: parameter 'use_sim_time' differs from that "
+                                 'of the other nodes in this process; give all the same')
+        if simulated:
+            # rclpy would subscribe each node to /clock, at the price of a node's own work.
+            node._time_source.detach_node()
+            self._ticker.follow(node.get_clock())
+        return self._ticker
+
+    @property
+    def ticker(self) -> Ticker:
+        """The ticker of this process; there is one once a node has been added."""
+        if self._ticker is None:
+            raise RuntimeError('no node has been added yet')
+        return self._ticker
+
+    def check_parameters(self) -> None:
+        """Refuse parameter overrides that no node knows; see :func:`check_overrides`."""
+        names = [node.get_name() for node in self.nodes]
+        for name in self._overrides:
+            if name not in names:
+                raise ParameterError(f"there are parameters for '{name}', but only "
+                                     f'{", ".join(names)} run here')
+        check_overrides(list(self.nodes))
+
+    def stop(self) -> None:
+        """Let :meth:`spin` return; may be called from any thread, before or while it spins."""
+        if not self._stop.done():
+            self._stop.set_result(None)
+
+    def spin(self) -> None:
+        """Serve all nodes until :meth:`stop` is called or the context is shut down."""
+        try:
+            self.spin_until(self._stop, FOREVER_S)
+        except ExternalShutdownException:
+            return
+
+    def spin_until(self, future: Future, timeout_s: float) -> bool:
+        """Serve all nodes until ``future`` is done; say whether it was in time."""
+        self.executor.spin_until_future_complete(future, timeout_sec=timeout_s)
+        return future.done()
+
+    @property
+    def exit_code(self) -> int:
+        """The gravest exit code of all nodes."""
+        return max((node.exit_code for node in self.nodes), default=0)
+
+    def close(self) -> None:
+        """Close and destroy every node, then shut the context down, whatever goes wrong between."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self._close_nodes(list(self.nodes))
+        finally:
+            try:
+                self.executor.shutdown()
+            finally:
+                self.context.try_shutdown()
+
+    def _close_nodes(self, nodes: list[EndoscopeNode]) -> None:
+        if not nodes:
+            return
+        node = nodes.pop()
+        try:
+            node.close()
+        finally:
+            try:
+                self.executor.remove_node(node)
+                node.destroy_node()
+            finally:
+                self._close_nodes(nodes)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+
+def run_nodes(factories: Sequence[Callable[[Runtime], EndoscopeNode]],
+              args: Sequence[str] | None = None) -> int:
+    """Run nodes composed in this process until SIGINT or SIGTERM stops them.
+
+    Parameters
+    ----------
+    factories
+        Called in order with the runtime; each gives a node.
+    args
+        Command line; ``sys.argv`` by default.
+
+    Returns
+    -------
+    int
+        0, the exit code that a node asked for, or 2 for parameters or arguments that were refused.
+    """
+    try:
+        with Runtime(args) as runtime, StopSignals(runtime.stop):
+            for factory in factories:
+                runtime.add(factory)
+            runtime.check_parameters()
+            runtime.spin()
+    except (ParameterError, InvalidNodeNameException, InvalidNamespaceException,
+            InvalidParameterTypeException) as error:
+        print(error, file=sys.stderr)
+        return 2
+    return runtime.exit_code
