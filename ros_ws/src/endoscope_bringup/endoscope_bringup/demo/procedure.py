@@ -1,0 +1,73 @@
+"""What the demonstration does, in order, and what the first paper reports for the same."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Mode(StrEnum):
+    """How the slave is compensated during one run."""
+
+    NONE = 'none'
+    FEED_FORWARD = 'feed-forward'
+    ADAPTIVE = 'adaptive'
+
+
+@dataclass(frozen=True)
+class Tube:
+    """A shape of the insertion tube.
+
+    Attributes
+    ----------
+    name : str
+        The colon section of the first paper's experiment (section 4) whose backlash it has.
+    capstan_exponent : float
+        Friction of the sheath in that shape, the same for both joints.
+    """
+
+    name: str
+    capstan_exponent: float
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One recorded run: a motion tracked in one mode, in seconds of the headers' clock."""
+
+    tube: str
+    motion: str
+    mode: Mode
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """Mean and standard deviation in degrees, as printed."""
+
+    mean: float
+    deviation: float
+
+    def __str__(self) -> str:
+        return f'{self.mean:.2f} ± {self.deviation:.2f}'
+
+
+MOTIONS = ('periodic', 'non_periodic')
+
+# Chosen so that the loop under 90 sin(t) deg is 94 and 102 deg wide at mid-height, the backlash
+# sizes of the two colon shapes (Table 4); none of the classes was fitted to these exponents.
+TUBES = (Tube('descending colon', 1.534), Tube('transverse colon', 1.861))
+
+# First paper, Table 5: (tube, motion) -> RMSE none, RMSE proposed, backlash none, proposed.
+TABLE_5: dict[tuple[str, str], tuple[PaperFigure, PaperFigure, PaperFigure, PaperFigure]] = {
+    ('descending colon', 'periodic'): (
+        PaperFigure(18.08, 0.35), PaperFigure(4.65, 0.13),
+        PaperFigure(50.02, 1.16), PaperFigure(10.77, 0.48)),
+    ('descending colon', 'non_periodic'): (
+        PaperFigure(23.64, 0.08), PaperFigure(6.34, 0.18),
+        PaperFigure(56.88, 1.26), PaperFigure(11.47, 0.71)),
+    ('transverse colon', 'periodic'): (
+        PaperFigure(25.95, 0.60), PaperFigure(6.99, 0.65),
+        PaperFigure(68.48, 0.77), PaperFigure(17.05, 0.16)),
+    ('transverse colon', 'non_periodic'): (
+        PaperFigure(26.78, 0.13), PaperFigure(6.33, 0.18),
+        PaperFigure(70.55, 0.51), PaperFigure(17.68, 0.10)),
+}
