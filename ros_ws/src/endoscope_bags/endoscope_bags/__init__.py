@@ -1,1 +1,17 @@
 """Reading, writing, checking and recovering rosbag2 MCAP recordings, free of ROS."""
+
+from endoscope_bags.bag_writer import BagWriter, MessageStream
+from endoscope_bags.errors import BagError
+from endoscope_bags.joint_state_series import JointStateSeries, PoseSeries
+from endoscope_bags.recording import Recording, Topic, open_bag
+
+__all__ = [
+    'BagError',
+    'BagWriter',
+    'JointStateSeries',
+    'MessageStream',
+    'PoseSeries',
+    'Recording',
+    'Topic',
+    'open_bag',
+]

@@ -1,0 +1,126 @@
+"""Many CDR messages to arrays at once.
+
+Messages of one topic nearly always differ in their numbers only. They are grouped by size and by
+layout (see `cdr_layout`); each group becomes one byte matrix out of which the numbers are cut.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from endoscope_bags.cdr_layout import Layout
+from endoscope_bags.errors import MalformedMessageError
+
+_NANOSECONDS = 1_000_000_000
+# A topic with more layouts than this (a counter in a string, say) is decoded one by one.
+_LAYOUTS_WORTH_COMPARING = 64
+
+
+@dataclass(frozen=True)
+class Payloads:
+    """The bytes of N messages, one after another.
+
+    Attributes
+    ----------
+    data
+        All bytes.
+    start
+        Where each message begins in `data`, shape (N,).
+    size
+        Bytes of each message, shape (N,).
+    """
+
+    data: bytes
+    start: npt.NDArray[np.int64]
+    size: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def __getitem__(self, index: int) -> bytes:
+        first = int(self.start[index])
+        return self.data[first : first + int(self.size[index])]
+
+    def matrix(self, rows: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:
+        """Return messages of equal size as a matrix, shape (len(rows), size)."""
+        size = int(self.size[rows[0]])
+        windows = np.lib.stride_tricks.sliding_window_view(
+            np.frombuffer(self.data, dtype=np.uint8), size
+        )
+        return windows[self.start[rows]]
+
+
+@dataclass(frozen=True)
+class LayoutGroup:
+    """Messages of one layout.
+
+    Attributes
+    ----------
+    rows
+        Their indices among all messages, shape (M,), ascending.
+    layout
+        Where their fields lie.
+    matrix
+        Their bytes, shape (M, size).
+    """
+
+    rows: npt.NDArray[np.int64]
+    layout: Layout
+    matrix: npt.NDArray[np.uint8]
+
+    def stamp_ns(self) -> npt.NDArray[np.int64]:
+        """Return the header stamps in ns, shape (M,)."""
+        order = '>' if self.layout.big_endian else '<'
+        seconds = self._field(4, 4).view(order + 'i4')[:, 0].astype(np.int64)
+        nanoseconds = self._field(8, 4).view(order + 'u4')[:, 0].astype(np.int64)
+        return seconds * _NANOSECONDS + nanoseconds
+
+    def column(self, quantity: str) -> npt.NDArray[np.float64] | None:
+        """Return the numbers of a quantity, shape (M, count), or None where it is empty."""
+        if quantity not in self.layout.columns:
+            return None
+        start, count = self.layout.columns[quantity]
+        order = '>' if self.layout.big_endian else '<'
+        return self._field(start, 8 * count).view(order + 'f8').astype(np.float64)
+
+    def _field(self, start: int, size: int) -> npt.NDArray[np.uint8]:
+        return np.ascontiguousarray(self.matrix[:, start : start + size])
+
+
+def grouped_by_layout(
+    payloads: Payloads, find_layout: Callable[[bytes], Layout]
+) -> Iterator[LayoutGroup]:
+    """Split messages into groups of equal layout.
+
+    Parameters
+    ----------
+    payloads
+        The messages.
+    find_layout
+        `joint_state_layout` or `pose_layout`.
+
+    Raises
+    ------
+    MalformedMessageError
+        A message does not decode; the message is counted from 1.
+    """
+    for size in np.unique(payloads.size):
+        rows = np.flatnonzero(payloads.size == size)
+        matrix = payloads.matrix(rows)
+        n_layouts = 0
+        while len(rows):
+            n_layouts += 1
+            try:
+                layout = find_layout(payloads[int(rows[0])])
+            except MalformedMessageError as error:
+                raise MalformedMessageError(f'message {int(rows[0]) + 1} {error}') from error
+            if n_layouts > _LAYOUTS_WORTH_COMPARING:
+                yield LayoutGroup(rows[:1], layout, matrix[:1])
+                rows, matrix = rows[1:], matrix[1:]
+                continue
+            columns = np.concatenate([np.arange(*span) for span in layout.fixed])
+            same = (matrix[:, columns] == matrix[0, columns]).all(axis=1)
+            yield LayoutGroup(rows[same], layout, matrix[same])
+            rows, matrix = rows[~same], matrix[~same]

@@ -1,0 +1,224 @@
+"""Messages to CDR bytes without ROS: whole series at once where the project writes many.
+
+The bytes equal those of `rosbags`' serialiser and of rmw_fastrtps up to trailing padding: little
+endian XCDR1 (OMG CDR), 4-byte encapsulation header, alignment counted after it.
+"""
+
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from endoscope_bags.errors import MalformedMessageError
+from endoscope_bags.message_types import DIAGNOSTIC_ARRAY, STRING, typestore
+
+_LITTLE_ENDIAN = b'\x00\x01\x00\x00'
+_NANOSECONDS = 1_000_000_000
+
+
+def encode_joint_states(
+    names: Sequence[str],
+    stamp_ns: npt.ArrayLike,
+    *,
+    position: npt.ArrayLike | None = None,
+    velocity: npt.ArrayLike | None = None,
+    effort: npt.ArrayLike | None = None,
+    frame_id: str = '',
+) -> list[bytes]:
+    """Encode a series of `sensor_msgs/msg/JointState`.
+
+    Parameters
+    ----------
+    names
+        The J joint names, the same in every message.
+    stamp_ns
+        Header stamps in ns since the epoch, shape (N,).
+    position, velocity, effort
+        Shape (N, J) in rad, rad/s, N m (or N for wires); None leaves the field empty.
+    frame_id
+        Frame of the header.
+
+    Returns
+    -------
+    list of bytes
+        N messages.
+
+    Raises
+    ------
+    MalformedMessageError
+        A shape does not fit, or a stamp is outside what `builtin_interfaces/msg/Time` can hold.
+    """
+    stamps = _checked_stamps(stamp_ns)
+    shape = (len(stamps), len(names))
+    prefix = bytearray(_LITTLE_ENDIAN + bytes(8))
+    _append_string(prefix, frame_id)
+    _append_count(prefix, len(names))
+    for name in names:
+        _append_string(prefix, name)
+    columns: list[tuple[int, npt.NDArray[np.float64]]] = []
+    for quantity, values in (('position', position), ('velocity', velocity), ('effort', effort)):
+        if values is None or not names:
+            _append_count(prefix, 0)
+            continue
+        array = np.asarray(values, dtype=np.float64)
+        if array.shape != shape:
+            raise MalformedMessageError(
+                f'JointState {quantity}: shape {array.shape} where {shape} (stamps, names) is due'
+            )
+        _append_count(prefix, len(names))
+        _align(prefix, 8)
+        columns.append((len(prefix), array))
+        prefix += bytes(8 * len(names))
+    return _filled(prefix, stamps, columns)
+
+
+def encode_joint_state(
+    names: Sequence[str],
+    stamp_ns: int,
+    *,
+    position: Sequence[float] | None = None,
+    velocity: Sequence[float] | None = None,
+    effort: Sequence[float] | None = None,
+    frame_id: str = '',
+) -> bytes:
+    """Encode one JointState; arguments as in `encode_joint_states`, shapes (J,)."""
+    row = {
+        key: None if values is None else [values]
+        for key, values in (('position', position), ('velocity', velocity), ('effort', effort))
+    }
+    return encode_joint_states(names, [stamp_ns], frame_id=frame_id, **row)[0]
+
+
+def encode_poses(
+    stamp_ns: npt.ArrayLike,
+    position: npt.ArrayLike,
+    orientation: npt.ArrayLike,
+    *,
+    frame_id: str = '',
+) -> list[bytes]:
+    """Encode a series of `geometry_msgs/msg/PoseStamped`.
+
+    Parameters
+    ----------
+    stamp_ns
+        Header stamps in ns since the epoch, shape (N,).
+    position
+        Metres, shape (N, 3).
+    orientation
+        Unit quaternions x, y, z, w, shape (N, 4).
+    frame_id
+        Frame of the header.
+
+    Raises
+    ------
+    MalformedMessageError
+        A shape does not fit, or a stamp is out of range.
+    """
+    stamps = _checked_stamps(stamp_ns)
+    parts = (np.asarray(position, dtype=np.float64), np.asarray(orientation, dtype=np.float64))
+    if parts[0].shape != (len(stamps), 3) or parts[1].shape != (len(stamps), 4):
+        raise MalformedMessageError(
+            f'PoseStamped: shapes {parts[0].shape} and {parts[1].shape} where '
+            f'({len(stamps)}, 3) and ({len(stamps)}, 4) are due'
+        )
+    prefix = bytearray(_LITTLE_ENDIAN + bytes(8))
+    _append_string(prefix, frame_id)
+    _align(prefix, 8)
+    start = len(prefix)
+    prefix += bytes(56)
+    return _filled(prefix, stamps, [(start, np.hstack(parts))])
+
+
+def encode_clock(time_ns: int) -> bytes:
+    """Encode one `rosgraph_msgs/msg/Clock`, `time_ns` in ns."""
+    return _LITTLE_ENDIAN + struct.pack('<iI', *divmod(time_ns, _NANOSECONDS))
+
+
+def encode_string(text: str) -> bytes:
+    """Encode one `std_msgs/msg/String`."""
+    return serialise(STRING, typestore().types[STRING](data=text))
+
+
+def encode_diagnostics(
+    stamp_ns: int, statuses: Sequence[tuple[int, str, str, dict[str, str]]], hardware_id: str = ''
+) -> bytes:
+    """Encode one `diagnostic_msgs/msg/DiagnosticArray`.
+
+    Parameters
+    ----------
+    stamp_ns
+        Header stamp in ns since the epoch.
+    statuses
+        For each status its level (0 ok, 1 warning, 2 error, 3 stale), name, message and values.
+    hardware_id
+        The same in every status.
+    """
+    types = typestore().types
+    seconds, nanoseconds = divmod(stamp_ns, _NANOSECONDS)
+    stamp = types['builtin_interfaces/msg/Time'](sec=seconds, nanosec=nanoseconds)
+    header = types['std_msgs/msg/Header'](stamp=stamp, frame_id='')
+    key_value = types['diagnostic_msgs/msg/KeyValue']
+    status = types['diagnostic_msgs/msg/DiagnosticStatus']
+    entries = [
+        status(
+            level=level,
+            name=name,
+            message=message,
+            hardware_id=hardware_id,
+            values=[key_value(key=k, value=v) for k, v in values.items()],
+        )
+        for level, name, message, values in statuses
+    ]
+    return serialise(DIAGNOSTIC_ARRAY, types[DIAGNOSTIC_ARRAY](header=header, status=entries))
+
+
+def serialise(type_name: str, message: Any) -> bytes:
+    """Encode any message object of `message_types.typestore()`."""
+    return bytes(typestore().serialize_cdr(message, type_name))
+
+
+def _checked_stamps(stamp_ns: npt.ArrayLike) -> npt.NDArray[np.int64]:
+    stamps = np.atleast_1d(np.asarray(stamp_ns))
+    if stamps.ndim != 1 or not np.issubdtype(stamps.dtype, np.integer):
+        raise MalformedMessageError('stamps: integers in ns of shape (N,) are due')
+    stamps = stamps.astype(np.int64)
+    seconds = stamps // _NANOSECONDS
+    if stamps.size and (seconds.min() < -(2**31) or seconds.max() >= 2**31):
+        raise MalformedMessageError('stamps: seconds outside the 32 bits of builtin_interfaces/Time')
+    return stamps
+
+
+def _filled(
+    template: bytearray,
+    stamps: npt.NDArray[np.int64],
+    columns: list[tuple[int, npt.NDArray[np.float64]]],
+) -> list[bytes]:
+    size = len(template)
+    rows = np.tile(np.frombuffer(bytes(template), dtype=np.uint8), (len(stamps), 1))
+    seconds = (stamps // _NANOSECONDS).astype('<i4')
+    nanoseconds = (stamps % _NANOSECONDS).astype('<u4')
+    rows[:, 4:8] = seconds.view(np.uint8).reshape(-1, 4)
+    rows[:, 8:12] = nanoseconds.view(np.uint8).reshape(-1, 4)
+    for start, values in columns:
+        width = 8 * values.shape[1]
+        raw = np.ascontiguousarray(values, dtype='<f8').view(np.uint8).reshape(-1, width)
+        rows[:, start : start + width] = raw
+    blob = rows.tobytes()
+    return [blob[k : k + size] for k in range(0, len(blob), size)]
+
+
+def _align(buffer: bytearray, size: int) -> None:
+    buffer += bytes(-(len(buffer) - 4) % size)
+
+
+def _append_count(buffer: bytearray, count: int) -> None:
+    _align(buffer, 4)
+    buffer += struct.pack('<I', count)
+
+
+def _append_string(buffer: bytearray, text: str) -> None:
+    encoded = text.encode() + b'\x00'
+    _append_count(buffer, len(encoded))
+    buffer += encoded

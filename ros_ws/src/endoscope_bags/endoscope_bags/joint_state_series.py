@@ -1,0 +1,205 @@
+"""All messages of one topic as arrays."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from endoscope_bags.cdr_decoding import LayoutGroup, Payloads, grouped_by_layout
+from endoscope_bags.cdr_layout import QUANTITIES, Layout, joint_state_layout, pose_layout
+from endoscope_bags.errors import MalformedMessageError, MissingJointError, NonFiniteError
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class JointStateSeries:
+    """N messages of `sensor_msgs/msg/JointState` with J joints.
+
+    Attributes
+    ----------
+    topic
+        Full name of the topic.
+    names
+        Joint names in the order in which they first appear, length J.
+    stamp_ns, log_ns, publish_ns
+        Header stamp, receipt and publication in ns since the epoch, int64, shape (N,).
+    sequence
+        The writer's message counter, shape (N,).
+    position, velocity, effort
+        Shape (N, J) in rad, rad/s, N m (N for wires); None where no message has the quantity, NaN
+        where some lack it.
+    """
+
+    topic: str
+    names: tuple[str, ...]
+    stamp_ns: IntArray
+    log_ns: IntArray
+    publish_ns: IntArray
+    sequence: IntArray
+    position: FloatArray | None
+    velocity: FloatArray | None
+    effort: FloatArray | None
+
+    def __len__(self) -> int:
+        return len(self.stamp_ns)
+
+    def seconds(self, origin_ns: int | None = None) -> FloatArray:
+        """Return the stamps in seconds since `origin_ns` (default: the first stamp), shape (N,)."""
+        if not len(self):
+            return np.empty(0)
+        origin = int(self.stamp_ns[0]) if origin_ns is None else origin_ns
+        return (self.stamp_ns - origin) * 1e-9
+
+    def ordered(self, index: npt.NDArray[np.int64]) -> 'JointStateSeries':
+        """Return the messages `index` (any index array), in its order."""
+        per_message = ('stamp_ns', 'log_ns', 'publish_ns', 'sequence', *QUANTITIES)
+        taken = {key: getattr(self, key) for key in per_message}
+        return replace(self, **{k: None if v is None else v[index] for k, v in taken.items()})
+
+    def select(self, names: Sequence[str]) -> 'JointStateSeries':
+        """Return the series with the joints `names` only, in that order.
+
+        Raises
+        ------
+        MissingJointError
+            A joint is not in the recording.
+        """
+        missing = [name for name in names if name not in self.names]
+        if missing:
+            raise MissingJointError(
+                f'topic {self.topic} has no joint {", ".join(missing)}; '
+                f'it has {", ".join(self.names) or "none"}'
+            )
+        columns = [self.names.index(name) for name in names]
+        taken = {key: getattr(self, key) for key in QUANTITIES}
+        chosen = {k: None if v is None else v[:, columns] for k, v in taken.items()}
+        return replace(self, names=tuple(names), **chosen)
+
+    def require(self, quantity: str) -> FloatArray:
+        """Return `position`, `velocity` or `effort`.
+
+        Raises
+        ------
+        MissingJointError
+            No message has the quantity.
+        """
+        values: FloatArray | None = getattr(self, quantity)
+        if values is None:
+            raise MissingJointError(f'topic {self.topic} has no {quantity}')
+        return values
+
+    def check_finite(self, quantities: Sequence[str] = QUANTITIES) -> None:
+        """Refuse NaN and infinity.
+
+        Raises
+        ------
+        NonFiniteError
+            Names topic, quantity, joint and how many messages are affected.
+        """
+        for quantity in quantities:
+            values = getattr(self, quantity)
+            if values is None or np.isfinite(values).all():
+                continue
+            bad = ~np.isfinite(values)
+            row, column = np.argwhere(bad)[0]
+            raise NonFiniteError(
+                f'topic {self.topic}: {quantity} of {self.names[column]} is {values[row, column]} '
+                f'at {self.seconds()[row]:.6f} s; {int(bad.any(axis=1).sum())} of {len(self)} '
+                'messages have values that are missing or not finite'
+            )
+
+
+@dataclass(frozen=True)
+class PoseSeries:
+    """N messages of `geometry_msgs/msg/PoseStamped`.
+
+    Attributes
+    ----------
+    topic
+        Full name of the topic.
+    frame_id
+        Frame of the first message.
+    stamp_ns, log_ns, publish_ns, sequence
+        As in `JointStateSeries`, shape (N,).
+    position
+        Metres, shape (N, 3).
+    orientation
+        Quaternions x, y, z, w, shape (N, 4).
+    """
+
+    topic: str
+    frame_id: str
+    stamp_ns: IntArray
+    log_ns: IntArray
+    publish_ns: IntArray
+    sequence: IntArray
+    position: FloatArray
+    orientation: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.stamp_ns)
+
+
+def decode_joint_states(
+    topic: str, payloads: Payloads, log_ns: IntArray, publish_ns: IntArray, sequence: IntArray
+) -> JointStateSeries:
+    """Decode all messages of a topic; joints may come in another order in every message.
+
+    Raises
+    ------
+    MalformedMessageError
+        A message does not decode.
+    """
+    groups = _groups(topic, payloads, joint_state_layout)
+    names = tuple(dict.fromkeys(name for group in groups for name in group.layout.names))
+    n = len(payloads)
+    stamp_ns = np.zeros(n, dtype=np.int64)
+    decoded: dict[str, FloatArray | None] = dict.fromkeys(QUANTITIES)
+    for group in groups:
+        stamp_ns[group.rows] = group.stamp_ns()
+        columns = [names.index(name) for name in group.layout.names]
+        for quantity in QUANTITIES:
+            values = group.column(quantity)
+            if values is None:
+                continue
+            target = decoded[quantity]
+            if target is None:
+                target = decoded[quantity] = np.full((n, len(names)), np.nan)
+            target[np.ix_(group.rows, columns)] = values
+    return JointStateSeries(topic, names, stamp_ns, log_ns, publish_ns, sequence, **decoded)
+
+
+def decode_poses(
+    topic: str, payloads: Payloads, log_ns: IntArray, publish_ns: IntArray, sequence: IntArray
+) -> PoseSeries:
+    """Decode all poses of a topic.
+
+    Raises
+    ------
+    MalformedMessageError
+        A message does not decode.
+    """
+    n = len(payloads)
+    stamp_ns = np.zeros(n, dtype=np.int64)
+    numbers = np.full((n, 7), np.nan)
+    frame_id = ''
+    for group in _groups(topic, payloads, pose_layout):
+        stamp_ns[group.rows] = group.stamp_ns()
+        numbers[group.rows] = np.hstack([group.column('position'), group.column('orientation')])
+        frame_id = group.layout.frame_id if group.rows[0] == 0 else frame_id
+    return PoseSeries(
+        topic, frame_id, stamp_ns, log_ns, publish_ns, sequence, numbers[:, :3], numbers[:, 3:]
+    )
+
+
+def _groups(
+    topic: str, payloads: Payloads, find_layout: Callable[[bytes], Layout]
+) -> list[LayoutGroup]:
+    try:
+        groups = list(grouped_by_layout(payloads, find_layout))
+    except MalformedMessageError as error:
+        raise MalformedMessageError(f'topic {topic}: {error}') from error
+    return sorted(groups, key=lambda group: int(group.rows[0]))

@@ -1,0 +1,86 @@
+"""Quality of service as rosbag2 writes it into recordings (metadata version 9)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+_INFINITE = {'sec': 9223372036, 'nsec': 854775807}
+
+
+@dataclass(frozen=True)
+class QosProfile:
+    """What a publisher offered.
+
+    Attributes
+    ----------
+    reliability
+        ``'reliable'`` or ``'best_effort'``.
+    durability
+        ``'volatile'`` or ``'transient_local'``.
+    depth
+        Length of the history; 0 where the publisher did not say.
+    history
+        ``'keep_last'``, ``'keep_all'`` or ``'unknown'``.
+    """
+
+    reliability: str = 'reliable'
+    durability: str = 'volatile'
+    depth: int = 10
+    history: str = 'keep_last'
+
+    def as_rosbag2(self) -> dict[str, Any]:
+        """Return the mapping that rosbag2 writes; the time limits are unset (infinite)."""
+        return {
+            'history': self.history,
+            'depth': self.depth,
+            'reliability': self.reliability,
+            'durability': self.durability,
+            'deadline': dict(_INFINITE),
+            'lifespan': dict(_INFINITE),
+            'liveliness': 'automatic',
+            'liveliness_lease_duration': dict(_INFINITE),
+            'avoid_ros_namespace_conventions': False,
+        }
+
+
+SENSOR_QOS = QosProfile(depth=100)
+COMMAND_QOS = QosProfile(depth=1)
+LATCHED_QOS = QosProfile(durability='transient_local', depth=1)
+
+
+def qos_as_yaml(profiles: Sequence[QosProfile]) -> str:
+    """Return the text for the channel metadata `offered_qos_profiles`; empty for no profile."""
+    if not profiles:
+        return ''
+    return yaml.safe_dump([p.as_rosbag2() for p in profiles], sort_keys=False).strip()
+
+
+def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
+    """Return the profiles in the channel metadata of any rosbag2 version; none if unreadable.
+
+    Before version 9 rosbag2 wrote the policies as the numbers of rmw; both are understood.
+    """
+    try:
+        entries = yaml.safe_load(text) if text else None
+    except yaml.YAMLError:
+        return ()
+    if not isinstance(entries, list):
+        return ()
+    return tuple(_from_entry(entry) for entry in entries if isinstance(entry, dict))
+
+
+def _from_entry(entry: dict[str, Any]) -> QosProfile:
+    def named(key: str, names: tuple[str, ...]) -> str:
+        value = entry.get(key)
+        if isinstance(value, int):
+            return names[value] if 0 <= value < len(names) else 'unknown'
+        return str(value) if value is not None else 'unknown'
+
+    return QosProfile(
+        reliability=named('reliability', ('system_default', 'reliable', 'best_effort')),
+        durability=named('durability', ('system_default', 'transient_local', 'volatile')),
+        depth=int(entry.get('depth') or 0),
+        history=named('history', ('system_default', 'keep_last', 'keep_all')),
+    )

@@ -1,0 +1,349 @@
+"""Reading recordings: `open_bag`, and what one can ask of what it returns."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from endoscope_bags.bag_files import bag_files
+from endoscope_bags.cdr_decoding import Payloads
+from endoscope_bags.cdr_layout import QUANTITIES
+from endoscope_bags.errors import (
+    AmbiguousTopicError,
+    BagError,
+    EmptyBagError,
+    MalformedMessageError,
+    MissingTopicError,
+    TopicTypeError,
+    UnknownTypeError,
+)
+from endoscope_bags.joint_state_series import (
+    JointStateSeries,
+    PoseSeries,
+    decode_joint_states,
+    decode_poses,
+)
+from endoscope_bags.mcap_scan import McapScan, scan_mcap
+from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, typestore
+from endoscope_bags.qos_profile import QosProfile, qos_from_yaml
+
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a recording.
+
+    Attributes
+    ----------
+    name
+        Full name, for example ``'/endoscope/motor/measured_js'``.
+    type
+        Message type, for example ``'sensor_msgs/msg/JointState'``.
+    message_count
+        Number of messages.
+    definition
+        `ros2msg` text of the type as recorded.
+    type_hash
+        RIHS01 hash as recorded; empty where the recorder did not say.
+    qos
+        What the publishers offered; empty where the recorder did not say.
+    """
+
+    name: str
+    type: str
+    message_count: int
+    definition: str
+    type_hash: str
+    qos: tuple[QosProfile, ...]
+
+
+class RawMessage(NamedTuple):
+    """One message as it was recorded; times in ns since the epoch."""
+
+    topic: str
+    log_ns: int
+    publish_ns: int
+    sequence: int
+    data: bytes
+
+
+class MessageTimes(NamedTuple):
+    """Receipt, publication (ns since the epoch) and counter of a topic's messages, each (N,)."""
+
+    log_ns: IntArray
+    publish_ns: IntArray
+    sequence: IntArray
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The messages of one topic in one file."""
+
+    scan: McapScan
+    index: IntArray
+
+
+class Recording:
+    """A recording that was opened with `open_bag`.
+
+    Attributes
+    ----------
+    path
+        What was opened.
+    topics
+        `Topic` by full name.
+    library
+        The program that wrote the (first) file.
+    metadata
+        MCAP metadata records by name.
+    damage
+        What is wrong, one line each; empty unless it was opened with `salvage`.
+    """
+
+    def __init__(self, path: Path, scans: Sequence[McapScan]) -> None:
+        self.path = path
+        self.library = scans[0].header.library
+        self.metadata = {k: v for scan in scans for k, v in scan.metadata.items()}
+        self.damage = tuple(f'{s.path.name}: {what}' for s in scans for what in s.damage)
+        self._rows: dict[str, list[_Rows]] = {}
+        self.topics: dict[str, Topic] = {}
+        for scan in scans:
+            self._add(scan)
+
+    def _add(self, scan: McapScan) -> None:
+        for channel in scan.channels.values():
+            rows = np.flatnonzero(scan.messages.channel == channel.id)
+            schema = scan.schemas.get(channel.schema_id)
+            before = self.topics.get(channel.topic)
+            kind = schema.name if schema else ''
+            if before and before.type != kind:
+                raise TopicTypeError(
+                    f'{scan.path}: topic {channel.topic} is both {before.type} and {kind}'
+                )
+            self._rows.setdefault(channel.topic, []).append(_Rows(scan, rows))
+            self.topics[channel.topic] = Topic(
+                name=channel.topic,
+                type=kind,
+                message_count=len(rows) + (before.message_count if before else 0),
+                definition=schema.data.decode() if schema else '',
+                type_hash=channel.metadata.get('topic_type_hash', ''),
+                qos=qos_from_yaml(channel.metadata.get('offered_qos_profiles', '')),
+            )
+
+    @property
+    def message_count(self) -> int:
+        """Number of messages of all topics."""
+        return sum(topic.message_count for topic in self.topics.values())
+
+    @property
+    def start_ns(self) -> int:
+        """First receipt, ns since the epoch."""
+        return min(int(t.min()) for t in self._all_log_ns())
+
+    @property
+    def end_ns(self) -> int:
+        """Last receipt, ns since the epoch."""
+        return max(int(t.max()) for t in self._all_log_ns())
+
+    def _all_log_ns(self) -> Iterator[IntArray]:
+        for parts in self._rows.values():
+            for part in parts:
+                if len(part.index):
+                    yield part.scan.messages.log_ns[part.index]
+
+    def find(self, suffix: str, namespace: str | None = None) -> str:
+        """Return the full name of the topic `suffix` under whatever namespace.
+
+        Parameters
+        ----------
+        suffix
+            Relative name, for example ``'motor/measured_js'``, or a full one with leading slash.
+        namespace
+            Only this namespace, for example ``'/endoscope'``.
+
+        Raises
+        ------
+        MissingTopicError
+            No topic with messages has this name.
+        AmbiguousTopicError
+            Topics under several namespaces have it.
+        """
+        matches = self._matches(suffix, namespace)
+        if not matches:
+            found = ', '.join(sorted(self.topics)) or 'none'
+            raise MissingTopicError(f'{self.path}: lacks topic {suffix}; it has {found}')
+        if len(matches) > 1:
+            raise AmbiguousTopicError(
+                f'{self.path}: {suffix} could be {" or ".join(matches)}; give the namespace'
+            )
+        return matches[0]
+
+    def has(self, suffix: str, namespace: str | None = None) -> bool:
+        """Tell whether `find` would find at least one topic."""
+        return bool(self._matches(suffix, namespace))
+
+    def _matches(self, suffix: str, namespace: str | None) -> list[str]:
+        relative = suffix.strip('/')
+        if suffix.startswith('/') or namespace is not None:
+            wanted = f'{(namespace or "").rstrip("/")}/{relative}'
+            names = [wanted] if wanted in self.topics else []
+        else:
+            names = [n for n in self.topics if ('/' + n.lstrip('/')).endswith('/' + relative)]
+        return sorted(name for name in names if self.topics[name].message_count)
+
+    def joint_state(
+        self,
+        suffix: str,
+        *,
+        namespace: str | None = None,
+        order: str = 'stamp',
+        finite: Sequence[str] = QUANTITIES,
+    ) -> JointStateSeries:
+        """Return all messages of a JointState topic as arrays.
+
+        Parameters
+        ----------
+        suffix, namespace
+            See `find`.
+        order
+            ``'stamp'`` (by header stamp; equal ones as recorded) or ``'recorded'`` (file order).
+        finite
+            Quantities that have to be finite in every message; ``()`` lets NaN pass.
+
+        Raises
+        ------
+        MissingTopicError, AmbiguousTopicError
+            See `find`.
+        TopicTypeError
+            The topic is no JointState.
+        MalformedMessageError
+            A message does not decode.
+        NonFiniteError
+            A number is NaN or infinite.
+        """
+        topic = self._typed(suffix, namespace, JOINT_STATE)
+        series = decode_joint_states(topic, self.payloads(topic), *self.times(topic))
+        if order == 'stamp':
+            series = series.ordered(np.argsort(series.stamp_ns, kind='stable'))
+        elif order != 'recorded':
+            raise ValueError(f"order is 'stamp' or 'recorded', not {order!r}")
+        series.check_finite(finite)
+        return series
+
+    def poses(self, suffix: str, *, namespace: str | None = None) -> PoseSeries:
+        """Return all messages of a PoseStamped topic as arrays, as recorded; errors as above."""
+        topic = self._typed(suffix, namespace, POSE_STAMPED)
+        return decode_poses(topic, self.payloads(topic), *self.times(topic))
+
+    def _typed(self, suffix: str, namespace: str | None, kind: str) -> str:
+        topic = self.find(suffix, namespace)
+        if self.topics[topic].type != kind:
+            raise TopicTypeError(
+                f'{self.path}: topic {topic} is {self.topics[topic].type or "untyped"}, not {kind}'
+            )
+        return topic
+
+    def times(self, topic: str) -> MessageTimes:
+        """Return receipt, publication and counter of the messages of a full topic name."""
+        parts = self._rows[topic]
+        return MessageTimes(
+            *(
+                np.concatenate([getattr(part.scan.messages, key)[part.index] for part in parts])
+                for key in ('log_ns', 'publish_ns', 'sequence')
+            )
+        )
+
+    def payloads(self, topic: str) -> Payloads:
+        """Return the bytes of the messages of a full topic name, as recorded."""
+        pieces: list[bytes] = []
+        sizes: list[IntArray] = []
+        for part in self._rows[topic]:
+            messages = part.scan.messages
+            blocks = messages.block[part.index]
+            for block, data in part.scan.block_data(np.unique(blocks)):
+                rows = part.index[blocks == block]
+                starts, lengths = messages.start[rows], messages.size[rows]
+                ends = starts + lengths
+                pieces += [data[a:b] for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
+                sizes.append(lengths)
+        size = np.concatenate(sizes) if sizes else np.empty(0, np.int64)
+        return Payloads(b''.join(pieces), np.cumsum(size) - size, size)
+
+    def messages(self, topics: Sequence[str] | None = None) -> Iterator[RawMessage]:
+        """Yield messages by receipt time.
+
+        Parameters
+        ----------
+        topics
+            Full names; None for all.
+        """
+        chosen = [t for t in (self.topics if topics is None else topics)]
+        times = [self.times(topic) for topic in chosen]
+        payloads = [self.payloads(topic) for topic in chosen]
+        if not chosen:
+            return
+        which = np.repeat(np.arange(len(chosen)), [len(t.log_ns) for t in times])
+        row = np.concatenate([np.arange(len(t.log_ns)) for t in times])
+        log_ns = np.concatenate([t.log_ns for t in times])
+        for k in np.argsort(log_ns, kind='stable'):
+            topic, index = int(which[k]), int(row[k])
+            yield RawMessage(
+                chosen[topic],
+                int(log_ns[k]),
+                int(times[topic].publish_ns[index]),
+                int(times[topic].sequence[index]),
+                payloads[topic][index],
+            )
+
+    def decoded(self, topic: str) -> Iterator[tuple[RawMessage, Any]]:
+        """Yield the messages of a full topic name, each with its object, of whatever type.
+
+        Raises
+        ------
+        UnknownTypeError
+            The type is not one of Jazzy's common ones.
+        MalformedMessageError
+            A message does not decode.
+        """
+        store, kind = typestore(), self.topics[topic].type
+        if kind not in store.types:
+            raise UnknownTypeError(f'{self.path}: topic {topic}: type {kind or "unnamed"} is unknown')
+        for number, message in enumerate(self.messages([topic]), start=1):
+            try:
+                yield message, store.deserialize_cdr(message.data, kind)
+            except (ValueError, IndexError, AssertionError, UnicodeDecodeError) as error:
+                raise MalformedMessageError(
+                    f'{self.path}: topic {topic}: message {number} does not decode: {error}'
+                ) from error
+
+
+def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
+    """Open a rosbag2 folder or a bare ``.mcap`` file.
+
+    Parameters
+    ----------
+    path
+        Folder with ``metadata.yaml`` and one or more ``.mcap``, or one such file.
+    salvage
+        Read what is sound of a damaged recording (see `Recording.damage`) instead of raising.
+
+    Raises
+    ------
+    BagNotFoundError, NotABagError, EmptyBagError, TruncatedBagError, CorruptBagError,
+    UnsupportedBagError
+        All of them `BagError`; the message names the file and what to do.
+    """
+    path = Path(path)
+    scans = [scan_mcap(file, salvage=salvage) for file in bag_files(path)]
+    for scan in scans:
+        foreign = {c.message_encoding for c in scan.channels.values()} - {'cdr'}
+        if foreign:
+            raise BagError(f'{scan.path}: message encoding {foreign.pop()!r} instead of cdr')
+    recording = Recording(path, scans)
+    if not recording.message_count:
+        raise EmptyBagError(f'{path}: holds no message')
+    return recording

@@ -1,0 +1,47 @@
+"""Asks the file system for room before it is needed, so that a full disk loses nothing."""
+
+import errno
+import os
+
+from endoscope_bags.errors import BagFullError
+
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+_NOT_OFFERED = {errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
+
+
+def require_room(descriptor: int, name: str, n_bytes: int) -> None:
+    """Check that a file can grow by `n_bytes`.
+
+    The room is allocated and given back at once: that alone asks the disk, the quota and the limit
+    of file sizes together.
+
+    Parameters
+    ----------
+    descriptor
+        Of a file open for writing, positioned at its end.
+    name
+        For the message.
+    n_bytes
+        How much it shall be able to grow.
+
+    Raises
+    ------
+    BagFullError
+        It cannot grow that much.
+    """
+    end = os.lseek(descriptor, 0, os.SEEK_CUR)
+    try:
+        os.posix_fallocate(descriptor, end, n_bytes)
+    except OSError as error:
+        if error.errno in _NOT_OFFERED:
+            return
+        raise_if_full(error, name)
+        raise
+    finally:
+        os.ftruncate(descriptor, end)
+
+
+def raise_if_full(error: OSError, name: str) -> None:
+    """Turn the errors of a full disk, quota or file size limit into `BagFullError`."""
+    if error.errno in _FULL:
+        raise BagFullError(f'{name}: {error.strerror}; recording ended there') from error
