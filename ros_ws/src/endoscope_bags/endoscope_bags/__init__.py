@@ -3,7 +3,8 @@
 from endoscope_bags.bag_writer import BagWriter, MessageStream
 from endoscope_bags.errors import BagError
 from endoscope_bags.joint_state_series import JointStateSeries, PoseSeries
-from endoscope_bags.recording import Recording, Topic, open_bag
+from endoscope_bags.recording import Recording, open_bag
+from endoscope_bags.topic import RawMessage, Topic
 
 __all__ = [
     'BagError',
@@ -11,6 +12,7 @@ __all__ = [
     'JointStateSeries',
     'MessageStream',
     'PoseSeries',
+    'RawMessage',
     'Recording',
     'Topic',
     'open_bag',

@@ -67,10 +67,14 @@ def read_metadata(path: Path) -> dict[str, Any]:
     try:
         document = yaml.safe_load(path.read_text(encoding='utf-8'))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise NotABagError(f'{path}: not readable as YAML ({" ".join(str(error).split())})') from error
-    information = (document or {}).get('rosbag2_bagfile_information') if (
-        isinstance(document, dict)
-    ) else None
+        raise NotABagError(
+            f'{path}: not readable as YAML ({" ".join(str(error).split())})'
+        ) from error
+    information = (
+        (document or {}).get('rosbag2_bagfile_information')
+        if (isinstance(document, dict))
+        else None
+    )
     if not isinstance(information, dict) or not information.get('relative_file_paths'):
         raise NotABagError(f'{path}: not the metadata of a rosbag2 recording')
     return information

@@ -186,7 +186,9 @@ def _checked_stamps(stamp_ns: npt.ArrayLike) -> npt.NDArray[np.int64]:
     stamps = stamps.astype(np.int64)
     seconds = stamps // _NANOSECONDS
     if stamps.size and (seconds.min() < -(2**31) or seconds.max() >= 2**31):
-        raise MalformedMessageError('stamps: seconds outside the 32 bits of builtin_interfaces/Time')
+        raise MalformedMessageError(
+            'stamps: seconds outside the 32 bits of builtin_interfaces/Time'
+        )
     return stamps
 
 

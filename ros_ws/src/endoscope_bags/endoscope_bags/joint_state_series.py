@@ -51,13 +51,21 @@ class JointStateSeries:
         if not len(self):
             return np.empty(0)
         origin = int(self.stamp_ns[0]) if origin_ns is None else origin_ns
-        return (self.stamp_ns - origin) * 1e-9
+        elapsed: FloatArray = (self.stamp_ns - origin) * np.float64(1e-9)
+        return elapsed
 
     def ordered(self, index: npt.NDArray[np.int64]) -> 'JointStateSeries':
         """Return the messages `index` (any index array), in its order."""
-        per_message = ('stamp_ns', 'log_ns', 'publish_ns', 'sequence', *QUANTITIES)
-        taken = {key: getattr(self, key) for key in per_message}
-        return replace(self, **{k: None if v is None else v[index] for k, v in taken.items()})
+        return replace(
+            self,
+            stamp_ns=self.stamp_ns[index],
+            log_ns=self.log_ns[index],
+            publish_ns=self.publish_ns[index],
+            sequence=self.sequence[index],
+            position=None if self.position is None else self.position[index],
+            velocity=None if self.velocity is None else self.velocity[index],
+            effort=None if self.effort is None else self.effort[index],
+        )
 
     def select(self, names: Sequence[str]) -> 'JointStateSeries':
         """Return the series with the joints `names` only, in that order.
@@ -74,9 +82,13 @@ class JointStateSeries:
                 f'it has {", ".join(self.names) or "none"}'
             )
         columns = [self.names.index(name) for name in names]
-        taken = {key: getattr(self, key) for key in QUANTITIES}
-        chosen = {k: None if v is None else v[:, columns] for k, v in taken.items()}
-        return replace(self, names=tuple(names), **chosen)
+        return replace(
+            self,
+            names=tuple(names),
+            position=None if self.position is None else self.position[:, columns],
+            velocity=None if self.velocity is None else self.velocity[:, columns],
+            effort=None if self.effort is None else self.effort[:, columns],
+        )
 
     def require(self, quantity: str) -> FloatArray:
         """Return `position`, `velocity` or `effort`.
@@ -184,15 +196,14 @@ def decode_poses(
     """
     n = len(payloads)
     stamp_ns = np.zeros(n, dtype=np.int64)
-    numbers = np.full((n, 7), np.nan)
+    decoded = {'position': np.full((n, 3), np.nan), 'orientation': np.full((n, 4), np.nan)}
     frame_id = ''
     for group in _groups(topic, payloads, pose_layout):
         stamp_ns[group.rows] = group.stamp_ns()
-        numbers[group.rows] = np.hstack([group.column('position'), group.column('orientation')])
+        for quantity, target in decoded.items():
+            target[group.rows] = group.column(quantity)
         frame_id = group.layout.frame_id if group.rows[0] == 0 else frame_id
-    return PoseSeries(
-        topic, frame_id, stamp_ns, log_ns, publish_ns, sequence, numbers[:, :3], numbers[:, 3:]
-    )
+    return PoseSeries(topic, frame_id, stamp_ns, log_ns, publish_ns, sequence, **decoded)
 
 
 def _groups(

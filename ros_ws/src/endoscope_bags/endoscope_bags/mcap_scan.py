@@ -207,7 +207,9 @@ class _Pass:
                 self._describe(opcode, self._data[start:stop])
         except (EndOfFile, struct.error, UnicodeDecodeError) as error:
             name = Opcode(opcode).name.lower()
-            self._damaged(CorruptBagError, f'{name} record at byte {start} does not decode: {error}')
+            self._damaged(
+                CorruptBagError, f'{name} record at byte {start} does not decode: {error}'
+            )
 
     def _describe(self, opcode: int, body: bytes) -> None:
         stream = ReadDataStream(BytesIO(body))
@@ -277,9 +279,16 @@ class _Pass:
             return self.scan.messages
         heads = np.concatenate(self._heads)
         block = np.repeat(self._blocks, [len(starts) for starts in self._starts])
-        columns = [heads[key].astype(np.int64) for key in ('channel', 'sequence', 'log', 'publish')]
         size = heads['length'].astype(np.int64) - _MESSAGE_HEAD_LENGTH
-        return Messages(*columns, block.astype(np.int64), np.concatenate(self._starts), size)
+        return Messages(
+            channel=heads['channel'].astype(np.int64),
+            sequence=heads['sequence'].astype(np.int64),
+            log_ns=heads['log'].astype(np.int64),
+            publish_ns=heads['publish'].astype(np.int64),
+            block=block.astype(np.int64),
+            start=np.concatenate(self._starts),
+            size=size,
+        )
 
 
 def _require_message_head(length: int) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,55 +28,10 @@ from endoscope_bags.joint_state_series import (
 )
 from endoscope_bags.mcap_scan import McapScan, scan_mcap
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, typestore
-from endoscope_bags.qos_profile import QosProfile, qos_from_yaml
+from endoscope_bags.qos_profile import qos_from_yaml
+from endoscope_bags.topic import MessageTimes, RawMessage, Topic
 
 IntArray = npt.NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Topic:
-    """A topic of a recording.
-
-    Attributes
-    ----------
-    name
-        Full name, for example ``'/endoscope/motor/measured_js'``.
-    type
-        Message type, for example ``'sensor_msgs/msg/JointState'``.
-    message_count
-        Number of messages.
-    definition
-        `ros2msg` text of the type as recorded.
-    type_hash
-        RIHS01 hash as recorded; empty where the recorder did not say.
-    qos
-        What the publishers offered; empty where the recorder did not say.
-    """
-
-    name: str
-    type: str
-    message_count: int
-    definition: str
-    type_hash: str
-    qos: tuple[QosProfile, ...]
-
-
-class RawMessage(NamedTuple):
-    """One message as it was recorded; times in ns since the epoch."""
-
-    topic: str
-    log_ns: int
-    publish_ns: int
-    sequence: int
-    data: bytes
-
-
-class MessageTimes(NamedTuple):
-    """Receipt, publication (ns since the epoch) and counter of a topic's messages, each (N,)."""
-
-    log_ns: IntArray
-    publish_ns: IntArray
-    sequence: IntArray
 
 
 @dataclass(frozen=True)
@@ -281,7 +236,7 @@ class Recording:
         topics
             Full names; None for all.
         """
-        chosen = [t for t in (self.topics if topics is None else topics)]
+        chosen = list(self.topics) if topics is None else list(topics)
         times = [self.times(topic) for topic in chosen]
         payloads = [self.payloads(topic) for topic in chosen]
         if not chosen:
@@ -311,7 +266,9 @@ class Recording:
         """
         store, kind = typestore(), self.topics[topic].type
         if kind not in store.types:
-            raise UnknownTypeError(f'{self.path}: topic {topic}: type {kind or "unnamed"} is unknown')
+            raise UnknownTypeError(
+                f'{self.path}: topic {topic}: type {kind or "unnamed"} is unknown'
+            )
         for number, message in enumerate(self.messages([topic]), start=1):
             try:
                 yield message, store.deserialize_cdr(message.data, kind)
