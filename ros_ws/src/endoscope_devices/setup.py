@@ -1,17 +1,19 @@
 from setuptools import find_packages, setup
 
 package_name = 'endoscope_devices'
+shipped_suffixes = ('csv', 'css', 'j2', 'js', 'json', 'npz', 'pt', 'svg', 'yaml')
 
 setup(
     name=package_name,
     version='0.1.0',
     packages=find_packages(exclude=['test']),
-    package_data={package_name: ['py.typed']},
+    package_data={'': ['py.typed', *('**/*.' + suffix for suffix in shipped_suffixes)]},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
     ],
     install_requires=['setuptools'],
+    extras_require={'test': ['pytest']},
     zip_safe=False,
     maintainer='The endoscope founders',
     maintainer_email='founders@endoscope.invalid',
