@@ -1,0 +1,222 @@
+"""Output-error least squares of one joint: Levenberg-Marquardt with bounds and priors."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_explain.evaluate import residuals, simulate_joint
+from endoscope_explain.free_parameters import LEAD, FreeParameter
+from endoscope_explain.observation import JointObservation
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+STEP = 2.0e-3
+"""Difference step of a coordinate: large against the integrator's error, small against bends."""
+
+
+@dataclass(frozen=True)
+class JointModel:
+    """One joint with some of its numbers free.
+
+    Attributes
+    ----------
+    observation : JointObservation
+    base : array (parameters,)
+        Packed parameters; the free ones are replaced.
+    flags : array (flags,) of bool
+    free : tuple of FreeParameter
+    """
+
+    observation: JointObservation
+    base: Array
+    flags: Flags
+    free: tuple[FreeParameter, ...]
+
+    def packed(self, theta: Array) -> tuple[Array, float]:
+        """Packed parameters and reading lead at the coordinates `theta` (n,)."""
+        parameters = self.base.copy()
+        lead = 0.0
+        for item, coordinate in zip(self.free, theta, strict=True):
+            if item.index == LEAD:
+                lead = item.value(float(coordinate))
+            else:
+                parameters[item.index] = item.value(float(coordinate))
+        return parameters, lead
+
+    def residuals(self, theta: Array) -> Array:
+        """Residuals in noise units, all channels in a row."""
+        parameters, lead = self.packed(theta)
+        return residuals(
+            self.observation, simulate_joint(self.observation, parameters, self.flags), lead)
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest coordinates."""
+        return (np.array([item.coordinate(item.low) for item in self.free]),
+                np.array([item.coordinate(item.high) for item in self.free]))
+
+    def prior(self, theta: Array) -> Array:
+        """Deviations from the priors' means in spreads."""
+        return np.array([
+            0.0 if math.isinf(item.spread) else (coordinate - item.mean) / item.spread
+            for item, coordinate in zip(self.free, theta, strict=True)
+        ])
+
+    def prior_weight(self) -> Array:
+        """Inverse spreads."""
+        return np.array([1.0 / item.spread for item in self.free])
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted joint.
+
+    Attributes
+    ----------
+    model : JointModel
+    theta : array (n,)
+        Coordinates of the free parameters.
+    residuals : array (size,)
+        Unweighted, in noise units.
+    jacobian : array (size, n)
+        Of the residuals, at or near `theta`.
+    cost : float
+        Half weighted squares, prior included.
+    """
+
+    model: JointModel
+    theta: Array
+    residuals: Array
+    jacobian: Array = field(repr=False)
+    cost: float
+
+
+def jacobian(model: JointModel, theta: Array, at: Array, columns: list[int] | None = None) -> Array:
+    """Difference quotients of the residuals `at` the coordinates `theta`.
+
+    Parameters
+    ----------
+    model : JointModel
+    theta : array (n,)
+    at : array (size,)
+        Residuals at `theta`.
+    columns : list of int, optional
+        Coordinates to differentiate by; all if not given.
+
+    Returns
+    -------
+    array (size, n or len(columns))
+    """
+    low, high = model.bounds()
+    columns = list(range(len(theta))) if columns is None else columns
+    result = np.empty((len(at), len(columns)))
+    for i, c in enumerate(columns):
+        moved = theta.copy()
+        step = STEP if model.free[c].logarithmic else 5.0 * STEP
+        step = step if theta[c] + step <= high[c] else -step
+        moved[c] = max(theta[c] + step, low[c])
+        result[:, i] = (model.residuals(moved) - at) / (moved[c] - theta[c])
+    return result
+
+
+def bounded_step(hessian: Array, gradient: Array, theta: Array, low: Array, high: Array) -> Array:
+    """Newton step that stays within bounds: coordinates that hit one are fixed, one by one."""
+    free = np.ones(len(theta), dtype=bool)
+    step = np.zeros(len(theta))
+    for _ in range(len(theta) + 1):
+        step[:] = 0.0
+        fixed = ~free
+        step[fixed] = np.where(gradient[fixed] > 0, low[fixed], high[fixed]) - theta[fixed]
+        rhs = -gradient[free] - hessian[np.ix_(free, fixed)] @ step[fixed]
+        step[free] = np.linalg.solve(hessian[np.ix_(free, free)], rhs)
+        new = theta + step
+        out = free & ((new < low - 1e-12) | (new > high + 1e-12))
+        if not out.any():
+            break
+        worst = np.argmax(np.where(out, np.maximum(low - new, new - high), -1.0))
+        gradient = gradient.copy()
+        gradient[worst] = 1.0 if new[worst] < low[worst] else -1.0
+        free[worst] = False
+        if not free.any():
+            break
+    return np.clip(theta + step, low, high) - theta
+
+
+def fit(
+    model: JointModel,
+    start: Array,
+    weight: Array | None = None,
+    iterations: int = 8,
+    tolerance: float = 1e-3,
+    known_jacobian: Array | None = None,
+    stop: Callable[[float], bool] | None = None,
+) -> Fit:
+    """Fit the free parameters of a joint.
+
+    Parameters
+    ----------
+    model : JointModel
+    start : array (n,)
+        Coordinates to start from.
+    weight : array (size,), optional
+        Factors on the residuals (at most 1 where an error of form is allowed for).
+    iterations : int
+        Largest number of accepted steps.
+    tolerance : float
+        Stop when a step lowers the cost by less than this share.
+    known_jacobian : array (size, n), optional
+        Used for the first step.
+    stop : callable, optional
+        Called with the cost after each step; ends the fit early when it says so.
+
+    Returns
+    -------
+    Fit
+    """
+    weight = np.ones(model.observation.size) if weight is None else weight
+    low, high = model.bounds()
+    theta = np.clip(start, low, high)
+    prior_weight = model.prior_weight()
+    current = model.residuals(theta)
+
+    def cost_of(values: Array, at: Array) -> float:
+        return 0.5 * float(np.sum((weight * values)**2) + np.sum(model.prior(at)**2))
+
+    cost = cost_of(current, theta)
+    damping = 1e-4
+    derivative = known_jacobian
+    for _ in range(iterations):
+        if derivative is None:
+            derivative = jacobian(model, theta, current)
+        weighted = derivative * weight[:, None]
+        gradient = weighted.T @ (weight * current) + prior_weight * model.prior(theta)
+        normal = weighted.T @ weighted + np.diag(prior_weight**2)
+        scale = np.maximum(np.diag(normal), 1e-9)
+        accepted = False
+        before = cost
+        for _ in range(6):
+            step = bounded_step(normal + damping * np.diag(scale), gradient, theta, low, high)
+            trial = model.residuals(theta + step)
+            trial_cost = cost_of(trial, theta + step)
+            if trial_cost < cost:
+                theta, current, cost = theta + step, trial, trial_cost
+                damping = max(damping / 10.0, 1e-7)
+                accepted = True
+                break
+            damping = max(damping * 10.0, 1e-3)
+        if not accepted:
+            if known_jacobian is not None and derivative is known_jacobian:
+                derivative = None
+                continue
+            break
+        if stop is not None and stop(cost):
+            break
+        if before - cost < tolerance * before and damping < 0.1:
+            break
+        derivative = None
+    if derivative is None:
+        derivative = jacobian(model, theta, current)
+    return Fit(model, theta, current, derivative, cost)

@@ -1,0 +1,202 @@
+"""What one joint's sensors read, on the analysis grid, with the noise known for each sample.
+
+Wires and motor are averaged over `ANALYSIS_PERIOD` (the average is the anti-aliasing filter, and
+it acts on simulated readings just the same); the tracker is taken at its own stamps.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+from endoscope_core.plant import PlantDescription, SensorParameters
+from endoscope_core.plant.kernel import (
+    IN_COMMAND,
+    IN_MOTOR,
+    INPUTS,
+    OUT_BENDING,
+    OUT_EFFORT,
+    OUT_MOTOR,
+    OUT_TENSION_A,
+    OUT_TENSION_B,
+)
+from endoscope_core.plant.on_stamps import hold_on_ticks
+from numpy.typing import NDArray
+
+from endoscope_explain.recording import Recording, Series
+from endoscope_explain.recording.signals import QUANTITY_UNITS, signal_name
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+TICK = 1.0e-3
+ANALYSIS_PERIOD = 0.01
+"""Length in s over which fast channels are averaged: 100 Hz, ten times the servo's bandwidth."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Readings of one sensor on the analysis grid.
+
+    Attributes
+    ----------
+    signal, quantity, unit : str
+        Name as the report writes it, series of the recording, SI unit.
+    output : int
+        Column of the compiled physics' output that this sensor reads.
+    scale : float
+        Unit of this channel for one unit of that output.
+    tick : array (R,) of int, share : array (R,)
+        Place of each raw sample between simulated ticks `tick` and `tick + 1`.
+    first : array (M,) of int
+        First raw sample of each analysis sample.
+    count : array (M,)
+        Raw samples in each analysis sample.
+    time, value, noise : array (M,)
+        Stamp in s from the first command, reading, and its known noise (rms).
+    """
+
+    signal: str
+    quantity: str
+    unit: str
+    output: int
+    scale: float
+    tick: Indices
+    share: Array
+    first: Indices
+    count: Array
+    time: Array
+    value: Array
+    noise: Array
+
+    def predicted(self, outputs: Array, lead: float = 0.0) -> Array:
+        """This channel's analysis samples (M,) from simulated outputs (N, OUTPUTS).
+
+        `lead` in [0, 1] is by how many ticks a reading is younger than its stamp says: a loop
+        that stamps, commands and then reads has a lead of up to one tick.
+        """
+        column = outputs[:, self.output]
+        left = column[self.tick]
+        raw = left + (self.share + lead) * (column[self.tick + 1] - left)
+        return self.scale * np.add.reduceat(raw, self.first) / self.count
+
+
+@dataclass(frozen=True)
+class JointObservation:
+    """One joint's input and channels.
+
+    Attributes
+    ----------
+    joint : str
+    inputs : array (1, N, INPUTS)
+        Input of the compiled physics on 1 ms ticks.
+    start : float
+        Joint-equivalent motor angle in rad at which the joint rests at first.
+    channels : tuple of Channel
+    """
+
+    joint: str
+    inputs: Array
+    start: float
+    channels: tuple[Channel, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of analysis samples of all channels."""
+        return sum(len(channel.time) for channel in self.channels)
+
+    def slices(self) -> tuple[slice, ...]:
+        """Place of each channel in a residual vector of all channels."""
+        ends = np.cumsum([0, *(len(channel.time) for channel in self.channels)])
+        return tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+
+
+def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObservation, ...]:
+    """The analysis view of a cleaned recording, joint by joint.
+
+    Parameters
+    ----------
+    recording : Recording
+        Stamps increasing; samples that must not be judged are marked invalid.
+    plant : PlantDescription
+        Gives gear and sensor noise; joints that it does not have are left out.
+
+    Returns
+    -------
+    tuple of JointObservation
+        In the recording's order.
+    """
+    begin = float(recording.command.time[0])
+    ticks = int(np.ceil((recording.duration - begin) / TICK)) + 2
+    held = hold_on_ticks(recording.command.time - begin, recording.command.values, ticks)
+    joints = []
+    for j, joint in enumerate(recording.joints):
+        if joint not in plant.joints:
+            continue
+        gear = plant.joints[joint].gear
+        inputs = np.zeros((1, ticks, INPUTS))
+        inputs[0, :, IN_COMMAND] = held[:, j] / gear
+        inputs[0, :, IN_MOTOR] = np.nan
+        channels = _channels(recording, j, joint, gear, plant.sensors, begin, ticks)
+        joints.append(JointObservation(joint, inputs, float(inputs[0, 0, IN_COMMAND]), channels))
+    return tuple(joints)
+
+
+def _channels(
+    recording: Recording, j: int, joint: str, gear: float, sensors: SensorParameters,
+    begin: float, ticks: int,
+) -> tuple[Channel, ...]:
+    encoder_step = 2.0 * pi / sensors.encoder_counts
+    plan = (
+        ('shaft_position', 0, OUT_MOTOR, gear, 0.0, encoder_step),
+        ('shaft_effort', 0, OUT_EFFORT, 1.0, sensors.effort_noise, sensors.effort_resolution),
+        ('tension', 0, OUT_TENSION_A, 1.0, sensors.load_cell_noise, sensors.load_cell_resolution),
+        ('tension', 1, OUT_TENSION_B, 1.0, sensors.load_cell_noise, sensors.load_cell_resolution),
+        ('bending', 0, OUT_BENDING, 1.0, sensors.tracker_noise, 0.0),
+    )
+    measured = recording.measured()
+    channels = []
+    for quantity, wire, output, scale, white, step in plan:
+        if quantity not in measured:
+            continue
+        period = 0.0 if quantity == 'bending' else ANALYSIS_PERIOD
+        time, values = _valid_column(measured[quantity], j, wire, begin, ticks)
+        if not len(time):
+            continue
+        # Rounding is white only where the noise itself spreads readings over several steps.
+        dithered = white >= 0.3 * step
+        channels.append(_channel(
+            signal_name(quantity, joint, wire), quantity, output, scale, time, values, period,
+            sqrt(white**2 + (step**2 / 12.0 if dithered else 0.0)),
+            0.0 if dithered else step / sqrt(12.0)))
+    return tuple(channels)
+
+
+def _valid_column(
+    series: Series, j: int, wire: int, begin: float, ticks: int
+) -> tuple[Array, Array]:
+    values = series.values[:, j, wire] if series.values.ndim == 3 else series.values[:, j]
+    valid = series.valid[:, j, wire] if series.valid.ndim == 3 else series.valid[:, j]
+    time = series.time - begin
+    use = valid & (time >= 0.0) & (time < (ticks - 1) * TICK)
+    return time[use], values[use]
+
+
+def _channel(
+    signal: str, quantity: str, output: int, scale: float, time: Array, values: Array,
+    period: float, white: float, rounding: float,
+) -> Channel:
+    place = time / TICK
+    # Stamps on a tick, to the nanosecond, take the tick's own row.
+    whole = np.round(place)
+    place = np.where(np.abs(place - whole) < 1e-5, whole, place)
+    tick = place.astype(np.int64)
+    if period > 0.0:
+        block = np.floor(time / period + 1e-6).astype(np.int64)
+        first = np.flatnonzero(np.r_[True, np.diff(block) > 0])
+    else:
+        first = np.arange(len(time))
+    count = np.diff(np.r_[first, len(time)]).astype(float)
+    return Channel(
+        signal, quantity, QUANTITY_UNITS[quantity], output, scale, tick, place - tick, first,
+        count, np.add.reduceat(time, first) / count, np.add.reduceat(values, first) / count,
+        np.sqrt(white**2 / count + rounding**2))
