@@ -2,7 +2,8 @@
 
 Numba's cache looks at the one file that holds a function, not at the functions that it calls in
 other files: after a change of one effect it would go on running the old physics. The cache folder
-is therefore named after a hash of all sources of this package.
+is therefore named after a hash of all sources of this package. Modules with compiled functions take
+`njit` from here, so that only they, not every start of the program, import numba.
 """
 
 import hashlib
@@ -10,6 +11,9 @@ import os
 from pathlib import Path
 
 import numba
+from numba import njit
+
+__all__ = ['njit', 'source_hash', 'use_cache_of_these_sources']
 
 
 def source_hash(package: Path) -> str:
@@ -29,3 +33,6 @@ def use_cache_of_these_sources() -> None:
     numba.config.CACHE_DIR = str(
         base / 'endoscope' / 'numba' / source_hash(Path(__file__).parent)
     )
+
+
+use_cache_of_these_sources()

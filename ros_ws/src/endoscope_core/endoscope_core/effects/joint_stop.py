@@ -1,7 +1,6 @@
 """`joint_stop`: a stiff, two-sided end stop of the bending section."""
 
-from numba import njit
-
+from endoscope_core.compiled_cache import njit
 from endoscope_core.effects.definition import EffectParameter, Stage, define
 
 DEFINITION = define(

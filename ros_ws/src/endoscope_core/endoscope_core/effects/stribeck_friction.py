@@ -2,8 +2,7 @@
 
 import math
 
-from numba import njit
-
+from endoscope_core.compiled_cache import njit
 from endoscope_core.effects.definition import EffectParameter, Stage, define
 
 DEFINITION = define(

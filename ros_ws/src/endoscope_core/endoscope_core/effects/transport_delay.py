@@ -1,7 +1,6 @@
 """`transport_delay`: the command reaches the servo late."""
 
-from numba import njit
-
+from endoscope_core.compiled_cache import njit
 from endoscope_core.effects.definition import EffectParameter, Stage, define
 from endoscope_core.effects.slots import COMMAND_HISTORY, HISTORY, TICKS
 

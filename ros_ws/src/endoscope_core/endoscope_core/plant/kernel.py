@@ -7,8 +7,7 @@ a command held over the substep; joint and pre-sliding states by a linearly impl
 
 import math
 
-from numba import njit
-
+from endoscope_core.compiled_cache import njit
 from endoscope_core.effects import joint_stop, stribeck_friction, transport_delay
 from endoscope_core.effects.slots import (
     ANGLE_HISTORY,
