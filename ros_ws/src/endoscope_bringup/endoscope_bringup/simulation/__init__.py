@@ -1,0 +1,1 @@
+"""The plant's answer to the commands of a bag."""

@@ -1,0 +1,147 @@
+"""Writes the bag in which a plant answers the commands of another bag."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_bags import BagWriter, MessageStream, Recording
+from endoscope_bags.cdr_encoding import encode_joint_states
+from endoscope_bags.message_types import JOINT_STATE
+from endoscope_bringup.simulation.commands_of_bag import (
+    ANGLE_TOPIC,
+    SHAFT_TOPIC,
+    BagCommands,
+    commands_of_bag,
+    motor_name,
+    wire_names,
+)
+from endoscope_core.plant import PlantDescription, SensorModel
+from endoscope_core.plant.on_stamps import Answer, AnswerStamps, answer_commands
+
+MOTOR_TOPIC = 'motor/measured_js'
+WIRES_TOPIC = 'wires/measured_js'
+BENDING_TOPIC = 'slave/measured_js'
+
+Stamps = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Times:
+    """Header stamp, receipt and publication of the messages of one topic, in ns."""
+
+    topic: str
+    stamp_ns: Stamps
+    log_ns: Stamps
+    publish_ns: Stamps
+
+
+def write_answer(
+    plant: PlantDescription, recording: Recording, out: Path, noise_seed: int | None = None
+) -> int:
+    """Write the answer of a plant to the commands of a recording.
+
+    The new bag has the commands as they are, and `motor/measured_js`, `wires/measured_js` and
+    `slave/measured_js` at the stamps, under the namespace and with the times of receipt of the
+    recording; a topic that the recording lacks comes at its nominal rate. Only joints that are
+    commanded answer.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+    recording : Recording
+        With `motor/servo_jp` or `slave/servo_jp`.
+    out : Path
+        A folder, or a file that ends in ``.mcap``; must not exist.
+    noise_seed : int, optional
+        Seed of the sensors' noise; without it there is neither noise nor quantisation.
+
+    Returns
+    -------
+    int
+        Number of messages written.
+
+    Raises
+    ------
+    NoCommandsError, BagError
+        If the recording has no usable commands, or `out` exists.
+    """
+    commands = commands_of_bag(recording, plant)
+    driven = replace(
+        plant,
+        joints={joint: plant.joints[joint] for joint in commands.joints},
+        effects=tuple(spec for spec in plant.effects if spec.joint in commands.joints))
+    with BagWriter(out) as writer:
+        times = {
+            suffix: _times(recording, commands, suffix, rate)
+            for suffix, rate in (
+                (MOTOR_TOPIC, plant.sensors.load_cell_rate),
+                (WIRES_TOPIC, plant.sensors.load_cell_rate),
+                (BENDING_TOPIC, plant.sensors.tracker_rate))
+        }
+        answer = answer_commands(
+            driven, commands.stamp_ns, commands.shaft,
+            AnswerStamps(*(times[s].stamp_ns for s in (MOTOR_TOPIC, WIRES_TOPIC, BENDING_TOPIC))))
+        if noise_seed is not None:
+            answer = _noisy(answer, SensorModel(plant.sensors, noise_seed))
+        streams = [_copied(recording, suffix) for suffix in (SHAFT_TOPIC, ANGLE_TOPIC)
+                   if recording.has(suffix)]
+        streams += _encoded(answer, times, commands.joints)
+        writer.write_streams(streams)
+        return writer.message_count
+
+
+def _times(
+    recording: Recording, commands: BagCommands, suffix: str, rate: float
+) -> _Times:
+    if recording.has(suffix):
+        series = recording.joint_state(suffix, order='recorded', finite=())
+        return _Times(series.topic, series.stamp_ns, series.log_ns, series.publish_ns)
+    namespace = commands.topic.removesuffix(SHAFT_TOPIC).removesuffix(ANGLE_TOPIC)
+    first, last = int(commands.stamp_ns[0]), int(commands.stamp_ns[-1])
+    stamps = np.arange(first, last + 1, round(1e9 / rate), dtype=np.int64)
+    return _Times(namespace + suffix, stamps, stamps, stamps)
+
+
+def _noisy(answer: Answer, sensors: SensorModel) -> Answer:
+    return Answer(
+        sensors.shaft_position(answer.shaft_position),
+        sensors.shaft_velocity(answer.shaft_velocity),
+        sensors.shaft_effort(answer.shaft_effort),
+        sensors.tension(answer.tension),
+        sensors.bending(answer.bending),
+    )
+
+
+def _copied(recording: Recording, suffix: str) -> MessageStream:
+    topic = recording.find(suffix)
+    messages = list(recording.messages([topic]))
+    return MessageStream(
+        topic, recording.topics[topic].type,
+        [message.data for message in messages],
+        np.array([message.log_ns for message in messages], dtype=np.int64),
+        np.array([message.publish_ns for message in messages], dtype=np.int64))
+
+
+def _encoded(
+    answer: Answer, times: dict[str, _Times], joints: tuple[str, ...]
+) -> list[MessageStream]:
+    motors = [motor_name(joint) for joint in joints]
+    wires = [wire for joint in joints for wire in wire_names(joint)]
+    tension = answer.tension.reshape(len(answer.tension), -1)
+    payloads: dict[str, Callable[[Stamps], list[bytes]]] = {
+        MOTOR_TOPIC: lambda stamps: encode_joint_states(
+            motors, stamps, position=answer.shaft_position, velocity=answer.shaft_velocity,
+            effort=answer.shaft_effort),
+        WIRES_TOPIC: lambda stamps: encode_joint_states(wires, stamps, effort=tension),
+        BENDING_TOPIC: lambda stamps: encode_joint_states(
+            joints, stamps, position=answer.bending),
+    }
+    return [
+        MessageStream(
+            times[suffix].topic, JOINT_STATE, encode(times[suffix].stamp_ns),
+            times[suffix].log_ns, times[suffix].publish_ns)
+        for suffix, encode in payloads.items()
+    ]

@@ -1,0 +1,98 @@
+"""The commands that a recording holds, as motor shaft angles of a plant's joints."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_bags import JointStateSeries, Recording
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.plant import PlantDescription
+
+SHAFT_TOPIC = 'motor/servo_jp'
+ANGLE_TOPIC = 'slave/servo_jp'
+
+
+class NoCommandsError(EndoscopeError, ValueError):
+    """A recording without commands for any joint of the plant."""
+
+
+@dataclass(frozen=True)
+class BagCommands:
+    """Commands of some joints of a plant.
+
+    Attributes
+    ----------
+    topic : str
+        Full name of the topic they come from.
+    joints : tuple of str
+        Joints of the plant that are commanded, in the plant's order.
+    stamp_ns : array (N,) of int64
+        Not decreasing.
+    shaft : array (N, J)
+        Motor shaft angle in rad.
+    """
+
+    topic: str
+    joints: tuple[str, ...]
+    stamp_ns: NDArray[np.int64]
+    shaft: NDArray[np.float64]
+
+
+def motor_name(joint: str) -> str:
+    """Name of the motor that drives a joint: `bend_x` is driven by `motor_x`."""
+    return joint.replace('bend_', 'motor_')
+
+
+def wire_names(joint: str) -> tuple[str, str]:
+    """Names of the wires that bend a joint to the positive and to the negative side."""
+    wire = joint.replace('bend_', 'wire_')
+    return f'{wire}_pos', f'{wire}_neg'
+
+
+def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommands:
+    """Shaft commands of a recording; desired angles times the gear where it has none.
+
+    Parameters
+    ----------
+    recording : Recording
+    plant : PlantDescription
+
+    Returns
+    -------
+    BagCommands
+
+    Raises
+    ------
+    NoCommandsError
+        If neither topic is there, or no joint of the plant is commanded.
+    BagError
+        If a command is not finite or does not decode.
+    """
+    if recording.has(SHAFT_TOPIC):
+        series = recording.joint_state(SHAFT_TOPIC, finite=('position',))
+        names = {joint: motor_name(joint) for joint in plant.joints}
+    elif recording.has(ANGLE_TOPIC):
+        series = recording.joint_state(ANGLE_TOPIC, finite=('position',))
+        names = {joint: joint for joint in plant.joints}
+    else:
+        found = ', '.join(sorted(recording.topics)) or 'none'
+        raise NoCommandsError(
+            f'{recording.path}: lacks topic {SHAFT_TOPIC} or {ANGLE_TOPIC}; it has {found}')
+    joints = tuple(joint for joint, name in names.items() if name in series.names)
+    if not joints:
+        raise NoCommandsError(
+            f'{recording.path}: {series.topic} commands {", ".join(series.names) or "nothing"}, '
+            f'the plant has {", ".join(names.values())}')
+    chosen = series.select([names[joint] for joint in joints])
+    return BagCommands(
+        series.topic, joints, chosen.stamp_ns, _shaft_angles(chosen, joints, plant))
+
+
+def _shaft_angles(
+    series: JointStateSeries, joints: tuple[str, ...], plant: PlantDescription
+) -> NDArray[np.float64]:
+    position = series.require('position')
+    if series.topic.endswith(SHAFT_TOPIC):
+        return position
+    return position * np.array([plant.joints[joint].gear for joint in joints])
