@@ -2,21 +2,20 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
-from mcap.writer import CompressionType, Writer
 
 from endoscope_bags.bag_files import METADATA
+from endoscope_bags.chunk_sink import ChunkSink, TopicRecord
 from endoscope_bags.errors import BagExistsError, BagFullError
+from endoscope_bags.mcap_chunk import MESSAGE_OVERHEAD, ChunkMessage
+from endoscope_bags.message_stream import MessageStream
 from endoscope_bags.message_types import MessageType, message_type
-from endoscope_bags.qos_profile import QosProfile, qos_as_yaml
-from endoscope_bags.room_on_disk import raise_if_full, require_room
+from endoscope_bags.qos_profile import QosProfile
+from endoscope_bags.room_on_disk import raise_if_full
 from endoscope_bags.rosbag2_metadata import (
     TopicSummary,
     metadata_document,
@@ -24,51 +23,17 @@ from endoscope_bags.rosbag2_metadata import (
     write_metadata,
 )
 
-LIBRARY = 'endoscope_bags'
 CHUNK_SECONDS = 0.5
 CHUNK_BYTES = 1 << 20
-# Upper bounds of what a message, a chunk and a topic add to the file besides the message's bytes.
-_MESSAGE_OVERHEAD = 31 + 16
-_CHUNK_OVERHEAD = 512
-_TOPIC_OVERHEAD = 4096
-
-
-@dataclass
-class _Channel:
-    topic: str
-    type: MessageType
-    qos: tuple[QosProfile, ...]
-    mcap_id: int
-    count: int = 0
-
-
-@dataclass(frozen=True)
-class MessageStream:
-    """Encoded messages of one topic, for `BagWriter.write_streams`.
-
-    Attributes
-    ----------
-    topic, type
-        Full topic name and message type.
-    payloads
-        N encoded messages.
-    log_ns, publish_ns
-        Receipt and publication in ns since the epoch, shape (N,).
-    """
-
-    topic: str
-    type: str
-    payloads: Sequence[bytes]
-    log_ns: npt.NDArray[np.int64]
-    publish_ns: npt.NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+METADATA_RECORD = 'endoscope_bags'
 
 
 class BagWriter:
     """Writes one recording: a rosbag2 folder, or a bare file where the name ends in ``.mcap``.
 
-    A chunk holds at most half a second, so that a killed writer loses no more than that. Use it as
-    a context manager: on an exception the chunks written so far are kept and finished, unless
-    `atomic`, then nothing is left behind.
+    A chunk spans at most half a second of receipt, so that a killed writer loses little. Use it as
+    a context manager: on an exception an atomic writer leaves nothing behind, another finishes
+    what it has.
 
     Parameters
     ----------
@@ -79,6 +44,8 @@ class BagWriter:
         that: what it leaves when it is killed shall be found.
     chunk_seconds, chunk_bytes
         A chunk is closed when it spans this time or exceeds this size, whatever comes first.
+    threaded
+        Compress and write chunks in a thread, for callers that must not stall.
 
     Raises
     ------
@@ -95,75 +62,75 @@ class BagWriter:
         atomic: bool = True,
         chunk_seconds: float = CHUNK_SECONDS,
         chunk_bytes: int = CHUNK_BYTES,
+        threaded: bool = False,
     ) -> None:
         self.path = Path(path)
         if self.path.exists() or self.path.is_symlink():
             raise BagExistsError(f'{self.path}: exists already; recordings are never overwritten')
+        self.closed = False
         self._bare = self.path.suffix == '.mcap'
+        self._file_name = self.path.name if self._bare else f'{self.path.name}_0.mcap'
         self._chunk_ns = round(chunk_seconds * 1e9)
         self._chunk_bytes = chunk_bytes
-        self._channels: dict[str, _Channel] = {}
-        self._schema_ids: dict[str, int] = {}
-        self._pending: list[tuple[int, int, int, int, bytes]] = []
+        self._topics: dict[str, TopicRecord] = {}
+        self._counts: dict[str, int] = {}
+        self._new_topics: list[TopicRecord] = []
+        self._pending: list[ChunkMessage] = []
         self._pending_bytes = 0
-        self._oldest_ns = 0
-        self._n_chunks = 0
-        self._start_ns: int | None = None
-        self._end_ns = 0
-        self._open(atomic)
+        self._first_ns = 0
+        self._home = self._make_home(atomic)
+        file_path = self._home if self._bare else self._home / self._file_name
+        try:
+            self._sink = ChunkSink(file_path, threaded=threaded)
+        except (BagFullError, OSError):
+            self._remove_home()
+            raise
 
-    def _open(self, atomic: bool) -> None:
+    def _make_home(self, atomic: bool) -> Path:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         hidden = self.path.with_name(f'.partial-{os.getpid()}-{self.path.name}')
-        self._home = hidden if atomic else self.path
-        self._file_name = self.path.name if self._bare else f'{self.path.name}_0.mcap'
+        home = hidden if atomic else self.path
         if not self._bare:
-            self._home.mkdir()
-        self._file_path = self._home if self._bare else self._home / self._file_name
-        self._file = self._file_path.open('xb')
-        self._mcap = Writer(
-            self._file, chunk_size=1 << 40, compression=CompressionType.ZSTD, enable_crcs=True
-        )
-        self.closed = False
-        try:
-            require_room(self._file.fileno(), str(self._file_path), _TOPIC_OVERHEAD)
-            self._mcap.start(profile='ros2', library=LIBRARY)
-            self._file.flush()
-        except (BagFullError, OSError):
-            self.discard()
-            raise
+            home.mkdir()
+        return home
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages accepted so far, by topic; those of a chunk that found no room are taken off."""
+        lost = self._sink.lost_counts
+        return {t: n - lost.get(self._topics[t].id, 0) for t, n in self._counts.items()}
 
     @property
     def message_count(self) -> int:
         """Messages accepted so far."""
-        return sum(channel.count for channel in self._channels.values())
+        return sum(self.counts.values())
 
-    @property
-    def counts(self) -> dict[str, int]:
-        """Messages accepted so far, by topic."""
-        return {channel.topic: channel.count for channel in self._channels.values()}
-
-    def add_topic(self, topic: str, type_name: str, qos: Sequence[QosProfile] = ()) -> None:
+    def add_topic(
+        self, topic: str, kind: str | MessageType, qos: Sequence[QosProfile] = ()
+    ) -> None:
         """Announce a topic; one without messages is listed, too. Again is harmless.
+
+        Parameters
+        ----------
+        topic
+            Full name.
+        kind
+            Name of the message type, or the type with its definition.
+        qos
+            What its publishers offer.
 
         Raises
         ------
         UnknownTypeError
             The definition of the type is nowhere to be found.
         """
-        if topic in self._channels:
+        if topic in self._topics:
             return
-        kind = message_type(type_name)
-        schema_id = self._schema_ids.get(kind.name)
-        if schema_id is None:
-            schema_id = self._mcap.register_schema(kind.name, 'ros2msg', kind.definition.encode())
-            self._schema_ids[kind.name] = schema_id
-        metadata = {
-            'offered_qos_profiles': qos_as_yaml(qos),
-            'topic_type_hash': kind.type_hash,
-        }
-        mcap_id = self._mcap.register_channel(topic, 'cdr', schema_id, metadata)
-        self._channels[topic] = _Channel(topic, kind, tuple(qos), mcap_id)
+        kind = message_type(kind) if isinstance(kind, str) else kind
+        record = TopicRecord(len(self._topics) + 1, topic, kind, tuple(qos))
+        self._topics[topic] = record
+        self._counts[topic] = 0
+        self._new_topics.append(record)
 
     def write_raw(
         self,
@@ -190,23 +157,28 @@ class BagWriter:
         Raises
         ------
         BagFullError
-            The disk is full; what came before the chunk in progress is kept, close the writer.
+            The disk is full; the chunks before are kept. Close the writer.
         """
-        channel = self._channels.get(topic)
-        if channel is None:
+        if topic not in self._topics:
             self.add_topic(topic, type_name)
-            channel = self._channels[topic]
         if self._pending and (
             self._pending_bytes > self._chunk_bytes
-            or abs(log_ns - self._oldest_ns) >= self._chunk_ns
+            or abs(log_ns - self._first_ns) >= self._chunk_ns
         ):
             self.flush()
         if not self._pending:
-            self._oldest_ns = log_ns
-        published = log_ns if publish_ns is None else publish_ns
-        self._pending.append((log_ns, channel.mcap_id, published, sequence & 0xFFFFFFFF, cdr))
-        self._pending_bytes += len(cdr) + _MESSAGE_OVERHEAD
-        channel.count += 1
+            self._first_ns = log_ns
+        self._pending.append(
+            (
+                log_ns,
+                self._topics[topic].id,
+                sequence & 0xFFFFFFFF,
+                log_ns if publish_ns is None else publish_ns,
+                cdr,
+            )
+        )
+        self._pending_bytes += len(cdr) + MESSAGE_OVERHEAD
+        self._counts[topic] += 1
 
     def write_streams(self, streams: Sequence[MessageStream]) -> None:
         """Add whole topics, merged by receipt (equal ones in the order of `streams`).
@@ -218,21 +190,20 @@ class BagWriter:
         BagFullError
             The disk is full.
         """
+        if not streams:
+            return
         for stream in streams:
             self.add_topic(stream.topic, stream.type)
         which = np.repeat(np.arange(len(streams)), [len(s.payloads) for s in streams])
         row = np.concatenate([np.arange(len(s.payloads)) for s in streams])
-        log_ns = np.concatenate([np.asarray(s.log_ns, dtype=np.int64) for s in streams])
-        for k in np.argsort(log_ns, kind='stable'):
-            stream, index = streams[which[k]], int(row[k])
-            published = int(stream.publish_ns[index]) if len(stream.publish_ns) else None
+        log_ns = np.concatenate([s.log_ns for s in streams])
+        publish_ns = np.concatenate([s.published_ns for s in streams])
+        order = np.argsort(log_ns, kind='stable')
+        columns = (which[order], row[order], log_ns[order], publish_ns[order])
+        for k, index, log, publish in zip(*(c.tolist() for c in columns), strict=True):
+            stream = streams[k]
             self.write_raw(
-                stream.topic,
-                stream.type,
-                stream.payloads[index],
-                int(log_ns[k]),
-                published,
-                index + 1,
+                stream.topic, stream.type, stream.payloads[index], log, publish, index + 1
             )
 
     def flush(self) -> None:
@@ -241,46 +212,14 @@ class BagWriter:
         Raises
         ------
         BagFullError
-            There is no room for it; the messages of this chunk are dropped and no longer counted.
+            There was no room for this chunk or, when threaded, for one before; its messages are
+            dropped and no longer counted.
         """
-        if not self._pending:
-            return
-        pending, self._pending = sorted(self._pending, key=lambda m: m[0]), []
+        pending, self._pending = self._pending, []
+        topics, self._new_topics = self._new_topics, []
         size, self._pending_bytes = self._pending_bytes, 0
-        try:
-            require_room(self._file.fileno(), str(self._file_path), size + self._closing_bytes())
-        except BagFullError:
-            self._uncount(pending)
-            raise
-        for log_ns, mcap_id, publish_ns, sequence, cdr in pending:
-            self._mcap.add_message(mcap_id, log_ns, cdr, publish_ns, sequence)
-        try:
-            self._mcap.flush()
-        except OSError as error:
-            self._uncount(pending)
-            self._abandon()
-            raise_if_full(error, str(self._file_path))
-            raise
-        self._n_chunks += 1
-        first, last = pending[0][0], pending[-1][0]
-        self._start_ns = first if self._start_ns is None else min(first, self._start_ns)
-        self._end_ns = max(last, self._end_ns)
-
-    def _uncount(self, messages: Sequence[tuple[int, int, int, int, bytes]]) -> None:
-        by_id = {channel.mcap_id: channel for channel in self._channels.values()}
-        for message in messages:
-            by_id[message[1]].count -= 1
-
-    def _abandon(self) -> None:
-        """Close the file with half a chunk at its end: to be read by recovery."""
-        self.closed = True
-        # What is still buffered cannot be written; the caller raises the first error.
-        with suppress(OSError):
-            self._file.close()
-
-    def _closing_bytes(self) -> int:
-        index = (_CHUNK_OVERHEAD + 10 * len(self._channels)) * (self._n_chunks + 2)
-        return index + 4 * _TOPIC_OVERHEAD * (len(self._channels) + 1)
+        if pending or topics:
+            self._sink.write(topics, pending, size)
 
     def close(self, custom_data: Mapping[str, str] | None = None) -> None:
         """Finish the recording; harmless when it is closed already.
@@ -298,48 +237,49 @@ class BagWriter:
         """
         if self.closed:
             return
+        self.closed = True
         full: BagFullError | None = None
         try:
             self.flush()
+            self._sink.wait()
         except BagFullError as error:
-            if self.closed:
-                raise
             full = error
-        self._finish(dict(custom_data or {}))
-        if full is not None:
-            raise full
-
-    def _finish(self, custom_data: dict[str, str]) -> None:
-        document = metadata_document(
-            [self._file_name],
-            [TopicSummary(c.topic, c.type, c.qos, c.count) for c in self._channels.values()],
-            start_ns=self._start_ns or 0,
-            end_ns=self._end_ns,
-            custom_data=custom_data,
-        )
-        self.closed = True
+        custom = dict(custom_data or {})
+        document = self._document(custom)
+        records = {METADATA_RECORD: custom} if custom else {}
+        self._sink.finish({**records, 'rosbag2': {'serialized_metadata': metadata_text(document)}})
         try:
-            if custom_data:
-                self._mcap.add_metadata(LIBRARY, custom_data)
-            self._mcap.add_metadata('rosbag2', {'serialized_metadata': metadata_text(document)})
-            self._mcap.finish()
-            self._file.flush()
-            os.fsync(self._file.fileno())
-            self._file.close()
             if not self._bare:
                 write_metadata(self._home / METADATA, document)
         except OSError as error:
-            self._abandon()
-            raise_if_full(error, str(self._file_path))
+            raise_if_full(error, str(self._home / METADATA))
             raise
         if self._home != self.path:
             self._home.rename(self.path)
+        if full is not None:
+            raise full
+
+    def _document(self, custom_data: dict[str, str]) -> dict[str, object]:
+        counts = self.counts
+        return metadata_document(
+            [self._file_name],
+            [TopicSummary(t.topic, t.type, t.qos, counts[t.topic]) for t in self._topics.values()],
+            start_ns=self._sink.start_ns,
+            end_ns=self._sink.end_ns,
+            custom_data=custom_data,
+        )
 
     def discard(self) -> None:
         """Remove what was written so far."""
-        self._abandon()
-        self._file_path.unlink(missing_ok=True)
-        if not self._bare:
+        self.closed = True
+        self._sink.abandon()
+        self._remove_home()
+
+    def _remove_home(self) -> None:
+        if self._bare:
+            self._home.unlink(missing_ok=True)
+        else:
+            (self._home / self._file_name).unlink(missing_ok=True)
             self._home.rmdir()
 
     def __enter__(self) -> Self:

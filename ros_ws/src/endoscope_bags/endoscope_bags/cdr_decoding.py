@@ -43,6 +43,14 @@ class Payloads:
         first = int(self.start[index])
         return self.data[first : first + int(self.size[index])]
 
+    def stamp_ns(self) -> npt.NDArray[np.int64]:
+        """Return the stamps of messages that begin with a header, in ns, shape (N,)."""
+        bytes_ = np.frombuffer(self.data, dtype=np.uint8)
+        field = bytes_[self.start[:, None] + np.arange(4, 12)]
+        big = bytes_[self.start + 1] == 0
+        little_endian = _stamps(field, '<')
+        return np.where(big, _stamps(field, '>'), little_endian) if big.any() else little_endian
+
     def matrix(self, rows: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:
         """Return messages of equal size as a matrix, shape (len(rows), size)."""
         size = int(self.size[rows[0]])
@@ -72,10 +80,7 @@ class LayoutGroup:
 
     def stamp_ns(self) -> npt.NDArray[np.int64]:
         """Return the header stamps in ns, shape (M,)."""
-        order = '>' if self.layout.big_endian else '<'
-        seconds = self._field(4, 4).view(order + 'i4')[:, 0].astype(np.int64)
-        nanoseconds = self._field(8, 4).view(order + 'u4')[:, 0].astype(np.int64)
-        return seconds * _NANOSECONDS + nanoseconds
+        return _stamps(self._field(4, 8), '>' if self.layout.big_endian else '<')
 
     def column(self, quantity: str) -> npt.NDArray[np.float64] | None:
         """Return the numbers of a quantity, shape (M, count), or None where it is empty."""
@@ -87,6 +92,12 @@ class LayoutGroup:
 
     def _field(self, start: int, size: int) -> npt.NDArray[np.uint8]:
         return np.ascontiguousarray(self.matrix[:, start : start + size])
+
+
+def _stamps(field: npt.NDArray[np.uint8], order: str) -> npt.NDArray[np.int64]:
+    stamp = field.view([('sec', order + 'i4'), ('nanosec', order + 'u4')])[:, 0]
+    total: npt.NDArray[np.int64] = stamp['sec'].astype(np.int64) * _NANOSECONDS + stamp['nanosec']
+    return total
 
 
 def grouped_by_layout(

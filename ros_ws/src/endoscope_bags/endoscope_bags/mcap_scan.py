@@ -30,7 +30,7 @@ from endoscope_bags.errors import (
 
 MAGIC = b'\x89MCAP0\r\n'
 _RECORD_HEAD = struct.Struct('<BQ')
-_MESSAGE_HEAD = np.dtype(
+MESSAGE_HEAD = np.dtype(
     [
         ('opcode', 'u1'),
         ('length', '<u8'),
@@ -41,7 +41,7 @@ _MESSAGE_HEAD = np.dtype(
     ]
 )
 
-_MESSAGE_HEAD_LENGTH = _MESSAGE_HEAD.itemsize - _RECORD_HEAD.size
+MESSAGE_HEAD_LENGTH = MESSAGE_HEAD.itemsize - _RECORD_HEAD.size
 
 IntArray = npt.NDArray[np.int64]
 
@@ -161,7 +161,7 @@ class _Pass:
             if record is None:
                 break
             opcode, start, stop = record
-            if opcode == Opcode.MESSAGE and stop - start >= _MESSAGE_HEAD_LENGTH:
+            if opcode == Opcode.MESSAGE and stop - start >= MESSAGE_HEAD_LENGTH:
                 self._loose.append(position)
             else:
                 self._end_loose_messages(position)
@@ -268,10 +268,10 @@ class _Pass:
             return
         starts = np.array(positions, dtype=np.int64)
         windows = np.lib.stride_tricks.sliding_window_view(
-            np.frombuffer(data, dtype=np.uint8), _MESSAGE_HEAD.itemsize
+            np.frombuffer(data, dtype=np.uint8), MESSAGE_HEAD.itemsize
         )
-        self._heads.append(windows[starts].view(_MESSAGE_HEAD)[:, 0])
-        self._starts.append(starts + _MESSAGE_HEAD.itemsize)
+        self._heads.append(windows[starts].view(MESSAGE_HEAD)[:, 0])
+        self._starts.append(starts + MESSAGE_HEAD.itemsize)
         self._blocks.append(len(self.scan.blocks) - 1)
 
     def _table(self) -> Messages:
@@ -279,7 +279,7 @@ class _Pass:
             return self.scan.messages
         heads = np.concatenate(self._heads)
         block = np.repeat(self._blocks, [len(starts) for starts in self._starts])
-        size = heads['length'].astype(np.int64) - _MESSAGE_HEAD_LENGTH
+        size = heads['length'].astype(np.int64) - MESSAGE_HEAD_LENGTH
         return Messages(
             channel=heads['channel'].astype(np.int64),
             sequence=heads['sequence'].astype(np.int64),
@@ -292,7 +292,7 @@ class _Pass:
 
 
 def _require_message_head(length: int) -> None:
-    if length < _MESSAGE_HEAD_LENGTH:
+    if length < MESSAGE_HEAD_LENGTH:
         raise ValueError(f'a message record of {length} bytes')
 
 

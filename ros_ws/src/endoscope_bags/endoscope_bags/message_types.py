@@ -67,6 +67,15 @@ def typestore() -> Typestore:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
+def begins_with_header(definition: str) -> bool:
+    """Tell whether the first field of a type is a ``std_msgs/Header``."""
+    for line in definition.splitlines():
+        code = line.partition('#')[0].split()
+        if code and '=' not in line.partition('#')[0]:
+            return code[0] in ('std_msgs/Header', 'std_msgs/msg/Header', 'Header')
+    return False
+
+
 def require_type(store: Typestore, name: str) -> None:
     """Add a type and all that it contains to `store` from the installed packages where it lacks.
 

@@ -1,0 +1,204 @@
+"""Takes chunks of messages and puts them into the file of a recording, in a thread if asked."""
+
+import os
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap.records import Channel, Schema
+
+from endoscope_bags.errors import BagFullError
+from endoscope_bags.mcap_chunk import ChunkMessage, encode_chunk
+from endoscope_bags.mcap_file import McapFile
+from endoscope_bags.message_types import MessageType
+from endoscope_bags.qos_profile import QosProfile, qos_as_yaml
+from endoscope_bags.room_on_disk import raise_if_full, require_room
+
+LIBRARY = 'endoscope_bags'
+# What the index of a chunk, and the two descriptions of a topic, take at the end of the file.
+_CHUNK_OVERHEAD = 512
+_TOPIC_OVERHEAD = 8192
+# A disk that cannot keep up is waited for rather than buffered for without bound.
+_CHUNKS_IN_FLIGHT = 16
+
+
+@dataclass(frozen=True)
+class TopicRecord:
+    """A topic as the file knows it."""
+
+    id: int
+    topic: str
+    type: MessageType
+    qos: tuple[QosProfile, ...]
+
+
+class ChunkSink:
+    """The file of a recording while it is written.
+
+    Room for a chunk and for the summary is asked for before the chunk is written, so that a file
+    on a full disk can always be finished.
+
+    Parameters
+    ----------
+    path
+        The file to make.
+    threaded
+        Encode and write in a thread; errors then come with a later call.
+
+    Attributes
+    ----------
+    lost_counts
+        Messages by topic id of the chunks that found no room.
+    start_ns, end_ns
+        First and last receipt in the file; 0 while it has none.
+
+    Raises
+    ------
+    BagFullError
+        There is no room for the beginning.
+    """
+
+    def __init__(self, path: Path, *, threaded: bool) -> None:
+        self.lost_counts: Counter[int] = Counter()
+        self.start_ns = 0
+        self.end_ns = 0
+        self._path = path
+        self._n_topics = 0
+        self._n_chunks = 0
+        self._refused: BagFullError | None = None
+        self._schemas: dict[str, Schema] = {}
+        self._worker = ThreadPoolExecutor(1, 'bag_writer') if threaded else None
+        self._jobs: list[Future[None]] = []
+        self._file = path.open('xb', buffering=0)
+        try:
+            self._require_room(0)
+            self._mcap = McapFile(self._file, LIBRARY)
+        except (BagFullError, OSError):
+            self.abandon()
+            raise
+
+    def write(
+        self, topics: Sequence[TopicRecord], messages: Sequence[ChunkMessage], size: int
+    ) -> None:
+        """Write new topics and a chunk of messages.
+
+        Parameters
+        ----------
+        topics
+            Those that are not in the file yet.
+        messages
+            The chunk; may be empty.
+        size
+            Upper bound of its bytes.
+
+        Raises
+        ------
+        BagFullError
+            There is no room for this chunk, or was not for an earlier one.
+        """
+        if self._worker is None:
+            self._write(topics, messages, size)
+            return
+        self._jobs.append(self._worker.submit(self._write, topics, messages, size))
+        while self._jobs and (self._jobs[0].done() or len(self._jobs) > _CHUNKS_IN_FLIGHT):
+            self._jobs.pop(0).result()
+
+    def wait(self) -> None:
+        """Wait until all chunks are written; errors as in `write`, the first one counts."""
+        jobs, self._jobs = self._jobs, []
+        errors = [error for error in (job.exception() for job in jobs) if error is not None]
+        if errors:
+            raise errors[0]
+
+    def _write(
+        self, topics: Sequence[TopicRecord], messages: Sequence[ChunkMessage], size: int
+    ) -> None:
+        try:
+            self._try_to_write(topics, messages, size)
+        except OSError as error:
+            self._refused = BagFullError(f'{self._path}: {error.strerror}; recording ended there')
+            # What was written of the chunk would make the rest of the file unreadable.
+            self._file.truncate(self._mcap.position)
+            self._file.seek(self._mcap.position)
+            raise_if_full(error, str(self._path))
+            raise
+        except BagFullError as error:
+            self._refused = error
+            raise
+        finally:
+            if self._refused is not None:
+                self.lost_counts.update(message[1] for message in messages)
+
+    def _try_to_write(
+        self, topics: Sequence[TopicRecord], messages: Sequence[ChunkMessage], size: int
+    ) -> None:
+        if self._refused is not None:
+            raise self._refused
+        self._n_topics += len(topics)
+        self._require_room(size)
+        for topic in topics:
+            self._describe(topic)
+        if messages:
+            self._add(messages)
+
+    def _describe(self, topic: TopicRecord) -> None:
+        kind = topic.type
+        if kind.name not in self._schemas:
+            self._schemas[kind.name] = self._mcap.add_schema(kind.name, kind.definition)
+        self._mcap.add_channel(
+            Channel(
+                id=topic.id,
+                topic=topic.topic,
+                message_encoding='cdr',
+                schema_id=self._schemas[kind.name].id,
+                metadata={
+                    'offered_qos_profiles': qos_as_yaml(topic.qos),
+                    'topic_type_hash': kind.type_hash,
+                },
+            )
+        )
+
+    def _add(self, messages: Sequence[ChunkMessage]) -> None:
+        chunk = encode_chunk(messages)
+        self._mcap.add_chunk(chunk)
+        first, last = chunk.index.message_start_time, chunk.index.message_end_time
+        self.start_ns = min(first, self.start_ns) if self._n_chunks else first
+        self.end_ns = max(last, self.end_ns) if self._n_chunks else last
+        self._n_chunks += 1
+
+    def _require_room(self, size: int) -> None:
+        per_chunk = _CHUNK_OVERHEAD + 10 * self._n_topics
+        summary = per_chunk * (self._n_chunks + 2) + _TOPIC_OVERHEAD * (self._n_topics + 2)
+        require_room(self._file.fileno(), str(self._path), size + summary)
+
+    def finish(self, metadata: Mapping[str, dict[str, str]]) -> None:
+        """Write metadata records and the summary, hand all to the disk, close.
+
+        Raises
+        ------
+        BagFullError
+            The room for it was taken by somebody else; the file can be recovered.
+        """
+        if self._worker is not None:
+            self._worker.shutdown()
+        try:
+            for name, content in metadata.items():
+                self._mcap.add_metadata(name, content)
+            self._mcap.finish()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise_if_full(error, str(self._path))
+            raise
+        finally:
+            self._file.close()
+
+    def abandon(self) -> None:
+        """Close the file as it is."""
+        if self._worker is not None:
+            self._worker.shutdown(cancel_futures=True)
+        # The file is given up: whatever closing it still complains of is of no use.
+        with suppress(OSError):
+            self._file.close()

@@ -1,0 +1,53 @@
+"""Counts lost messages by the gaps in the numbers that publishers give them."""
+
+
+class SequenceGaps:
+    """Lost messages of one topic.
+
+    DDS numbers the messages of every publisher from 1. Where several publish on a topic, their
+    numbers arrive mixed and unlabelled; each number is taken for the publisher that expects it.
+
+    Attributes
+    ----------
+    received
+        Messages seen.
+    lost
+        Messages that never came, between the first and the last that did.
+    """
+
+    def __init__(self) -> None:
+        self.received = 0
+        self.lost = 0
+        self._last: list[int] = []
+
+    @property
+    def publisher_count(self) -> int:
+        """Publishers told apart so far; one that was restarted counts again."""
+        return len(self._last)
+
+    def add(self, sequence: int, publishers: int = 1) -> int:
+        """Note a message and return how many were lost directly before it.
+
+        Parameters
+        ----------
+        sequence
+            Number that its publisher gave it.
+        publishers
+            How many publish on this topic at the moment, as far as is known. An unexpected number
+            begins a new publisher as long as fewer were seen, and is a loss after that.
+        """
+        self.received += 1
+        last = self._last
+        for k, before in enumerate(last):
+            if before + 1 == sequence:
+                last[k] = sequence
+                return 0
+        earlier = [k for k, before in enumerate(last) if before < sequence]
+        if not earlier or len(last) < publishers:
+            last.append(sequence)
+            return 0
+        nearest = max(earlier, key=lambda k: last[k])
+        gap = sequence - last[nearest] - 1
+        last[nearest] = sequence
+        self.lost += gap
+        return gap
