@@ -1,6 +1,8 @@
 """A recording as analysis sees it: one time series for each measured quantity, by joint."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,21 +31,35 @@ class Series:
         One column for each joint; tensions have two for each, positive and negative wire.
     valid : array like values, of bool
         False where a sample must not be judged: absent, frozen, clipped or wrong.
+    received : array (N,) or None
+        When each sample was received, by the recorder's clock, in s from the recording's first
+        stamp.
     """
 
     topic: str
     time: Array
     values: Array
     valid: Mask
+    received: Array | None = None
 
     def __post_init__(self) -> None:
         if len(self.time) != len(self.values) or self.valid.shape != self.values.shape:
             raise ValueError(f'{self.topic}: time, values and valid differ in length')
 
     @staticmethod
-    def of(topic: str, time: Array, values: Array) -> 'Series':
+    def of(topic: str, time: Array, values: Array, received: Array | None = None) -> 'Series':
         """All samples valid where they are finite."""
-        return Series(topic, time, values, np.isfinite(values))
+        return Series(topic, time, values, np.isfinite(values), received)
+
+    def taken(self, index: NDArray[np.intp] | Mask) -> 'Series':
+        """Return the samples of an index array, in its order."""
+        return replace(
+            self, time=self.time[index], values=self.values[index], valid=self.valid[index],
+            received=None if self.received is None else self.received[index])
+
+    def without(self, wrong: Mask) -> 'Series':
+        """Return the same samples, with those that are `wrong` no longer valid."""
+        return replace(self, valid=self.valid & ~wrong)
 
 
 @dataclass(frozen=True)
@@ -82,9 +98,14 @@ class Recording:
     notes: tuple[str, ...] = field(default=())
 
     def measured(self) -> dict[str, Series]:
-        """Measured series by their name in this class; those that were recorded."""
+        """Return the recorded measured series by their name in this class."""
         names = ('shaft_position', 'shaft_velocity', 'shaft_effort', 'tension', 'bending')
         return {name: s for name in names if (s := getattr(self, name)) is not None}
+
+    def with_series(self, changed: Mapping[str, Series]) -> 'Recording':
+        """Return the same recording with some series, by name, replaced."""
+        fields: dict[str, Any] = dict(changed)
+        return replace(self, **fields)
 
     @property
     def duration(self) -> float:

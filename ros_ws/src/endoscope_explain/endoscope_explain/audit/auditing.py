@@ -1,0 +1,164 @@
+"""The audit of a recording: what is wrong with it, and a version that can be analysed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from endoscope_core.plant import PlantDescription, SensorParameters
+from endoscope_explain.audit.finding import AuditReport, Finding, Severity
+from endoscope_explain.audit.held_samples import held, held_finding
+from endoscope_explain.audit.outliers import find_outliers, motor_travel, outlier_finding
+from endoscope_explain.audit.receipt_clock import (
+    clock_skew_from_receipt,
+    retimed,
+    skew_finding,
+)
+from endoscope_explain.audit.saturation import clipped, saturation_finding
+from endoscope_explain.audit.stamps import (
+    find_gaps,
+    gap_findings,
+    order_stamps,
+    usual_interval,
+)
+from endoscope_explain.recording import Recording, Series
+from endoscope_explain.recording.signals import signal_name
+
+SETTLING_S = 0.5
+"""How long after a gap in the commands the rig's answer is not judged."""
+
+
+def audit_recording(recording: Recording, plant: PlantDescription) -> AuditReport:
+    """Find what is wrong with a recording, and work around it where that is possible.
+
+    Parameters
+    ----------
+    recording : Recording
+        As it was recorded.
+    plant : PlantDescription
+        For the noise and resolution of the sensors.
+
+    Returns
+    -------
+    AuditReport
+    """
+    findings: list[Finding] = []
+    recording = _on_ordered_stamps(recording, findings)
+    recording = _on_one_clock(recording, findings)
+    recording = _without_commandless_times(recording, findings)
+    recording = replace(
+        recording,
+        tension=_audited_tension(recording, plant.sensors, findings),
+        bending=_audited_bending(recording, plant, findings),
+    )
+    order = {Severity.FAULT: 0, Severity.NOTE: 1}
+    findings.sort(key=lambda f: order[f.severity])
+    return AuditReport(recording, tuple(findings))
+
+
+def _on_ordered_stamps(recording: Recording, findings: list[Finding]) -> Recording:
+    joint = recording.joints[0]
+    cleaned = {}
+    seen = set()
+    for name, series in {'command': recording.command, **recording.measured()}.items():
+        cleaned[name], found = order_stamps(series, joint)
+        # Position, velocity and effort of the motor come in the same messages.
+        if series.topic not in seen:
+            findings += found
+        seen.add(series.topic)
+    return recording.with_series(cleaned)
+
+
+def _on_one_clock(recording: Recording, findings: list[Finding]) -> Recording:
+    every = {'command': recording.command, **recording.measured()}
+    skews = clock_skew_from_receipt({s.topic: s for s in every.values()})
+    for topic, skew in skews.items():
+        findings.append(skew_finding(topic, recording.joints[0], skew, recording.duration))
+    changed = {
+        name: retimed(s, skews[s.topic].value) for name, s in every.items() if s.topic in skews
+    }
+    return recording.with_series(changed)
+
+
+def _without_commandless_times(recording: Recording, findings: list[Finding]) -> Recording:
+    every = {s.topic: s for s in (recording.command, *recording.measured().values())}
+    start = min(float(s.time[0]) for s in every.values())
+    end = max(float(s.time[-1]) for s in every.values())
+    gaps = {topic: find_gaps(s, start, end) for topic, s in every.items()}
+    intervals = {topic: usual_interval(s.time) for topic, s in every.items()}
+    findings += gap_findings(gaps, intervals, recording.joints[0])
+    blind = _unknown_command(recording.command, gaps[recording.command.topic], end)
+    if not blind:
+        return recording
+    changed = {}
+    for name, series in recording.measured().items():
+        wrong = np.zeros(len(series.time), bool)
+        for a, b in blind:
+            wrong |= (series.time > a) & (series.time < b + SETTLING_S)
+        shape = (-1,) + (1,) * (series.values.ndim - 1)
+        changed[name] = series.without(np.broadcast_to(wrong.reshape(shape), series.valid.shape))
+    return recording.with_series(changed)
+
+
+def _unknown_command(
+    command: Series, gaps: tuple[tuple[float, float], ...], end: float
+) -> list[tuple[float, float]]:
+    """Gaps across which the command changed by more than its usual step."""
+    unknown = []
+    usual = float(np.quantile(np.abs(np.diff(command.values, axis=0)), 0.99))
+    for a, b in gaps:
+        if a < command.time[0] or b >= end:
+            continue
+        before = command.values[np.searchsorted(command.time, a)]
+        after = command.values[np.searchsorted(command.time, b)]
+        if np.abs(after - before).max() > 2.0 * usual:
+            unknown.append((a, b))
+    return unknown
+
+
+def _audited_tension(
+    recording: Recording, sensors: SensorParameters, findings: list[Finding]
+) -> Series:
+    series = recording.tension
+    interval = usual_interval(series.time)
+    wrong = np.zeros(series.valid.shape, bool)
+    for j, joint in enumerate(recording.joints):
+        for wire in range(2):
+            signal = signal_name('tension', joint, wire)
+            values = series.values[:, j, wire]
+            pile = clipped(values, sensors.load_cell_noise, sensors.load_cell_resolution)
+            at_limit = np.zeros(len(values), bool)
+            if pile is not None:
+                at_limit, limit = pile
+                findings.append(saturation_finding(
+                    joint, signal, series.time, at_limit, limit, sensors.load_cell_resolution,
+                    wire))
+            repeated, _ = held(values, sensors.load_cell_noise, sensors.load_cell_resolution)
+            repeated &= ~at_limit
+            if repeated.any():
+                findings.append(held_finding(
+                    joint, signal, series.topic, series.time, repeated, interval))
+            wrong[:, j, wire] = at_limit | repeated
+    return series.without(wrong)
+
+
+def _audited_bending(
+    recording: Recording, plant: PlantDescription, findings: list[Finding]
+) -> Series:
+    series = recording.bending
+    interval = usual_interval(series.time)
+    motor = recording.shaft_position or recording.command
+    wrong = np.zeros(series.valid.shape, bool)
+    for j, joint in enumerate(recording.joints):
+        signal = signal_name('bending', joint)
+        values = series.values[:, j]
+        repeated, _ = held(values, plant.sensors.tracker_noise, 0.0)
+        if repeated.any():
+            findings.append(held_finding(
+                joint, signal, series.topic, series.time, repeated, interval))
+        travel = motor_travel(
+            series.time, motor.time, motor.values[:, j] / plant.joints[joint].gear, 3.0 * interval)
+        spikes = find_outliers(values, plant.sensors.tracker_noise, travel)
+        if spikes.any():
+            findings.append(outlier_finding(joint, signal, series.time, values, spikes))
+        wrong[:, j] = repeated | spikes
+    return series.without(wrong)

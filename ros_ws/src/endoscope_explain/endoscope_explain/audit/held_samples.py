@@ -1,0 +1,73 @@
+"""Readings that stand still although the sensor's noise never does."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_explain.audit.finding import Finding, Severity
+from endoscope_explain.recording.series import Array, Mask
+
+Indices = NDArray[np.int64]
+
+
+def runs_of_equal(values: Array) -> tuple[Indices, Indices]:
+    """Return starts and lengths of the runs of equal consecutive values of a 1-D array."""
+    starts = np.flatnonzero(np.r_[True, values[1:] != values[:-1]]).astype(np.int64)
+    return starts, np.diff(np.r_[starts, len(values)]).astype(np.int64)
+
+
+def chance_of_repeat(noise: float, resolution: float) -> float:
+    """Return the probability that two readings of a constant are equal, for white noise (rms) and a step."""
+    if noise <= 0.0:
+        return 1.0
+    return min(1.0, resolution / (2.0 * noise * math.sqrt(math.pi)))
+
+
+def held(values: Array, noise: float, resolution: float) -> tuple[Mask, int]:
+    """Find samples that repeat the one before for longer than chance allows.
+
+    Parameters
+    ----------
+    values : array (N,)
+    noise, resolution : float
+        Noise (rms) and step of the sensor, in the values' unit.
+
+    Returns
+    -------
+    repeated : array (N,) of bool
+        All but the first sample of every run that is too long.
+    period : int
+        Usual run length: above 1 where the sensor is published faster than it is read.
+    """
+    starts, lengths = runs_of_equal(values)
+    period = int(np.median(lengths))
+    chance = max(chance_of_repeat(noise, resolution), 1e-3)
+    if chance > 0.5:
+        return np.zeros(len(values), bool), 1
+    # A run this long turns up by chance in fewer than one recording in ten thousand.
+    bound = math.ceil(math.log(1e-4 / len(values)) / math.log(chance)) + 1
+    bound = max(bound, 4 * period, 3)
+    repeated = np.zeros(len(values), bool)
+    for start, length in zip(starts, lengths, strict=True):
+        if length >= bound:
+            repeated[start + 1:start + length] = True
+    return repeated, period
+
+
+def held_finding(
+    joint: str, signal: str, topic: str, time: Array, repeated: Mask, interval: float
+) -> Finding:
+    """Describe the repeated samples of one signal; a note while they are few."""
+    starts = np.flatnonzero(repeated & ~np.r_[False, repeated[:-1]])
+    ends = np.flatnonzero(repeated & ~np.r_[repeated[1:], False])
+    spans = tuple((float(time[a - 1]), float(time[b])) for a, b in zip(starts, ends, strict=True))
+    longest = max(b - a for a, b in spans)
+    severity = Severity.FAULT if longest > max(0.05, 4 * interval) else Severity.NOTE
+    return Finding(
+        'held_samples', severity, joint, 'recording', (signal,), spans,
+        f'{signal} stands still for up to {longest:.3f} s (first from {spans[0][0]:.3f} s), which '
+        'its noise does not allow: the source repeated an old sample',
+        'repeated samples are not judged',
+        evidence={'count': float(repeated.sum()), 'longest_s': longest},
+    )

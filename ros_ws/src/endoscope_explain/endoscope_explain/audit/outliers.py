@@ -1,0 +1,155 @@
+"""Isolated wrong samples of the EM tracker."""
+
+import numpy as np
+from scipy.stats import norm, poisson
+
+from endoscope_explain.audit.finding import Finding, Severity
+from endoscope_explain.explanation import Estimate
+from endoscope_explain.recording.series import Array, Mask
+
+TRAVEL_FACTOR = 1.5
+"""A spike is no motion of the joint where it exceeds the motor's travel by this factor."""
+
+
+def spike_heights(values: Array) -> Array:
+    """Measure how far each sample sticks out beyond both neighbours.
+
+    Parameters
+    ----------
+    values : array (N,)
+
+    Returns
+    -------
+    array (N,)
+        Distance to the nearer of the neighbours where both lie on the same side, else 0; with the
+        sign of the spike.
+    """
+    before = values[1:-1] - values[:-2]
+    after = values[1:-1] - values[2:]
+    same_side = before * after > 0
+    height = np.where(same_side, np.sign(before) * np.minimum(abs(before), abs(after)), 0.0)
+    return np.r_[0.0, height, 0.0]
+
+
+def spike_chance(height: Array, noise: float) -> Array:
+    """Return the probability that white noise (rms `noise`) makes a spike of at least |height|.
+
+    For three independent normal readings of a constant: integral over the middle one of both
+    neighbours lying beyond it by `height`, on either side.
+    """
+    grid = np.linspace(-10.0, 10.0, 801)
+    weight = norm.pdf(grid) * (grid[1] - grid[0])
+    h = np.abs(np.asarray(height, float)) / noise
+    levels = np.linspace(0.0, 20.0, 401)
+    # Squares far in the tail underflow to 0, which is the answer wanted.
+    chance = np.array([2.0 * np.sum(weight * norm.cdf(grid - level) ** 2) for level in levels])
+    return np.where(h > 0, np.exp(np.interp(h, levels, np.log(np.maximum(chance, 1e-300)))), 1.0)
+
+
+def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
+    """Find samples that stick out of their surroundings as noise and motion never do.
+
+    A bending section may jump there and back within three samples where its motor does: a spike
+    counts only where it is larger than the motor's travel around it, and where it stands alone
+    against the signal's own roughness nearby.
+
+    Parameters
+    ----------
+    values : array (N,)
+        Readings at the tracker's own rate, without gaps that matter.
+    noise : float
+        Usual noise (rms) in rad.
+    travel : array (N,)
+        How far the motor moves around each sample, as an angle of the joint in rad.
+
+    Returns
+    -------
+    array (N,) of bool
+        Empty of True unless there are more spikes than chance allows.
+    """
+    wrong = np.zeros(len(values), bool)
+    if len(values) < 20:
+        return wrong
+    scale = max(noise, _quiet_noise(values))
+    for _ in range(3):
+        kept = np.flatnonzero(~wrong)
+        heights = spike_heights(values[kept])
+        roughness = _roughness_nearby(heights)
+        chance = spike_chance(heights, scale)
+        lonely = np.abs(heights) > np.maximum(3.0 * roughness, TRAVEL_FACTOR * travel[kept])
+        bound = 1e-6
+        found = (chance < bound) & lonely
+        surprising = poisson.sf(found.sum() - 1, len(kept) * bound) < 1e-4 if found.any() else False
+        if not surprising:
+            break
+        wrong[kept[found | ((chance < 1e-4) & lonely)]] = True
+    return wrong
+
+
+def motor_travel(
+    tracker_time: Array, motor_time: Array, motor_angle: Array, reach: float
+) -> Array:
+    """Return the range of the motor's angle within `reach` s of each tracker sample.
+
+    Parameters
+    ----------
+    tracker_time : array (N,), motor_time : array (M,)
+        In s, increasing.
+    motor_angle : array (M,)
+        As an angle of the joint in rad.
+    reach : float
+
+    Returns
+    -------
+    array (N,)
+    """
+    first = np.searchsorted(motor_time, tracker_time - reach)
+    last = np.searchsorted(motor_time, tracker_time + reach)
+    last = np.maximum(last, first + 1)
+    padded = np.r_[motor_angle, motor_angle[-1]]
+    bounds = np.minimum(np.c_[first, last].ravel(), len(motor_angle))
+    highest = np.maximum.reduceat(padded, bounds)[::2]
+    lowest = np.minimum.reduceat(padded, bounds)[::2]
+    return np.asarray(highest - lowest)
+
+
+def outlier_finding(
+    joint: str, signal: str, time: Array, values: Array, wrong: Mask
+) -> Finding:
+    """Describe the `tracker_outliers` of one joint."""
+    right = ~wrong
+    size = np.abs(values[wrong] - np.interp(time[wrong], time[right], values[right]))
+    count, n = int(wrong.sum()), len(values)
+    share = count / n
+    spread = 1.645 * np.sqrt(max(count, 1)) / n
+    typical = float(np.sqrt(np.mean(size**2)))
+    return Finding(
+        'tracker_outliers', Severity.FAULT, joint, 'sensing', (signal,),
+        tuple((float(t), float(t)) for t in time[wrong]),
+        f'{count} of {n} samples of {signal} are isolated and wrong, by {np.degrees(typical):.1f} '
+        'deg rms',
+        'wrong samples are not judged',
+        parameters={
+            'share': Estimate(share, max(share - spread, 0.0), share + spread, '-'),
+            'size_rad': Estimate(typical, float(size.min()), float(size.max()), 'rad'),
+        },
+        evidence={'count': float(count)},
+    )
+
+
+def _quiet_noise(values: Array) -> float:
+    # The interpolation error of a cubic through the four neighbours is noise times sqrt(1 + 34/36)
+    # where the signal is smooth; the median ignores what is not.
+    inner = values[2:-2] - (
+        4.0 * (values[1:-3] + values[3:-1]) - (values[:-4] + values[4:])) / 6.0
+    return float(np.median(np.abs(inner)) / 0.6745 / np.sqrt(1.0 + 34.0 / 36.0))
+
+
+def _roughness_nearby(heights: Array, reach: int = 6) -> Array:
+    """Return the second largest |spike| within `reach` samples of every sample."""
+    size = np.abs(heights)
+    padded = np.pad(size, reach)
+    around = np.stack([
+        padded[reach + k:reach + k + len(size)] for k in range(-reach, reach + 1) if abs(k) > 1
+    ])
+    return np.partition(around, -2, axis=0)[-2]

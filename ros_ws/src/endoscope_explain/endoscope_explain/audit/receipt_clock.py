@@ -1,0 +1,91 @@
+"""Clocks that run apart, from when samples were received."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from endoscope_explain.audit.finding import Finding, Severity
+from endoscope_explain.explanation import Estimate
+from endoscope_explain.recording.series import Array, Series
+
+WINDOW_S = 1.0
+
+
+def delay_slope(series: Series) -> tuple[float, float] | None:
+    """Measure the drift of receipt against stamp, from the quickest deliveries of each second.
+
+    Parameters
+    ----------
+    series : Series
+        With increasing stamps.
+
+    Returns
+    -------
+    (float, float) or None
+        Slope in s/s and its standard error; None where receipt is unknown or the series short.
+    """
+    if series.received is None or series.time[-1] - series.time[0] < 5 * WINDOW_S:
+        return None
+    delay = series.received - series.time
+    window = ((series.time - series.time[0]) / WINDOW_S).astype(int)
+    starts = np.flatnonzero(np.r_[True, np.diff(window) > 0])
+    quickest = np.minimum.reduceat(delay, starts)
+    middle = series.time[starts] + 0.5 * WINDOW_S
+    design = np.c_[np.ones(len(middle)), middle - middle.mean()]
+    (_, slope), *_ = np.linalg.lstsq(design, quickest, rcond=None)
+    rest = quickest - design @ np.array([quickest.mean(), slope])
+    # Rounding of receipt times would otherwise promise a precision that nobody has.
+    spread = max(float(np.std(rest, ddof=2)), 1e-6)
+    return float(slope), spread / float(np.sqrt(np.sum(design[:, 1] ** 2)))
+
+
+def clock_skew_from_receipt(series: dict[str, Series]) -> dict[str, Estimate]:
+    """Find the skew of each device's clock against the majority, where it is beyond doubt.
+
+    Parameters
+    ----------
+    series : dict of topic to Series
+
+    Returns
+    -------
+    dict of topic to Estimate
+        Relative rate of its stamps minus one; only topics whose clock runs apart.
+    """
+    slopes = {t: s for t, one in series.items() if (s := delay_slope(one)) is not None}
+    if len(slopes) < 3:
+        return {}
+    usual = float(np.median([slope for slope, _ in slopes.values()]))
+    found = {}
+    for topic, (slope, error) in slopes.items():
+        apart = slope - usual
+        if abs(apart) > max(6.0 * error, 3e-5):
+            skew = -apart / (1.0 + apart)
+            found[topic] = Estimate(skew, skew - 1.645 * error, skew + 1.645 * error, '-')
+    return found
+
+
+def retimed(series: Series, skew: float, start: float = 0.0) -> Series:
+    """Put a series whose clock ran `1 + skew` times as fast on the common clock.
+
+    Parameters
+    ----------
+    series : Series
+    skew : float
+        Relative rate minus one.
+    start : float
+        Stamp in s at which both clocks agreed.
+    """
+    time: Array = start + (series.time - start) / (1.0 + skew)
+    return replace(series, time=time)
+
+
+def skew_finding(topic: str, joint: str, skew: Estimate, duration: float) -> Finding:
+    """Describe the `clock_skew` of the device behind one topic."""
+    way = 'fast' if skew.value > 0 else 'slow'
+    return Finding(
+        'clock_skew', Severity.FAULT, joint, 'recording', (topic,), ((0.0, duration),),
+        f'the clock behind {topic} runs {way} by {abs(skew.value) * 1e3:.3f} ms in a second',
+        'its stamps were put on the common clock',
+        parameters={'skew': skew},
+        evidence={'z': abs(skew.value) / max((skew.high - skew.low) / 3.29, 1e-12)},
+    )

@@ -1,0 +1,162 @@
+"""From a bag to a `Recording`."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from endoscope_bags.errors import BagError, MissingJointError, MissingTopicError
+from endoscope_bags.joint_state_series import JointStateSeries
+from endoscope_bags.recording import Recording as Bag
+from endoscope_bags.recording import open_bag
+from endoscope_core.plant import PlantDescription
+from endoscope_explain.recording.series import (
+    BENDING,
+    COMMAND,
+    DESIRED,
+    MOTOR,
+    WIRES,
+    Recording,
+    Series,
+)
+from endoscope_explain.recording.signals import motor_name, wire_names
+
+WAIVABLE = (MOTOR,)
+"""Topics that analysis can do without where the caller says so."""
+
+
+class TooShortError(BagError):
+    """A topic holds too few messages to be a time series."""
+
+
+def recording_from_bag(
+    path: str | Path,
+    plant: PlantDescription,
+    *,
+    without: Collection[str] = (),
+    namespace: str | None = None,
+) -> Recording:
+    """Read what analysis needs from a bag, in the order in which it was recorded.
+
+    Parameters
+    ----------
+    path : str or Path
+        rosbag2 folder or `.mcap`.
+    plant : PlantDescription
+        Its joints are looked for; its gear turns a bending command into a shaft command where
+        `motor/servo_jp` was not recorded.
+    without : collection of str
+        Topics of `WAIVABLE` that may be missing.
+    namespace : str, optional
+        Where several rigs are in one bag.
+
+    Returns
+    -------
+    Recording
+        With the joints that all topics have, and what is missing in its notes.
+
+    Raises
+    ------
+    BagError
+        Any of endoscope_bags: the bag is cut, empty, lacks a topic or every joint, holds NaN ...
+    """
+    bag = open_bag(path)
+    lacking = [t for t in (WIRES, BENDING, MOTOR) if not bag.has(t, namespace)]
+    lacking += [] if bag.has(COMMAND, namespace) or bag.has(DESIRED, namespace) else [COMMAND]
+    fatal = [t for t in lacking if t not in without]
+    if fatal:
+        raise MissingTopicError(_lacking_message(bag, fatal))
+    notes = [f'{t} was not recorded' for t in lacking]
+
+    def read(topic: str, quantity: str) -> JointStateSeries:
+        series = bag.joint_state(topic, namespace=namespace, order='recorded', finite=(quantity,))
+        if len(series) < 2:
+            raise TooShortError(f'{path}: topic {series.topic} holds {len(series)} message')
+        series.require(quantity)
+        return series
+
+    if bag.has(COMMAND, namespace):
+        command = read(COMMAND, 'position')
+        command_names = {j: motor_name(j) for j in plant.joints}
+    else:
+        command = read(DESIRED, 'position')
+        command_names = {j: j for j in plant.joints}
+        notes.append(f'{COMMAND} was not recorded: {DESIRED} times the gear is taken for it')
+    wires, bending = read(WIRES, 'effort'), read(BENDING, 'position')
+    motor = None if MOTOR in lacking else read(MOTOR, 'position')
+
+    has = {
+        joint: [
+            (command, [command_names[joint]]), (wires, list(wire_names(joint))), (bending, [joint]),
+            *([] if motor is None else [(motor, [motor_name(joint)])]),
+        ] for joint in plant.joints
+    }
+    joints = []
+    for joint, needed in has.items():
+        absent = [f'{s.topic} has no {n}' for s, names in needed for n in names if n not in s.names]
+        if absent:
+            notes.append(f'{joint} is left out: ' + ', '.join(absent))
+        else:
+            joints.append(joint)
+    if not joints:
+        raise MissingJointError(f'{path}: no joint is complete: ' + '; '.join(notes))
+
+    every = [s for s in (command, wires, bending, motor) if s is not None]
+    origin_ns = min(int(s.stamp_ns.min()) for s in every)
+
+    def series(topic: str, source: JointStateSeries, names: Sequence[str], key: str) -> Series:
+        chosen = source.select(names)
+        values = chosen.require(key)
+        time = (chosen.stamp_ns - origin_ns) * 1e-9
+        if key == 'effort' and topic == WIRES:
+            values = values.reshape(len(values), len(joints), 2)
+        received = (chosen.log_ns - origin_ns) * 1e-9
+        return Series.of(topic, time, np.ascontiguousarray(values), received)
+
+    shaft = series(
+        command.topic, command, [command_names[j] for j in joints], 'position')
+    if not bag.has(COMMAND, namespace):
+        gears = np.array([plant.joints[j].gear for j in joints])
+        shaft = Series.of(DESIRED, shaft.time, shaft.values * gears, shaft.received)
+    else:
+        shaft = replace(shaft, topic=COMMAND)
+    motors = dict.fromkeys(('position', 'velocity', 'effort'))
+    if motor is not None:
+        for key in motors:
+            if getattr(motor, key) is None:
+                notes.append(f'{MOTOR} has no {key}')
+                continue
+            motor.check_finite([key])
+            motors[key] = series(MOTOR, motor, [motor_name(j) for j in joints], key)
+    wire_list = [w for j in joints for w in wire_names(j)]
+    return Recording(
+        name=Path(path).name.removesuffix('.mcap'),
+        origin=origin_ns * 1e-9,
+        joints=tuple(joints),
+        command=shaft,
+        tension=series(WIRES, wires, wire_list, 'effort'),
+        bending=series(BENDING, bending, joints, 'position'),
+        shaft_position=motors['position'],
+        shaft_velocity=motors['velocity'],
+        shaft_effort=motors['effort'],
+        notes=tuple(notes),
+    )
+
+
+def plant_of_joints(plant: PlantDescription, joints: Sequence[str]) -> PlantDescription:
+    """Return the plant with those of its joints only that were recorded, and their effects."""
+    return replace(
+        plant,
+        joints={name: plant.joints[name] for name in joints},
+        effects=tuple(e for e in plant.effects if e.joint in joints),
+    )
+
+
+def _lacking_message(bag: Bag, topics: Sequence[str]) -> str:
+    found = ', '.join(sorted(bag.topics)) or 'none'
+    text = f'{bag.path}: lacks topic {", ".join(topics)}; it has {found}'
+    waivable = [t for t in topics if t in WAIVABLE]
+    if waivable and len(waivable) == len(topics):
+        text += f'; to explain it all the same give --without {waivable[0]}'
+    return text

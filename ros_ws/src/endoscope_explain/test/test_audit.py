@@ -1,0 +1,156 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from endoscope_core.plant import PlantDescription
+from endoscope_explain.audit import Severity, audit_recording
+from endoscope_explain.audit.outliers import spike_chance
+from endoscope_explain.audit.receipt_clock import retimed
+from endoscope_explain.recording import Recording, Series
+
+PLANT = PlantDescription()
+
+
+@pytest.fixture(scope='module')
+def sound(record) -> Recording:
+    return record()
+
+
+def named(recording: Recording) -> dict[str, object]:
+    return {f.id: f for f in audit_recording(recording, PLANT).findings}
+
+
+def changed(series: Series, **fields: object) -> Series:
+    return dataclasses.replace(series, **fields)
+
+
+def test_a_sound_recording_has_no_findings_and_stays_as_it_is(sound):
+    report = audit_recording(sound, PLANT)
+    assert report.findings == ()
+    for name, series in sound.measured().items():
+        kept = report.recording.measured()[name]
+        assert np.array_equal(kept.values, series.values)
+        assert kept.valid.all()
+
+
+@pytest.mark.parametrize('quantity', ['bending', 'tension'])
+def test_a_gap_is_named_with_its_topic_and_its_beginning(sound, quantity):
+    series = sound.measured()[quantity]
+    keep = (series.time < 4.2) | (series.time >= 4.9)
+    finding = named(sound.with_series({quantity: series.taken(keep)}))['recording_gap']
+    assert finding.signals == (series.topic,)
+    onset = finding.parameters['time_s']
+    assert onset.low - 1e-9 <= 4.2 <= onset.high + 1e-9
+    assert finding.severity is Severity.FAULT
+
+
+def test_a_topic_that_starts_late_has_a_gap(sound):
+    finding = named(sound.with_series({'bending': sound.bending.taken(sound.bending.time > 2.0)}))
+    assert finding['recording_gap'].intervals[0][0] == 0.0
+
+
+def test_one_lost_sample_is_no_gap(sound):
+    lost = np.arange(len(sound.bending.time)) != 100
+    assert named(sound.with_series({'bending': sound.bending.taken(lost)})) == {}
+
+
+def test_nothing_is_judged_while_the_command_is_unknown(sound):
+    command = sound.command
+    keep = (command.time < 5.0) | (command.time >= 5.5)
+    report = audit_recording(sound.with_series({'command': command.taken(keep)}), PLANT)
+    valid = report.recording.tension.valid.all(axis=(1, 2))
+    time = report.recording.tension.time
+    assert not valid[(time > 5.01) & (time < 5.49)].any()
+    assert valid[(time < 4.9) | (time > 6.1)].all()
+
+
+def test_repeated_stamps_are_dropped_and_noted(sound):
+    doubled = sound.bending.taken(np.sort(np.r_[np.arange(480), np.arange(100, 140)]))
+    report = audit_recording(sound.with_series({'bending': doubled}), PLANT)
+    assert [f.id for f in report.findings] == ['repeated_stamps']
+    assert np.array_equal(report.recording.bending.time, sound.bending.time)
+
+
+def test_swapped_neighbours_are_put_in_order(sound):
+    order = np.arange(len(sound.tension.time))
+    order[[500, 501]] = [501, 500]
+    report = audit_recording(sound.with_series({'tension': sound.tension.taken(order)}), PLANT)
+    (finding,) = report.findings
+    assert (finding.id, finding.severity) == ('unordered_stamps', Severity.NOTE)
+    assert np.array_equal(report.recording.tension.values, sound.tension.values)
+
+
+def test_a_clock_that_is_set_back_is_a_fault(sound):
+    time = sound.bending.time.copy()
+    time[300:] -= 1.0
+    finding = named(sound.with_series({'bending': changed(sound.bending, time=time)}))
+    assert finding['unordered_stamps'].severity is Severity.FAULT
+
+
+def test_a_frozen_cell_is_found_and_not_judged(sound):
+    values = sound.tension.values.copy()
+    values[3000:3400, 0, 1] = values[3000, 0, 1]
+    report = audit_recording(sound.with_series({
+        'tension': changed(sound.tension, values=values)}), PLANT)
+    (finding,) = report.findings
+    assert (finding.id, finding.signals) == ('held_samples', ('wires/measured_js:wire_x_neg',))
+    assert not report.recording.tension.valid[3001:3400, 0, 1].any()
+    assert report.recording.tension.valid.sum() == values.size - 399
+
+
+def test_clipping_is_named_with_wire_and_limit(sound):
+    values = np.minimum(sound.tension.values, np.array([np.inf, 9.0])[None, None, :])
+    values[:, 1] = sound.tension.values[:, 1]
+    report = audit_recording(sound.with_series({
+        'tension': changed(sound.tension, values=values)}), PLANT)
+    (finding,) = report.findings
+    assert (finding.id, finding.joint) == ('load_cell_saturation', 'bend_x')
+    assert finding.parameters['limit_n'].value == pytest.approx(9.0)
+    assert finding.parameters['wire'].value == 1.0
+    assert not report.recording.tension.valid[values == 9.0].any()
+
+
+@pytest.mark.parametrize(('size', 'share'), [(0.2, 0.02), (0.05, 0.01)])
+def test_isolated_wrong_tracker_samples_are_found(sound, size, share):
+    rng = np.random.default_rng(3)
+    values = sound.bending.values.copy()
+    wrong = rng.choice(np.arange(10, len(values) - 10), int(share * len(values)), replace=False)
+    values[wrong, 1] += size * rng.choice([-1, 1], len(wrong))
+    report = audit_recording(sound.with_series({
+        'bending': changed(sound.bending, values=values)}), PLANT)
+    (finding,) = report.findings
+    assert (finding.id, finding.joint) == ('tracker_outliers', 'bend_y')
+    masked = ~report.recording.bending.valid[:, 1]
+    assert masked[wrong].mean() >= 0.7
+    assert masked[np.setdiff1d(np.arange(len(values)), wrong)].mean() < 0.005
+
+
+def test_spikes_of_pure_noise_are_as_rare_as_said():
+    noise = np.random.default_rng(1).standard_normal(200_001)
+    before, after = noise[1:-1] - noise[:-2], noise[1:-1] - noise[2:]
+    height = 1.5
+    seen = ((before * after > 0) & (np.minimum(abs(before), abs(after)) > height)).mean()
+    assert spike_chance(np.array([height]), 1.0)[0] == pytest.approx(seen, rel=0.05)
+
+
+@pytest.mark.parametrize('skew', [2e-3, -5e-4])
+def test_a_skewed_clock_shows_in_the_times_of_receipt(sound, skew):
+    rng = np.random.default_rng(5)
+    every = {'command': sound.command, **sound.measured()}
+    received = {
+        name: changed(s, received=s.time + 2e-4 + rng.exponential(3e-4, len(s.time)))
+        for name, s in every.items()
+    }
+    tracker = received['bending']
+    received['bending'] = changed(tracker, time=tracker.time * (1.0 + skew))
+    report = audit_recording(sound.with_series(received), PLANT)
+    finding = next(f for f in report.findings if f.id == 'clock_skew')
+    assert finding.signals == ('slave/measured_js',)
+    assert finding.parameters['skew'].value == pytest.approx(skew, rel=0.05)
+    assert report.recording.bending.time == pytest.approx(sound.bending.time, abs=1e-3)
+
+
+def test_retiming_undoes_a_skew(sound):
+    fast = changed(sound.bending, time=1.0 + 1.01 * (sound.bending.time - 1.0))
+    assert retimed(fast, 0.01, start=1.0).time == pytest.approx(sound.bending.time)
