@@ -1,0 +1,150 @@
+"""The six packages say truly what they contain, need and may import."""
+
+import ast
+import importlib
+import re
+import subprocess
+import sys
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+WORKSPACE = ROOT / 'ros_ws'
+PACKAGES = sorted(path.parent for path in WORKSPACE.glob('src/*/package.xml'))
+FREE_OF_ROS = ('endoscope_core', 'endoscope_bags', 'endoscope_devices', 'endoscope_explain')
+ROS_MODULES = {'rclpy', 'launch', 'launch_ros', 'ament_index_python'}
+NOT_SOURCE = {'__pycache__', '.mypy_cache', '.pytest_cache', '.ruff_cache'}
+
+# Names under which a distribution is imported, where they differ from its own.
+IMPORT_NAMES = {
+    'dynamixel-sdk': 'dynamixel_sdk',
+    'pyserial': 'serial',
+    'pyyaml': 'yaml',
+    'scikit-learn': 'sklearn',
+    'scikit-surgerynditracker': 'sksurgerynditracker',
+}
+
+each_package = pytest.mark.parametrize('package', PACKAGES, ids=lambda path: path.name)
+
+
+def _imported_modules(folder: Path) -> dict[str, Path]:
+    """Top-level names of absolute imports below `folder`, each with one file that has it."""
+    found: dict[str, Path] = {}
+    for path in folder.rglob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                names = [node.module]
+            else:
+                continue
+            for name in names:
+                found.setdefault(name.split('.')[0], path.relative_to(ROOT))
+    return found
+
+
+def _declared(package: Path) -> set[str]:
+    manifest = ElementTree.parse(package / 'package.xml').getroot()
+    return {str(element.text) for tag in ('depend', 'exec_depend') for element in manifest.iter(tag)}
+
+
+def _locked_modules() -> set[str]:
+    project = tomllib.loads((WORKSPACE / 'pyproject.toml').read_text())['project']
+    names = [re.split(r'[^\w-]', line, maxsplit=1)[0] for line in project['dependencies']]
+    return {IMPORT_NAMES.get(name, name) for name in names}
+
+
+def _entry_points(package: str) -> dict[str, str]:
+    setup = ast.parse((WORKSPACE / 'src' / package / 'setup.py').read_text())
+    strings = [node.value for node in ast.walk(setup) if isinstance(node, ast.Constant)]
+    scripts = [re.fullmatch(r'(\w+) = ([\w.]+:\w+)', str(text)) for text in strings]
+    return {match.group(1): match.group(2) for match in scripts if match}
+
+
+def test_colcon_takes_all_packages_as_ament_python() -> None:
+    listed = subprocess.run(
+        [sys.executable, '-m', 'colcon', '--log-base', '/dev/null', 'list', '--base-paths', 'src'],
+        cwd=WORKSPACE,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert listed.stdout.splitlines() == [
+        f'{package.name}\tsrc/{package.name}\t(ros.ament_python)' for package in PACKAGES
+    ]
+    assert len(PACKAGES) == 6
+
+
+@each_package
+def test_everything_in_the_package_is_installed(package: Path, tmp_path: Path) -> None:
+    subprocess.run(
+        [sys.executable, 'setup.py', '-q', 'egg_info', '--egg-base', str(tmp_path)]
+        + ['build_py', '--build-lib', str(tmp_path / 'lib')],
+        cwd=package,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    built = {
+        path.relative_to(tmp_path / 'lib')
+        for path in (tmp_path / 'lib').rglob('*')
+        if path.is_file()
+    }
+    sources = {
+        path.relative_to(package)
+        for path in (package / package.name).rglob('*')
+        if path.is_file() and not NOT_SOURCE & set(path.parts)
+    }
+    assert built == sources, 'a folder without __init__.py, or a suffix that setup.py does not ship'
+
+
+@each_package
+def test_manifests_agree(package: Path) -> None:
+    manifest = ElementTree.parse(package / 'package.xml').getroot()
+    setup = (package / 'setup.py').read_text()
+    assert manifest.findtext('name') == package.name
+    assert f"package_name = '{package.name}'" in setup
+    assert f"version='{manifest.findtext('version')}'" in setup
+    assert f"license='{manifest.findtext('license')}'" in setup
+    assert (package / 'resource' / package.name).exists()
+    assert f'install_scripts=$base/lib/{package.name}' in (package / 'setup.cfg').read_text()
+
+
+@each_package
+def test_imports_are_declared(package: Path) -> None:
+    locked = _locked_modules() | set(sys.stdlib_module_names)
+    undeclared = {
+        f'{name} ({path})'
+        for name, path in _imported_modules(package / package.name).items()
+        if name not in locked | _declared(package) | {package.name}
+    }
+    assert not undeclared, 'neither in package.xml nor in pyproject.toml'
+
+
+@each_package
+def test_functional_core_imports_no_ros(package: Path) -> None:
+    if package.name in FREE_OF_ROS:
+        assert not ROS_MODULES & _imported_modules(package / package.name).keys()
+
+
+def test_packages_do_not_depend_on_each_other_in_a_circle() -> None:
+    names = {package.name for package in PACKAGES}
+    remaining = {
+        package.name: _imported_modules(package / package.name).keys() & names - {package.name}
+        for package in PACKAGES
+    }
+    while remaining:
+        free = {name for name, needed in remaining.items() if not needed & remaining.keys()}
+        assert free, f'a circle among {sorted(remaining)}'
+        for name in free:
+            del remaining[name]
+
+
+@each_package
+def test_entry_points_can_be_called(package: Path) -> None:
+    for target in _entry_points(package.name).values():
+        module, function = target.split(':')
+        assert callable(getattr(importlib.import_module(module), function))
