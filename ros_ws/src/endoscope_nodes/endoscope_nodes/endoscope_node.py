@@ -1,7 +1,7 @@
 """What every node of the endoscope has: its runtime, the shared ticker, parameters, diagnostics."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from rclpy.node import Node
 
@@ -10,8 +10,6 @@ from endoscope_nodes.parameters import declare_parameters
 
 if TYPE_CHECKING:
     from endoscope_nodes.runtime import Runtime
-
-P = TypeVar('P')
 
 
 class EndoscopeNode(Node):
@@ -41,9 +39,10 @@ class EndoscopeNode(Node):
         self.ticker = runtime.ticker_of(self)
         self.diagnostics = Diagnostics(self, self.ticker)
 
-    def parameters(self, kind: type[P], on_change: Callable[[P], None] | None = None) -> P:
+    def parameters[P](self, kind: type[P], on_change: Callable[[P], None] | None = None,
+                      check: Callable[[P], object] | None = None) -> P:
         """Declare the parameters of the dataclass ``kind``; see :func:`declare_parameters`."""
-        return declare_parameters(self, kind, on_change)
+        return declare_parameters(self, kind, on_change, check)
 
     def close(self) -> None:
         """Finish what must not be cut off; called once, before the node is destroyed."""

@@ -9,13 +9,11 @@ import difflib
 import math
 import typing
 from collections.abc import Callable, Iterable
-from typing import Any, TypeVar
+from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-
-P = TypeVar('P')
 
 
 class ParameterError(ValueError):
@@ -45,14 +43,17 @@ def parameter(default: Any, description: str, *, unit: str = '', low: float | No
         'choices': choices, 'dynamic': dynamic})
 
 
-def declare_parameters(node: Node, kind: type[P], on_change: Callable[[P], None] | None = None
-                       ) -> P:
+def declare_parameters[P](node: Node, kind: type[P],
+                          on_change: Callable[[P], None] | None = None,
+                          check: Callable[[P], object] | None = None) -> P:
     """Declare every field of the dataclass ``kind`` on ``node`` and return its checked values.
 
     Parameters
     ----------
     on_change
         Called with the new values after a dynamic parameter was set.
+    check
+        Called with the new values before they are taken; raises `ParameterError` to refuse them.
 
     Raises
     ------
@@ -74,12 +75,13 @@ def declare_parameters(node: Node, kind: type[P], on_change: Callable[[P], None]
         values[name] = _checked(node.get_name(), field, hints[name], given)
     current = kind(**values)
     if any(f.metadata['dynamic'] for f in fields.values()):
-        _watch(node, fields, hints, current, on_change)
+        _watch(node, fields, hints, current, on_change, check)
     return current
 
 
 def _watch(node: Node, fields: dict[str, dataclasses.Field], hints: dict[str, Any], current: Any,
-           on_change: Callable[[Any], None] | None) -> None:
+           on_change: Callable[[Any], None] | None,
+           check_all: Callable[[Any], object] | None) -> None:
     state = [current]
 
     def changed(parameters: list[Parameter]) -> dict[str, Any]:
@@ -88,7 +90,9 @@ def _watch(node: Node, fields: dict[str, dataclasses.Field], hints: dict[str, An
 
     def check(parameters: list[Parameter]) -> SetParametersResult:
         try:
-            changed(parameters)
+            new = changed(parameters)
+            if new and check_all is not None:
+                check_all(dataclasses.replace(state[0], **new))
         except ParameterError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)

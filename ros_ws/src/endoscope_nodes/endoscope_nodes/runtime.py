@@ -1,6 +1,7 @@
 """The one place that starts, spins and shuts down ROS, for one node or for many in a process."""
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self, TypeVar
@@ -121,6 +122,12 @@ class Runtime:
                                      f'{", ".join(names)} run here')
         check_overrides(list(self.nodes))
 
+    def connected(self) -> bool:
+        """Whether every publisher of this process has found every subscription of this process."""
+        wanted = Counter(s.topic_name for node in self.nodes for s in node.subscriptions)
+        return all(p.get_subscription_count() >= wanted[p.topic_name]
+                   for node in self.nodes for p in node.publishers)
+
     def stop(self) -> None:
         """Let :meth:`spin` return; may be called from any thread, before or while it spins."""
         if not self._stop.done():
@@ -193,10 +200,18 @@ def run_nodes(factories: Sequence[Callable[[Runtime], EndoscopeNode]],
     int
         0, the exit code that a node asked for, or 2 for parameters or arguments that were refused.
     """
+    def compose(runtime: Runtime) -> None:
+        for factory in factories:
+            runtime.add(factory)
+
+    return run(compose, args)
+
+
+def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -> int:
+    """Let ``compose`` add nodes to a runtime and run them; see :func:`run_nodes`."""
     try:
         with Runtime(args) as runtime, StopSignals(runtime.stop):
-            for factory in factories:
-                runtime.add(factory)
+            compose(runtime)
             runtime.check_parameters()
             runtime.spin()
     except (ParameterError, InvalidNodeNameException, InvalidNamespaceException,

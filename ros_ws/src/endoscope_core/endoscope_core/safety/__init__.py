@@ -1,0 +1,17 @@
+"""What stands between a command and motion: states, gates, guards and bumpless changes."""
+
+from endoscope_core.safety.bumpless_output import BumplessOutput
+from endoscope_core.safety.clutch_follower import ClutchFollower
+from endoscope_core.safety.command_gate import CommandGate, CommandLimits, Refusal
+from endoscope_core.safety.operating_state import (
+    Answer,
+    OperatingState,
+    OperatingStateMachine,
+    StateCommand,
+)
+from endoscope_core.safety.tension_guard import TensionGuard
+
+__all__ = [
+    'Answer', 'BumplessOutput', 'ClutchFollower', 'CommandGate', 'CommandLimits', 'OperatingState',
+    'OperatingStateMachine', 'Refusal', 'StateCommand', 'TensionGuard',
+]

@@ -1,0 +1,134 @@
+"""Operating states of the slave by CRTK, with a fault that latches.
+
+States and commands follow the Collaborative Robotics Toolkit (Su et al., IEEE IRC 2020):
+``DISABLED``, ``ENABLED``, ``PAUSED``, ``FAULT`` and ``enable``, ``disable``, ``pause``, ``resume``,
+``home``.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class OperatingState(StrEnum):
+    """What the slave may do; it moves only when ``ENABLED``."""
+
+    DISABLED = 'DISABLED'
+    ENABLED = 'ENABLED'
+    PAUSED = 'PAUSED'
+    FAULT = 'FAULT'
+
+
+class StateCommand(StrEnum):
+    """What an operator may ask for."""
+
+    ENABLE = 'enable'
+    DISABLE = 'disable'
+    PAUSE = 'pause'
+    RESUME = 'resume'
+    HOME = 'home'
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What became of a state command.
+
+    Attributes
+    ----------
+    accepted
+        Whether it was carried out.
+    reason
+        Why not; empty when accepted.
+    """
+
+    accepted: bool
+    reason: str = ''
+
+
+_ALLOWED = {
+    StateCommand.ENABLE: {OperatingState.DISABLED, OperatingState.FAULT, OperatingState.ENABLED},
+    StateCommand.DISABLE: {OperatingState.DISABLED, OperatingState.ENABLED, OperatingState.PAUSED},
+    StateCommand.PAUSE: {OperatingState.ENABLED, OperatingState.PAUSED},
+    StateCommand.RESUME: {OperatingState.PAUSED, OperatingState.ENABLED},
+    StateCommand.HOME: {OperatingState.ENABLED},
+}
+
+_LEADS_TO = {
+    StateCommand.ENABLE: OperatingState.ENABLED,
+    StateCommand.DISABLE: OperatingState.DISABLED,
+    StateCommand.PAUSE: OperatingState.PAUSED,
+    StateCommand.RESUME: OperatingState.ENABLED,
+}
+
+
+class OperatingStateMachine:
+    """The one place that decides in which state the slave is.
+
+    A fault latches: it stays after its cause has gone, and only an explicit ``enable`` ends it,
+    which is refused while any cause is present.  Nothing else ever leads to ``ENABLED``.
+
+    Attributes
+    ----------
+    state
+        The state now.
+    cause
+        Why it is ``FAULT``: the first cause; empty otherwise.
+    """
+
+    def __init__(self) -> None:
+        self.state = OperatingState.DISABLED
+        self.cause = ''
+        self._present: dict[str, str] = {}
+
+    @property
+    def present_causes(self) -> dict[str, str]:
+        """Conditions that forbid motion now: name to description."""
+        return dict(self._present)
+
+    def command(self, text: str) -> Answer:
+        """Carry out a command, or say why not.
+
+        Parameters
+        ----------
+        text
+            One of :class:`StateCommand`; anything else is refused.
+        """
+        try:
+            command = StateCommand(text)
+        except ValueError:
+            known = ', '.join(StateCommand)
+            return Answer(False, f"unknown state command '{text}'; known are {known}")
+        if self.state not in _ALLOWED[command]:
+            extra = f' ({self.cause}); use enable once the cause is gone' if self.cause else ''
+            return Answer(False, f"'{command}' is not possible in {self.state}{extra}")
+        if command is StateCommand.ENABLE and self._present:
+            return Answer(False, 'not enabled: ' + '; '.join(self._present.values()))
+        if command is not StateCommand.HOME:
+            self.state = _LEADS_TO[command]
+            self.cause = ''
+        return Answer(True)
+
+    def report_cause(self, name: str, description: str) -> bool:
+        """Note that a condition forbids motion; a fault if the slave may be moving.
+
+        Parameters
+        ----------
+        name
+            Key of the condition, for :meth:`clear_cause`.
+        description
+            One line that names the thing and what is wrong with it.
+
+        Returns
+        -------
+        bool
+            Whether the state changed.
+        """
+        self._present[name] = description
+        if self.state in (OperatingState.ENABLED, OperatingState.PAUSED):
+            self.state = OperatingState.FAULT
+            self.cause = description
+            return True
+        return False
+
+    def clear_cause(self, name: str) -> None:
+        """Note that a condition is gone; a fault stays until ``enable``."""
+        self._present.pop(name, None)

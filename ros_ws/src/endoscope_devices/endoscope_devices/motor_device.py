@@ -1,0 +1,70 @@
+"""What a motor driver node needs of a servo bus, simulated or real."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from endoscope_core.errors import EndoscopeError
+
+
+class DeviceError(EndoscopeError, RuntimeError):
+    """A device cannot be opened or is set up wrongly; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class MotorReading:
+    """Newest valid state of J motor shafts.
+
+    Attributes
+    ----------
+    position, velocity, effort
+        rad, rad/s and N m, shape (J,).
+    """
+
+    position: tuple[float, ...]
+    velocity: tuple[float, ...]
+    effort: tuple[float, ...]
+
+
+class MotorDevice(Protocol):
+    """A set of servos in position mode.
+
+    A real bus runs in a thread of its own; :meth:`exchange` hands over the newest goal, takes the
+    newest reading, and never waits.
+    """
+
+    names: tuple[str, ...]
+
+    def open(self) -> None:
+        """Connect and check the settings.
+
+        Raises
+        ------
+        DeviceError
+            Not reachable, or set up wrongly.
+        """
+
+    def set_torque(self, on: bool) -> None:
+        """Let the servos hold their goal, or let them go."""
+
+    def exchange(self, goal: Sequence[float], periods: int) -> MotorReading | None:
+        """Set the goal and give the newest reading.
+
+        Parameters
+        ----------
+        goal
+            Shaft angles in rad, shape (J,): the newest command.
+        periods
+            Control periods (1 ms) since the last call.
+
+        Returns
+        -------
+        MotorReading or None
+            None while there is no new valid reading.
+        """
+
+    def health(self) -> tuple[str, dict[str, object]]:
+        """What is wrong (empty if nothing), and figures for diagnostics."""
+
+    def close(self) -> None:
+        """Let go of the device."""

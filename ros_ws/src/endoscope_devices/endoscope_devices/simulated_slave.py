@@ -1,0 +1,80 @@
+"""The simulated slave behind the interface of a servo bus."""
+
+from collections.abc import Sequence
+
+from endoscope_core.plant import PlantDescription, PlantSample, PlantSimulator, SensorModel
+from endoscope_devices.motor_device import MotorReading
+
+Numbers = tuple[float, ...]
+
+
+class SimulatedSlave:
+    """Servos, wires and joints of a plant, advanced by the motor driver's beat.
+
+    Parameters
+    ----------
+    plant
+        The rig with its effects.
+    names
+        Motor names, one for each joint of the plant and in that order.
+    seed
+        Of the sensors' noise.
+
+    Attributes
+    ----------
+    tension
+        Noise-free wire tensions in N after the last exchange, shape (2 J,): positive and negative
+        wire of each joint in turn.
+    bending
+        Noise-free bending angles in rad as the tracker would read them, shape (J,).
+    """
+
+    def __init__(self, plant: PlantDescription, names: Sequence[str], seed: int) -> None:
+        if len(names) != len(plant.joint_names()):
+            raise ValueError(f'{len(names)} motors for {len(plant.joint_names())} joints')
+        self.names = tuple(names)
+        self._plant = plant
+        self._simulator = PlantSimulator(plant)
+        self._sensors = SensorModel(plant.sensors, seed)
+        self._torque = False
+        self._goal: Numbers = (0.0,) * len(self.names)
+        self._started = False
+        self.tension: Numbers = ()
+        self.bending: Numbers = ()
+
+    def open(self) -> None:
+        """Nothing to connect; the plant is compiled here rather than in the first tick."""
+        PlantSimulator(self._plant).advance(self._goal)
+        self._take(self._simulator.sample)
+
+    def set_torque(self, on: bool) -> None:
+        """A servo without torque is held by its gear: the goal stays where it was."""
+        self._torque = on
+
+    def exchange(self, goal: Sequence[float], periods: int) -> MotorReading | None:
+        """Advance the plant under the goal, which has been in force since the last call.
+
+        The first call only reads: time begins there.
+        """
+        if not self._started:
+            self._started = True
+            return self._take(self._simulator.sample)
+        if self._torque:
+            self._goal = tuple(goal)
+        return self._take(self._simulator.advance(self._goal, periods))
+
+    def _take(self, sample: PlantSample) -> MotorReading:
+        self.tension = tuple(sample.tension.ravel().tolist())
+        self.bending = tuple(sample.bending.tolist())
+        sensors = self._sensors
+        return MotorReading(
+            tuple(sensors.shaft_position(sample.shaft_position).tolist()),
+            tuple(sensors.shaft_velocity(sample.shaft_velocity).tolist()),
+            tuple(sensors.shaft_effort(sample.shaft_effort).tolist()))
+
+    def health(self) -> tuple[str, dict[str, object]]:
+        """A simulation has nothing to complain about."""
+        return '', {}
+
+    def close(self) -> None:
+        """Nothing to let go of."""

@@ -1,0 +1,211 @@
+"""Beats simulated time for the whole graph, a tick at a time, as fast as the graph can follow."""
+
+import struct
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rclpy.clock import Clock, ClockType
+from rclpy.task import Future
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import JointState
+
+from endoscope_bags.cdr_encoding import encode_clock
+from endoscope_core.errors import EndoscopeError
+from endoscope_nodes.diagnostics import OK, Report
+from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.names import (
+    CALIBRATION_COMMAND,
+    CORRECTION,
+    MOTOR_COMMAND,
+    MOTOR_MEASURED,
+    SLAVE_COMMAND,
+    SLAVE_MEASURED,
+    WIRES_MEASURED,
+)
+from endoscope_nodes.parameters import parameter
+from endoscope_nodes.qos import LOCK_STEP
+from endoscope_nodes.runtime import Runtime, run_nodes
+from endoscope_nodes.sampling import SampleClock
+from endoscope_nodes.ticker import TICK_NS
+
+FOLLOWED = (SLAVE_COMMAND, CALIBRATION_COMMAND, CORRECTION, MOTOR_COMMAND, SLAVE_MEASURED,
+            MOTOR_MEASURED, WIRES_MEASURED)
+_STAMP = struct.Struct('<iI')
+
+
+class BarrierTimeout(EndoscopeError, TimeoutError):
+    """A topic did not answer a tick; the message names it."""
+
+
+@dataclass(frozen=True)
+class ConductorParameters:
+    """Parameters of the conductor."""
+
+    wait_for: tuple[str, ...] = parameter(
+        (MOTOR_MEASURED, WIRES_MEASURED), 'topics without whose answer time never goes on',
+        choices=FOLLOWED)
+    start: float = parameter(1.0, 'simulated time of the first tick', unit='s', low=0.001)
+    duration: float = parameter(
+        0.0, 'how long to run when started as a process of its own; 0 for ever', unit='s', low=0.0)
+    speed: float = parameter(
+        0.0, 'simulated seconds in a real one; 0 for as fast as possible', low=0.0, high=100.0)
+    tracker_rate: float = parameter(
+        40.0, 'rate of slave/measured_js, to know in which ticks to expect it', unit='Hz', low=0.1,
+        high=1000.0)
+    timeout: float = parameter(
+        10.0, 'real time after which a missing answer is an error', unit='s', low=0.1)
+    grace: float = parameter(
+        0.05, 'real time after which a stream that is not waited for is taken as ended', unit='s',
+        low=0.001)
+
+
+class ConductorNode(EndoscopeNode):
+    """Publishes ``/clock`` in lock-step with the graph.
+
+    The next tick comes once every topic of ``wait_for``, and every other stream that answered the
+    tick before, has published a message with this tick's stamp.  In one process this makes the
+    content of every message a function of parameters and seeds alone.
+    """
+
+    def __init__(self, runtime: Runtime) -> None:
+        super().__init__('conductor', runtime)
+        p = self.parameters(ConductorParameters)
+        self._runtime = runtime
+        self._settings = p
+        self._now_ns = round(p.start * 1e9) - TICK_NS
+        self._until_ns = self._now_ns
+        self._answered: dict[str, int] = dict.fromkeys(FOLLOWED, 0)
+        self._pending: set[str] = set()
+        self._tracker = SampleClock(p.tracker_rate)
+        self._asked_at = time.monotonic()
+        self._repeated = False
+        self._future: Future | None = None
+        self.ticks = 0
+        self.failure: BarrierTimeout | None = None
+        self._clock_out = self.create_publisher(ClockMessage, '/clock', LOCK_STEP)
+        for topic in FOLLOWED:
+            self.create_subscription(
+                JointState, topic, self._answer_to(topic), LOCK_STEP, raw=True)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(min(p.grace, p.timeout) / 2, self._look, clock=steady)
+        if p.speed > 0.0:
+            self.create_timer(TICK_NS * 1e-9 / p.speed, self._go_on, clock=steady)
+        self.diagnostics.add('lock-step', self._report)
+
+    def advance(self, seconds: float) -> Future:
+        """Let simulated time go on by ``seconds``; the future is done when it has.
+
+        Its exception is a :class:`BarrierTimeout` if a topic did not answer.
+        """
+        self._until_ns = self._now_ns + round(seconds * 1e9)
+        self._future = Future()
+        self._asked_at = time.monotonic()
+        if not self._pending:
+            self._step()
+        return self._future
+
+    @property
+    def now_ns(self) -> int:
+        """Stamp of the last tick."""
+        return self._now_ns
+
+    def _answer_to(self, topic: str) -> Callable[[bytes], None]:
+        answered, pending = self._answered, self._pending
+
+        def answer(data: bytes) -> None:
+            seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+            answered[topic] = seconds * 1_000_000_000 + nanoseconds
+            if answered[topic] >= self._now_ns and topic in pending:
+                pending.discard(topic)
+                if not pending and self._settings.speed == 0.0:
+                    self._step()
+
+        return answer
+
+    def _go_on(self) -> None:
+        if not self._pending:
+            self._step()
+
+    def _step(self) -> None:
+        if self._now_ns >= self._until_ns:
+            future, self._future = self._future, None
+            if future is not None and not future.done():
+                future.set_result(None)
+            return
+        before = self._now_ns
+        self._now_ns = now = before + TICK_NS
+        self.ticks += 1
+        tracked = self._tracker.due(now)
+        self._pending.update(self._settings.wait_for)
+        for topic, stamp in self._answered.items():
+            if topic == SLAVE_MEASURED:
+                if tracked and now - stamp < 1.5e9 / self._settings.tracker_rate:
+                    self._pending.add(topic)
+            elif stamp == before:
+                self._pending.add(topic)
+        self._asked_at = time.monotonic()
+        self._clock_out.publish(encode_clock(now))
+
+    def _look(self) -> None:
+        """Repeat a tick that may have been lost, give streams up that have ended."""
+        if not self._pending or self._future is None:
+            return
+        waited = time.monotonic() - self._asked_at
+        if waited > self._settings.grace:
+            self._clock_out.publish(encode_clock(self._now_ns))
+            self._pending.intersection_update(self._settings.wait_for)
+            if not self._pending:
+                self._step()
+        if self._pending and waited > self._settings.timeout:
+            self._fail()
+
+    def _fail(self) -> None:
+        topics = ', '.join(sorted(self._pending))
+        self.failure = BarrierTimeout(
+            f'simulated time stands still at {self._now_ns * 1e-9:.3f} s: waited '
+            f'{self._settings.timeout:g} s for {topics}; start the node that publishes it, or '
+            "leave it out of the conductor's parameter 'wait_for'")
+        self.exit_code = 1
+        future, self._future = self._future, None
+        if future is not None:
+            future.set_exception(self.failure)
+
+    def _report(self) -> Report:
+        return OK, 'running', {'ticks': self.ticks}
+
+
+class SelfStartingConductor(ConductorNode):
+    """A conductor that begins by itself once its topics exist, for a process of its own."""
+
+    def __init__(self, runtime: Runtime) -> None:
+        super().__init__(runtime)
+        self._begun = False
+        self._waiting_since = time.monotonic()
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(0.5, self._begin, clock=self._steady)
+
+    def _begin(self) -> None:
+        if self._begun:
+            if self.failure is not None:
+                self.get_logger().error(str(self.failure))
+                self._runtime.stop()
+            return
+        missing = [t for t in self._settings.wait_for if not self.count_publishers(t)]
+        if missing or not self._runtime.connected():
+            if time.monotonic() - self._waiting_since > self._settings.timeout:
+                self.get_logger().error(f'nobody publishes {", ".join(missing)}')
+                self._waiting_since = time.monotonic()
+            return
+        self._begun = True
+        future = self.advance(self._settings.duration or 1e9)
+        future.add_done_callback(self._on_end)
+
+    def _on_end(self, future: Future) -> None:
+        if future.exception() is None:
+            self._runtime.stop()
+
+
+def main() -> int:
+    """Run the conductor in a process of its own."""
+    return run_nodes([SelfStartingConductor])

@@ -1,0 +1,209 @@
+"""JointState streams at 1 kHz: bytes in, bytes out, no message objects.
+
+Converting a JointState between C and Python costs more than sending it (22 us a hop against 8).
+The layout of a stream never changes, so each publisher fills numbers into a prepared message and
+each subscription reads them from known places; a message of another layout is parsed anew.
+"""
+
+import struct
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+
+from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.cdr_layout import QUANTITIES, joint_state_layout
+from endoscope_bags.errors import MalformedMessageError
+
+_SECOND = 1_000_000_000
+_STAMP_END = 12
+
+
+class JointSample(NamedTuple):
+    """One JointState, values in the order of the names that the subscriber asked for.
+
+    Attributes
+    ----------
+    stamp_ns
+        Header stamp in ns.
+    position, velocity, effort
+        rad, rad/s, N m (N for wires); empty where the message has none.
+    """
+
+    stamp_ns: int
+    position: tuple[float, ...]
+    velocity: tuple[float, ...]
+    effort: tuple[float, ...]
+
+
+class JointPublisher:
+    """Publishes JointStates of fixed names and fields.
+
+    Parameters
+    ----------
+    names
+        The J joints.
+    fields
+        Which of ``position``, ``velocity``, ``effort`` the messages carry, in this order.
+    """
+
+    def __init__(self, node: Node, topic: str, names: Sequence[str], fields: Sequence[str],
+                 qos: QoSProfile) -> None:
+        zeros: dict[str, Any] = dict.fromkeys(fields, [0.0] * len(names))
+        self._message = bytearray(encode_joint_state(names, 0, **zeros))
+        columns = joint_state_layout(bytes(self._message)).columns
+        starts = [columns[field][0] for field in QUANTITIES if field in fields]
+        self._struct, self._at = _values_struct(starts, len(names))
+        self._stamp = struct.Struct('<iI')
+        self._publisher = node.create_publisher(JointState, topic, qos)
+        self.count = 0
+
+    def publish(self, stamp_ns: int, *values: float) -> None:
+        """Publish one message: the J numbers of the first field, then those of the next."""
+        seconds, nanoseconds = divmod(stamp_ns, _SECOND)
+        self._stamp.pack_into(self._message, 4, seconds, nanoseconds)
+        self._struct.pack_into(self._message, self._at, *values)
+        self._publisher.publish(bytes(self._message))
+        self.count += 1
+
+
+class JointReader:
+    """Reads JointStates of certain joints out of CDR bytes.
+
+    Parameters
+    ----------
+    names
+        The joints asked for.
+    exact
+        Whether other joints in a message make it unacceptable: right for commands.
+    """
+
+    def __init__(self, names: Sequence[str], exact: bool = False) -> None:
+        self._names = tuple(names)
+        self._exact = exact
+        self._spans: list[tuple[int, int, bytes]] = [(0, 4, b'none')]
+        self._struct = struct.Struct('<iI')
+        self._slices: list[slice] = []
+        self._pick: list[int] | None = None
+
+    def read(self, data: bytes) -> JointSample:
+        """Read one message.
+
+        Raises
+        ------
+        MalformedMessageError
+            Not a JointState, or not of the joints asked for.
+        """
+        for start, stop, expected in self._spans:
+            if data[start:stop] != expected:
+                self._learn(data)
+                break
+        values = self._struct.unpack_from(data, 4)
+        fields = [values[part] for part in self._slices]
+        if self._pick is not None:
+            fields = [tuple(f[i] for i in self._pick) if f else f for f in fields]
+        return JointSample(values[0] * _SECOND + values[1], *fields)
+
+    def _learn(self, data: bytes) -> None:
+        self._spans = [(0, 4, b'none')]
+        layout = joint_state_layout(data)
+        wrong = [n for n in self._names if n not in layout.names]
+        if wrong or (self._exact and len(layout.names) != len(self._names)):
+            raise MalformedMessageError(
+                f'is for {", ".join(layout.names) or "no joint"} instead of '
+                f'{", ".join(self._names)}')
+        n = len(layout.names)
+        present = [layout.columns[q][0] if q in layout.columns else None for q in QUANTITIES]
+        starts = [start for start in present if start is not None]
+        order = '>' if layout.big_endian else '<'
+        body, at = _values_format(starts, n)
+        self._struct = struct.Struct(f'{order}iI{at - _STAMP_END}x{body}')
+        self._slices = []
+        first = 2
+        for start in present:
+            self._slices.append(slice(first, first if start is None else first + n))
+            first = self._slices[-1].stop
+        order_here = [layout.names.index(name) for name in self._names]
+        self._pick = None if order_here == list(range(n)) else order_here
+        edges = [0, 4, _STAMP_END]
+        for start in starts:
+            edges += [start, start + 8 * n]
+        edges.append(max(stop for _, stop in layout.fixed))
+        gaps = [(a, max(a, b)) for a, b in zip(edges[0::2], edges[1::2], strict=True)]
+        self._spans = [(a, b, data[a:b]) for a, b in gaps]
+
+
+class JointSubscription:
+    """Delivers the JointStates of a topic as samples.
+
+    Parameters
+    ----------
+    callback
+        Called with each sample.
+    on_malformed
+        Called with the reason where a message is not a JointState of these joints.
+
+    Attributes
+    ----------
+    malformed
+        How many messages were unreadable or of other joints.
+    """
+
+    def __init__(self, node: Node, topic: str, names: Sequence[str],
+                 callback: Callable[[JointSample], None], qos: QoSProfile, *,
+                 exact: bool = False,
+                 on_malformed: Callable[[str], None] | None = None) -> None:
+        self.malformed = 0
+        self._reader = JointReader(names, exact)
+        self._callback = callback
+        self._on_malformed = on_malformed
+        node.create_subscription(JointState, topic, self._receive, qos, raw=True)
+
+    def _receive(self, data: bytes) -> None:
+        try:
+            sample = self._reader.read(data)
+        except MalformedMessageError as error:
+            self.malformed += 1
+            if self._on_malformed is not None:
+                self._on_malformed(str(error))
+            return
+        self._callback(sample)
+
+
+class LatestJointState:
+    """Keeps the newest message of a topic and reads it only when it is wanted."""
+
+    def __init__(self, node: Node, topic: str, names: Sequence[str], qos: QoSProfile) -> None:
+        self._reader = JointReader(names)
+        self._data: bytes | None = None
+        node.create_subscription(JointState, topic, self._keep, qos, raw=True)
+
+    def _keep(self, data: bytes) -> None:
+        self._data = data
+
+    def read(self) -> JointSample | None:
+        """Read the newest message, or None while there is none of these joints."""
+        if self._data is None:
+            return None
+        try:
+            return self._reader.read(self._data)
+        except MalformedMessageError:
+            return None
+
+
+def _values_format(starts: Sequence[int], count: int) -> tuple[str, int]:
+    """Format of all numbers from the first one on, and where that is."""
+    if not starts:
+        return '', _STAMP_END
+    text = f'{count}d'
+    for before, after in pairwise(starts):
+        text += f'{after - before - 8 * count}x{count}d'
+    return text, starts[0]
+
+
+def _values_struct(starts: Sequence[int], count: int) -> tuple[struct.Struct, int]:
+    text, at = _values_format(starts, count)
+    return struct.Struct('<' + text), at

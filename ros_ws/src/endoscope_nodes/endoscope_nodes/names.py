@@ -1,0 +1,23 @@
+"""Names of joints, motors, wires and topics, as other people's programs rely on them."""
+
+JOINTS = ('bend_x', 'bend_y')
+MOTORS = ('motor_x', 'motor_y')
+WIRES = ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg')
+
+MASTER_MEASURED = 'master/measured_js'
+MASTER_CLUTCH = 'master/clutch'
+SLAVE_COMMAND = 'slave/servo_jp'
+SLAVE_MEASURED = 'slave/measured_js'
+CALIBRATION_COMMAND = 'calibration/servo_jp'
+CALIBRATION_RESULT = 'calibration/result'
+CALIBRATION_RUN = 'calibration/run'
+CORRECTION = 'controller/correction_js'
+COMPENSATOR_STATE = 'compensator/state'
+MOTOR_COMMAND = 'motor/servo_jp'
+MOTOR_MEASURED = 'motor/measured_js'
+WIRES_MEASURED = 'wires/measured_js'
+TRACKER_POSE = 'tracker/measured_cp'
+OPERATING_STATE = 'slave/operating_state'
+STATE_COMMAND = 'slave/state_command'
+SIMULATED_WIRES = 'simulation/wires'
+SIMULATED_BENDING = 'simulation/bending'

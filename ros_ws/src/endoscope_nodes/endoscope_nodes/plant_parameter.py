@@ -1,0 +1,26 @@
+"""The plant that the nodes of a simulated slave share, named by a parameter."""
+
+from endoscope_core.plant import PlantDescription, PlantFileError, load_plant
+from endoscope_nodes.names import JOINTS
+from endoscope_nodes.parameters import ParameterError
+
+
+def load_plant_parameter(node_name: str, path: str) -> PlantDescription:
+    """Load the plant file of a parameter; an empty path is the nominal plant.
+
+    Raises
+    ------
+    ParameterError
+        The file cannot be read as a plant of both joints.
+    """
+    if not path:
+        return PlantDescription()
+    try:
+        plant = load_plant(path)
+    except (PlantFileError, OSError) as error:
+        raise ParameterError(f"{node_name}: parameter 'plant_file': {error}") from error
+    if plant.joint_names() != JOINTS:
+        raise ParameterError(
+            f"{node_name}: parameter 'plant_file': {path} describes {', '.join(plant.joints)}; "
+            f'the nodes need {", ".join(JOINTS)} in this order')
+    return plant
