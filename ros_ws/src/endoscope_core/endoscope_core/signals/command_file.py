@@ -1,0 +1,137 @@
+"""Command files: a motion of the bending joints as a table that a console can play.
+
+CSV with a header line; the column `time` in s and one column in rad for each joint. Between its
+rows the angle is interpolated linearly.
+"""
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from endoscope_core.atomic_output import write_text
+from endoscope_core.errors import EndoscopeError
+
+FloatArray = NDArray[np.float64]
+
+TIME = 'time'
+JOINTS = ('bend_x', 'bend_y')
+
+
+class CommandFileError(EndoscopeError, ValueError):
+    """A command file that cannot be played; the message names the line."""
+
+
+@dataclass(frozen=True)
+class CommandTable:
+    """A sampled motion.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        Columns of `angle`.
+    time : array (N,)
+        Increasing, in s.
+    angle : array (N, J)
+        Desired bending angles in rad.
+    """
+
+    joints: tuple[str, ...]
+    time: FloatArray
+    angle: FloatArray
+
+
+def write_command_file(
+    path: str | Path, time: ArrayLike, angle: ArrayLike, joints: Sequence[str] = JOINTS
+) -> None:
+    """Write a command file, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    time : array (N,)
+        In s, increasing.
+    angle : array (N, J)
+        In rad.
+    joints : sequence of str
+        Names of the columns of `angle`.
+
+    Raises
+    ------
+    CommandFileError
+        If the table has another shape, is not finite, or its time does not increase.
+    """
+    time, angle = np.asarray(time, float), np.asarray(angle, float)
+    table = CommandTable(tuple(joints), time, angle)
+    _check(table, str(path))
+    lines = [','.join([TIME, *joints])]
+    lines += [
+        ','.join([f'{t:.4f}', *(f'{a:.6f}' for a in row)])
+        for t, row in zip(time, angle, strict=True)
+    ]
+    write_text(path, '\n'.join(lines) + '\n')
+
+
+def read_command_file(path: str | Path, joints: Sequence[str] = JOINTS) -> CommandTable:
+    """Read a command file.
+
+    Parameters
+    ----------
+    path : str or Path
+    joints : sequence of str
+        Columns that it must have; the table has them in this order.
+
+    Returns
+    -------
+    CommandTable
+
+    Raises
+    ------
+    CommandFileError
+        If the file cannot be read, lacks a column, or a value is not a finite number or out of
+        order.
+    """
+    path = Path(path)
+    wanted = (TIME, *joints)
+    try:
+        with path.open(newline='', encoding='utf-8') as file:
+            reader = csv.DictReader(file)
+            missing = [c for c in wanted if c not in (reader.fieldnames or ())]
+            if missing:
+                raise CommandFileError(f'{path}: no column {", ".join(missing)}')
+            rows = [_numbers(path, reader.line_num, row, wanted) for row in reader]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise CommandFileError(f'{path} cannot be read: {error}') from error
+    if len(rows) < 2:
+        raise CommandFileError(f'{path}: fewer than two rows')
+    numbers = np.array(rows)
+    table = CommandTable(tuple(joints), numbers[:, 0], numbers[:, 1:])
+    _check(table, str(path))
+    return table
+
+
+def _numbers(
+    path: Path, line: int, row: dict[str, str], wanted: Sequence[str]
+) -> list[float]:
+    try:
+        values = [float(row[name]) for name in wanted]
+    except (TypeError, ValueError) as error:
+        raise CommandFileError(f'{path}: line {line} holds something else than numbers') from error
+    if not all(math.isfinite(value) for value in values):
+        raise CommandFileError(f'{path}: line {line} holds a value that is not finite')
+    return values
+
+
+def _check(table: CommandTable, name: str) -> None:
+    if table.angle.shape != (len(table.time), len(table.joints)) or len(table.time) < 2:
+        raise CommandFileError(
+            f'{name}: {len(table.time)} times for angles of shape {table.angle.shape}')
+    if not (np.isfinite(table.time).all() and np.isfinite(table.angle).all()):
+        raise CommandFileError(f'{name}: a value is not finite')
+    backward = np.flatnonzero(np.diff(table.time) <= 0)
+    if len(backward):
+        raise CommandFileError(f'{name}: time does not increase at line {backward[0] + 3}')
