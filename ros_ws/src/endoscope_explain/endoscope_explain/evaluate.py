@@ -1,11 +1,11 @@
 """Simulate one joint on its recorded commands and compare with what its sensors read."""
 
 import numpy as np
+from numpy.typing import NDArray
+
 from endoscope_core.plant import PlantDescription
 from endoscope_core.plant.kernel import OUTPUTS, run_joints
 from endoscope_core.plant.packing import pack, rest_state
-from numpy.typing import NDArray
-
 from endoscope_explain.observation import TICK, JointObservation
 
 Array = NDArray[np.float64]

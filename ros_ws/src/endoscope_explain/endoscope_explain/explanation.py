@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
-from endoscope_core.plant import PlantDescription
 from numpy.typing import NDArray
+
+from endoscope_core.plant import PlantDescription
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from endoscope_explain.observation import JointObservation
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-STEP = 2.0e-3
+STEP = 1.0e-2
 """Difference step of a coordinate: large against the integrator's error, small against bends."""
 
 
@@ -115,7 +115,7 @@ def jacobian(model: JointModel, theta: Array, at: Array, columns: list[int] | No
     result = np.empty((len(at), len(columns)))
     for i, c in enumerate(columns):
         moved = theta.copy()
-        step = STEP if model.free[c].logarithmic else 5.0 * STEP
+        step = STEP if model.free[c].logarithmic else 2.0 * STEP
         step = step if theta[c] + step <= high[c] else -step
         moved[c] = max(theta[c] + step, low[c])
         result[:, i] = (model.residuals(moved) - at) / (moved[c] - theta[c])

@@ -4,9 +4,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from endoscope_core.effects import CATALOGUE, EffectParameter
 from endoscope_core.effects.slots import NOMINAL_KEYS
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

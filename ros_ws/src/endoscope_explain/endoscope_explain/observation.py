@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
+
 from endoscope_core.plant import PlantDescription, SensorParameters
 from endoscope_core.plant.kernel import (
     IN_COMMAND,
@@ -20,8 +22,6 @@ from endoscope_core.plant.kernel import (
     OUT_TENSION_B,
 )
 from endoscope_core.plant.on_stamps import hold_on_ticks
-from numpy.typing import NDArray
-
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.signals import QUANTITY_UNITS, signal_name
 

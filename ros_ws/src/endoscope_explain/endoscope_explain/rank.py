@@ -1,0 +1,107 @@
+"""Fit one more effect to a joint: a cheap quasi-Newton look first, a full fit where it pays.
+
+The derivative by the parameters that the parent fit already has is shared by all effects that are
+tried on it and corrected by Broyden's rank-one update (Broyden, Math. Comp. 19, 1965), so that a
+look costs about ten simulations instead of a hundred.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_explain.fit import Fit, JointModel, bounded_step, fit, jacobian
+from endoscope_explain.screen import Promise, with_effect
+
+Array = NDArray[np.float64]
+
+LOOK_STEPS = 5
+
+
+@dataclass(frozen=True)
+class Look:
+    """A candidate after the cheap fit.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Effects on the joint, the new one last.
+    model : JointModel
+    theta : array (n,)
+    cost : float
+    """
+
+    effects: tuple[str, ...]
+    model: JointModel
+    theta: Array
+    cost: float
+
+
+def look(
+    anchors: tuple[Fit, ...], effects: tuple[str, ...], promise: Promise, steps: int = LOOK_STEPS
+) -> Look:
+    """Cheap fit of one more effect from one starting point.
+
+    Parameters
+    ----------
+    anchors : tuple of Fit
+        Fits of the same model without the effect, to start from; the better one is taken.
+    effects : tuple of str
+        Effects that the anchors already have.
+    promise : Promise
+        Effect and starting point.
+    steps : int
+        Quasi-Newton steps.
+
+    Returns
+    -------
+    Look
+    """
+    model = with_effect(anchors[0].model, promise.effect_id, promise.start)
+    added = model.free[len(anchors[0].theta):]
+    own = np.array([item.coordinate(float(model.base[item.index])) for item in added])
+    begun = []
+    for anchor in anchors:
+        theta = np.concatenate([anchor.theta, own])
+        begun.append((theta, model.residuals(theta), anchor))
+    theta, residuals, anchor = min(
+        begun, key=lambda b: float(np.sum(b[1]**2) + np.sum(model.prior(b[0])**2)))
+    columns = list(range(len(anchor.theta), len(theta)))
+    derivative = np.hstack([anchor.jacobian, jacobian(model, theta, residuals, columns)])
+    theta, cost = _quasi_newton(model, theta, residuals, derivative, steps)
+    return Look((*effects, promise.effect_id), model, theta, cost)
+
+
+def _quasi_newton(
+    model: JointModel, theta: Array, residuals: Array, derivative: Array, steps: int
+) -> tuple[Array, float]:
+    low, high = model.bounds()
+    weight = model.prior_weight()
+
+    def cost_of(values: Array, at: Array) -> float:
+        return 0.5 * float(values @ values + np.sum(model.prior(at)**2))
+
+    cost = cost_of(residuals, theta)
+    damping = 1e-3
+    for _ in range(steps):
+        normal = derivative.T @ derivative + np.diag(weight**2)
+        gradient = derivative.T @ residuals + weight * model.prior(theta)
+        scale = np.maximum(np.diag(normal), 1e-9)
+        step = bounded_step(normal + damping * np.diag(scale), gradient, theta, low, high)
+        length = float(step @ step)
+        if length < 1e-12:
+            break
+        trial = model.residuals(theta + step)
+        derivative += np.outer((trial - residuals - derivative @ step) / length, step)
+        trial_cost = cost_of(trial, theta + step)
+        if trial_cost < cost:
+            theta, residuals, cost = theta + step, trial, trial_cost
+            damping = max(damping / 5.0, 1e-6)
+        else:
+            damping *= 20.0
+    return theta, cost
+
+
+def polish(candidate: Look, iterations: int = 10) -> Fit:
+    """Full fit of a candidate from where its look ended."""
+    return fit(candidate.model, candidate.theta, iterations=iterations)
