@@ -10,7 +10,7 @@ import numpy as np
 
 from endoscope_bags.bag_files import METADATA
 from endoscope_bags.chunk_sink import ChunkSink, TopicRecord
-from endoscope_bags.errors import BagExistsError, BagFullError
+from endoscope_bags.errors import BagError, BagExistsError, BagFullError
 from endoscope_bags.mcap_chunk import MESSAGE_OVERHEAD, ChunkMessage
 from endoscope_bags.message_stream import MessageStream
 from endoscope_bags.message_types import MessageType, message_type
@@ -47,12 +47,20 @@ class BagWriter:
     threaded
         Compress and write chunks in a thread, for callers that must not stall.
 
+    Attributes
+    ----------
+    closed, finished
+        Whether `close` or `discard` was called, and whether the recording is complete with its
+        summary and metadata.
+
     Raises
     ------
     BagExistsError
         Something is there already.
     BagFullError
         There is no room even for the beginning.
+    BagError
+        The place cannot be written to.
     """
 
     def __init__(
@@ -68,6 +76,7 @@ class BagWriter:
         if self.path.exists() or self.path.is_symlink():
             raise BagExistsError(f'{self.path}: exists already; recordings are never overwritten')
         self.closed = False
+        self.finished = False
         self._bare = self.path.suffix == '.mcap'
         self._file_name = self.path.name if self._bare else f'{self.path.name}_0.mcap'
         self._chunk_ns = round(chunk_seconds * 1e9)
@@ -82,16 +91,23 @@ class BagWriter:
         file_path = self._home if self._bare else self._home / self._file_name
         try:
             self._sink = ChunkSink(file_path, threaded=threaded)
-        except (BagFullError, OSError):
+        except BagFullError:
             self._remove_home()
             raise
+        except OSError as error:
+            self._remove_home()
+            raise BagError(f'{file_path}: cannot be made: {error.strerror}') from error
 
     def _make_home(self, atomic: bool) -> Path:
-        self.path.parent.mkdir(parents=True, exist_ok=True)
         hidden = self.path.with_name(f'.partial-{os.getpid()}-{self.path.name}')
         home = hidden if atomic else self.path
-        if not self._bare:
-            home.mkdir()
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            if not self._bare:
+                home.mkdir()
+        except OSError as error:
+            raise_if_full(error, str(home))
+            raise BagError(f'{self.path}: cannot be made: {error.strerror}') from error
         return home
 
     @property
@@ -104,6 +120,11 @@ class BagWriter:
     def message_count(self) -> int:
         """Messages accepted so far."""
         return sum(self.counts.values())
+
+    @property
+    def waiting_since_ns(self) -> int | None:
+        """Receipt of the first message of the chunk in progress; None if there is none."""
+        return self._first_ns if self._pending else None
 
     def add_topic(
         self, topic: str, kind: str | MessageType, qos: Sequence[QosProfile] = ()
@@ -256,6 +277,7 @@ class BagWriter:
             raise
         if self._home != self.path:
             self._home.rename(self.path)
+        self.finished = True
         if full is not None:
             raise full
 

@@ -93,8 +93,8 @@ class BagInformation:
     def __str__(self) -> str:
         begin = np.datetime64(self.start_ns, 'ns')
         lines = [
-            f'{self.path}: {self.message_count} messages over {self.duration_s:.3f} s '
-            f'from {begin} UTC, written by {self.library or "an unnamed program"}'
+            f'{self.path}: {self.message_count} messages over {self.duration_s:.3f} s',
+            f'from {begin} UTC, written by {self.library or "an unnamed program"}',
         ]
         lines += [f'{key}: {value}' for key, value in self.notes.items()]
         lines += [f'damage: {what}' for what in self.damage]

@@ -1,5 +1,12 @@
 """Counts lost messages by the gaps in the numbers that publishers give them."""
 
+from collections.abc import Callable
+
+
+def one_publisher() -> int:
+    """Return 1: what to assume where nothing is known."""
+    return 1
+
 
 class SequenceGaps:
     """Lost messages of one topic.
@@ -25,16 +32,17 @@ class SequenceGaps:
         """Publishers told apart so far; one that was restarted counts again."""
         return len(self._last)
 
-    def add(self, sequence: int, publishers: int = 1) -> int:
+    def add(self, sequence: int, count_publishers: Callable[[], int] = one_publisher) -> int:
         """Note a message and return how many were lost directly before it.
 
         Parameters
         ----------
         sequence
             Number that its publisher gave it.
-        publishers
-            How many publish on this topic at the moment, as far as is known. An unexpected number
-            begins a new publisher as long as fewer were seen, and is a loss after that.
+        count_publishers
+            Tells how many publish on this topic at the moment; asked in case of doubt only. An
+            unexpected number begins a new publisher as long as fewer were seen, and is a loss
+            after that.
         """
         self.received += 1
         last = self._last
@@ -43,7 +51,7 @@ class SequenceGaps:
                 last[k] = sequence
                 return 0
         earlier = [k for k, before in enumerate(last) if before < sequence]
-        if not earlier or len(last) < publishers:
+        if not earlier or len(last) < count_publishers():
             last.append(sequence)
             return 0
         nearest = max(earlier, key=lambda k: last[k])

@@ -1,0 +1,241 @@
+"""The recorder without ROS: counts, losses, a full disk, and what is told at the end."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from endoscope_bags.bag_writer import CHUNK_SECONDS, BagWriter
+from endoscope_bags.errors import BagFullError
+from endoscope_bags.information import LOST_PREFIX
+from endoscope_bags.qos_profile import QosProfile
+from endoscope_bags.sequence_gaps import SequenceGaps
+
+_STALE_CHUNK_NS = round(1.25e9 * CHUNK_SECONDS)
+
+
+class Arrival(NamedTuple):
+    """A message that arrived; the order of the fields is the order of recording.
+
+    Attributes
+    ----------
+    received_ns
+        Receipt, ns since the epoch.
+    topic
+        Number that `RecordingSession.add_topic` gave.
+    sequence
+        The publisher's message counter.
+    published_ns
+        Publication, ns since the epoch.
+    data
+        The message in CDR.
+    """
+
+    received_ns: int
+    topic: int
+    sequence: int
+    published_ns: int
+    data: bytes
+
+
+@dataclass(frozen=True)
+class SessionReport:
+    """How a recording went.
+
+    Attributes
+    ----------
+    path
+        The recording.
+    counts
+        Messages recorded, by topic.
+    lost
+        Messages published and not recorded, by topic; topics without loss have 0.
+    full
+        Why recording ended early (the disk was full); empty otherwise.
+    finished
+        Whether the recording is complete with its summary; if not, `recover` completes it.
+    """
+
+    path: Path
+    counts: dict[str, int]
+    lost: dict[str, int]
+    full: str
+    finished: bool
+
+    @property
+    def message_count(self) -> int:
+        """Messages recorded."""
+        return sum(self.counts.values())
+
+    @property
+    def lost_count(self) -> int:
+        """Messages lost."""
+        return sum(self.lost.values())
+
+    @property
+    def complete(self) -> bool:
+        """Whether everything that was published is in the recording."""
+        return not self.lost_count and not self.full and self.finished
+
+    def __str__(self) -> str:
+        text = f'{self.path}: {self.message_count} messages, {self.lost_count} lost'
+        losses = [f'{topic} {count}' for topic, count in self.lost.items() if count]
+        text += f' ({", ".join(losses)})' if losses else ''
+        text += f'; {self.full}' if self.full else ''
+        return text if self.finished else f'{text}; complete it with `endoscope bag recover`'
+
+
+@dataclass
+class _Source:
+    topic: str
+    type: str
+    offered_qos: Callable[[], Sequence[QosProfile]]
+    count_publishers: Callable[[], int]
+    gaps: SequenceGaps
+    announced: bool = False
+
+
+class RecordingSession:
+    """One recording while it is made.
+
+    A full disk does not end the session: what was recorded is finished at once, and what still
+    arrives is counted as lost.
+
+    Parameters
+    ----------
+    path
+        Folder or ``.mcap`` to write; what is there when the process is killed can be recovered.
+    threaded
+        Compress and write in a thread.
+
+    Raises
+    ------
+    BagExistsError
+        `path` is taken.
+    BagFullError
+        There is no room even for the beginning.
+    """
+
+    def __init__(self, path: str | Path, *, threaded: bool = True) -> None:
+        self._writer = BagWriter(path, atomic=False, threaded=threaded)
+        self._sources: list[_Source] = []
+        self._full = ''
+
+    @property
+    def path(self) -> Path:
+        """The recording."""
+        return self._writer.path
+
+    def add_topic(
+        self,
+        topic: str,
+        type_name: str,
+        offered_qos: Callable[[], Sequence[QosProfile]] = tuple,
+        count_publishers: Callable[[], int] = lambda: 1,
+    ) -> int:
+        """Announce a topic and return its number.
+
+        Parameters
+        ----------
+        topic, type_name
+            Full name and message type.
+        offered_qos
+            Asked once, when the first message has come: the publishers are known then.
+        count_publishers
+            Asked when a message has an unexpected number.
+        """
+        self._sources.append(
+            _Source(topic, type_name, offered_qos, count_publishers, SequenceGaps())
+        )
+        return len(self._sources) - 1
+
+    def accept(self, batch: Iterable[Arrival]) -> None:
+        """Record what arrived since the last call; sorted by receipt here."""
+        for received_ns, number, sequence, published_ns, data in sorted(batch):
+            source = self._sources[number]
+            source.gaps.add(sequence, source.count_publishers)
+            if self._full:
+                continue
+            try:
+                if not source.announced:
+                    self._announce(source)
+                self._writer.write_raw(
+                    source.topic, source.type, data, received_ns, published_ns, sequence
+                )
+            except BagFullError as error:
+                self._end_full(error)
+
+    def _announce(self, source: _Source) -> None:
+        self._writer.add_topic(source.topic, source.type, source.offered_qos())
+        source.announced = True
+
+    def flush_stale(self, now_ns: int) -> None:
+        """Hand a chunk to the operating system that no later message has closed.
+
+        Parameters
+        ----------
+        now_ns
+            Time by the clock of the receipts, ns since the epoch.
+        """
+        waiting_since = self._writer.waiting_since_ns
+        if self._full or waiting_since is None or now_ns - waiting_since < _STALE_CHUNK_NS:
+            return
+        try:
+            self._writer.flush()
+        except BagFullError as error:
+            self._end_full(error)
+
+    def _end_full(self, error: BagFullError) -> None:
+        self._full = str(error)
+        self._finish()
+
+    def _finish(self) -> None:
+        try:
+            self._writer.close(self._notes())
+        except BagFullError as error:
+            self._full = str(error)
+
+    def _notes(self) -> dict[str, str]:
+        notes = {'ended': self._full or 'on request'}
+        return notes | {
+            f'{LOST_PREFIX}{source.topic}': str(source.gaps.lost) for source in self._sources
+        }
+
+    def report(self) -> SessionReport:
+        """Say how it goes, or went."""
+        written = self._writer.counts
+        counts = {s.topic: written.get(s.topic, 0) for s in self._sources}
+        lost = {s.topic: s.gaps.lost + s.gaps.received - counts[s.topic] for s in self._sources}
+        return SessionReport(
+            self.path, counts, lost, self._full, self._writer.finished or not self._writer.closed
+        )
+
+    def close(self) -> SessionReport:
+        """Finish the recording and say how it went; again is harmless."""
+        if not self._writer.closed:
+            for source in self._sources:
+                if not source.announced:
+                    self._announce(source)
+            self._finish()
+        return self.report()
+
+
+def simulated_receipt_ns(stamp_ns: int | None, last_tick_ns: int, now_ns: int) -> int:
+    """Return when a message was received in simulated time.
+
+    Messages are collected at a tick of the clock, `now_ns`; what is found then came during the
+    tick before, or was sent already in this one by a node that heard the clock earlier. Its stamp
+    tells which, so that the same simulation is recorded the same whoever was faster.
+
+    Parameters
+    ----------
+    stamp_ns
+        Header stamp; None for types without one.
+    last_tick_ns
+        The tick before; 0 if this is the first one.
+    now_ns
+        This tick.
+    """
+    if not last_tick_ns:
+        return now_ns
+    return min(now_ns, max(last_tick_ns, stamp_ns or 0))

@@ -1,0 +1,282 @@
+"""Records topics into a bag: every message as it came, counted, with what was lost."""
+
+import struct
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from rclpy.qos import QoSProfile
+from std_srvs.srv import Trigger
+
+from endoscope_bags.errors import BagError, UnknownTypeError
+from endoscope_bags.message_types import begins_with_header, message_type
+from endoscope_bags.recording_session import (
+    Arrival,
+    RecordingSession,
+    SessionReport,
+    simulated_receipt_ns,
+)
+from endoscope_nodes.diagnostics import ERROR, OK, Report
+from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.qos import RECORDER_ASKED
+from endoscope_nodes.raw_subscription import RawSubscription
+from endoscope_nodes.recorded_topics import (
+    INTERFACE_TOPICS,
+    message_class,
+    offered_profiles,
+    suitable_qos,
+    type_name,
+)
+from endoscope_nodes.runtime import Runtime, run_nodes
+
+_STAMP = struct.Struct('<iI')
+_SECOND = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class RecorderParameters:
+    """Parameters of the recorder."""
+
+    bag: str = parameter(
+        '', 'folder or .mcap file to write; empty for bags/recording-DATE-TIME', dynamic=True
+    )
+    topics: tuple[str, ...] = parameter(
+        tuple(INTERFACE_TOPICS), 'topics to record, relative ones in the namespace of the node'
+    )
+    autostart: bool = parameter(True, 'record from the start instead of on recorder/start')
+    drain_period: float = parameter(
+        0.002, 'how often the queues are emptied', unit='s', low=0.0005, high=0.1
+    )
+
+
+@dataclass
+class _Source:
+    name: str
+    kind: type
+    asked: QoSProfile
+    has_stamp: bool
+    subscription: RawSubscription
+    number: int
+
+
+class RecorderNode(EndoscopeNode):
+    """Records from ``recorder/start`` (or from the beginning) to ``recorder/stop`` or the end.
+
+    In real time a message is recorded with the middleware's stamps of receipt and publication. In
+    simulated time both are the tick of ``/clock`` in which it came, so that the same simulation
+    gives the same bag. Losses, found as gaps in the publishers' numbers, and a full disk are told
+    in the diagnostics, in the bag, and by exit code 1.
+
+    Attributes
+    ----------
+    last_report
+        How the last recording went; None before it ended.
+    """
+
+    def __init__(self, runtime: Runtime) -> None:
+        super().__init__('recorder', runtime)
+        self._bag = ''
+        p = self.parameters(RecorderParameters, self._on_parameters)
+        self._bag = p.bag
+        self._topics = p.topics
+        self._session: RecordingSession | None = None
+        self._sources: list[_Source] = []
+        self._untyped: list[str] = []
+        self._last_tick_ns = 0
+        self._said_loss = 0
+        self.last_report: SessionReport | None = None
+        self.create_service(Trigger, 'recorder/start', self._on_start)
+        self.create_service(Trigger, 'recorder/stop', self._on_stop)
+        if self.ticker.simulated:
+            self.ticker.add(self._on_tick)
+        else:
+            self.ticker.every(p.drain_period, self._drain)
+        self.ticker.every(1.0, self._look_around)
+        self.diagnostics.add('recording', self._report)
+        if p.autostart:
+            try:
+                self.start()
+            except BagError as error:
+                raise ParameterError(f"recorder: parameter 'bag': {error}") from error
+
+    def _on_parameters(self, new: RecorderParameters) -> None:
+        self._bag = new.bag
+
+    def start(self) -> Path:
+        """Begin a recording and return where it goes.
+
+        Raises
+        ------
+        BagError
+            One is being made already, its place is taken, or the disk is full.
+        """
+        if self._session is not None:
+            raise BagError(f'already recording to {self._session.path}; stop that first')
+        path = Path(self._bag or time.strftime('bags/recording-%Y%m%d-%H%M%S'))
+        self._session = RecordingSession(path)
+        self._said_loss = 0
+        self._untyped = list(self._topics)
+        self._subscribe_untyped()
+        self.get_logger().info(f'recording to {path}')
+        return path
+
+    def stop(self) -> SessionReport:
+        """End the recording and say how it went.
+
+        Raises
+        ------
+        BagError
+            There is none.
+        """
+        if self._session is None:
+            raise BagError('not recording')
+        self._collect(self.ticker.now_ns())
+        session, self._session = self._session, None
+        sources, self._sources = self._sources, []
+        for source in sources:
+            source.subscription.close()
+        report = self.last_report = session.close()
+        if report.complete:
+            self.get_logger().info(str(report))
+        else:
+            self.exit_code = 1
+            self.get_logger().error(str(report))
+        return report
+
+    def close(self) -> None:
+        """Finish a recording that is being made."""
+        if self._session is not None:
+            self.stop()
+
+    def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            response.message = str(self.start())
+            response.success = True
+        except BagError as error:
+            response.message = str(error)
+        return response
+
+    def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            report = self.stop()
+            response.message, response.success = str(report), report.complete
+        except BagError as error:
+            response.message = str(error)
+        return response
+
+    def _subscribe_untyped(self) -> None:
+        """Subscribe to the topics whose type is known by now."""
+        untyped, self._untyped = self._untyped, []
+        for topic in untyped:
+            try:
+                self._subscribe(topic)
+            except UnknownTypeError as error:
+                self.get_logger().error(f'{topic} is not recorded: {error}')
+
+    def _subscribe(self, topic: str) -> None:
+        known = INTERFACE_TOPICS.get(topic)
+        if known is not None:
+            self._add_source(topic, *known)
+            return
+        types = dict(self.get_topic_names_and_types()).get(self.resolve_topic_name(topic), [])
+        if types:
+            self._add_source(topic, message_class(types[0]), RECORDER_ASKED)
+        else:
+            self._untyped.append(topic)
+
+    def _add_source(self, topic: str, kind: type, asked: QoSProfile) -> None:
+        assert self._session is not None
+        full = self.resolve_topic_name(topic)
+        name = type_name(kind)
+        has_stamp = begins_with_header(message_type(name).definition)
+        qos = suitable_qos(asked, self.get_publishers_info_by_topic(full))
+        subscription = RawSubscription(self, kind, topic, qos)
+        source = _Source(full, kind, asked, has_stamp, subscription, 0)
+        source.number = self._session.add_topic(
+            full,
+            name,
+            lambda: offered_profiles(self.get_publishers_info_by_topic(full)),
+            lambda: source.subscription.count_publishers(),
+        )
+        self._sources.append(source)
+
+    def _look_around(self) -> None:
+        """Find the types of topics that nobody had published yet, and adapt to their QoS."""
+        session = self._session
+        if session is None:
+            return
+        self._subscribe_untyped()
+        for source in self._sources:
+            publishers = self.get_publishers_info_by_topic(source.name)
+            qos = suitable_qos(source.asked, publishers)
+            if publishers and (qos.durability, qos.reliability) != (
+                source.subscription.qos.durability,
+                source.subscription.qos.reliability,
+            ):
+                self._collect(self.ticker.now_ns())
+                source.subscription.close()
+                source.subscription = RawSubscription(self, source.kind, source.name, qos)
+        report = session.report()
+        if report.lost_count > self._said_loss:
+            self._said_loss = report.lost_count
+            self.get_logger().error(str(report))
+
+    def _on_tick(self, stamp_ns: int, periods: int) -> None:
+        self._collect(stamp_ns)
+        self._last_tick_ns = stamp_ns
+
+    def _drain(self) -> None:
+        self._collect(self.ticker.now_ns())
+
+    def _collect(self, now_ns: int) -> None:
+        session = self._session
+        if session is None or now_ns == 0:
+            return
+        arrivals = []
+        simulated = self.ticker.simulated
+        for source in self._sources:
+            number = source.number
+            for data, info in source.subscription.take():
+                if simulated:
+                    received = simulated_receipt_ns(
+                        _stamp_ns(data) if source.has_stamp else None, self._last_tick_ns, now_ns
+                    )
+                    published = received
+                else:
+                    received = info['received_timestamp']
+                    published = info['source_timestamp']
+                arrivals.append(
+                    Arrival(received, number, info['publication_sequence_number'], published, data)
+                )
+        if arrivals:
+            session.accept(arrivals)
+        if not simulated:
+            session.flush_stale(now_ns)
+
+    def _report(self) -> Report:
+        if self._session is None:
+            return OK, 'not recording', {}
+        report = self._session.report()
+        values: dict[str, object] = {
+            'bag': report.path,
+            'messages': report.message_count,
+            'lost': report.lost_count,
+        }
+        for topic, count in report.counts.items():
+            values[topic] = f'{count} recorded, {report.lost[topic]} lost'
+        if report.full:
+            return ERROR, report.full, values
+        if report.lost_count:
+            return ERROR, f'{report.lost_count} messages lost', values
+        return OK, 'recording', values
+
+
+def _stamp_ns(data: bytes) -> int:
+    seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+    return int(seconds) * _SECOND + int(nanoseconds)
+
+
+def main() -> int:
+    """Run the recorder in a process of its own."""
+    return run_nodes([RecorderNode])

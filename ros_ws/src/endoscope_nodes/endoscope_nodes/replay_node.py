@@ -1,0 +1,182 @@
+"""Publishes the topics of a bag again, at their pace or another, with ``/clock``."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rclpy.duration import Duration
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock as ClockMessage
+
+from endoscope_bags import RawMessage, Recording, Topic, open_bag
+from endoscope_bags.cdr_encoding import encode_clock
+from endoscope_bags.errors import BagError
+from endoscope_nodes.diagnostics import OK, Report
+from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.names import MOTOR_COMMAND, MOTOR_MEASURED
+from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.qos import LOCK_STEP, SENSOR_OFFERED
+from endoscope_nodes.recorded_topics import message_class
+from endoscope_nodes.runtime import Runtime, run_nodes
+from endoscope_nodes.ticker import TICK_NS
+
+_CLOCK = '/clock'
+
+
+@dataclass(frozen=True)
+class ReplayParameters:
+    """Parameters of the replay."""
+
+    bag: str = parameter('', 'rosbag2 folder or .mcap file to replay')
+    speed: float = parameter(1.0, 'recorded seconds in a real one', low=0.01, high=100.0)
+    topics: tuple[str, ...] = parameter(('',), 'full names to publish; an empty one for all')
+    clock: bool = parameter(True, 'publish the time of the recording on /clock')
+    delay: float = parameter(
+        1.0, 'time for readers to be found before the first message', unit='s', low=0.0
+    )
+    beside_live_nodes: bool = parameter(
+        False, 'replay even where other nodes publish the same topics'
+    )
+
+
+class ReplayNode(EndoscopeNode):
+    """Publishes the recorded bytes in the order of their receipt, then ends the process.
+
+    ``/clock`` goes in steps of 1 ms; each is followed by the messages received until the next. It
+    refuses to talk into a running system: where another node publishes one of the topics, or
+    measures a motor that recorded commands would move, it says so and ends.
+
+    Attributes
+    ----------
+    published
+        Messages sent so far.
+    """
+
+    def __init__(self, runtime: Runtime) -> None:
+        super().__init__('replay', runtime)
+        p = self.parameters(ReplayParameters)
+        if self.ticker.simulated:
+            raise ParameterError("replay: parameter 'use_sim_time' is true; it makes /clock itself")
+        self._parameters_ = p
+        self._runtime = runtime
+        recording = self._open(p.bag)
+        self._publishers = {topic.name: self._publisher(topic) for topic in self._chosen(recording)}
+        self._messages: Iterator[RawMessage] = recording.messages(list(self._publishers))
+        self._next = next(self._messages, None)
+        if self._next is None:
+            raise ParameterError(f'replay: {p.bag}: nothing to publish in the chosen topics')
+        self._start_ns = self._next.log_ns // TICK_NS * TICK_NS
+        self._clock_ns = self._start_ns - TICK_NS
+        self._clock_out = (
+            self.create_publisher(ClockMessage, _CLOCK, LOCK_STEP) if (p.clock) else None
+        )
+        self._begin_ns = time.monotonic_ns() + round(p.delay * 1e9)
+        self._checked = p.beside_live_nodes
+        self.published = 0
+        self.diagnostics.add('replay', self._report)
+        self.ticker.every(TICK_NS * 1e-9, self._go_on)
+
+    def _open(self, bag: str) -> Recording:
+        try:
+            return open_bag(bag)
+        except BagError as error:
+            raise ParameterError(f"replay: parameter 'bag': {error}") from error
+
+    def _chosen(self, recording: Recording) -> list[Topic]:
+        wanted = [topic for topic in self._parameters_.topics if topic]
+        unknown = [topic for topic in wanted if topic not in recording.topics]
+        if unknown:
+            raise ParameterError(
+                f"replay: parameter 'topics': {recording.path} has no {', '.join(unknown)}; it "
+                f'has {", ".join(sorted(recording.topics))}'
+            )
+        chosen = [recording.topics[name] for name in wanted or sorted(recording.topics)]
+        return [
+            topic
+            for topic in chosen
+            if topic.message_count and not (self._parameters_.clock and topic.name == _CLOCK)
+        ]
+
+    def _publisher(self, topic: Topic) -> Publisher:
+        try:
+            kind = message_class(topic.type)
+        except BagError as error:
+            raise ParameterError(f'replay: topic {topic.name}: {error}') from error
+        return self.create_publisher(kind, topic.name, _offered(topic))
+
+    def _go_on(self) -> None:
+        now = time.monotonic_ns()
+        if now < self._begin_ns or self._next is None:
+            return
+        if not self._checked:
+            live = self._live_nodes()
+            if live:
+                self._end(
+                    f'refused: {live}; replay in a ROS_DOMAIN_ID of its own, or set '
+                    'beside_live_nodes',
+                    failed=True,
+                )
+                return
+            self._checked = True
+        until = self._start_ns + round((now - self._begin_ns) * self._parameters_.speed)
+        while self._next is not None and self._clock_ns + TICK_NS <= until:
+            self._clock_ns += TICK_NS
+            if self._clock_out is not None:
+                self._clock_out.publish(encode_clock(self._clock_ns))
+            self._publish_until(self._clock_ns + TICK_NS)
+        if self._next is None:
+            for publisher in self._publishers.values():
+                publisher.wait_for_all_acked(Duration(seconds=1))
+            self._end(f'{self._parameters_.bag}: {self.published} messages replayed', failed=False)
+
+    def _publish_until(self, end_ns: int) -> None:
+        message = self._next
+        while message is not None and message.log_ns < end_ns:
+            self._publishers[message.topic].publish(message.data)
+            self.published += 1
+            message = next(self._messages, None)
+        self._next = message
+
+    def _live_nodes(self) -> str:
+        """Name a node that the replay would talk over; empty if there is none."""
+        watched = {*self._publishers, *([_CLOCK] if self._clock_out is not None else [])}
+        for topic in self._publishers:
+            if topic.endswith('/' + MOTOR_COMMAND):
+                watched.add(topic.removesuffix(MOTOR_COMMAND) + MOTOR_MEASURED)
+        watched.discard('/diagnostics')
+        for topic in sorted(watched):
+            for info in self.get_publishers_info_by_topic(topic):
+                if info.node_name != self.get_name():
+                    return f'{topic} is published by the node {info.node_name}'
+        return ''
+
+    def _end(self, text: str, failed: bool) -> None:
+        self._next = None
+        if failed:
+            self.exit_code = 1
+            self.get_logger().error(text)
+        else:
+            self.get_logger().info(text)
+        self._runtime.stop()
+
+    def _report(self) -> Report:
+        done = max(0, self._clock_ns - self._start_ns) * 1e-9
+        return OK, 'replaying', {'messages': self.published, 'seconds': done}
+
+
+def _offered(topic: Topic) -> QoSProfile:
+    """As it was offered when recorded; a deep queue where the recording does not tell."""
+    latched = bool(topic.qos) and all(q.durability == 'transient_local' for q in topic.qos)
+    best_effort = bool(topic.qos) and all(q.reliability == 'best_effort' for q in topic.qos)
+    return QoSProfile(
+        depth=max([SENSOR_OFFERED.depth, *(q.depth for q in topic.qos)]),
+        history=HistoryPolicy.KEEP_LAST,
+        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def main() -> int:
+    """Run the replay in a process of its own."""
+    return run_nodes([ReplayNode])
