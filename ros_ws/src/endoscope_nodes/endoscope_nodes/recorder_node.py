@@ -59,6 +59,10 @@ class _Source:
     subscription: RawSubscription
     number: int
 
+    def count_publishers(self) -> int:
+        # The subscription may be replaced by another one.
+        return self.subscription.count_publishers()
+
 
 class RecorderNode(EndoscopeNode):
     """Records from ``recorder/start`` (or from the beginning) to ``recorder/stop`` or the end.
@@ -197,7 +201,7 @@ class RecorderNode(EndoscopeNode):
             full,
             name,
             lambda: offered_profiles(self.get_publishers_info_by_topic(full)),
-            lambda: source.subscription.count_publishers(),
+            source.count_publishers,
         )
         self._sources.append(source)
 

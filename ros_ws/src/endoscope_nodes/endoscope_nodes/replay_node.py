@@ -61,8 +61,8 @@ class ReplayNode(EndoscopeNode):
         self._parameters_ = p
         self._runtime = runtime
         recording = self._open(p.bag)
-        self._publishers = {topic.name: self._publisher(topic) for topic in self._chosen(recording)}
-        self._messages: Iterator[RawMessage] = recording.messages(list(self._publishers))
+        self._outputs = {topic.name: self._publisher(topic) for topic in self._chosen(recording)}
+        self._messages: Iterator[RawMessage] = recording.messages(list(self._outputs))
         self._next = next(self._messages, None)
         if self._next is None:
             raise ParameterError(f'replay: {p.bag}: nothing to publish in the chosen topics')
@@ -126,22 +126,22 @@ class ReplayNode(EndoscopeNode):
                 self._clock_out.publish(encode_clock(self._clock_ns))
             self._publish_until(self._clock_ns + TICK_NS)
         if self._next is None:
-            for publisher in self._publishers.values():
+            for publisher in self._outputs.values():
                 publisher.wait_for_all_acked(Duration(seconds=1))
             self._end(f'{self._parameters_.bag}: {self.published} messages replayed', failed=False)
 
     def _publish_until(self, end_ns: int) -> None:
         message = self._next
         while message is not None and message.log_ns < end_ns:
-            self._publishers[message.topic].publish(message.data)
+            self._outputs[message.topic].publish(message.data)
             self.published += 1
             message = next(self._messages, None)
         self._next = message
 
     def _live_nodes(self) -> str:
         """Name a node that the replay would talk over; empty if there is none."""
-        watched = {*self._publishers, *([_CLOCK] if self._clock_out is not None else [])}
-        for topic in self._publishers:
+        watched = {*self._outputs, *([_CLOCK] if self._clock_out is not None else [])}
+        for topic in self._outputs:
             if topic.endswith('/' + MOTOR_COMMAND):
                 watched.add(topic.removesuffix(MOTOR_COMMAND) + MOTOR_MEASURED)
         watched.discard('/diagnostics')

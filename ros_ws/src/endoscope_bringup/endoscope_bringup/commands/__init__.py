@@ -5,4 +5,4 @@ gives the exit status. It imports nothing heavy at module level: every start of 
 all of them.
 """
 
-COMMANDS: tuple[str, ...] = ('simulate', 'bench')
+COMMANDS: tuple[str, ...] = ('simulate', 'record', 'replay', 'bag', 'bench')

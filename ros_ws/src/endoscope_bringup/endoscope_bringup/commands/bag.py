@@ -1,0 +1,39 @@
+"""`endoscope bag`: what is in a recording, and saving a damaged one."""
+
+import argparse
+from pathlib import Path
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `bag` with `info` and `recover`."""
+    parser = subparsers.add_parser('bag', help='look into a recording, or save a damaged one')
+    actions = parser.add_subparsers(dest='action', metavar='ACTION', required=True)
+    info = actions.add_parser(
+        'info',
+        help='topics, counts, rates, duration, dropouts and losses',
+        description='Says what is in BAG, and what is missing from it. Dropouts are silences of '
+        'more than 2.5 periods by the stamps of the source; lost are messages that were published '
+        'and did not arrive ("?" where the recorder did not tell).',
+    )
+    info.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder or .mcap file')
+    recover = actions.add_parser(
+        'recover',
+        help='write the sound part of a damaged recording to a new one',
+        description='Saves every sound chunk of a recording that was cut off or damaged.',
+    )
+    recover.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder or .mcap file')
+    recover.add_argument('out', metavar='OUT', type=Path, help='the new recording')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what was found or saved; return 0."""
+    if args.action == 'info':
+        from endoscope_bags import open_bag
+        from endoscope_bags.information import bag_information
+
+        print(bag_information(open_bag(args.bag)))
+    else:
+        from endoscope_bags.recovery import recover
+
+        print(recover(args.bag, args.out))
+    return 0
