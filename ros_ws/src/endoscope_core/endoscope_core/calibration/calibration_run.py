@@ -1,0 +1,117 @@
+"""The steps of one calibration: back to zero, rest, sinusoid, verdict."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.calibration.tension_record import TensionRecord
+from endoscope_core.signals import (
+    CALIBRATION_SAMPLES,
+    both_joints,
+    calibration_sinusoid,
+    move,
+)
+
+Array = NDArray[np.float64]
+
+# A minimum-jerk move peaks at 1.875 times its mean speed.
+_PEAK_OF_MEAN = 1.875
+
+
+class CalibrationStep(StrEnum):
+    """Where a calibration is."""
+
+    RETURNING = 'returning to zero'
+    RESTING = 'resting'
+    MOVING = 'moving'
+    DONE = 'done'
+
+
+@dataclass(frozen=True)
+class CalibrationCommand:
+    """What to command in one tick: joint-equivalent angle (J,) in rad and velocity (J,) in rad/s."""
+
+    position: tuple[float, ...]
+    velocity: tuple[float, ...]
+
+
+class CalibrationRun:
+    """Commands a calibration tick by tick and collects the tensions that belong to it.
+
+    The motors return to zero first, so that every calibration starts from pretension (first paper,
+    section 2.2), and rest there a moment; then all joints follow the calibration sinusoid.
+
+    Parameters
+    ----------
+    start
+        Joint-equivalent motor angles now, in rad, shape (J,).
+    wires
+        Number of wires W whose tension is collected.
+    tick_ns
+        Control period in ns.
+    return_speed
+        Largest speed on the way to zero in rad/s.
+    rest
+        Rest at zero before the sinusoid in s.
+    homing
+        Whether to end after the return to zero.
+    """
+
+    def __init__(self, start: Sequence[float], wires: int, tick_ns: int, return_speed: float,
+                 rest: float, homing: bool = False) -> None:
+        self._tick_ns = tick_ns
+        self._wires = wires
+        tick = tick_ns * 1e-9
+        largest = max(abs(x) for x in start)
+        length = max(0.2, _PEAK_OF_MEAN * largest / return_speed)
+        time = np.arange(round(length / tick) + 1) * tick
+        legs = [move(x, 0.0, float(time[-1]))(time) for x in start]
+        back = np.hstack([np.stack([leg[k] for leg in legs], axis=1) for k in (0, 1)])
+        still = np.zeros((round(rest / tick), 2 * len(start)))
+        parts = [back, still]
+        if not homing:
+            motion = both_joints(calibration_sinusoid())
+            time = np.arange(round(motion.duration / tick) + 1) * tick
+            parts.append(np.hstack(motion.sample(time)))
+        self._rows = np.vstack(parts)
+        self._joints = len(start)
+        self._returned = len(back)
+        self._moving_from = len(back) + len(still)
+        self._next = 0
+        self.record: TensionRecord | None = None
+
+    @property
+    def step(self) -> CalibrationStep:
+        """Where the calibration is."""
+        if self._next >= len(self._rows):
+            return CalibrationStep.DONE
+        if self._next < self._returned:
+            return CalibrationStep.RETURNING
+        if self._next < self._moving_from:
+            return CalibrationStep.RESTING
+        return CalibrationStep.MOVING
+
+    @property
+    def progress(self) -> float:
+        """Share of the commands that have been given, from 0 to 1."""
+        return self._next / len(self._rows)
+
+    def command(self, stamp_ns: int, periods: int) -> CalibrationCommand | None:
+        """Command for the tick at ``stamp_ns``, ``periods`` after the one before; None when done."""
+        if self._next >= len(self._rows):
+            return None
+        if self._next >= self._moving_from and self.record is None:
+            into = (self._next - self._moving_from) * self._tick_ns
+            self.record = TensionRecord(
+                self._wires, stamp_ns - into, self._tick_ns, CALIBRATION_SAMPLES)
+        row = self._rows[self._next].tolist()
+        self._next += periods
+        return CalibrationCommand(tuple(row[:self._joints]), tuple(row[self._joints:]))
+
+    def add_tension(self, stamp_ns: int, tension: Sequence[float]) -> None:
+        """Take a reading of all wires in N, shape (W,)."""
+        if self.record is not None:
+            self.record.add(stamp_ns, tension)

@@ -1,0 +1,67 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from endoscope_core.kinematics import bending_from_orientation, tip_pose
+
+angles = st.floats(-2.2, 2.2)
+
+
+@given(angles, angles)
+def test_round_trip(x, y):
+    if math.hypot(x, y) >= 3.1:
+        return
+    _, orientation = tip_pose((x, y), 0.02)
+    np.testing.assert_allclose(bending_from_orientation(orientation), (x, y), atol=1e-9)
+
+
+@given(angles, angles, st.floats(-3.0, 3.0))
+def test_a_twist_of_the_sensor_about_its_own_axis_changes_nothing(x, y, twist):
+    if math.hypot(x, y) >= 3.0:
+        return
+    _, orientation = tip_pose((x, y), 0.02)
+    twisted = Rotation.from_quat(orientation) * Rotation.from_rotvec((0.0, 0.0, twist))
+    np.testing.assert_allclose(bending_from_orientation(twisted.as_quat()), (x, y), atol=1e-7)
+
+
+@given(angles, angles)
+def test_orientation_is_the_rotation_by_both_angles(x, y):
+    if math.hypot(x, y) >= 3.1:
+        return
+    _, orientation = tip_pose((x, y), 0.02)
+    expected = Rotation.from_rotvec((-y, x, 0.0))
+    assert (expected.inv() * Rotation.from_quat(orientation)).magnitude() < 1e-9
+
+
+@pytest.mark.parametrize(('bending', 'tip'), [
+    ((0.0, 0.0), (0.0, 0.0, 0.02)),
+    ((math.pi / 2, 0.0), (0.04 / math.pi, 0.0, 0.04 / math.pi)),
+    ((0.0, math.pi / 2), (0.0, 0.04 / math.pi, 0.04 / math.pi)),
+    ((0.0, -math.pi / 2), (0.0, -0.04 / math.pi, 0.04 / math.pi)),
+])
+def test_tip_of_known_arcs(bending, tip):
+    np.testing.assert_allclose(tip_pose(bending, 0.02)[0], tip, atol=1e-12)
+
+
+@given(angles, angles)
+def test_position_is_the_integral_of_the_tangent_along_the_arc(x, y):
+    if math.hypot(x, y) >= 3.1:
+        return
+    s = (np.arange(2000) + 0.5) / 2000
+    tangent = Rotation.from_rotvec(np.outer(s, (-y, x, 0.0))).apply((0.0, 0.0, 1.0))
+    np.testing.assert_allclose(tip_pose((x, y), 1.0)[0], tangent.mean(axis=0), atol=1e-6)
+
+
+@pytest.mark.parametrize('bad', [(0, 0, 0, 0), (math.nan, 0, 0, 1), (1, 0, 0, 0)])
+def test_refuses_what_has_no_bending(bad):
+    with pytest.raises(ValueError, match='orientation|straight back'):
+        bending_from_orientation(bad)
+
+
+def test_refuses_half_a_turn():
+    with pytest.raises(ValueError, match='half a turn'):
+        tip_pose((math.pi, 0.1), 0.02)

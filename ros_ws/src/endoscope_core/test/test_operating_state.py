@@ -1,0 +1,77 @@
+import pytest
+
+from endoscope_core.safety import OperatingState, OperatingStateMachine
+
+
+def machine_in(state):
+    machine = OperatingStateMachine()
+    paths = {
+        OperatingState.DISABLED: [], OperatingState.ENABLED: ['enable'],
+        OperatingState.PAUSED: ['enable', 'pause'], OperatingState.FAULT: ['enable'],
+    }
+    for command in paths[state]:
+        assert machine.command(command).accepted
+    if state is OperatingState.FAULT:
+        machine.report_cause('heat', 'too hot')
+        machine.clear_cause('heat')
+    assert machine.state is state
+    return machine
+
+
+@pytest.mark.parametrize(('start', 'command', 'end'), [
+    (OperatingState.DISABLED, 'enable', OperatingState.ENABLED),
+    (OperatingState.ENABLED, 'pause', OperatingState.PAUSED),
+    (OperatingState.PAUSED, 'resume', OperatingState.ENABLED),
+    (OperatingState.PAUSED, 'disable', OperatingState.DISABLED),
+    (OperatingState.ENABLED, 'disable', OperatingState.DISABLED),
+    (OperatingState.ENABLED, 'home', OperatingState.ENABLED),
+    (OperatingState.FAULT, 'enable', OperatingState.ENABLED),
+])
+def test_commands_that_are_carried_out(start, command, end):
+    machine = machine_in(start)
+    assert machine.command(command).accepted
+    assert machine.state is end
+
+
+@pytest.mark.parametrize(('start', 'command'), [
+    (OperatingState.DISABLED, 'pause'), (OperatingState.DISABLED, 'resume'),
+    (OperatingState.DISABLED, 'home'), (OperatingState.PAUSED, 'enable'),
+    (OperatingState.PAUSED, 'home'), (OperatingState.FAULT, 'disable'),
+    (OperatingState.FAULT, 'resume'), (OperatingState.FAULT, 'pause'),
+    (OperatingState.ENABLED, 'go'), (OperatingState.ENABLED, ''),
+])
+def test_commands_that_are_refused_change_nothing(start, command):
+    machine = machine_in(start)
+    answer = machine.command(command)
+    assert not answer.accepted
+    assert answer.reason
+    assert machine.state is start
+
+
+def test_fault_latches_until_the_cause_is_gone_and_enable_is_given():
+    machine = machine_in(OperatingState.ENABLED)
+    assert machine.report_cause('wire', 'wire_x_pos is broken')
+    assert machine.state is OperatingState.FAULT
+    refused = machine.command('enable')
+    assert not refused.accepted
+    assert 'wire_x_pos is broken' in refused.reason
+    machine.clear_cause('wire')
+    assert machine.state is OperatingState.FAULT
+    assert machine.cause == 'wire_x_pos is broken'
+    assert machine.command('enable').accepted
+    assert machine.cause == ''
+
+
+def test_a_cause_forbids_enabling_from_the_start():
+    machine = OperatingStateMachine()
+    assert not machine.report_cause('motor', 'motor is silent')
+    assert machine.state is OperatingState.DISABLED
+    assert not machine.command('enable').accepted
+
+
+def test_first_cause_is_kept():
+    machine = machine_in(OperatingState.ENABLED)
+    machine.report_cause('a', 'first')
+    assert not machine.report_cause('b', 'second')
+    assert machine.cause == 'first'
+    assert set(machine.present_causes) == {'a', 'b'}
