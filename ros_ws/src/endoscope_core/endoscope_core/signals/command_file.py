@@ -114,9 +114,7 @@ def read_command_file(path: str | Path, joints: Sequence[str] = JOINTS) -> Comma
     return table
 
 
-def _numbers(
-    path: Path, line: int, row: dict[str, str], wanted: Sequence[str]
-) -> list[float]:
+def _numbers(path: Path, line: int, row: dict[str, str], wanted: Sequence[str]) -> list[float]:
     try:
         values = [float(row[name]) for name in wanted]
     except (TypeError, ValueError) as error:
@@ -129,7 +127,8 @@ def _numbers(
 def _check(table: CommandTable, name: str) -> None:
     if table.angle.shape != (len(table.time), len(table.joints)) or len(table.time) < 2:
         raise CommandFileError(
-            f'{name}: {len(table.time)} times for angles of shape {table.angle.shape}')
+            f'{name}: {len(table.time)} times for angles of shape {table.angle.shape}'
+        )
     if not (np.isfinite(table.time).all() and np.isfinite(table.angle).all()):
         raise CommandFileError(f'{name}: a value is not finite')
     backward = np.flatnonzero(np.diff(table.time) <= 0)

@@ -1,0 +1,226 @@
+"""Symmetric Bouc-Wen hysteresis and its direct inverse (equations 3 to 5 of the first paper)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from endoscope_core.hysteresis.bouc_wen_kernel import (
+    bouc_wen_normalised_path,
+    bouc_wen_normalised_step,
+)
+
+SMALLEST_ALPHA = 0.2
+GREATEST_ALPHA = 3.0
+GREATEST_LAG = math.radians(120.0)
+GREATEST_INVERSE_SLOPE = 40.0
+GREATEST_EXPONENT = 5.0
+
+
+@dataclass(frozen=True)
+class BoucWenParameters:
+    """The six parameters of equations 3 to 5, refused unless the inverse they give is safe to drive
+    a motor with.
+
+    ``theta_a = alpha theta + beta h`` and ``h' = A theta' - B |theta'| |h|^(n-1) h - C theta'
+    |h|^n``.
+
+    Parameters
+    ----------
+    alpha : float
+        Ratio of actual to driving angle, dimensionless, in [0.2, 3]: the inverse divides by it.
+    beta : float
+        Weight of the hysteresis, dimensionless, at most 0: the actual angle lags behind.
+    A, B, C, n : float
+        Shape; ``A > 0``, ``B > 0``, ``B + C > 0``, ``1 <= n <= 5``. With `theta` in rad, `h` is in
+        rad where A is dimensionless, and B and C are in rad^-n.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is not finite or out of its range, the lag ``|beta| h_max`` exceeds 120 deg,
+        or the inverse would somewhere be steeper than 40.
+
+    Notes
+    -----
+    ``|h| <= h_max = (A / (B + C))^(1/n)`` always (invariance, Ikhouane and Rodellar 2007), so that
+    ``|theta_FF| <= (|theta_d| + |beta| h_max) / alpha``, and with ``|dh/dtheta| <= A max(1, 1 +
+    rho)``, ``rho = (B - C) / (B + C)``, the inverse's slope ``|d theta_FF / d theta_d| <= (1 +
+    |beta| A max(1, 1 + rho)) / alpha``. ``B > 0`` makes ``dh/dtheta`` positive on the whole of
+    ``|h| < h_max``, so that the inverse is strictly increasing on every branch. The six parameters
+    hold one redundancy: scaling `h` changes nothing (Ma et al. 2004). `identify` therefore returns
+    A = 1.
+    """
+
+    alpha: float
+    beta: float
+    A: float
+    B: float
+    C: float
+    n: float
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if not math.isfinite(value):
+                raise ValueError(
+                    f'Bouc-Wen parameter {name} is {value}: it must be a finite number'
+                )
+        checks = [
+            (
+                SMALLEST_ALPHA <= self.alpha <= GREATEST_ALPHA,
+                f'alpha = {self.alpha:g} must lie in [{SMALLEST_ALPHA:g}, {GREATEST_ALPHA:g}]',
+            ),
+            (self.beta <= 0.0, f'beta = {self.beta:g} must not be positive'),
+            (self.A > 0.0, f'A = {self.A:g} must be positive'),
+            (self.B > 0.0, f'B = {self.B:g} must be positive'),
+            (self.B + self.C > 0.0, f'B + C = {self.B + self.C:g} must be positive'),
+            (
+                1.0 <= self.n <= GREATEST_EXPONENT,
+                f'n = {self.n:g} must lie in [1, {GREATEST_EXPONENT:g}]',
+            ),
+        ]
+        for holds, message in checks:
+            if not holds:
+                raise ValueError(f'Bouc-Wen parameter {message}')
+        if self.lag > GREATEST_LAG * (1.0 + 1e-9):
+            raise ValueError(
+                f'Bouc-Wen lag |beta| h_max = {math.degrees(self.lag):.1f} deg exceeds '
+                f'{math.degrees(GREATEST_LAG):.0f} deg'
+            )
+        if self.inverse_slope > GREATEST_INVERSE_SLOPE * (1.0 + 1e-9):
+            raise ValueError(
+                f'Bouc-Wen inverse is too steep: {self.inverse_slope:.1f} exceeds {GREATEST_INVERSE_SLOPE:g}'
+            )
+
+    @property
+    def h_max(self) -> float:
+        """Bound of ``|h|``."""
+        return (self.A / (self.B + self.C)) ** (1.0 / self.n)
+
+    @property
+    def lag(self) -> float:
+        """``|beta| h_max`` in rad: half the width of a saturated loop, measured along the actual
+        angle.
+        """
+        return -self.beta * self.h_max
+
+    @property
+    def travel(self) -> float:
+        """``h_max / A`` in rad: distance over which the state builds up."""
+        return self.h_max / self.A
+
+    @property
+    def rho(self) -> float:
+        """``(B - C) / (B + C)``: how much faster the state leaves saturation than it would from
+        rest.
+        """
+        return (self.B - self.C) / (self.B + self.C)
+
+    @property
+    def inverse_slope(self) -> float:
+        """Greatest slope of ``theta_FF`` over ``theta_d``."""
+        return (1.0 - self.beta * self.A * max(1.0, 1.0 + self.rho)) / self.alpha
+
+    @classmethod
+    def from_shape(
+        cls, alpha: float, lag: float, travel: float, rho: float, n: float
+    ) -> BoucWenParameters:
+        """Parameters with A = 1 from quantities that can be pictured.
+
+        Parameters
+        ----------
+        alpha : float
+            Ratio of actual to driving angle.
+        lag : float
+            Half the width of a saturated loop along the actual angle, rad.
+        travel : float
+            Distance over which the hysteresis builds up, rad.
+        rho : float
+            In (-1, 1]; 1 means C = 0.
+        n : float
+            Sharpness.
+        """
+        total = travel ** (-n)
+        return cls(
+            alpha=alpha,
+            beta=-lag / travel,
+            A=1.0,
+            B=0.5 * (1.0 + rho) * total,
+            C=0.5 * (1.0 - rho) * total,
+            n=n,
+        )
+
+    def to_dict(self) -> dict[str, float]:
+        """The six parameters by name."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, float]) -> BoucWenParameters:
+        """Parameters from a mapping of exactly the six names.
+
+        Raises
+        ------
+        ValueError
+            If a name is missing or unknown, or the parameters are unsafe.
+        """
+        wanted = {field.name for field in fields(cls)}
+        if set(values) != wanted:
+            odd = ', '.join(sorted(set(values) ^ wanted))
+            raise ValueError(
+                f'Bouc-Wen parameters must be exactly {", ".join(sorted(wanted))}; wrong or missing: {odd}'
+            )
+        return cls(**{name: float(value) for name, value in values.items()})
+
+
+def bouc_wen_step(parameters: BoucWenParameters, h: float, delta: float) -> float:
+    """State `h` of equation 4 after the driving angle has moved by `delta` (rad), monotonically.
+
+    ``|h| <= h_max`` holds after a step of any size if it held before, exactly for n = 1 and by
+    construction of the scheme otherwise (see
+    :func:`~endoscope_core.hysteresis.bouc_wen_kernel.bouc_wen_normalised_step`); an `h` outside is
+    brought to the bound first.
+    """
+    scale = parameters.h_max
+    y = min(1.0, max(-1.0, h / scale))
+    return scale * bouc_wen_normalised_step(
+        y, delta, parameters.travel, parameters.rho, parameters.n
+    )
+
+
+def bouc_wen_forward(
+    parameters: BoucWenParameters, theta: ArrayLike, h0: float = 0.0
+) -> NDArray[np.float64]:
+    """Actual angle (N,) by equation 3 for a driving angle (N,) in rad, `h` being `h0` at the first
+    sample.
+    """
+    driver = np.ascontiguousarray(theta, dtype=float)
+    state = _path(parameters, driver, h0)
+    return parameters.alpha * driver + parameters.beta * state
+
+
+def bouc_wen_inverse(
+    parameters: BoucWenParameters, theta_d: ArrayLike, h0: float = 0.0
+) -> NDArray[np.float64]:
+    """Feed-forward command (N,) by equation 5 for a desired angle (N,) in rad; equation 4 is driven
+    by the desired angle.
+    """
+    driver = np.ascontiguousarray(theta_d, dtype=float)
+    state = _path(parameters, driver, h0)
+    return (driver - parameters.beta * state) / parameters.alpha
+
+
+def _path(
+    parameters: BoucWenParameters, driver: NDArray[np.float64], h0: float
+) -> NDArray[np.float64]:
+    if driver.ndim != 1 or driver.size == 0 or not np.all(np.isfinite(driver)):
+        raise ValueError(
+            f'the driving angle must be a non-empty series of finite numbers, not of shape {driver.shape}'
+        )
+    scale = parameters.h_max
+    y0 = min(1.0, max(-1.0, h0 / scale))
+    return scale * bouc_wen_normalised_path(
+        driver, y0, parameters.travel, parameters.rho, parameters.n
+    )

@@ -1,0 +1,72 @@
+"""Size of the backlash: how wide the loop of actual against desired angle is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def width_at_mid_height(desired: ArrayLike, actual: ArrayLike) -> float:
+    """Width of the hysteresis loop at the middle of its height.
+
+    The loop is cut half-way between the least and the greatest actual angle; its width is the mean
+    desired angle at which the actual angle rises through that level, less the one at which it falls
+    through it. Positive where the actual angle lags. With several loops the mean is taken; noise
+    that crosses the level to and fro is averaged out because a run of crossings is weighed as one.
+
+    Parameters
+    ----------
+    desired, actual : array_like, shape (N,)
+        Angles at the same instants, in time order, over at least one whole loop.
+
+    Returns
+    -------
+    float
+        Width in the unit of `desired`.
+
+    Raises
+    ------
+    ValueError
+        If the shapes are wrong, a value is not finite, or the actual angle does not pass its middle
+        both upwards and downwards.
+    """
+    u = np.asarray(desired, dtype=float)
+    q = np.asarray(actual, dtype=float)
+    if u.ndim != 1 or u.shape != q.shape:
+        raise ValueError(
+            f'desired {u.shape} and actual {q.shape} must be one-dimensional and equally long'
+        )
+    if not (np.all(np.isfinite(u)) and np.all(np.isfinite(q))):
+        raise ValueError('desired or actual holds values that are not finite')
+    if u.size < 3 or np.ptp(q) == 0.0:
+        raise ValueError('the actual angle does not move: there is no loop to measure')
+    height = np.ptp(q)
+    offset = q - 0.5 * (np.max(q) + np.min(q))
+    rising, falling = _crossings(u, offset, 0.1 * height)
+    if rising.size == 0 or falling.size == 0:
+        raise ValueError(
+            'the recording holds no whole loop: the actual angle passes its middle one way only'
+        )
+    return float(np.mean(rising) - np.mean(falling))
+
+
+def _crossings(
+    u: NDArray[np.float64],
+    offset: NDArray[np.float64],
+    band: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values of u where offset passes zero on its way from beyond -band to beyond +band, and back."""
+    outside = np.flatnonzero(np.abs(offset) > band)
+    side = np.sign(offset[outside])
+    turns = np.flatnonzero(side[1:] != side[:-1])
+    rising: list[float] = []
+    falling: list[float] = []
+    for k in turns:
+        first, last = outside[k], outside[k + 1]
+        piece = offset[first : last + 1]
+        through = (np.sign(piece[1:]) * np.sign(piece[:-1]) <= 0.0) & (piece[1:] != piece[:-1])
+        passes = first + np.flatnonzero(through)
+        weight = offset[passes] / (offset[passes] - offset[passes + 1])
+        where = float(np.mean(u[passes] + weight * (u[passes + 1] - u[passes])))
+        (rising if side[k] < 0 else falling).append(where)
+    return np.array(rising), np.array(falling)

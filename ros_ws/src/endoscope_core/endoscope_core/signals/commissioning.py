@@ -1,0 +1,148 @@
+"""A motion rich enough to tell the causes of a mismatch apart, for first use of a rig and for
+`explain`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from endoscope_core.signals.calibration_sinusoid import calibration_sinusoid
+from endoscope_core.signals.signal import FloatArray, Motion, Signal, hold, sequence
+from endoscope_core.signals.smooth_ramp import move, window
+
+CORNER = 0.1
+
+
+def triangle(amplitude: float, speed: float) -> Signal:
+    """One slow triangle 0, +a, -a, 0 (rad) at constant `speed` (rad/s) with corners rounded over
+    0.1 s.
+
+    Constant speed shows friction without inertia or servo lag; a slow one separates creep and
+    Stribeck friction from them.
+    """
+    legs = [(0.0, amplitude), (amplitude, -amplitude), (-amplitude, 0.0)]
+    knots = np.concatenate(([0.0], np.cumsum([abs(b - a) / speed for a, b in legs]))) + 0.5 * CORNER
+    corner_angle = np.array([0.0, amplitude, -amplitude, 0.0])
+    slopes = np.concatenate(([0.0], np.diff(corner_angle) / np.diff(knots), [0.0]))
+    duration = float(knots[-1] + 0.5 * CORNER)
+
+    def evaluate(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        angle = np.zeros_like(time)
+        velocity = np.zeros_like(time)
+        for knot, change in zip(knots, np.diff(slopes), strict=True):
+            into = np.clip((time - knot) / CORNER + 0.5, 0.0, 1.0)
+            beyond = np.maximum(time - knot - 0.5 * CORNER, 0.0)
+            velocity += change * into
+            angle += change * (0.5 * CORNER * into**2 + beyond)
+        return angle, velocity
+
+    return Signal('triangle', duration, evaluate, (0.5 * CORNER, duration - 0.5 * CORNER))
+
+
+def steps_with_holds(angles: tuple[float, ...], rise: float = 0.15, rest: float = 0.6) -> Signal:
+    """Quick moves to each angle (rad) in turn with a rest after each, then back to zero: shows
+    creep, delay and ringing.
+    """
+    parts: list[Signal] = []
+    here = 0.0
+    for target in (*angles, 0.0):
+        parts += [move(here, target, rise), hold(rest, target)]
+        here = target
+    return sequence('steps', parts)
+
+
+def multisine(amplitude: float, duration: float, lowest: float = 0.2, lines: int = 8) -> Signal:
+    """Sines at odd multiples of a base frequency (Hz) with Schroeder phases and amplitudes falling
+    as 1/f, peak `amplitude` rad.
+    """
+    order = 2 * np.arange(lines) + 1
+    omega = 2.0 * np.pi * lowest * order
+    phase = -np.pi * np.arange(lines) * (np.arange(lines) + 1) / lines
+    weight = 1.0 / order
+    grid = np.linspace(0.0, 1.0 / lowest, 2000)
+    peak = np.max(np.abs(np.sum(weight * np.sin(grid[:, None] * omega + phase), axis=1)))
+    scale = amplitude / peak
+
+    def evaluate(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        gain, rate = window(time, duration, 0.5, 0.5)
+        argument = time[:, None] * omega + phase
+        value = scale * np.sum(weight * np.sin(argument), axis=1)
+        slope = scale * np.sum(weight * omega * np.cos(argument), axis=1)
+        return gain * value, gain * slope + rate * value
+
+    return Signal('multisine', duration, evaluate, (0.5, duration - 0.5))
+
+
+def chirp(amplitude: float, duration: float, start: float = 0.2, stop: float = 4.0) -> Signal:
+    """Exponential sweep from `start` to `stop` Hz whose amplitude (rad) falls as the square root of
+    the frequency rises.
+    """
+    growth = np.log(stop / start) / duration
+
+    def evaluate(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        gain, rate = window(time, duration, 0.5, 0.5)
+        sweep = np.exp(growth * time)
+        argument = 2.0 * np.pi * start * (sweep - 1.0) / growth
+        omega = 2.0 * np.pi * start * sweep
+        size = amplitude / np.sqrt(sweep)
+        value = size * np.sin(argument)
+        slope = size * (omega * np.cos(argument) - 0.5 * growth * np.sin(argument))
+        return gain * value, gain * slope + rate * value
+
+    return Signal('chirp', duration, evaluate, (0.5, duration - 0.5))
+
+
+def teleoperation_like(seed: int, reaches: int, reach: float, end: float = 0.0) -> Signal:
+    """Minimum-jerk reaches to random angles within +-`reach` rad with random pauses, as a person's
+    hand moves; same seed, same motion.
+    """
+    generator = np.random.default_rng(seed)
+    parts: list[Signal] = []
+    here = 0.0
+    for k in range(reaches):
+        target = end if k == reaches - 1 else float(generator.uniform(-reach, reach))
+        parts += [
+            move(here, target, float(generator.uniform(0.5, 1.1))),
+            hold(float(generator.uniform(0.05, 0.4)), target),
+        ]
+        here = target
+    return sequence('teleoperation', parts)
+
+
+def commissioning_motion(seed: int = 1) -> Motion:
+    """Calibration sinusoid, rest, slow triangle, steps with holds, multisine, chirp,
+    teleoperation-like; then the other joint.
+
+    `bend_x` moves alone through the first five pieces, so that whatever appears at `bend_y` then is
+    coupling; during the last two both move.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the teleoperation-like part.
+
+    Returns
+    -------
+    Motion
+        For `bend_x` and `bend_y`, about 52 s.
+    """
+    deg = float(np.deg2rad(1.0))
+    alone = [
+        calibration_sinusoid(),
+        hold(1.0),
+        triangle(60.0 * deg, 30.0 * deg),
+        steps_with_holds((40.0 * deg, 70.0 * deg, -10.0 * deg, -60.0 * deg, 20.0 * deg)),
+        multisine(60.0 * deg, 8.0),
+    ]
+    x = sequence(
+        'commissioning', [*alone, chirp(50.0 * deg, 8.0), teleoperation_like(seed, 8, 75.0 * deg)]
+    )
+    y = sequence(
+        'commissioning',
+        [
+            hold(sum(part.duration for part in alone)),
+            multisine(60.0 * deg, 8.0),
+            teleoperation_like(seed + 1, 8, 75.0 * deg),
+        ],
+    )
+    return Motion('commissioning', {'bend_x': x, 'bend_y': y})

@@ -1,0 +1,152 @@
+"""A motion of one joint, or of several, as a function of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Angle and velocity of one joint as functions of time; starts and ends at rest.
+
+    Parameters
+    ----------
+    name : str
+        What the signal is called on the command line and in reports.
+    duration : float
+        Length in s. Before 0 and after `duration` the first and the last angle are held.
+    evaluate : callable
+        ``evaluate(time (N,)) -> (angle (N,), velocity (N,))`` in rad and rad/s for ``0 <= time <=
+        duration``.
+    steady : tuple of float
+        ``(start, end)`` in s: where the signal has its nominal form, without ramps; figures are
+        taken there.
+    """
+
+    name: str
+    duration: float
+    evaluate: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    steady: tuple[float, float]
+
+    def __call__(self, time: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Angle and velocity at the given times.
+
+        Parameters
+        ----------
+        time : array_like, shape (N,) or scalar
+            Seconds since the signal began.
+
+        Returns
+        -------
+        angle, velocity : ndarray, shape of `time`
+            rad and rad/s.
+        """
+        asked = np.asarray(time, dtype=float)
+        flat = np.atleast_1d(asked).ravel()
+        angle, velocity = self.evaluate(np.clip(flat, 0.0, self.duration))
+        moving = (flat >= 0.0) & (flat <= self.duration)
+        velocity = np.where(moving, velocity, 0.0)
+        return angle.reshape(asked.shape), velocity.reshape(asked.shape)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A signal for each joint, all starting together.
+
+    Parameters
+    ----------
+    name : str
+        What the motion is called.
+    joints : mapping of str to Signal
+        Signal of each joint, in the order of the columns that :meth:`sample` returns.
+    """
+
+    name: str
+    joints: Mapping[str, Signal]
+
+    @property
+    def duration(self) -> float:
+        """Length of the longest signal in s."""
+        return max(signal.duration for signal in self.joints.values())
+
+    @property
+    def steady(self) -> tuple[float, float]:
+        """Interval in s in which every joint has its nominal form."""
+        return (
+            max(signal.steady[0] for signal in self.joints.values()),
+            min(signal.steady[1] for signal in self.joints.values()),
+        )
+
+    def sample(self, time: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Angle and velocity of every joint.
+
+        Parameters
+        ----------
+        time : array_like, shape (N,) or scalar
+            Seconds since the motion began.
+
+        Returns
+        -------
+        angle, velocity : ndarray, shape (N, J) or (J,)
+            rad and rad/s, columns in the order of `joints`.
+        """
+        pairs = [signal(time) for signal in self.joints.values()]
+        angle = np.stack([pair[0] for pair in pairs], axis=-1)
+        velocity = np.stack([pair[1] for pair in pairs], axis=-1)
+        return angle, velocity
+
+
+def hold(duration: float, angle: float = 0.0) -> Signal:
+    """Stay at an angle (rad) for a while (s)."""
+
+    def evaluate(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return np.full_like(time, angle), np.zeros_like(time)
+
+    return Signal('hold', duration, evaluate, (0.0, duration))
+
+
+def sequence(name: str, parts: Sequence[Signal]) -> Signal:
+    """Play signals one after the other.
+
+    Parameters
+    ----------
+    name : str
+        Name of the result.
+    parts : sequence of Signal
+        Each must begin at the angle where the one before it ends.
+
+    Returns
+    -------
+    Signal
+        Its `steady` interval is the whole.
+
+    Raises
+    ------
+    ValueError
+        If two neighbours do not meet: a jump would be commanded.
+    """
+    starts = np.concatenate(([0.0], np.cumsum([part.duration for part in parts])))
+    for before, after in zip(parts, parts[1:], strict=False):
+        gap = float(after(0.0)[0] - before(before.duration)[0])
+        if abs(gap) > 1e-6:
+            raise ValueError(
+                f'{name}: {after.name} begins {gap:.3g} rad from the end of {before.name}'
+            )
+
+    def evaluate(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        angle = np.empty_like(time)
+        velocity = np.empty_like(time)
+        index = np.clip(np.searchsorted(starts, time, side='right') - 1, 0, len(parts) - 1)
+        for k, part in enumerate(parts):
+            chosen = index == k
+            angle[chosen], velocity[chosen] = part(time[chosen] - starts[k])
+        return angle, velocity
+
+    total = float(starts[-1])
+    return Signal(name, total, evaluate, (0.0, total))
