@@ -78,7 +78,9 @@ def test_public_names_are_documented(module: Path) -> None:
         taken = _own_parameters(node)
         unknown = [one for one in documented if one not in taken]
         if unknown and not _accepts_bases(node):
-            problems.append(f'line {node.lineno}: {name} documents {unknown}, which it does not take')
+            problems.append(
+                f'line {node.lineno}: {name} documents {unknown}, which it does not take'
+            )
         missing = [one for one in taken if one not in documented]
         if missing:
             problems.append(f'line {node.lineno}: {name} leaves out {missing}')

@@ -48,7 +48,9 @@ def _imported_modules(folder: Path) -> dict[str, Path]:
 
 def _declared(package: Path) -> set[str]:
     manifest = ElementTree.parse(package / 'package.xml').getroot()
-    return {str(element.text) for tag in ('depend', 'exec_depend') for element in manifest.iter(tag)}
+    return {
+        str(element.text) for tag in ('depend', 'exec_depend') for element in manifest.iter(tag)
+    }
 
 
 def _locked_modules() -> set[str]:

@@ -1,4 +1,4 @@
-"""The program `endoscope`: parses the command line, runs one subcommand, turns errors into one line."""
+"""The program `endoscope`: runs one subcommand and turns errors into one line."""
 
 import os
 import signal

@@ -30,9 +30,9 @@ def use_cache_of_these_sources() -> None:
     if 'NUMBA_CACHE_DIR' in os.environ:
         return
     base = Path(os.environ.get('XDG_CACHE_HOME', Path.home() / '.cache'))
-    numba.config.CACHE_DIR = str(
-        base / 'endoscope' / 'numba' / source_hash(Path(__file__).parent)
-    )
+    folder = base / 'endoscope' / 'numba' / source_hash(Path(__file__).parent)
+    # Numba sets the names of its configuration at run time, out of the type checker's sight.
+    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
 
 
 use_cache_of_these_sources()
