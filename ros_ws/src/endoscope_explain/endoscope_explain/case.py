@@ -1,0 +1,117 @@
+"""One recording, audited and explained: what every output is made from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from endoscope_core.plant import PlantDescription
+from endoscope_explain.audit import AuditReport
+from endoscope_explain.explanation import ChannelFit, Explanation, NamedEffect, Verdict
+from endoscope_explain.recording import Recording
+
+Ladder = Mapping[str, Mapping[str, ChannelFit]]
+"""By rung (`nominal`, `refitted`, `augmented`, black boxes), then by signal."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a mismatch shows.
+
+    Attributes
+    ----------
+    stage, joint : str
+    signals : tuple of str
+        Largest share of the excess misfit first.
+    intervals : tuple of (float, float)
+        In s from the first stamp.
+    regime : str
+        In words, from measured conditions.
+    band_hz : (float, float)
+        Frequencies that hold most of it.
+    shares : mapping of str to float
+        Share of the excess misfit of each of the signals.
+    onset_s : float or None
+        When it began, where it did not act from the start.
+    """
+
+    stage: str
+    joint: str
+    signals: tuple[str, ...]
+    intervals: tuple[tuple[float, float], ...]
+    regime: str
+    band_hz: tuple[float, float]
+    shares: Mapping[str, float] = field(default_factory=dict)
+    onset_s: float | None = None
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """The motion that would tell rivals apart.
+
+    Attributes
+    ----------
+    why : str
+    separates : tuple of str
+        Ids.
+    waveform : str
+        Name of the family's member.
+    joint : str
+        The joint that moves.
+    distances : mapping of str to float
+        Smallest predicted distance between rivals for each motion tried, in noise units rms.
+    time, command : tuple
+        The chosen motion: s, and rad for each joint, as rows.
+    joints : tuple of str
+        Columns of `command`.
+    """
+
+    why: str
+    separates: tuple[str, ...]
+    waveform: str
+    joint: str
+    distances: Mapping[str, float]
+    time: tuple[float, ...]
+    command: tuple[tuple[float, ...], ...]
+    joints: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ExplainedCase:
+    """All that is known about one recording.
+
+    Attributes
+    ----------
+    recording : Recording
+        As audited.
+    audit : AuditReport
+    explanation : Explanation
+        The engine's own words.
+    verdict : Verdict
+        Of engine and audit together.
+    effects : tuple of NamedEffect
+        Of engine and audit together, most certain first.
+    places : tuple of Place
+    plant : PlantDescription
+        The improved plant.
+    ladder : Ladder
+        On held-out blocks of the recording.
+    validation : Ladder
+        On the second recording; empty if none was given.
+    validation_name, baseline_name : str
+        Empty if none was given.
+    next_experiment : NextExperiment or None
+    runtime_s : float
+    """
+
+    recording: Recording
+    audit: AuditReport
+    explanation: Explanation
+    verdict: Verdict
+    effects: tuple[NamedEffect, ...]
+    places: tuple[Place, ...]
+    plant: PlantDescription
+    ladder: Ladder
+    validation: Ladder = field(default_factory=dict)
+    validation_name: str = ''
+    baseline_name: str = ''
+    next_experiment: NextExperiment | None = None
+    runtime_s: float = 0.0

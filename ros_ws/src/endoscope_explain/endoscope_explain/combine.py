@@ -1,0 +1,93 @@
+"""Engine's and audit's findings in one verdict."""
+
+from dataclasses import replace
+
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.plant import EffectSpec, PlantDescription
+from endoscope_explain.audit import AuditReport, Finding
+from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
+
+AUDITED_EFFECTS = {
+    'recording_gap': (
+        'samples absent in [time_s, time_s + duration_s]',
+        'intervals of header stamps against their median',
+    ),
+    'clock_skew': (
+        'stamp = t0 + (1 + skew) (t - t0)',
+        'IEEE 1588 terms; times of receipt against stamps, quickest delivery in each second',
+    ),
+    'tracker_outliers': (
+        'reading = q + wrong, in isolated samples',
+        'Hampel, J. Am. Stat. Assoc. 69, 1974, with the chance of a spike of white noise',
+    ),
+    'load_cell_saturation': (
+        'reading = min(T, limit_n)',
+        'VDI/VDE 2638, characteristics of force transducers (overload)',
+    ),
+}
+"""Equation and source of what the audit itself can name."""
+
+PHYSICAL = ('actuator', 'transmission', 'joint')
+
+
+def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[NamedEffect, ...]:
+    """Merge the effects that the audit found into those of the engine.
+
+    Parameters
+    ----------
+    explanation : Explanation
+    audit : AuditReport
+
+    Returns
+    -------
+    tuple of NamedEffect
+        Most certain first; an effect that both found is listed once, as the engine fitted it.
+    """
+    effects = list(explanation.effects)
+    known = {(e.id, e.joint) for e in effects}
+    for finding in audit.faults():
+        if finding.id in AUDITED_EFFECTS and (finding.id, finding.joint) not in known:
+            effects.append(_effect_of(finding))
+    return tuple(sorted(effects, key=lambda e: -e.probability))
+
+
+def combined_verdict(explanation: Explanation, audit: AuditReport) -> Verdict:
+    """Say in one word what engine and audit found.
+
+    Missing physics wins over a faulty sensor, that over a faulty recording, and any of them over
+    differing parameters: these always differ a little.
+    """
+    effects = combined_effects(explanation, audit)
+    stages = {effect.stage for effect in effects}
+    if explanation.verdict is Verdict.UNKNOWN_PHYSICS:
+        return Verdict.UNKNOWN_PHYSICS
+    if stages & set(PHYSICAL):
+        return Verdict.MISSING_PHYSICS
+    if 'sensing' in stages:
+        return Verdict.SENSOR_FAULT
+    if 'recording' in stages or audit.faults():
+        return Verdict.RECORDING_FAULT
+    return explanation.verdict
+
+
+def improved_plant(explanation: Explanation, audit: AuditReport) -> PlantDescription:
+    """Add what the audit found, and the simulator can do, to the engine's augmented plant."""
+    plant = explanation.augmented
+    present = {(e.id, e.joint) for e in plant.effects}
+    added = []
+    for finding in audit.faults():
+        definition = CATALOGUE.get(finding.id)
+        if definition is None or (finding.id, finding.joint) in present:
+            continue
+        names = {parameter.name for parameter in definition.parameters}
+        values = {n: e.value for n, e in finding.parameters.items() if n in names}
+        added.append(EffectSpec(finding.id, finding.joint, values))
+        present.add((finding.id, finding.joint))
+    return replace(plant, effects=plant.effects + tuple(added))
+
+
+def _effect_of(finding: Finding) -> NamedEffect:
+    equation, source = AUDITED_EFFECTS[finding.id]
+    return NamedEffect(
+        finding.id, finding.joint, finding.stage, finding.probability, equation, source,
+        finding.parameters, (), finding.evidence)

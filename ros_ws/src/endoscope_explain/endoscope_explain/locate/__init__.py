@@ -1,0 +1,1 @@
+"""Where a mismatch is, before and after it has a name."""

@@ -1,0 +1,155 @@
+"""States of the rig as a person names them, from what was measured."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_explain.locate.time_windows import WINDOW_S
+from endoscope_explain.recording import Recording
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+GRID_S = 0.01
+AFTER_REVERSAL_RAD = 0.15
+"""Travel of the motor (joint-equivalent) that counts as just after a reversal."""
+STANDING_RAD_PER_S = 0.02
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One state.
+
+    Attributes
+    ----------
+    words : str
+        As it stands in a sentence after "shows".
+    active : array (N,) of bool
+        On a grid of `GRID_S`.
+    """
+
+    words: str
+    active: Mask
+
+
+def conditions(recording: Recording, j: int, gear: float) -> list[Condition]:
+    """List the states that a joint was in.
+
+    Parameters
+    ----------
+    recording : Recording
+        As audited.
+    j : int
+        Column of the joint.
+    gear : float
+
+    Returns
+    -------
+    list of Condition
+        Those that hold for some, not all of the time.
+    """
+    grid = np.arange(0.0, recording.duration, GRID_S)
+    motor = _motor(recording, j, gear, grid)
+    speed = _speed(motor)
+    bending = np.interp(
+        grid, recording.bending.time, _smoothed(recording.bending.values[:, j], 5))
+    tension = recording.tension.values[:, j].sum(axis=1)
+    tension = np.interp(grid, recording.tension.time, tension)
+    moving = np.abs(speed) > STANDING_RAD_PER_S
+    found = [
+        Condition('in holds', _lasting(~moving, 0.2)),
+        Condition('while the motor moves', moving),
+        Condition('while the motor turns in the positive direction', speed > STANDING_RAD_PER_S),
+        Condition('while the motor turns in the negative direction', speed < -STANDING_RAD_PER_S),
+        Condition('just after reversals', _after_reversal(motor, speed)),
+    ]
+    if moving.any():
+        slow, fast = np.quantile(np.abs(speed[moving]), [1 / 3, 2 / 3])
+        found += [
+            Condition('at low speed', moving & (np.abs(speed) < slow)),
+            Condition('at low speed and in holds', np.abs(speed) < slow),
+            Condition('at high speed', np.abs(speed) > fast),
+        ]
+    largest = float(np.abs(bending).max())
+    for share in (0.3, 0.5, 0.7, 0.85):
+        level = share * largest
+        degrees = f'{np.degrees(level):.0f} deg'
+        found += [
+            Condition(f'beyond {degrees} of bending', np.abs(bending) > level),
+            Condition(f'above +{degrees} of bending', bending > level),
+            Condition(f'below -{degrees} of bending', bending < -level),
+        ]
+    found.append(Condition(
+        f'within {np.degrees(0.2 * largest):.0f} deg of straight', np.abs(bending) < 0.2 * largest))
+    high = float(np.quantile(tension, 0.75))
+    found.append(Condition(f'where the wires carry more than {high:.1f} N', tension > high))
+    for other, name in enumerate(recording.joints):
+        if other != j:
+            its_speed = _speed(_motor(recording, other, gear, grid))
+            found.append(Condition(
+                f'while {name} moves', np.abs(its_speed) > STANDING_RAD_PER_S))
+    for share in (0.25, 0.5, 0.75):
+        time = share * recording.duration
+        found.append(Condition(f'after {time:.0f} s', grid > time))
+    return [c for c in found if 0.02 < c.active.mean() < 0.98]
+
+
+def drive(recording: Recording, j: int, gear: float, end: float) -> Array:
+    """Measure how much was asked of a joint in windows of time.
+
+    Parameters
+    ----------
+    recording : Recording
+    j : int
+    gear : float
+    end : float
+        In s.
+
+    Returns
+    -------
+    array (W, 3)
+        Largest angle and speed of the motor, joint-equivalent, and largest bending angle in each
+        window.
+    """
+    count = int(np.ceil(end / WINDOW_S))
+    grid = (np.arange(count * int(WINDOW_S / GRID_S)) + 0.5) * GRID_S
+    motor = _motor(recording, j, gear, grid)
+    bending = np.interp(grid, recording.bending.time, recording.bending.values[:, j])
+    every = np.abs(np.c_[motor, _speed(motor), bending]).reshape(count, -1, 3)
+    return np.asarray(every.max(axis=1))
+
+
+def _motor(recording: Recording, j: int, gear: float, grid: Array) -> Array:
+    source = recording.shaft_position or recording.command
+    return np.interp(grid, source.time, source.values[:, j]) / gear
+
+
+def _speed(angle: Array) -> Array:
+    return np.gradient(_smoothed(angle, 5), GRID_S)
+
+
+def _smoothed(values: Array, width: int) -> Array:
+    padded = np.pad(values, width // 2, mode='edge')
+    return np.convolve(padded, np.ones(width) / width, 'valid')
+
+
+def _lasting(active: Mask, shortest: float) -> Mask:
+    """Keep the stretches of at least `shortest` s."""
+    edges = np.flatnonzero(np.diff(np.r_[False, active, False].astype(int)))
+    kept = np.zeros(len(active), bool)
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        if (b - a) * GRID_S >= shortest:
+            kept[a:b] = True
+    return kept
+
+
+def _after_reversal(motor: Array, speed: Array) -> Mask:
+    active = np.zeros(len(motor), bool)
+    way, turned_at = 0.0, -np.inf
+    for i, v in enumerate(speed):
+        if abs(v) > STANDING_RAD_PER_S and np.sign(v) != way:
+            turned_at = motor[i] if way else -np.inf
+            way = float(np.sign(v))
+        active[i] = abs(motor[i] - turned_at) < AFTER_REVERSAL_RAD
+    return active

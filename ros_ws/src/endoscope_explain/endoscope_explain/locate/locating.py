@@ -1,0 +1,144 @@
+"""Where a mismatch is: stage, signals, time, state and frequency."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from endoscope_core.plant import PlantDescription
+from endoscope_explain.audit import AuditReport, Finding
+from endoscope_explain.case import Place
+from endoscope_explain.explanation import Explanation, NamedEffect
+from endoscope_explain.locate.band import band_hz
+from endoscope_explain.locate.conditions import conditions, drive
+from endoscope_explain.locate.excess import SignalExcess, excess_between, shares
+from endoscope_explain.locate.regime import regime_in_words
+from endoscope_explain.locate.time_windows import intervals, onset
+from endoscope_explain.predicted_signals import view
+from endoscope_explain.recording import Recording
+
+STAGE_OF_PARAMETER = {
+    'pretension': 'transmission',
+    'wire_stiffness': 'transmission',
+    'joint_radius': 'transmission',
+    'pulley_radius': 'transmission',
+    'capstan_exponent': 'transmission',
+    'presliding_distance': 'transmission',
+    'joint_stiffness': 'joint',
+    'joint_damping': 'joint',
+    'joint_friction': 'joint',
+    'joint_presliding': 'joint',
+    'motor_bandwidth': 'actuator',
+    'motor_damping_ratio': 'actuator',
+}
+
+STAGE_OF_NODE = {'command': 'actuator', 'stretch': 'transmission', 'moment': 'joint'}
+
+
+def locate_effects(
+    recording: Recording, plant: PlantDescription, effects: Sequence[NamedEffect]
+) -> list[Place]:
+    """Say where each effect of an explained recording shows.
+
+    The plant with all effects is compared with the same plant without the one in question: what
+    the measurement then has in excess is that effect's trace.
+
+    Parameters
+    ----------
+    recording : Recording
+        As audited.
+    plant : PlantDescription
+        With the effects in it.
+    effects : sequence of NamedEffect
+
+    Returns
+    -------
+    list of Place
+        In the order of the effects; those that the plant does not hold are left out.
+    """
+    located = []
+    for effect in effects:
+        rest = tuple(
+            e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
+        if len(rest) == len(plant.effects):
+            continue
+        recorded = view(recording, {'without': replace(plant, effects=rest), 'with': plant})
+        found = excess_between(list(recorded.signals.values()), 'without', 'with')
+        time = effect.parameters.get('time_s')
+        located.append(place(
+            recording, plant, found, effect.stage, effect.joint,
+            None if time is None else time.value))
+    return located
+
+
+def locate_unknown(
+    recording: Recording, explanation: Explanation
+) -> list[Place]:
+    """Say where a mismatch shows that no effect of the catalogue explains."""
+    term = explanation.unknown
+    recorded = view(recording, {'refitted': explanation.refitted})
+    found = excess_between(list(recorded.signals.values()), 'refitted', None)
+    joint = term.joint if term is not None else found[0].view.joint
+    stage = STAGE_OF_NODE.get(term.node, 'joint') if term is not None else 'joint'
+    return [place(recording, explanation.refitted, found, stage, joint)]
+
+
+def locate_parameters(recording: Recording, explanation: Explanation) -> list[Place]:
+    """Say where parameters that left their band show, stage by stage."""
+    recorded = view(
+        recording, {'nominal': explanation.nominal, 'refitted': explanation.refitted})
+    found = excess_between(list(recorded.signals.values()), 'nominal', 'refitted')
+    stages: Mapping[tuple[str, str], float] = {
+        (STAGE_OF_PARAMETER[name], joint): 0.0
+        for joint, estimates in explanation.parameters.items()
+        for name, e in estimates.items() if not e.in_band
+    }
+    return [
+        place(recording, explanation.refitted, found, stage, joint) for stage, joint in stages
+    ]
+
+
+def locate_findings(audit: AuditReport) -> list[Place]:
+    """Say where the audit's faults are."""
+    return [_place_of(finding) for finding in audit.faults()]
+
+
+def place(
+    recording: Recording, plant: PlantDescription, found: Sequence[SignalExcess], stage: str,
+    joint: str, began: float | None = None,
+) -> Place:
+    """Describe one trace in signals, time, state and frequency.
+
+    Parameters
+    ----------
+    recording : Recording
+    plant : PlantDescription
+        For the gear.
+    found : sequence of SignalExcess
+        Largest first; those of both joints.
+    stage, joint : str
+        Known already.
+    began : float, optional
+        When it began, in s, where that is known.
+
+    Returns
+    -------
+    Place
+    """
+    by_signal = shares(found)
+    j, gear = recording.joints.index(joint), plant.joints[joint].gear
+    telling = [e for e in found if e.view.signal in by_signal] or list(found[:1])
+    end = recording.duration
+    regime = regime_in_words(telling, conditions(recording, j, gear))
+    if began is None:
+        began = onset(telling, drive(recording, j, gear, end), end)
+    if began is not None:
+        rest = '' if regime == 'throughout' or regime.startswith('after') else f', {regime}'
+        regime = f'from {began:.1f} s on{rest}'
+    return Place(
+        stage, joint, tuple(by_signal) or (telling[0].view.signal,),
+        intervals(telling, end), regime, band_hz(telling[0]), by_signal, began)
+
+
+def _place_of(finding: Finding) -> Place:
+    return Place(
+        finding.stage, finding.joint, finding.signals, finding.intervals[:12], finding.text,
+        (0.0, 0.0))

@@ -1,0 +1,97 @@
+"""In which states of the rig a mismatch shows, in words."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_explain.locate.conditions import GRID_S, Condition
+from endoscope_explain.locate.excess import SignalExcess
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LEAST_NATS = 0.08
+"""Information that a state must give about where the excess is to be worth a word."""
+SHIFTS = 99
+
+
+def regime_in_words(
+    excesses: Sequence[SignalExcess], states: Sequence[Condition], seed: int = 0
+) -> str:
+    """Name the one or two states that hold most of the excess in the least time.
+
+    How far a state concentrates the excess is the Kullback-Leibler divergence between its share of
+    the excess and its share of the time; by chance is what shifts of the excess in time reach.
+
+    Parameters
+    ----------
+    excesses : sequence of SignalExcess
+        The signals in which it shows.
+    states : sequence of Condition
+        On the grid of `conditions`.
+    seed : int
+        Of the shifts.
+
+    Returns
+    -------
+    str
+    """
+    if not states or not excesses:
+        return 'throughout'
+    energy = _energy_on_grid(excesses, len(states[0].active))
+    everywhere = np.ones(len(energy), bool)
+    first = _best(energy, states, everywhere, seed)
+    if first is None:
+        return 'throughout'
+    rest = [s for s in states if s is not first]
+    second = _best(energy, rest, first.active, seed + 1)
+    return first.words if second is None else f'{first.words}, {second.words}'
+
+
+def information(energy: Array, active: Mask, within: Mask) -> float:
+    """Return what a state says about where the energy is, in nats; 0 where it holds less.
+
+    Parameters
+    ----------
+    energy : array (N,)
+        At least 0.
+    active, within : array (N,) of bool
+        The state, and the stretch of time that is looked at.
+    """
+    total = float(energy[within].sum())
+    inside = active & within
+    time_share = inside.sum() / max(within.sum(), 1)
+    if total <= 0.0 or not 0.02 < time_share < 0.98:
+        return 0.0
+    share = float(np.clip(energy[inside].sum() / total, 1e-9, 1 - 1e-9))
+    if share <= time_share:
+        return 0.0
+    return float(
+        share * np.log(share / time_share) + (1 - share) * np.log((1 - share) / (1 - time_share)))
+
+
+def _best(
+    energy: Array, states: Sequence[Condition], within: Mask, seed: int
+) -> Condition | None:
+    scored = [(information(energy, s.active, within), i) for i, s in enumerate(states)]
+    value, index = max(scored)
+    if value < LEAST_NATS:
+        return None
+    rng = np.random.default_rng(seed)
+    least = int(1.0 / GRID_S)
+    if len(energy) < 4 * least:
+        return states[index]
+    shifts = rng.integers(least, len(energy) - least, SHIFTS)
+    by_chance = [
+        max(information(np.roll(energy, k), s.active, within) for s in states) for k in shifts
+    ]
+    return states[index] if value > np.quantile(by_chance, 0.9) else None
+
+
+def _energy_on_grid(excesses: Sequence[SignalExcess], size: int) -> Array:
+    energy = np.zeros(size)
+    for one in excesses:
+        index = np.clip((one.view.time / GRID_S).astype(int), 0, size - 1)
+        energy += np.bincount(index, one.missing**2, size)
+    return energy

@@ -1,0 +1,154 @@
+"""From bags to an explained case: read, audit, explain, locate, judge, propose."""
+
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from endoscope_bags.errors import BagError
+from endoscope_core.plant import PlantDescription
+from endoscope_explain.audit import AuditReport, audit_recording
+from endoscope_explain.case import ExplainedCase, Place
+from endoscope_explain.combine import combined_effects, combined_verdict, improved_plant
+from endoscope_explain.explanation import Explanation, Verdict
+from endoscope_explain.locate.locating import (
+    locate_effects,
+    locate_findings,
+    locate_parameters,
+    locate_unknown,
+)
+from endoscope_explain.recording import Recording, plant_of_joints, recording_from_bag
+
+Progress = Callable[[str], None]
+Engine = Callable[..., Explanation]
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What one explanation is made from.
+
+    Attributes
+    ----------
+    bag : Path
+        The recording to explain.
+    plant : PlantDescription
+        The simulation that an engineer has.
+    baseline : Path or None
+        A recording of the same rig when it was well.
+    validate : Path or None
+        A second recording of the same rig to judge on.
+    without : collection of str
+        Topics that may be missing.
+    """
+
+    bag: Path
+    plant: PlantDescription
+    baseline: Path | None = None
+    validate: Path | None = None
+    without: Collection[str] = ()
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The sources, read and audited.
+
+    Attributes
+    ----------
+    plant : PlantDescription
+        With the recorded joints only.
+    audit : AuditReport
+    baseline, validation : Recording or None
+        As audited.
+    """
+
+    plant: PlantDescription
+    audit: AuditReport
+    baseline: Recording | None
+    validation: Recording | None
+
+
+class JointsDifferError(BagError):
+    """A second recording lacks a joint of the first."""
+
+
+def read_inputs(sources: Sources) -> Inputs:
+    """Read and audit all recordings of a case.
+
+    Parameters
+    ----------
+    sources : Sources
+
+    Returns
+    -------
+    Inputs
+
+    Raises
+    ------
+    BagError
+        If a recording cannot be used; the message names it.
+    """
+    raw = recording_from_bag(sources.bag, sources.plant, without=sources.without)
+    plant = plant_of_joints(sources.plant, raw.joints)
+
+    def second(path: Path | None) -> Recording | None:
+        if path is None:
+            return None
+        other = recording_from_bag(path, plant, without=sources.without)
+        if other.joints != raw.joints:
+            raise JointsDifferError(
+                f'{path}: has {", ".join(other.joints)}, but {sources.bag} has '
+                f'{", ".join(raw.joints)}')
+        return audit_recording(other, plant).recording
+
+    return Inputs(
+        plant, audit_recording(raw, plant), second(sources.baseline), second(sources.validate))
+
+
+def explain_case(
+    inputs: Inputs, engine: Engine, *, jobs: int = 2, progress: Progress | None = None
+) -> ExplainedCase:
+    """Explain a recording.
+
+    Parameters
+    ----------
+    inputs : Inputs
+    engine : callable
+        `explain_recording`.
+    jobs : int
+        Processes side by side.
+    progress : callable, optional
+        Told in a few words what is being done.
+
+    Returns
+    -------
+    ExplainedCase
+    """
+    begun = time.monotonic()
+    tell = progress or (lambda _: None)
+    audit = inputs.audit
+    for finding in audit.findings:
+        tell(f'audit: {finding.text}; {finding.remedy}')
+    explanation = engine(
+        audit.recording, inputs.plant, baseline=inputs.baseline, jobs=jobs, progress=progress)
+    tell('locating')
+    plant = improved_plant(explanation, audit)
+    case = ExplainedCase(
+        audit.recording, audit, explanation, combined_verdict(explanation, audit),
+        combined_effects(explanation, audit), (), plant, explanation.fit)
+    return replace(case, places=_places(case), runtime_s=time.monotonic() - begun)
+
+
+def _places(case: ExplainedCase) -> tuple[Place, ...]:
+    if case.verdict in (Verdict.CONSISTENT, Verdict.INSUFFICIENT_DATA):
+        return ()
+    explanation = case.explanation
+    audited = {(f.id, f.joint) for f in case.audit.faults()}
+    places = locate_effects(
+        case.recording, explanation.augmented,
+        [e for e in case.effects if (e.id, e.joint) not in audited])
+    places += locate_findings(case.audit)
+    if case.verdict is Verdict.UNKNOWN_PHYSICS:
+        places = locate_unknown(case.recording, explanation) + places
+    if case.verdict is Verdict.PARAMETERS_DIFFER:
+        places += locate_parameters(case.recording, explanation)
+    return tuple(places)

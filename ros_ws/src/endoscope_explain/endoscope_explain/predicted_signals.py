@@ -1,0 +1,166 @@
+"""What a plant predicts for every signal of a recording, beside what was measured."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.plant import PlantDescription
+from endoscope_core.plant.kernel import OUTPUTS, run_joints
+from endoscope_core.plant.packing import pack, rest_state
+from endoscope_explain.evaluate import SUBSTEPS
+from endoscope_explain.explanation import ChannelFit
+from endoscope_explain.observation import TICK, JointObservation, observe
+from endoscope_explain.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SignalView:
+    """One signal on the analysis grid.
+
+    Attributes
+    ----------
+    signal, joint, quantity, unit : str
+        Name as the report writes it, joint, series of the recording, SI unit.
+    time : array (M,)
+        In s from the recording's first stamp.
+    measured : array (M,)
+    noise : array (M,)
+        Known noise (rms) of each sample.
+    predicted : mapping of str to array (M,)
+        By the plant's name.
+    """
+
+    signal: str
+    joint: str
+    quantity: str
+    unit: str
+    time: Array
+    measured: Array
+    noise: Array
+    predicted: Mapping[str, Array]
+
+    def residual(self, name: str) -> Array:
+        """Return measured minus predicted in noise units."""
+        return np.asarray((self.measured - self.predicted[name]) / self.noise)
+
+
+@dataclass(frozen=True)
+class RecordedView:
+    """A recording and its predictions.
+
+    Attributes
+    ----------
+    observations : tuple of JointObservation
+    signals : mapping of str to SignalView
+        By name, joint after joint.
+    command, shaft, bending : mapping of joint to array (N,)
+        Command, measured motor (predicted where it was not recorded) and predicted bending angle
+        by the last plant given, joint-equivalent rad on 1 ms ticks.
+    begin : float
+        First command's stamp in s from the recording's first stamp.
+    """
+
+    observations: tuple[JointObservation, ...]
+    signals: Mapping[str, SignalView]
+    outputs: Mapping[str, Array]
+    begin: float
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Return the names of the joints."""
+        return tuple(o.joint for o in self.observations)
+
+    def of_joint(self, joint: str) -> tuple[SignalView, ...]:
+        """Return the signals of one joint."""
+        return tuple(s for s in self.signals.values() if s.joint == joint)
+
+
+def simulate_rig(
+    observations: tuple[JointObservation, ...], plant: PlantDescription
+) -> Array:
+    """Simulate all joints of a recording side by side.
+
+    Parameters
+    ----------
+    observations : tuple of JointObservation
+        In the order of the plant's joints.
+    plant : PlantDescription
+
+    Returns
+    -------
+    array (J, N, OUTPUTS)
+    """
+    parameters, flags = pack(plant)
+    rows = [plant.joint_names().index(o.joint) for o in observations]
+    parameters, flags = parameters[rows], flags[rows]
+    inputs = np.concatenate([o.inputs for o in observations])
+    states, histories = rest_state(parameters, np.array([o.start for o in observations]))
+    out = np.empty((len(observations), inputs.shape[1], OUTPUTS))
+    run_joints(
+        states, histories, parameters, flags, inputs, len(observations) > 1, TICK, SUBSTEPS, out)
+    return out
+
+
+def reading_lead(
+    observations: tuple[JointObservation, ...], outputs: Array
+) -> float:
+    """Estimate by how much of a tick readings are younger than their stamps.
+
+    From the motor's angle, which moves fast and is read without noise; 0 where it was not
+    recorded.
+    """
+    numerator = denominator = 0.0
+    for observation, out in zip(observations, outputs, strict=True):
+        for channel in observation.channels:
+            if channel.quantity != 'shaft_position':
+                continue
+            late, early = channel.predicted(out, 0.0), channel.predicted(out, 1.0)
+            weight = 1.0 / channel.noise**2
+            numerator += float(np.sum(weight * (early - late) * (channel.value - late)))
+            denominator += float(np.sum(weight * (early - late) ** 2))
+    return float(np.clip(numerator / denominator, 0.0, 1.0)) if denominator > 0 else 0.0
+
+
+def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> RecordedView:
+    """Predict every signal of a recording by several plants.
+
+    Parameters
+    ----------
+    recording : Recording
+        As audited.
+    plants : mapping of str to PlantDescription
+        The last one is taken for the best one: its motor tells when readings were taken.
+
+    Returns
+    -------
+    RecordedView
+    """
+    best = list(plants.values())[-1]
+    observations = observe(recording, best)
+    begin = float(recording.command.time[0])
+    simulated = {name: simulate_rig(observations, plant) for name, plant in plants.items()}
+    outputs = simulated[list(plants)[-1]]
+    lead = reading_lead(observations, outputs)
+    signals = {}
+    for j, observation in enumerate(observations):
+        for channel in observation.channels:
+            signals[channel.signal] = SignalView(
+                channel.signal, observation.joint, channel.quantity, channel.unit,
+                channel.time + begin, channel.value, channel.noise,
+                {name: channel.predicted(out[j], lead) for name, out in simulated.items()})
+    by_joint = {o.joint: outputs[j] for j, o in enumerate(observations)}
+    return RecordedView(observations, signals, by_joint, begin)
+
+
+def rung(recorded: RecordedView, name: str) -> dict[str, ChannelFit]:
+    """Return rmse and noise of every signal under one of the plants of a view."""
+    return {
+        signal: ChannelFit(
+            float(np.sqrt(np.mean((v.measured - v.predicted[name]) ** 2))),
+            float(np.sqrt(np.mean(v.noise**2))))
+        for signal, v in recorded.signals.items()
+    }

@@ -1,0 +1,35 @@
+"""The files of a report."""
+
+import json
+from pathlib import Path
+
+from endoscope_core.plant import save_plant
+from endoscope_core.signals.command_file import write_command_file
+from endoscope_explain.case import ExplainedCase
+from endoscope_explain.report.report_mapping import EXPERIMENT_FILE, report_mapping
+
+REPORT_JSON = 'report.json'
+PLANT_YAML = 'plant.yaml'
+
+
+def write_report(case: ExplainedCase, folder: Path) -> None:
+    """Write report.json, plant.yaml and, where there is one, the next experiment's motion.
+
+    Parameters
+    ----------
+    case : ExplainedCase
+    folder : Path
+        Existing; see `atomic_directory`.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written.
+    """
+    content = json.dumps(report_mapping(case), indent=1, allow_nan=False)
+    (folder / REPORT_JSON).write_text(content + '\n', encoding='utf-8')
+    save_plant(case.plant, folder / PLANT_YAML)
+    if case.next_experiment is not None:
+        experiment = case.next_experiment
+        write_command_file(
+            folder / EXPERIMENT_FILE, experiment.time, experiment.command, experiment.joints)

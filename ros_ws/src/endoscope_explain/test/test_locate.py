@@ -1,0 +1,76 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.plant import EffectSpec, PlantDescription
+from endoscope_explain.explanation import Estimate, NamedEffect
+from endoscope_explain.locate.locating import STAGE_OF_PARAMETER, locate_effects
+from endoscope_explain.locate.regime import information
+
+PLANT = PlantDescription()
+
+
+def located(record, effect_id, joint='bend_x', **parameters):
+    spec = EffectSpec(effect_id, joint, parameters)
+    plant = dataclasses.replace(PLANT, effects=(spec,))
+    recording = record(plant, duration=15.0)
+    effect = NamedEffect(
+        effect_id, joint, str(CATALOGUE[effect_id].stage), 1.0, '', '',
+        {k: Estimate(v, v, v, '-') for k, v in parameters.items()})
+    (place,) = locate_effects(recording, plant, [effect])
+    return place
+
+
+def test_a_wrong_cell_shows_in_its_own_wire_alone(record):
+    place = located(record, 'load_cell_gain', gain=1.2, wire=1.0)
+    assert place.signals == ('wires/measured_js:wire_x_neg',)
+    assert place.stage == 'sensing'
+
+
+def test_a_stop_shows_beyond_its_angle(record):
+    place = located(record, 'joint_stop', angle_rad=0.5)
+    assert place.regime.startswith(('beyond', 'above', 'below'))
+    degrees = float(place.regime.split()[1].strip('+-'))
+    assert 15 <= degrees <= 40
+    assert set(place.signals) >= {'wires/measured_js:wire_x_pos', 'wires/measured_js:wire_x_neg'}
+
+
+def test_a_trace_is_found_on_the_joint_that_has_it(record):
+    place = located(record, 'joint_stop', 'bend_y', angle_rad=0.2)
+    assert place.joint == 'bend_y'
+    assert all('_y' in signal for signal in place.signals)
+
+
+def test_what_begins_is_said_to_begin(record):
+    place = located(record, 'configuration_change', time_s=8.0, factor=1.6)
+    assert place.onset_s == 8.0
+    assert place.regime.startswith('from 8.0 s on')
+    assert min(a for a, _ in place.intervals) >= 7.75
+
+
+def test_a_slow_drift_is_slow_and_breathing_is_not(record):
+    drift = located(record, 'tracker_drift', rate_rad_per_s=0.01)
+    breathing = located(record, 'breathing', frequency_hz=1.5, moment_nm=0.004)
+    assert drift.band_hz[1] < 0.5
+    assert breathing.band_hz[1] >= 1.4
+
+
+def test_where_nothing_is_missing_no_interval_stands_out(record):
+    place = located(record, 'tracker_bias', bias_rad=0.0)
+    assert place.intervals == ()
+    assert place.onset_s is None
+
+
+def test_information_is_zero_for_a_state_that_tells_nothing():
+    energy = np.ones(1000)
+    active = np.arange(1000) % 2 == 0
+    assert information(energy, active, np.ones(1000, bool)) == pytest.approx(0.0, abs=1e-9)
+    energy[~active] = 0.0
+    assert information(energy, active, np.ones(1000, bool)) == pytest.approx(np.log(2), rel=1e-3)
+
+
+def test_every_nominal_parameter_has_a_stage():
+    names = {f.name for f in dataclasses.fields(PLANT.joints['bend_x'])}
+    assert set(STAGE_OF_PARAMETER) == names

@@ -1,0 +1,150 @@
+"""report.json to the letter of its description."""
+
+import dataclasses
+import json
+import math
+
+import pytest
+
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.plant import load_plant
+from endoscope_explain.audit import AuditReport, Finding, Severity
+from endoscope_explain.case import NextExperiment
+from endoscope_explain.combine import AUDITED_EFFECTS, combined_effects, combined_verdict
+from endoscope_explain.explanation import Estimate, UnknownTerm, Verdict
+from endoscope_explain.report.report_mapping import report_mapping
+from endoscope_explain.report.writing import write_report
+
+NUMBER = (int, float)
+STAGES = {'actuator', 'transmission', 'joint', 'sensing', 'recording'}
+KEYS = {
+    'schema', 'verdict', 'where', 'effects', 'parameters', 'fit', 'symbolic', 'next_experiment',
+    'runtime_s',
+}
+
+
+def check_report(report):
+    assert set(report) == KEYS
+    assert report['schema'] == 1
+    assert report['verdict'] in set(Verdict)
+    for place in report['where']:
+        assert set(place) == {'stage', 'joint', 'signals', 'intervals', 'regime', 'band_hz'}
+        assert place['stage'] in STAGES
+        assert place['signals']
+        assert all('/' in s for s in place['signals'])
+        assert all(a <= b for a, b in place['intervals'])
+        assert place['regime']
+        low, high = place['band_hz']
+        assert 0 <= low <= high
+    for effect in report['effects']:
+        assert set(effect) == {
+            'id', 'joint', 'stage', 'probability', 'equation', 'source', 'parameters',
+            'alternatives', 'evidence'}
+        assert effect['stage'] in STAGES
+        assert 0 <= effect['probability'] <= 1
+        assert effect['equation']
+        assert effect['source']
+        for estimate in effect['parameters'].values():
+            assert set(estimate) == {'value', 'low', 'high', 'unit'}
+            assert estimate['low'] <= estimate['value'] <= estimate['high']
+        definition = CATALOGUE.get(effect['id'])
+        if definition is not None:
+            wanted = {p.name for p in definition.parameters if p.comparable}
+            assert wanted <= set(effect['parameters'])
+    for joint in report['parameters'].values():
+        for estimate in joint.values():
+            assert {'nominal', 'value', 'low', 'high'} <= set(estimate)
+    assert {'nominal', 'refitted', 'augmented'} <= set(report['fit'])
+    for rung in ('nominal', 'refitted', 'augmented'):
+        for fit in report['fit'][rung].values():
+            assert fit['rmse_over_noise'] == pytest.approx(fit['rmse'] / fit['noise'])
+    symbolic = report['symbolic']
+    assert symbolic is None or symbolic['expression']
+    experiment = report['next_experiment']
+    assert experiment is None or set(experiment) == {'why', 'separates', 'command'}
+    check_finite(report)
+
+
+def check_finite(value):
+    if isinstance(value, dict):
+        for item in value.values():
+            check_finite(item)
+    elif isinstance(value, list):
+        for item in value:
+            check_finite(item)
+    elif isinstance(value, float):
+        assert math.isfinite(value)
+
+
+def test_a_report_has_the_form_that_is_promised(stribeck_case):
+    report = report_mapping(stribeck_case)
+    check_report(json.loads(json.dumps(report, allow_nan=False)))
+    assert report['verdict'] == 'missing_physics'
+    assert report['where'][0]['stage'] == 'transmission'
+    augmented, nominal = report['fit']['augmented'], report['fit']['nominal']
+    wire = 'wires/measured_js:wire_x_pos'
+    assert augmented[wire]['rmse'] < 0.5 * nominal[wire]['rmse']
+
+
+def test_an_open_interval_ends_at_the_parameters_bound(stribeck_case):
+    effect = stribeck_case.effects[0]
+    open_ended = dataclasses.replace(effect.parameters['rise'], high=math.inf)
+    changed = dataclasses.replace(effect, parameters={**effect.parameters, 'rise': open_ended})
+    report = report_mapping(dataclasses.replace(stribeck_case, effects=(changed,)))
+    bound = next(p.high for p in CATALOGUE['stribeck_friction'].parameters if p.name == 'rise')
+    assert report['effects'][0]['parameters']['rise']['high'] == bound
+
+
+def test_a_number_that_is_not_finite_is_refused(stribeck_case):
+    with pytest.raises(ValueError, match='runtime_s is nan'):
+        report_mapping(dataclasses.replace(stribeck_case, runtime_s=math.nan))
+
+
+def test_unknown_physics_carries_its_formula(stribeck_case):
+    term = UnknownTerm(
+        'bend_x', 'moment', 'N m', 'a exp(-((q - b) / c)**2)', {'q': 'angle, rad'},
+        (Estimate(0.01, 0.009, 0.011, 'N m'),), 0.9, None, None, None, ('gravity',))
+    explanation = dataclasses.replace(
+        stribeck_case.explanation, verdict=Verdict.UNKNOWN_PHYSICS, unknown=term)
+    case = dataclasses.replace(
+        stribeck_case, explanation=explanation, verdict=Verdict.UNKNOWN_PHYSICS)
+    report = report_mapping(case)
+    check_report(report)
+    assert report['symbolic']['expression'] == term.expression
+    assert report['symbolic']['siblings'] == ['gravity']
+
+
+def test_the_written_plant_holds_the_effect_and_the_motion_is_beside_it(stribeck_case, tmp_path):
+    experiment = NextExperiment(
+        'two rivals', ('viscous_friction', 'stribeck_friction'), 'slow ramps', 'bend_x',
+        {'slow ramps': 4.0}, (0.0, 0.5, 1.0), ((0.0, 0.0), (0.2, 0.0), (0.0, 0.0)),
+        ('bend_x', 'bend_y'))
+    write_report(dataclasses.replace(stribeck_case, next_experiment=experiment), tmp_path)
+    report = json.loads((tmp_path / 'report.json').read_text())
+    check_report(report)
+    assert load_plant(tmp_path / 'plant.yaml') == stribeck_case.plant
+    assert (tmp_path / report['next_experiment']['command']['file']).is_file()
+
+
+def finding(effect_id, stage):
+    return Finding(
+        effect_id, Severity.FAULT, 'bend_x', stage, ('slave/measured_js',), ((1.0, 2.0),), 'text',
+        'remedy', parameters={'time_s': Estimate(1.0, 0.9, 1.1, 's')})
+
+
+@pytest.mark.parametrize(('findings', 'effects', 'verdict'), [
+    ([('recording_gap', 'recording')], True, 'missing_physics'),
+    ([('recording_gap', 'recording')], False, 'recording_fault'),
+    ([('tracker_outliers', 'sensing')], False, 'sensor_fault'),
+    ([('held_samples', 'recording')], False, 'recording_fault'),
+    ([], False, 'consistent'),
+])
+def test_the_audits_faults_enter_the_verdict(stribeck_case, findings, effects, verdict):
+    explanation = stribeck_case.explanation
+    if not effects:
+        explanation = dataclasses.replace(explanation, effects=(), verdict=Verdict.CONSISTENT)
+    audit = AuditReport(stribeck_case.recording, tuple(finding(*f) for f in findings))
+    assert combined_verdict(explanation, audit) == verdict
+    named = {e.id for e in combined_effects(explanation, audit)}
+    assert named == ({'stribeck_friction'} if effects else set()) | (
+        {f for f, _ in findings} & set(AUDITED_EFFECTS))
