@@ -10,7 +10,12 @@ import numpy as np
 
 from endoscope_bags.bag_files import METADATA
 from endoscope_bags.chunk_sink import ChunkSink, TopicRecord
-from endoscope_bags.errors import BagError, BagExistsError, BagFullError
+from endoscope_bags.errors import (
+    BagError,
+    BagExistsError,
+    BagFullError,
+    MalformedMessageError,
+)
 from endoscope_bags.mcap_chunk import MESSAGE_OVERHEAD, ChunkMessage
 from endoscope_bags.message_stream import MessageStream
 from endoscope_bags.message_types import MessageType, message_type
@@ -179,7 +184,12 @@ class BagWriter:
         ------
         BagFullError
             The disk is full; the chunks before are kept. Close the writer.
+        MalformedMessageError
+            A time is negative.
         """
+        published = log_ns if publish_ns is None else publish_ns
+        if log_ns < 0 or published < 0:
+            raise MalformedMessageError(f'{topic}: time {min(log_ns, published)} ns is negative')
         if topic not in self._topics:
             self.add_topic(topic, type_name)
         if self._pending and (
@@ -194,7 +204,7 @@ class BagWriter:
                 log_ns,
                 self._topics[topic].id,
                 sequence & 0xFFFFFFFF,
-                log_ns if publish_ns is None else publish_ns,
+                published,
                 cdr,
             )
         )

@@ -18,8 +18,9 @@ import numpy.typing as npt
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Header, Metadata, Schema
+from mcap.records import Channel, Chunk, DataEnd, Header, Metadata, Schema
 from mcap.stream_reader import get_chunk_data_stream
+from zstandard import ZstdError
 
 from endoscope_bags.errors import (
     BagNotFoundError,
@@ -29,6 +30,7 @@ from endoscope_bags.errors import (
 )
 
 MAGIC = b'\x89MCAP0\r\n'
+_CRC_STEP = 1 << 24
 _RECORD_HEAD = struct.Struct('<BQ')
 MESSAGE_HEAD = np.dtype(
     [
@@ -166,8 +168,12 @@ class _Pass:
             else:
                 self._end_loose_messages(position)
                 self._other(opcode, start, stop)
+                if opcode == Opcode.DATA_END:
+                    self._check_data(position, self._data[start:stop])
                 ended = opcode == Opcode.FOOTER
             position = stop
+        if ended and self._data[position : position + len(MAGIC)] != MAGIC:
+            self._truncated(position)
         self._end_loose_messages(position)
         self.scan.messages = self._table()
         return self.scan
@@ -211,6 +217,14 @@ class _Pass:
                 CorruptBagError, f'{name} record at byte {start} does not decode: {error}'
             )
 
+    def _check_data(self, end: int, body: bytes) -> None:
+        expected = DataEnd.read(ReadDataStream(BytesIO(body))).data_section_crc
+        actual = 0
+        for start in range(0, end, _CRC_STEP):
+            actual = zlib.crc32(self._data[start : min(start + _CRC_STEP, end)], actual)
+        if expected not in (0, actual):
+            self._damaged(CorruptBagError, 'the data do not agree with their checksum')
+
     def _describe(self, opcode: int, body: bytes) -> None:
         stream = ReadDataStream(BytesIO(body))
         if opcode == Opcode.SCHEMA:
@@ -229,7 +243,7 @@ class _Pass:
         try:
             records = _decompressed(self._data[start:stop])
             positions = self._message_positions(records)
-        except (McapError, ValueError, RuntimeError, zlib.error) as error:
+        except (McapError, ValueError, RuntimeError, struct.error, ZstdError) as error:
             number = sum(chunked for _, _, chunked in self.scan.blocks) + 1
             self._damaged(CorruptBagError, f'chunk {number} at byte {start} is damaged: {error}')
             return

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from rosbags.serde import SerdeError
 
 from endoscope_bags.bag_files import bag_files
 from endoscope_bags.cdr_decoding import Payloads
@@ -84,7 +85,7 @@ class Recording:
                 name=channel.topic,
                 type=kind,
                 message_count=len(rows) + (before.message_count if before else 0),
-                definition=schema.data.decode() if schema else '',
+                definition=schema.data.decode(errors='replace') if schema else '',
                 type_hash=channel.metadata.get('topic_type_hash', ''),
                 qos=qos_from_yaml(channel.metadata.get('offered_qos_profiles', '')),
             )
@@ -272,7 +273,7 @@ class Recording:
         for number, message in enumerate(self.messages([topic]), start=1):
             try:
                 yield message, store.deserialize_cdr(message.data, kind)
-            except (ValueError, IndexError, AssertionError, UnicodeDecodeError) as error:
+            except (SerdeError, ValueError, IndexError) as error:
                 raise MalformedMessageError(
                     f'{self.path}: topic {topic}: message {number} does not decode: {error}'
                 ) from error

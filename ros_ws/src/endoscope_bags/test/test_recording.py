@@ -1,0 +1,286 @@
+"""Reading: any namespace, order, rate and joints; each flaw one clear error."""
+
+import contextlib
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, Writer
+
+from endoscope_bags import BagError, BagWriter, open_bag
+from endoscope_bags.cdr_encoding import (
+    encode_diagnostics,
+    encode_joint_state,
+    encode_poses,
+    encode_string,
+)
+from endoscope_bags.errors import (
+    AmbiguousTopicError,
+    BagNotFoundError,
+    CorruptBagError,
+    EmptyBagError,
+    MalformedMessageError,
+    MissingJointError,
+    MissingTopicError,
+    NonFiniteError,
+    NotABagError,
+    TopicTypeError,
+    TruncatedBagError,
+    UnsupportedBagError,
+)
+from endoscope_bags.message_types import DIAGNOSTIC_ARRAY, JOINT_STATE, POSE_STAMPED, STRING
+
+MS = 10**6
+
+
+def write(path, topic='/robot/left/motor/measured_js', n=500, kind=JOINT_STATE, data=None):
+    with BagWriter(path) as writer:
+        for k in range(n):
+            cdr = data or encode_joint_state(
+                ['motor_y', 'motor_x'], k * MS, position=[k + 0.5, k], effort=[0.25, 0.125]
+            )
+            writer.write_raw(topic, kind, cdr, k * MS + 7, k * MS + 5, k + 1)
+    return path
+
+
+def test_any_namespace_and_joint_order(tmp_path):
+    bag = open_bag(write(tmp_path / 'bag'))
+    series = bag.joint_state('motor/measured_js').select(['motor_x', 'motor_y'])
+    assert series.topic == '/robot/left/motor/measured_js'
+    np.testing.assert_array_equal(series.position[:, 0], np.arange(500))
+    np.testing.assert_array_equal(series.position[:, 1], np.arange(500) + 0.5)
+    assert series.velocity is None
+    assert series.effort[3].tolist() == [0.125, 0.25]
+    assert series.stamp_ns.dtype == np.int64
+    np.testing.assert_array_equal(series.stamp_ns, np.arange(500) * MS)
+    np.testing.assert_array_equal(series.log_ns - series.stamp_ns, np.full(500, 7))
+    np.testing.assert_array_equal(series.publish_ns - series.stamp_ns, np.full(500, 5))
+    np.testing.assert_array_equal(series.sequence, np.arange(500) + 1)
+    np.testing.assert_allclose(series.seconds(), np.arange(500) * 1e-3)
+    one = series.select(['motor_y'])
+    assert one.names == ('motor_y',)
+    assert one.position.shape == (500, 1)
+
+
+def test_a_suffix_matches_whole_names_only(tmp_path):
+    bag = open_bag(write(tmp_path / 'bag', topic='/fast_motor/measured_js', n=1))
+    assert not bag.has('motor/measured_js')
+    with pytest.raises(MissingTopicError, match='lacks topic motor/measured_js; it has /fast_'):
+        bag.joint_state('motor/measured_js')
+
+
+def test_two_namespaces_have_to_be_told_apart(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        for k, topic in enumerate(('/a/wires/measured_js', '/b/wires/measured_js')):
+            writer.write_raw(topic, JOINT_STATE, encode_joint_state(['w'], k, effort=[k]), k)
+    bag = open_bag(tmp_path / 'bag')
+    with pytest.raises(AmbiguousTopicError, match='/a/wires/measured_js or /b/wires/measured_js'):
+        bag.joint_state('wires/measured_js')
+    assert bag.joint_state('wires/measured_js', namespace='/b').effort.tolist() == [[1.0]]
+    assert bag.joint_state('/a/wires/measured_js').effort.tolist() == [[0.0]]
+
+
+def test_messages_out_of_order_are_sorted_by_stamp_unless_asked_otherwise(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        for log, stamp in enumerate((3, 1, 2)):
+            cdr = encode_joint_state(['a'], stamp, position=[stamp])
+            writer.write_raw('/x', JOINT_STATE, cdr, log)
+    bag = open_bag(tmp_path / 'bag')
+    assert bag.joint_state('x').position[:, 0].tolist() == [1, 2, 3]
+    assert bag.joint_state('x', order='recorded').position[:, 0].tolist() == [3, 1, 2]
+
+
+def test_joints_that_change_places_in_the_middle(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        for k in range(10):
+            names = ['a', 'b'] if k < 5 else ['b', 'a']
+            values = [k, -k] if k < 5 else [-k, k]
+            cdr = encode_joint_state(names, k, position=values)
+            writer.write_raw('/x', JOINT_STATE, cdr, k)
+    series = open_bag(tmp_path / 'bag').joint_state('x')
+    np.testing.assert_array_equal(series.position, [[k, -k] for k in range(10)])
+
+
+def test_a_joint_that_is_not_there_is_named(tmp_path):
+    series = open_bag(write(tmp_path / 'bag', n=1)).joint_state('motor/measured_js')
+    with pytest.raises(MissingJointError, match='no joint motor_z; it has motor_y, motor_x'):
+        series.select(['motor_z', 'motor_x'])
+    with pytest.raises(MissingJointError, match='has no velocity'):
+        series.require('velocity')
+
+
+def test_nan_is_refused_where_it_matters(tmp_path):
+    data = encode_joint_state(['a'], 5 * MS, position=[np.nan], effort=[1.0])
+    bag = open_bag(write(tmp_path / 'bag', n=1, data=data))
+    with pytest.raises(NonFiniteError, match='position of a is nan'):
+        bag.joint_state('motor/measured_js')
+    assert bag.joint_state('motor/measured_js', finite=('effort',)).effort.tolist() == [[1.0]]
+
+
+def test_another_type_is_named(tmp_path):
+    path = write(tmp_path / 'bag', n=1, kind=STRING, data=encode_string('x'))
+    with pytest.raises(TopicTypeError, match='is std_msgs/msg/String, not sensor_msgs/msg/JointS'):
+        open_bag(path).joint_state('motor/measured_js')
+
+
+def test_bytes_that_do_not_decode_are_named(tmp_path):
+    path = write(tmp_path / 'bag', n=2, data=b'\x00\x01\x00\x00\x01')
+    bag = open_bag(path)
+    with pytest.raises(MalformedMessageError, match=r'motor/measured_js: message 1 ends after 5'):
+        bag.joint_state('motor/measured_js')
+    with pytest.raises(MalformedMessageError, match='message 1 does not decode'):
+        list(bag.decoded('/robot/left/motor/measured_js'))
+
+
+def test_poses_and_other_types(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        pose = encode_poses([3], [[1, 2, 3]], [[0, 0, 0, 1]], frame_id='base')[0]
+        writer.write_raw('/e/tracker/measured_cp', POSE_STAMPED, pose, 1)
+        state = encode_diagnostics(9, [(0, 'n', 'm', {'k': 'v'})])
+        writer.write_raw('/e/compensator/state', DIAGNOSTIC_ARRAY, state, 2)
+    bag = open_bag(tmp_path / 'bag')
+    poses = bag.poses('tracker/measured_cp')
+    assert poses.position.tolist() == [[1, 2, 3]]
+    assert poses.frame_id == 'base'
+    [(raw, message)] = bag.decoded('/e/compensator/state')
+    assert raw.log_ns == 2
+    assert message.status[0].values[0].value == 'v'
+
+
+def test_messages_come_by_receipt_over_all_topics(tmp_path):
+    with BagWriter(tmp_path / 'bag', chunk_seconds=1e-9) as writer:
+        for log, topic in ((5, '/a'), (1, '/b'), (3, '/a'), (2, '/b')):
+            writer.write_raw(topic, STRING, encode_string(str(log)), log)
+    bag = open_bag(tmp_path / 'bag')
+    assert [(m.log_ns, m.topic) for m in bag.messages()] == [
+        (1, '/b'),
+        (2, '/b'),
+        (3, '/a'),
+        (5, '/a'),
+    ]
+    assert [m.log_ns for m in bag.messages(['/a'])] == [3, 5]
+    assert (bag.start_ns, bag.end_ns, bag.message_count) == (1, 5, 4)
+
+
+@pytest.mark.parametrize('compression', list(CompressionType))
+@pytest.mark.parametrize('use_chunking', [True, False])
+def test_files_of_another_writer(tmp_path, compression, use_chunking):
+    path = tmp_path / 'other.mcap'
+    with path.open('wb') as file:
+        writer = Writer(file, compression=compression, use_chunking=use_chunking, chunk_size=2000)
+        writer.start(profile='ros2', library='other')
+        schema = writer.register_schema(JOINT_STATE, 'ros2msg', b'')
+        channel = writer.register_channel('/ns/slave/servo_jp', 'cdr', schema)
+        for k in range(100):
+            cdr = encode_joint_state(['bend_x'], k * MS, position=[k])
+            writer.add_message(channel, k, cdr, k)
+        writer.finish()
+    bag = open_bag(path)
+    np.testing.assert_array_equal(bag.joint_state('slave/servo_jp').position[:, 0], np.arange(100))
+    assert bag.library == 'other'
+
+
+def test_a_folder_with_several_files(tmp_path):
+    folder = write(tmp_path / 'bag', n=10)
+    write(tmp_path / 'more.mcap', n=5).rename(folder / 'bag_1.mcap')
+    metadata = folder / 'metadata.yaml'
+    text = metadata.read_text().replace('- bag_0.mcap', '- bag_0.mcap\n  - bag_1.mcap')
+    metadata.write_text(text)
+    assert open_bag(folder).joint_state('motor/measured_js').stamp_ns.shape == (15,)
+    metadata.unlink()
+    assert open_bag(folder).message_count == 15
+
+
+def test_what_is_no_bag_is_named(tmp_path):
+    (tmp_path / 'empty.mcap').write_bytes(b'')
+    (tmp_path / 'text.mcap').write_text('joint states, sort of, but not in any known format')
+    (tmp_path / 'folder').mkdir()
+    for name, error, what in (
+        ('absent', BagNotFoundError, 'absent: no such file or folder'),
+        ('empty.mcap', NotABagError, 'empty.mcap: empty file'),
+        ('text.mcap', NotABagError, 'text.mcap: not an MCAP recording'),
+        ('folder', NotABagError, 'neither metadata.yaml nor any .mcap'),
+    ):
+        with pytest.raises(error, match=what) as raised:
+            open_bag(tmp_path / name)
+        assert isinstance(raised.value, BagError)
+        assert '\n' not in str(raised.value)
+
+
+def test_a_recording_without_messages_is_said(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/a', STRING)
+    with pytest.raises(EmptyBagError, match='bag: holds no message'):
+        open_bag(tmp_path / 'bag')
+
+
+@pytest.mark.parametrize(
+    ('text', 'error', 'what'),
+    [
+        ('a: [', NotABagError, 'not readable as YAML'),
+        ('a: 1', NotABagError, 'not the metadata of a rosbag2'),
+        ('', NotABagError, 'not the metadata of a rosbag2'),
+    ],
+)
+def test_metadata_that_are_none(tmp_path, text, error, what):
+    folder = write(tmp_path / 'bag', n=1)
+    (folder / 'metadata.yaml').write_text(text)
+    with pytest.raises(error, match=what):
+        open_bag(folder)
+
+
+def test_other_storages_and_missing_files_are_named(tmp_path):
+    folder = write(tmp_path / 'bag', n=1)
+    metadata = folder / 'metadata.yaml'
+    good = metadata.read_text()
+    metadata.write_text(good.replace('storage_identifier: mcap', 'storage_identifier: sqlite3'))
+    with pytest.raises(UnsupportedBagError, match=r'storage sqlite3.*ros2 bag convert'):
+        open_bag(folder)
+    metadata.write_text(good.replace("compression_mode: ''", 'compression_mode: FILE'))
+    with pytest.raises(UnsupportedBagError, match='compression mode FILE'):
+        open_bag(folder)
+    metadata.write_text(good)
+    (folder / 'bag_0.mcap').unlink()
+    with pytest.raises(BagNotFoundError, match=r'bag_0\.mcap: missing, though'):
+        open_bag(folder)
+
+
+def test_every_cut_is_noticed(tmp_path):
+    whole = write(tmp_path / 'bag.mcap').read_bytes()
+    cut = tmp_path / 'cut.mcap'
+    for length in (8, 20, 300, len(whole) // 2, len(whole) - 9, len(whole) - 1):
+        cut.write_bytes(whole[:length])
+        with pytest.raises(TruncatedBagError, match=r'ends in the middle.*endoscope bag recover'):
+            open_bag(cut)
+
+
+def test_zeros_after_a_crash_of_the_machine_are_a_cut(tmp_path):
+    whole = write(tmp_path / 'bag.mcap').read_bytes()
+    (tmp_path / 'zeros.mcap').write_bytes(whole[: len(whole) // 2] + bytes(1000))
+    with pytest.raises(BagError, match=r'zeros\.mcap'):
+        open_bag(tmp_path / 'zeros.mcap')
+
+
+def test_a_flipped_bit_is_noticed(tmp_path):
+    path = write(tmp_path / 'bag.mcap')
+    data = bytearray(path.read_bytes())
+    data[len(data) // 3] ^= 0x10
+    path.write_bytes(data)
+    with pytest.raises(CorruptBagError, match=r'chunk 1 .* is damaged'):
+        open_bag(path)
+
+
+def test_no_damage_makes_the_reader_crash(tmp_path):
+    """Whatever is done to the bytes, the reader refuses with its own error or reads."""
+    original = write(tmp_path / 'bag.mcap', n=50).read_bytes()
+    damaged = tmp_path / 'damaged.mcap'
+    random = np.random.default_rng(1)
+    for _ in range(300):
+        data = bytearray(original)
+        for position in random.integers(8, len(data), size=random.integers(1, 4)):
+            data[position] = random.integers(256)
+        damaged.write_bytes(data)
+        for salvage in (False, True):
+            with contextlib.suppress(BagError):
+                bag = open_bag(damaged, salvage=salvage)
+                for topic in bag.topics:
+                    bag.payloads(topic)

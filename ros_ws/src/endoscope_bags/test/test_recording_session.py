@@ -1,0 +1,167 @@
+"""The recorder without ROS: losses, a full disk, simulated time."""
+
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+from endoscope_bags import open_bag
+from endoscope_bags.cdr_encoding import encode_joint_states, encode_string
+from endoscope_bags.errors import BagExistsError
+from endoscope_bags.information import bag_information
+from endoscope_bags.message_types import JOINT_STATE, STRING
+from endoscope_bags.qos_profile import SENSOR_QOS
+from endoscope_bags.recording_session import Arrival, RecordingSession, simulated_receipt_ns
+
+MS = 10**6
+
+
+def arrivals(topic, numbers, text='x' * 40):
+    return [Arrival(k * MS, topic, k + 1, k * MS, encode_string(text)) for k in numbers]
+
+
+def test_losses_are_counted_and_written_down(tmp_path):
+    session = RecordingSession(tmp_path / 'bag')
+    topic = session.add_topic('/a', STRING, lambda: [SENSOR_QOS])
+    session.add_topic('/silent', STRING)
+    for k in range(0, 1000, 5):
+        session.accept(arrivals(topic, [n for n in range(k, k + 5) if n not in (7, 8, 900)]))
+    report = session.close()
+    assert report.counts == {'/a': 997, '/silent': 0}
+    assert report.lost == {'/a': 3, '/silent': 0}
+    assert not report.complete
+    assert '997 messages, 3 lost (/a 3)' in str(report)
+    bag = open_bag(tmp_path / 'bag')
+    assert bag.message_count == 997
+    assert bag.topics['/a'].qos == (SENSOR_QOS,)
+    assert bag.metadata['endoscope_bags'] == {
+        'ended': 'on request',
+        'lost /a': '3',
+        'lost /silent': '0',
+    }
+    assert 'lost /a: ' in (tmp_path / 'bag' / 'metadata.yaml').read_text()
+    assert [t.lost for t in bag_information(bag).topics] == [3, 0]
+
+
+def test_a_batch_is_sorted_over_its_topics(tmp_path):
+    session = RecordingSession(tmp_path / 'bag', threaded=False)
+    a, b = session.add_topic('/a', STRING), session.add_topic('/b', STRING)
+    session.accept(arrivals(b, [0, 2, 4]) + arrivals(a, [1, 3]))
+    assert session.close().message_count == 5
+    topics = [message.topic for message in open_bag(tmp_path / 'bag').messages()]
+    assert topics == ['/b', '/a', '/b', '/a', '/b']
+
+
+def test_what_waits_too_long_is_handed_over(tmp_path):
+    session = RecordingSession(tmp_path / 'bag', threaded=False)
+    session.accept(arrivals(session.add_topic('/a', STRING), [0]))
+    session.flush_stale(500 * MS)
+    file = tmp_path / 'bag' / 'bag_0.mcap'
+    empty = file.stat().st_size
+    session.flush_stale(700 * MS)
+    assert file.stat().st_size > empty
+    assert open_bag(tmp_path / 'bag', salvage=True).message_count == 1
+    session.close()
+
+
+def test_an_existing_recording_is_refused(tmp_path):
+    RecordingSession(tmp_path / 'bag').close()
+    with pytest.raises(BagExistsError):
+        RecordingSession(tmp_path / 'bag')
+
+
+def test_closing_twice_gives_the_same_report(tmp_path):
+    session = RecordingSession(tmp_path / 'bag')
+    session.accept(arrivals(session.add_topic('/a', STRING), range(10)))
+    assert session.close() == session.close()
+
+
+FULL = """
+    import resource, sys
+    import numpy as np
+    from endoscope_bags.recording_session import Arrival, RecordingSession
+    path, limit, threaded = sys.argv[1], int(sys.argv[2]), sys.argv[3] == 'threaded'
+    if limit:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    session = RecordingSession(path, threaded=threaded)
+    topic = session.add_topic('/a', 'std_msgs/msg/String')
+    noise = np.random.default_rng(0)
+    for k in range(0, 4000, 5):
+        session.accept([
+            Arrival(n * 10**6, topic, n + 1, n * 10**6, noise.bytes(400)) for n in range(k, k + 5)
+        ])
+    report = session.close()
+    print(report.message_count, report.lost_count, report.complete, report.finished)
+    print(report)
+"""
+
+
+def fill(path, limit, threaded):
+    done = subprocess.run(
+        [sys.executable, '-c', textwrap.dedent(FULL), str(path), str(limit), threaded],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    first, second = done.stdout.splitlines()
+    recorded, lost, complete, finished = first.split()
+    return int(recorded), int(lost), complete, finished, second
+
+
+@pytest.mark.parametrize('threaded', ['threaded', 'inline'])
+def test_a_full_disk_keeps_what_is_there_and_is_said(tmp_path, threaded):
+    recorded, lost, complete, finished, text = fill(tmp_path / 'bag', 700_000, threaded)
+    assert recorded + lost == 4000
+    assert 500 < recorded < 2000
+    assert (complete, finished) == ('False', 'True')
+    assert 'File too large; recording ended there' in text
+    bag = open_bag(tmp_path / 'bag')
+    assert bag.message_count == recorded
+    np.testing.assert_array_equal(bag.times('/a').log_ns, np.arange(recorded) * MS)
+    assert 'File too large' in bag_information(bag).notes['ended']
+
+
+def test_the_limit_is_what_stopped_it(tmp_path):
+    recorded, lost, complete, *_ = fill(tmp_path / 'bag', 0, 'threaded')
+    assert (recorded, lost, complete) == (4000, 0, 'True')
+
+
+def test_no_room_at_all_is_an_error_that_leaves_nothing(tmp_path):
+    code = f"""
+        import resource
+        from endoscope_bags.recording_session import RecordingSession
+        from endoscope_bags.errors import BagFullError
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
+        try:
+            RecordingSession({str(tmp_path / 'bag')!r})
+        except BagFullError as error:
+            print(error)
+    """
+    done = subprocess.run(
+        [sys.executable, '-c', textwrap.dedent(code)], capture_output=True, text=True, check=True
+    )
+    assert 'File too large' in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_simulated_receipt():
+    assert simulated_receipt_ns(None, 5 * MS, 6 * MS) == 5 * MS
+    assert simulated_receipt_ns(5 * MS, 5 * MS, 6 * MS) == 5 * MS
+    assert simulated_receipt_ns(6 * MS, 5 * MS, 6 * MS) == 6 * MS
+    assert simulated_receipt_ns(2 * MS, 5 * MS, 6 * MS) == 5 * MS
+    assert simulated_receipt_ns(99 * MS, 5 * MS, 6 * MS) == 6 * MS
+    assert simulated_receipt_ns(3 * MS, 0, 6 * MS) == 6 * MS
+
+
+def test_joint_states_of_a_series_are_recorded_as_they_are(tmp_path):
+    stamps = np.arange(100) * MS
+    payloads = encode_joint_states(['a'], stamps, effort=np.arange(100.0)[:, None])
+    session = RecordingSession(tmp_path / 'bag.mcap')
+    topic = session.add_topic('/e/wires', JOINT_STATE)
+    session.accept(Arrival(int(t), topic, k + 1, int(t), payloads[k]) for k, t in enumerate(stamps))
+    assert session.close().complete
+    series = open_bag(tmp_path / 'bag.mcap').joint_state('wires')
+    np.testing.assert_array_equal(series.effort[:, 0], np.arange(100))
