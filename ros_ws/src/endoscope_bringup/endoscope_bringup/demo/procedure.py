@@ -40,6 +40,30 @@ class Segment:
 
 
 @dataclass(frozen=True)
+class CalibrationFacts:
+    """What one calibration announced.
+
+    Attributes
+    ----------
+    tube : str
+    start : float
+        Stamp in s at which the sinusoid began.
+    class_deg : float
+        Class chosen.
+    probabilities : dict of int to float
+        By class in degrees.
+    duration : float
+        Seconds from request to result.
+    """
+
+    tube: str
+    start: float
+    class_deg: float
+    probabilities: dict[int, float]
+    duration: float
+
+
+@dataclass(frozen=True)
 class PaperFigure:
     """Mean and standard deviation in degrees, as printed."""
 

@@ -1,0 +1,94 @@
+"""The demonstration as a whole: all tubes, their recordings, and the report."""
+
+import json
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+
+from endoscope_bringup.demo.analysis import analyse
+from endoscope_bringup.demo.page import report_page, table_rows
+from endoscope_bringup.demo.procedure import TUBES, Tube
+from endoscope_bringup.demo.results import DemoResults
+from endoscope_bringup.demo.run_tube import TubeRecording, run_tube
+from endoscope_core.atomic_output import write_text
+
+REPORT = 'report.html'
+FIGURES = 'figures.json'
+
+
+def run_demo(
+    folder: Path,
+    *,
+    tubes: Sequence[Tube] = TUBES,
+    seed: int,
+    real_time: bool,
+    progress: Callable[[str], None],
+) -> DemoResults:
+    """Run the procedure on every tube, and write bags, figures and report into a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists; gets a bag and a plant file for each tube, `report.html` and `figures.json`.
+    tubes : sequence of Tube
+    seed : int
+        Of the sensors' noise; the same seed gives the same bags unless `real_time`.
+    real_time : bool
+        Whether to run by the wall clock instead of in lock-step on /clock.
+    progress : callable
+        Told, in a line, what happens.
+
+    Returns
+    -------
+    DemoResults
+
+    Raises
+    ------
+    EndoscopeError
+        If a node refuses, or the graph stands still.
+    """
+    began = time.monotonic()
+    recordings = [
+        run_tube(tube, folder, seed=seed, real_time=real_time, progress=progress)
+        for tube in tubes]
+    progress('reading the recordings back')
+    results = analyse(
+        {tube.name: made.bag for tube, made in zip(tubes, recordings, strict=True)},
+        [segment for made in recordings for segment in made.segments],
+        [made.calibration for made in recordings],
+        _summed_losses(recordings))
+    facts = {
+        'date': datetime.now(UTC).strftime('%Y-%m-%d %H:%M UTC'),
+        'command': 'endoscope demo' + (' --real-time' if real_time else '') + f' --seed {seed}',
+        'time': 'wall clock' if real_time else 'simulated, in lock-step on /clock',
+        'took': f'{time.monotonic() - began:.0f} s',
+        'recordings': ', '.join(made.bag.name for made in recordings),
+    }
+    write_text(folder / REPORT, report_page(results, facts))
+    write_text(folder / FIGURES, json.dumps(
+        {'facts': facts, 'calibrations': [asdict(made.calibration) for made in recordings],
+         'segments': [asdict(s) for made in recordings for s in made.segments],
+         'table': [asdict(row) for row in table_rows(results)]}, indent=2) + '\n')
+    return results
+
+
+def _summed_losses(recordings: Sequence[TubeRecording]) -> dict[str, int]:
+    losses: Counter[str] = Counter()
+    for recording in recordings:
+        losses.update(recording.lost)
+    return dict(losses)
+
+
+def figures_table(results: DemoResults) -> str:
+    """The table of the report as text for a terminal."""
+    heading = (f'{"tube":17s} {"signal":22s} {"figure":14s} {"paper none":>13s} '
+               f'{"paper":>13s} {"none":>7s} {"ff":>7s} {"ff+fb":>7s}')
+    lines = [heading]
+    lines += [
+        f'{row.tube:17s} {row.motion:22s} {row.figure:14s} {row.paper_none!s:>13s} '
+        f'{row.paper_proposed!s:>13s} {row.none:7.2f} {row.feed_forward:7.2f} {row.adaptive:7.2f}'
+        for row in table_rows(results)]
+    return '\n'.join(lines)
