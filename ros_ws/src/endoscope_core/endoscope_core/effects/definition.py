@@ -1,10 +1,23 @@
 """What the catalogue says of one effect: its parameters, equation, source and place."""
 
+import difflib
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
 from endoscope_core.effects.slots import SLOTS
+
+
+class UnknownEffectError(ValueError):
+    """An effect, its joint or one of its parameters that the catalogue does not have."""
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """A hint that names the valid name nearest to a wrong one, and else all of them."""
+    valid = list(valid)
+    close = difflib.get_close_matches(name, valid, n=1, cutoff=0.5)
+    return f'did you mean {close[0]}?' if close else 'valid are ' + ', '.join(valid)
 
 
 class Stage(StrEnum):
@@ -52,6 +65,9 @@ class EffectParameter:
     def __post_init__(self) -> None:
         if not self.low <= self.typical <= self.high:
             raise ValueError(f'{self.name}: typical {self.typical} is outside its bounds')
+        for value in (*self.starts, *self.choices):
+            if not self.low <= value <= self.high:
+                raise ValueError(f'{self.name}: {value} is outside its bounds')
 
 
 @dataclass(frozen=True)
@@ -109,3 +125,16 @@ def define(
     )
     CATALOGUE[effect_id] = definition
     return definition
+
+
+def describe(effect_id: str) -> EffectDefinition:
+    """The catalogue's definition of an effect.
+
+    Raises
+    ------
+    UnknownEffectError
+        If the catalogue has no such id; the message names the nearest.
+    """
+    if effect_id not in CATALOGUE:
+        raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, CATALOGUE)}')
+    return CATALOGUE[effect_id]

@@ -1,6 +1,6 @@
 """`joint_stop`: a stiff, two-sided end stop of the bending section."""
 
-from endoscope_core.compiled_cache import njit
+from endoscope_core.compiled import Array, compiled
 from endoscope_core.effects.definition import EffectParameter, Stage, define
 
 DEFINITION = define(
@@ -20,8 +20,8 @@ ANGLE = DEFINITION.first_parameter
 STIFFNESS = ANGLE + 1
 
 
-@njit(cache=True)
-def moment_and_slope(parameters, angle):
+@compiled
+def moment_and_slope(parameters: Array, angle: float) -> tuple[float, float]:
     """Moment in N m on the joint, and minus its derivative by the angle in N m/rad."""
     beyond = abs(angle) - parameters[ANGLE]
     if beyond <= 0.0:

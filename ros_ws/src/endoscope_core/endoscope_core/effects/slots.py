@@ -5,11 +5,21 @@ modules are imported; numba then compiles the indices in as constants. An effect
 one test of a flag.
 """
 
-from dataclasses import fields
-
-from endoscope_core.plant.parameters import JointParameters
-
-NOMINAL_KEYS = tuple(f.name for f in fields(JointParameters))
+NOMINAL_KEYS = (
+    'pretension',
+    'wire_stiffness',
+    'joint_radius',
+    'pulley_radius',
+    'capstan_exponent',
+    'presliding_distance',
+    'joint_stiffness',
+    'joint_damping',
+    'joint_friction',
+    'joint_presliding',
+    'motor_bandwidth',
+    'motor_damping_ratio',
+)
+"""Fields of `JointParameters` in order; named here too because the plant imports the effects."""
 
 
 class SlotAllocator:
@@ -19,6 +29,7 @@ class SlotAllocator:
         self.flags = 0
         self.parameters = len(NOMINAL_KEYS)
         self.states = 0
+        self.resting_angles: list[int] = []
 
     def flag(self) -> int:
         """Index of the next effect's on/off flag."""
@@ -34,6 +45,11 @@ class SlotAllocator:
         """First of `count` consecutive state indices."""
         self.states += count
         return self.states - count
+
+    def angle_state(self) -> int:
+        """Index of a state that rests at the joint-equivalent angle where the rig rests."""
+        self.resting_angles.append(self.state_block())
+        return self.resting_angles[-1]
 
 
 SLOTS = SlotAllocator()
@@ -52,14 +68,17 @@ MOTOR_BANDWIDTH = NOMINAL_KEYS.index('motor_bandwidth')
 MOTOR_DAMPING_RATIO = NOMINAL_KEYS.index('motor_damping_ratio')
 
 TICKS = SLOTS.state_block()
-MOTOR = SLOTS.state_block()
+MOTOR = SLOTS.angle_state()
 MOTOR_SPEED = SLOTS.state_block()
-JOINT = SLOTS.state_block()
+JOINT = SLOTS.angle_state()
 JOINT_SPEED = SLOTS.state_block()
 SLIDE_A = SLOTS.state_block()
 SLIDE_B = SLOTS.state_block()
 JOINT_SLIDE = SLOTS.state_block()
-PULLEY = SLOTS.state_block()
+PULLEY = SLOTS.angle_state()
+PULLEY_SPEED = SLOTS.state_block()
+WIRE_END = SLOTS.angle_state()
+TIP = SLOTS.angle_state()
 TENSION_A = SLOTS.state_block()
 TENSION_B = SLOTS.state_block()
 

@@ -1,6 +1,6 @@
 """`transport_delay`: the command reaches the servo late."""
 
-from endoscope_core.compiled_cache import njit
+from endoscope_core.compiled import Array, compiled
 from endoscope_core.effects.definition import EffectParameter, Stage, define
 from endoscope_core.effects.slots import COMMAND_HISTORY, HISTORY, TICKS
 
@@ -19,8 +19,10 @@ ON = DEFINITION.flag
 DELAY = DEFINITION.first_parameter
 
 
-@njit(cache=True)
-def delayed_command(state, parameters, history, fraction, width, tick):
+@compiled
+def delayed_command(
+    state: Array, parameters: Array, history: Array, fraction: float, width: float, tick: float,
+) -> float:
     """Mean of the delayed, held command over one substep.
 
     `fraction` and `width` are the substep's start and length in ticks. The mean, not the value at

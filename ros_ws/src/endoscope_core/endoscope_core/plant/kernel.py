@@ -7,11 +7,21 @@ a command held over the substep; joint and pre-sliding states by a linearly impl
 
 import math
 
-from endoscope_core.compiled_cache import njit
-from endoscope_core.effects import joint_stop, stribeck_friction, transport_delay
+from endoscope_core.compiled import Array, Flags, compiled
+from endoscope_core.effects import (
+    cogging,
+    dahl,
+    distributed_friction,
+    friction_run_in,
+    gear_backlash,
+    joint_backlash,
+    joint_inertia,
+    presliding_shape,
+    torque_limit,
+    viscous_friction,
+    wire_creep,
+)
 from endoscope_core.effects.slots import (
-    ANGLE_HISTORY,
-    CAPSTAN_EXPONENT,
     COMMAND_HISTORY,
     HISTORY,
     JOINT,
@@ -21,61 +31,69 @@ from endoscope_core.effects.slots import (
     JOINT_RADIUS,
     JOINT_SLIDE,
     JOINT_SPEED,
-    JOINT_STIFFNESS,
     MOTOR,
     MOTOR_BANDWIDTH,
     MOTOR_DAMPING_RATIO,
     MOTOR_SPEED,
     PRESLIDING_DISTANCE,
-    PRETENSION,
     PULLEY,
-    PULLEY_RADIUS,
+    PULLEY_SPEED,
     SLIDE_A,
     SLIDE_B,
     TENSION_A,
     TENSION_B,
     TICKS,
-    WIRE_STIFFNESS,
+    TIP,
+    WIRE_END,
+)
+from endoscope_core.plant import sheath_chain
+from endoscope_core.plant.actuator import (
+    pulley_angle,
+    servo_command,
+    servo_step,
+    servo_transition,
+)
+from endoscope_core.plant.inputs import (
+    IN_COMMAND,
+    IN_MOTOR,
+    IN_OTHER_JOINT,
+    IN_PUSH_COMMAND,
+    IN_PUSH_MOMENT,
+    IN_PUSH_STRETCH,
+    INPUTS,
+    OUT_BENDING,
+    OUT_EFFORT,
+    OUT_JOINT,
+    OUT_MOTOR,
+    OUT_MOTOR_SPEED,
+    OUT_TENSION_A,
+    OUT_TENSION_B,
+    OUTPUTS,
+)
+from endoscope_core.plant.joint import load
+from endoscope_core.plant.proximal import proximal_tensions, stretch_shift
+from endoscope_core.plant.readings import read_sensors
+from endoscope_core.plant.transmission import (
+    friction_exponent,
+    half_exponent,
+    is_distributed,
+    pretension_now,
+    wire_tension,
 )
 
-OUT_MOTOR, OUT_MOTOR_SPEED, OUT_EFFORT, OUT_TENSION_A, OUT_TENSION_B, OUT_BENDING, OUT_JOINT = (
-    range(7))
-OUTPUTS = 7
-
-IN_COMMAND, IN_OTHER_JOINT, IN_MOTOR, IN_PUSH_COMMAND, IN_PUSH_STRETCH, IN_PUSH_MOMENT = range(6)
-INPUTS = 6
-"""Columns of the input: command u, the other joint's angle, measured motor angle (NaN: let the
-servo run), and latent pushes added to command (rad), wire stretch (m) and joint moment (N m)."""
+__all__ = [
+    'INPUTS', 'IN_COMMAND', 'IN_MOTOR', 'IN_OTHER_JOINT', 'IN_PUSH_COMMAND', 'IN_PUSH_MOMENT',
+    'IN_PUSH_STRETCH', 'OUTPUTS', 'OUT_BENDING', 'OUT_EFFORT', 'OUT_JOINT', 'OUT_MOTOR',
+    'OUT_MOTOR_SPEED', 'OUT_TENSION_A', 'OUT_TENSION_B', 'advance_tick', 'read_sensors',
+    'run_joints',
+]
 
 
-@njit(cache=True)
-def servo_transition(bandwidth, damping_ratio, step):
-    """Exact transition of the servo over `step` s: rows of the matrix on (m - u, m')."""
-    sigma = damping_ratio * bandwidth
-    discriminant = damping_ratio * damping_ratio - 1.0
-    decay = math.exp(-sigma * step)
-    if discriminant < -1e-9:
-        w = bandwidth * math.sqrt(-discriminant)
-        c, s = math.cos(w * step), math.sin(w * step) / w
-    elif discriminant > 1e-9:
-        w = bandwidth * math.sqrt(discriminant)
-        c, s = math.cosh(w * step), math.sinh(w * step) / w
-    else:
-        c, s = 1.0, step
-    return (decay * (c + sigma * s), decay * s,
-            -decay * bandwidth * bandwidth * s, decay * (c - sigma * s))
-
-
-@njit(cache=True)
-def presliding_step(slide, ratio):
-    """Dahl state after sliding `ratio` pre-sliding distances (signed); stays in [-1, 1]."""
-    size = abs(ratio)
-    share = 1.0 - math.exp(-size) if size > 0.02 else size - 0.5 * size * size
-    return slide + share * ((1.0 if ratio > 0.0 else -1.0) - slide)
-
-
-@njit(cache=True)
-def advance_tick(state, history, p, on, u, x, tick, substeps):
+@compiled
+def advance_tick(
+    state: Array, history: Array, p: Array, on: Flags, u: float, x: Array, tick: float,
+    substeps: int,
+) -> None:
     """Advance one joint by one tick with the input row `x` and command `u` in force.
 
     Parameters
@@ -95,90 +113,157 @@ def advance_tick(state, history, p, on, u, x, tick, substeps):
     """
     dt = tick / substeps
     width = 1.0 / substeps
+    start = state[TICKS] * tick
     history[COMMAND_HISTORY, int(state[TICKS]) % HISTORY] = u
     r = p[JOINT_RADIUS]
-    k = p[WIRE_STIFFNESS]
-    phi0 = p[CAPSTAN_EXPONENT]
     xs = p[PRESLIDING_DISTANCE]
-    a11, a12, a21, a22 = servo_transition(p[MOTOR_BANDWIDTH], p[MOTOR_DAMPING_RATIO], dt)
+    qs = p[JOINT_PRESLIDING]
+    transition = servo_transition(p[MOTOR_BANDWIDTH], p[MOTOR_DAMPING_RATIO], dt)
     driven = not math.isnan(x[IN_MOTOR])
     driven_speed = (x[IN_MOTOR] - state[MOTOR]) / tick if driven else 0.0
-    m, dm, q, dq = state[MOTOR], state[MOTOR_SPEED], state[JOINT], state[JOINT_SPEED]
+    geared = on[gear_backlash.ON] or on[cogging.ON]
+    chained = is_distributed(p, on)
+    loaded_tip = joint_backlash.tip_is_loaded(p, on) and not chained
+    shaped_wires = presliding_shape.acts(p, on, presliding_shape.WIRE_A)
+    shaped_joint = presliding_shape.acts(p, on, presliding_shape.JOINT)
+    shift = stretch_shift(p, on, x)
+    m, dm, pulley, pulley_speed = state[MOTOR], state[MOTOR_SPEED], state[PULLEY], 0.0
+    q, dq, wire_end = state[JOINT], state[JOINT_SPEED], state[WIRE_END]
+    wire_end_speed = state[JOINT_SPEED]
     za, zb, zj = state[SLIDE_A], state[SLIDE_B], state[JOINT_SLIDE]
+    ca, cb = 0.0, 0.0
     for i in range(substeps):
-        command = u
-        if on[transport_delay.ON]:
-            command = transport_delay.delayed_command(state, p, history, i * width, width, tick)
-        command += x[IN_PUSH_COMMAND]
+        time = start + i * dt
+        pretension = pretension_now(p, on, time)
+
         if driven:
             m_new, dm_new = m + dt * driven_speed, driven_speed
         else:
-            error = m - command
-            m_new = command + a11 * error + a12 * dm
-            dm_new = a21 * error + a22 * dm
-        sliding_motor = (m_new - m) / dt
-        pulley = 0.5 * (m + m_new)
+            command = servo_command(state, history, p, on, u, i * width, width, tick)
+            m_new, dm_new = servo_step(p, on, transition, m, dm, command + x[IN_PUSH_COMMAND])
+            if on[torque_limit.ON]:
+                state[SLIDE_A], state[SLIDE_B] = za, zb
+                v = 0.5 * r * (state[PULLEY_SPEED] + wire_end_speed)
+                phi = friction_exponent(state, p, on, v, time, dt)
+                stretch = r * (pulley - wire_end) + shift
+                loads = proximal_tensions(state, p, on, pretension, phi, v, stretch, shift)
+                step = torque_limit.yielding(p, m_new - m, loads)
+                if step != m_new - m:
+                    m_new, dm_new = m + step, step / dt
+        pulley_new = pulley_angle(state, p, on, m_new) if geared else m_new
+        pulley_speed = (pulley_new - pulley) / dt
 
-        v = 0.5 * r * (sliding_motor + dq)
-        phi = phi0
-        if on[stribeck_friction.ON]:
-            phi *= stribeck_friction.friction_factor(p, v)
-        stretch = r * (pulley - q) + x[IN_PUSH_STRETCH]
-        ta = max(0.0, p[PRETENSION] + k * stretch)
-        tb = max(0.0, p[PRETENSION] - k * stretch)
-        da = math.exp(-0.5 * phi * za)
-        db = math.exp(-0.5 * phi * zb)
+        v = 0.5 * r * (pulley_speed + wire_end_speed)
+        phi = friction_exponent(state, p, on, v, time, dt)
+        if on[wire_creep.ON]:
+            ca, cb = state[wire_creep.CREEP_A], state[wire_creep.CREEP_B]
+        wire_step = r * (pulley_new - pulley)
+        stretch = r * (0.5 * (pulley + pulley_new) - wire_end) + shift
+        if chained:
+            share = p[distributed_friction.SHARE]
+            ta, ka = sheath_chain.eliminate(
+                state, distributed_friction.WIRE_A, p, on, pretension, shift - ca,
+                share * phi, wire_step)
+            tb, kb = sheath_chain.eliminate(
+                state, distributed_friction.WIRE_B, p, on, pretension, -shift - cb,
+                share * phi, -wire_step)
+            # The chain is solved for the end of the substep, the joint for its middle.
+            ka *= 2.0
+            kb *= 2.0
+            phi *= 1.0 - share
+        else:
+            ta, ka = wire_tension(p, on, pretension, stretch - ca)
+            tb, kb = wire_tension(p, on, pretension, -stretch - cb)
+        ea, grip_a = half_exponent(p, on, phi, za, v)
+        eb, grip_b = half_exponent(p, on, phi, zb, -v)
+        da, db = math.exp(-ea), math.exp(-eb)
+
         way = 1.0 if v > 0.0 else -1.0
-        moment = r * (ta * da - tb * db) + x[IN_PUSH_MOMENT]
-        moment -= p[JOINT_STIFFNESS] * q + p[JOINT_FRICTION] * zj
-        slope = p[JOINT_STIFFNESS]
-        slope += r * r * k * ((da if ta > 0.0 else 0.0) + (db if tb > 0.0 else 0.0))
-        grip = 0.25 * r * r * phi / xs
-        slope += grip * (ta * da * (1.0 - za * way) + tb * db * (1.0 + zb * way))
         way_joint = 1.0 if dq > 0.0 else -1.0
-        slope += p[JOINT_FRICTION] / p[JOINT_PRESLIDING] * (1.0 - zj * way_joint)
-        if on[joint_stop.ON]:
-            stop_moment, stop_slope = joint_stop.moment_and_slope(p, q)
-            moment += stop_moment
-            slope += stop_slope
-        # The half step of sliding that the motor alone causes; the joint's share is in `slope`.
-        moment -= (grip * dt * sliding_motor * 0.5
-                   * (ta * da * (1.0 - za * way) + tb * db * (1.0 + zb * way)))
-        dq = moment / (p[JOINT_DAMPING] + 0.5 * dt * slope)
+        if shaped_wires:
+            steep_a = presliding_shape.steepness(state, p, presliding_shape.WIRE_A, way)
+            steep_b = presliding_shape.steepness(state, p, presliding_shape.WIRE_B, -way)
+        else:
+            steep_a, steep_b = 1.0 - za * way, 1.0 + zb * way
+        if shaped_joint:
+            steep_j = presliding_shape.steepness(state, p, presliding_shape.JOINT, way_joint)
+        else:
+            steep_j = 1.0 - zj * way_joint
+        pull = r * (ta * da - tb * db)
+        grip = 0.5 * r * r / xs * (grip_a * ta * da * steep_a + grip_b * tb * db * steep_b)
+        pull_slope = r * r * (ka * da + kb * db) + grip
+        # The half step of sliding that the motor alone causes; the joint's share is in the slope.
+        pull -= 0.5 * dt * grip * pulley_speed
+        drag = 0.0
+        if on[viscous_friction.ON]:
+            film = 0.5 * r * r * p[viscous_friction.COEFFICIENT]
+            loaded = 0.25 * r * r * p[viscous_friction.LOAD_FACTOR] * (ta * da + tb * db)
+            pull += loaded * wire_end_speed - film * pulley_speed
+            drag = loaded + film
+        offset = 0.0
+        if loaded_tip:
+            offset, pull, touching = joint_backlash.through_gap(
+                p, wire_end - q, pull, pull_slope + drag / dt)
+            pull_slope *= touching
+            drag *= touching
 
-        slid = 0.5 * r * (sliding_motor + dq) * dt / xs
-        za = presliding_step(za, slid)
-        zb = presliding_step(zb, -slid)
-        zj = presliding_step(zj, dq * dt / p[JOINT_PRESLIDING])
-        q += dq * dt
-        m, dm = m_new, dm_new
-    state[MOTOR], state[MOTOR_SPEED], state[JOINT], state[JOINT_SPEED] = m, dm, q, dq
+        moment, slope = load(p, on, x, q, time, dt)
+        moment += pull - p[JOINT_FRICTION] * zj
+        slope += pull_slope + p[JOINT_FRICTION] / qs * steep_j
+        resistance = p[JOINT_DAMPING] + drag
+        resistance += 0.5 * dt * max(slope, 0.0)
+        mean_dq = moment / resistance
+        if on[joint_inertia.ON]:
+            mean_dq, dq = joint_inertia.speeds(p, dq, mean_dq, resistance, dt)
+        else:
+            dq = mean_dq
+
+        q += mean_dq * dt
+        wire_end_speed = (q + offset - wire_end) / dt if loaded_tip else mean_dq
+        wire_end = q + offset
+        slid = 0.5 * r * (pulley_speed + wire_end_speed) * dt
+        if shaped_wires:
+            za = presliding_shape.slid(state, p, presliding_shape.WIRE_A, slid / xs)
+            zb = presliding_shape.slid(state, p, presliding_shape.WIRE_B, -slid / xs)
+        else:
+            za = dahl.slid(za, slid / xs)
+            zb = dahl.slid(zb, -slid / xs)
+        if shaped_joint:
+            zj = presliding_shape.slid(state, p, presliding_shape.JOINT, mean_dq * dt / qs)
+        else:
+            zj = dahl.slid(zj, mean_dq * dt / qs)
+        if chained:
+            end_step = r * mean_dq * dt
+            sheath_chain.follow(state, distributed_friction.WIRE_A, p, wire_step, end_step)
+            sheath_chain.follow(state, distributed_friction.WIRE_B, p, -wire_step, -end_step)
+        if on[wire_creep.ON]:
+            wire_creep.advance(state, p, ta - pretension, tb - pretension, dt)
+        if on[friction_run_in.ON]:
+            friction_run_in.advance(state, slid)
+        m, dm, pulley = m_new, dm_new, pulley_new
+        state[PULLEY_SPEED] = pulley_speed
+
+    state[MOTOR], state[MOTOR_SPEED], state[PULLEY] = m, dm, pulley
+    state[JOINT], state[JOINT_SPEED], state[WIRE_END] = q, dq, wire_end
     state[SLIDE_A], state[SLIDE_B], state[JOINT_SLIDE] = za, zb, zj
-    state[PULLEY] = m
-    phi = phi0
-    if on[stribeck_friction.ON]:
-        phi *= stribeck_friction.friction_factor(p, 0.5 * r * (dm + dq))
-    stretch = r * (m - q) + x[IN_PUSH_STRETCH]
-    state[TENSION_A] = max(0.0, p[PRETENSION] + k * stretch) * math.exp(0.5 * phi * za)
-    state[TENSION_B] = max(0.0, p[PRETENSION] - k * stretch) * math.exp(0.5 * phi * zb)
+    play_behind_joint = on[joint_backlash.ON] and not loaded_tip
+    state[TIP] = joint_backlash.tip(state, p, q) if play_behind_joint else q
     state[TICKS] += 1.0
+    if not geared:
+        pulley_speed = dm
+    v = 0.5 * r * (pulley_speed + (wire_end_speed if loaded_tip else dq))
+    end = state[TICKS] * tick
+    phi = friction_exponent(state, p, on, v, end, dt)
+    loads = proximal_tensions(
+        state, p, on, pretension_now(p, on, end), phi, v, r * (pulley - wire_end) + shift, shift)
+    state[TENSION_A], state[TENSION_B] = loads[0], loads[1]
 
 
-@njit(cache=True)
-def read_sensors(state, history, p, on, tick, out):
-    """Write what the noise-free sensors read now into `out` (OUTPUTS,); once a tick."""
-    history[ANGLE_HISTORY, int(state[TICKS]) % HISTORY] = state[JOINT]
-    out[OUT_MOTOR] = state[MOTOR]
-    out[OUT_MOTOR_SPEED] = state[MOTOR_SPEED]
-    out[OUT_EFFORT] = p[PULLEY_RADIUS] * (state[TENSION_A] - state[TENSION_B])
-    out[OUT_TENSION_A] = state[TENSION_A]
-    out[OUT_TENSION_B] = state[TENSION_B]
-    out[OUT_BENDING] = state[JOINT]
-    out[OUT_JOINT] = state[JOINT]
-
-
-@njit(cache=True)
-def run_joints(states, histories, p, on, inputs, coupled, tick, substeps, out):
+@compiled
+def run_joints(
+    states: Array, histories: Array, p: Array, on: Flags, inputs: Array, coupled: bool,
+    tick: float, substeps: int, out: Array,
+) -> None:
     """Run all joints side by side over a whole input.
 
     Parameters
@@ -187,20 +272,20 @@ def run_joints(states, histories, p, on, inputs, coupled, tick, substeps, out):
         Changed in place.
     p : array (J, parameters), on : array (J, flags)
     inputs : array (J, N, INPUTS)
+        Changed where `coupled`.
     coupled : bool
-        Whether each joint sees the other's angle of the tick before, instead of the input's.
+        Whether each joint sees the other's angle, which is then written into its input.
     tick : float
     substeps : int
     out : array (J, N, OUTPUTS)
         Row k is what the sensors read at tick k, before command k acts.
     """
     joints, ticks = inputs.shape[0], inputs.shape[1]
-    x = inputs[0, 0].copy()
     for n in range(ticks):
         for j in range(joints):
             read_sensors(states[j], histories[j], p[j], on[j], tick, out[j, n])
         for j in range(joints):
-            x[:] = inputs[j, n]
+            x = inputs[j, n]
             if coupled and joints > 1:
-                x[IN_OTHER_JOINT] = out[1 - j, n, OUT_JOINT] if j < 2 else 0.0
+                x[IN_OTHER_JOINT] = out[1 - j, n, OUT_JOINT]
             advance_tick(states[j], histories[j], p[j], on[j], x[IN_COMMAND], x, tick, substeps)

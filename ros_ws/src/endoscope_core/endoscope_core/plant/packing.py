@@ -1,49 +1,14 @@
 """From a plant description to the flat arrays that the compiled physics works on."""
 
-import difflib
 import math
-from collections.abc import Iterable
 from dataclasses import astuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE, EffectDefinition
-from endoscope_core.effects.slots import (
-    HISTORY,
-    JOINT,
-    MOTOR,
-    PRETENSION,
-    PULLEY,
-    SLOTS,
-    TENSION_A,
-    TENSION_B,
-)
+from endoscope_core.effects import CATALOGUE, UnknownEffectError, describe, nearest
+from endoscope_core.effects.slots import HISTORY, SLOTS
 from endoscope_core.plant.parameters import EffectSpec, PlantDescription
-
-
-class UnknownEffectError(ValueError):
-    """An effect, its joint or one of its parameters that the catalogue does not have."""
-
-
-def nearest(name: str, valid: Iterable[str]) -> str:
-    """A hint that names the valid name nearest to a wrong one, and else all of them."""
-    valid = list(valid)
-    close = difflib.get_close_matches(name, valid, n=1, cutoff=0.5)
-    return f'did you mean {close[0]}?' if close else 'valid are ' + ', '.join(valid)
-
-
-def effect_definition(effect_id: str) -> EffectDefinition:
-    """The catalogue's definition of an effect.
-
-    Raises
-    ------
-    UnknownEffectError
-        If the catalogue has no such id.
-    """
-    if effect_id not in CATALOGUE:
-        raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, CATALOGUE)}')
-    return CATALOGUE[effect_id]
 
 
 def effect_values(spec: EffectSpec) -> NDArray[np.float64]:
@@ -56,7 +21,7 @@ def effect_values(spec: EffectSpec) -> NDArray[np.float64]:
     ValueError
         If a value is not finite or outside the parameter's bounds.
     """
-    definition = effect_definition(spec.id)
+    definition = describe(spec.id)
     names = [parameter.name for parameter in definition.parameters]
     for name in spec.parameters:
         if name not in names:
@@ -118,7 +83,7 @@ def pack(plant: PlantDescription) -> tuple[NDArray[np.float64], NDArray[np.bool_
 def rest_state(
     parameters: NDArray[np.float64], motor: NDArray[np.float64] | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """States and histories of joints at rest, wires at pretension, not yet slid either way.
+    """States and histories of joints at rest, not yet slid either way.
 
     Parameters
     ----------
@@ -134,9 +99,8 @@ def rest_state(
     joints = len(parameters)
     states = np.zeros((joints, SLOTS.states))
     histories = np.zeros((joints, 2, HISTORY))
-    states[:, TENSION_A] = states[:, TENSION_B] = parameters[:, PRETENSION]
     if motor is not None:
-        for index in (MOTOR, PULLEY, JOINT):
+        for index in SLOTS.resting_angles:
             states[:, index] = motor
         histories[:] = motor[:, None, None]
     return states, histories

@@ -8,8 +8,9 @@ from typing import Any
 import yaml
 
 from endoscope_core.atomic_output import write_text
+from endoscope_core.effects import nearest
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.plant.packing import nearest, pack
+from endoscope_core.plant.packing import pack
 from endoscope_core.plant.parameters import (
     EffectSpec,
     JointParameters,

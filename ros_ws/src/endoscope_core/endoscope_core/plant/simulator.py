@@ -210,7 +210,7 @@ def simulate(
     run_joints(states, histories, parameters, on, inputs, True, tick, substeps, out)
     by_time = out.transpose(1, 0, 2)
     return PlantTrajectory(
-        tick * np.arange(len(command)),
+        tick * np.arange(len(command), dtype=np.float64),
         by_time[:, :, OUT_MOTOR] * gear,
         by_time[:, :, OUT_MOTOR_SPEED] * gear,
         by_time[:, :, OUT_EFFORT],

@@ -1,0 +1,28 @@
+"""`configuration_change`: the tube changes its shape during the recording."""
+
+from endoscope_core.compiled import Array, compiled
+from endoscope_core.effects import onset
+from endoscope_core.effects.definition import EffectParameter, Stage, define
+
+DEFINITION = define(
+    'configuration_change',
+    Stage.TRANSMISSION,
+    physics='The tube changes its shape during the recording, and sheath friction jumps.',
+    equation='phi(t) = phi for t < time_s, factor phi after',
+    source='phi = mu Theta, Euler-Eytelwein: Kaneko et al., IEEE ICRA 1991',
+    parameters=(
+        EffectParameter('time_s', 's', 0.0, 3600.0, 15.0,
+                        starts=(3.0, 8.0, 15.0, 22.0, 30.0, 40.0), comparable=True),
+        EffectParameter('factor', '-', 0.1, 8.0, 1.6, off=1.0, starts=(0.7, 1.4)),
+    ),
+)
+ON = DEFINITION.flag
+TIME = DEFINITION.first_parameter
+FACTOR = TIME + 1
+
+
+@compiled
+def friction_factor(parameters: Array, time: float, duration: float) -> float:
+    """Mean factor on the capstan exponent over a step that begins at `time`."""
+    after = onset.share_after(parameters[TIME], time, duration)
+    return 1.0 + after * (parameters[FACTOR] - 1.0)

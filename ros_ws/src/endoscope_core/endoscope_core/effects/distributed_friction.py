@@ -1,0 +1,38 @@
+"""`distributed_friction`: friction acts along the sheath; motion has to travel through it."""
+
+import numpy as np
+
+from endoscope_core.effects.definition import EffectParameter, Stage, define
+from endoscope_core.effects.slots import SLOTS
+
+DEFINITION = define(
+    'distributed_friction',
+    Stage.TRANSMISSION,
+    physics='Friction acts all along the sheath: motion reaches the joint only after the sliding '
+            'front has travelled through it.',
+    equation='8 nodes along each wire, T_i exp(-phi_i z_i / 2) = T_(i+1) exp(phi_i z_i / 2), '
+             'phi_i = share phi / 8, each with its own Dahl z_i; springs between them',
+    source='Kaneko et al., IEEE ICRA 1991; Palli, Borghesan, Melchiorri, IEEE Trans. Robot. '
+           '28(2), 2012 (lumped chain)',
+    parameters=(
+        EffectParameter('share', '-', 0.0, 1.0, 1.0, off=0.0, starts=(0.7,)),
+    ),
+)
+ON = DEFINITION.flag
+SHARE = DEFINITION.first_parameter
+
+NODES = 8
+LENGTHS = np.array([0.5, *[1.0] * (NODES - 1), 0.5]) / NODES
+"""Shares of the wire's length before, between and after the nodes."""
+
+STRETCH = 0
+"""Elongations in m of the springs, the first of a chain's states; all states are zero at rest."""
+SLIDE = STRETCH + NODES + 1
+"""Pre-sliding states of the nodes."""
+STEP = SLIDE + NODES
+"""Latest displacements of the nodes in m, towards the motor."""
+OFFSET = STEP + NODES
+GAIN = OFFSET + NODES
+"""A node's step is its offset plus its gain times the next node's step."""
+WIRE_A = SLOTS.state_block(GAIN + NODES)
+WIRE_B = SLOTS.state_block(GAIN + NODES)

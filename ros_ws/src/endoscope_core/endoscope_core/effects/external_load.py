@@ -1,0 +1,28 @@
+"""`external_load`: a constant moment from some time on."""
+
+from endoscope_core.compiled import Array, compiled
+from endoscope_core.effects import onset
+from endoscope_core.effects.definition import EffectParameter, Stage, define
+
+DEFINITION = define(
+    'external_load',
+    Stage.JOINT,
+    physics='A constant moment acts on the joint from some time on.',
+    equation='tau = moment_nm for t >= time_s',
+    source='Step disturbance: De Luca, Mattone, IEEE ICRA 2005',
+    parameters=(
+        EffectParameter('moment_nm', 'N m', -0.1, 0.1, 0.005, off=0.0, starts=(-0.003, 0.003),
+                        comparable=True),
+        EffectParameter('time_s', 's', 0.0, 3600.0, 15.0,
+                        starts=(3.0, 8.0, 15.0, 22.0, 30.0, 40.0), comparable=True),
+    ),
+)
+ON = DEFINITION.flag
+MOMENT = DEFINITION.first_parameter
+TIME = MOMENT + 1
+
+
+@compiled
+def mean_moment(parameters: Array, time: float, duration: float) -> float:
+    """Mean moment in N m over a step that begins at `time`."""
+    return parameters[MOMENT] * onset.share_after(parameters[TIME], time, duration)

@@ -1,0 +1,16 @@
+"""`recording_gap`: samples of a topic are missing."""
+
+from endoscope_core.effects.definition import EffectParameter, Stage, define
+
+DEFINITION = define(
+    'recording_gap',
+    Stage.RECORDING,
+    physics='The samples of one topic are missing for a while.',
+    equation='no sample of `topic` with time_s <= t < time_s + duration_s',
+    source='Little, Rubin, Statistical Analysis with Missing Data, 3rd ed. 2019, ch. 1',
+    parameters=(
+        EffectParameter('time_s', 's', 0.0, 3600.0, 5.0, comparable=True),
+        EffectParameter('duration_s', 's', 0.0, 600.0, 0.5, off=0.0),
+        EffectParameter('topic', '-', 0.0, 2.0, 2.0, choices=(0.0, 1.0, 2.0)),
+    ),
+)

@@ -1,0 +1,87 @@
+"""Compiled physics of one wire whose friction acts on nodes along the sheath.
+
+The nodes have no mass: their balance holds at the end of every substep, linearised about its
+start. Elimination from the motor towards the joint leaves the last spring's tension as a linear
+function of the joint's step; once the joint is solved, the nodes follow backwards.
+"""
+
+import math
+
+from endoscope_core.compiled import Array, Flags, compiled
+from endoscope_core.effects import dahl
+from endoscope_core.effects.distributed_friction import (
+    GAIN,
+    LENGTHS,
+    NODES,
+    OFFSET,
+    SLIDE,
+    STEP,
+    STRETCH,
+)
+from endoscope_core.effects.slots import PRESLIDING_DISTANCE, WIRE_STIFFNESS
+from endoscope_core.plant.transmission import wire_tension
+
+LEAST_STIFFNESS = 1e-3
+"""Share of its stiffness that a slack spring keeps in the linearisation: it must be solvable."""
+
+
+@compiled
+def spring_tension(
+    state: Array, chain: int, p: Array, on: Flags, pretension: float, common: float, i: int,
+) -> tuple[float, float]:
+    """Tension and slope of spring `i`; `common` is stretch in m spread over the whole wire."""
+    tension, slope = wire_tension(
+        p, on, pretension, state[chain + STRETCH + i] / LENGTHS[i] + common)
+    return tension, max(slope, LEAST_STIFFNESS * p[WIRE_STIFFNESS]) / LENGTHS[i]
+
+
+@compiled
+def eliminate(
+    state: Array, chain: int, p: Array, on: Flags, pretension: float, common: float, phi: float,
+    motor_step: float,
+) -> tuple[float, float]:
+    """Tension in N at the joint after a substep if the joint stood still, and its slope in N/m.
+
+    Parameters
+    ----------
+    chain : int
+        First state of this wire's chain.
+    phi : float
+        Capstan exponent of the whole chain.
+    motor_step : float
+        By how much the motor pulls the wire in this substep, m.
+    """
+    share = 0.5 * phi / NODES
+    offset, gain = motor_step, 0.0
+    before, slope_before = spring_tension(state, chain, p, on, pretension, common, 0)
+    for i in range(NODES):
+        after, slope_after = spring_tension(state, chain, p, on, pretension, common, i + 1)
+        slide = state[chain + SLIDE + i]
+        released = math.exp(-share * slide)
+        pulled = 1.0 / released
+        way = 1.0 if state[chain + STEP + i] > 0.0 else -1.0
+        grip = share * (before * released + after * pulled)
+        grip *= (1.0 - slide * way) / p[PRESLIDING_DISTANCE]
+        towards = slope_before * released
+        away = slope_after * pulled
+        pivot = towards * (1.0 - gain) + away + grip
+        offset = (before * released - after * pulled + towards * offset) / pivot
+        gain = away / pivot
+        state[chain + OFFSET + i] = offset
+        state[chain + GAIN + i] = gain
+        before, slope_before = after, slope_after
+    return before + slope_before * offset, slope_before * (1.0 - gain)
+
+
+@compiled
+def follow(state: Array, chain: int, p: Array, motor_step: float, joint_step: float) -> None:
+    """Move the nodes, once the joint has let out `joint_step` m of wire towards the motor."""
+    step = joint_step
+    for i in range(NODES - 1, -1, -1):
+        beyond = step
+        step = state[chain + OFFSET + i] + state[chain + GAIN + i] * beyond
+        state[chain + STRETCH + i + 1] += step - beyond
+        slide = chain + SLIDE + i
+        state[slide] = dahl.slid(state[slide], step / p[PRESLIDING_DISTANCE])
+        state[chain + STEP + i] = step
+    state[chain + STRETCH] += motor_step - step
