@@ -93,7 +93,8 @@ def motor_travel(
 
     Parameters
     ----------
-    tracker_time : array (N,), motor_time : array (M,)
+    tracker_time : array (N,)
+    motor_time : array (M,)
         In s, increasing.
     motor_angle : array (M,)
         As an angle of the joint in rad.

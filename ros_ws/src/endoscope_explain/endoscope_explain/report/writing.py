@@ -6,14 +6,16 @@ from pathlib import Path
 from endoscope_core.plant import save_plant
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_explain.case import ExplainedCase
+from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.report_mapping import EXPERIMENT_FILE, report_mapping
 
 REPORT_JSON = 'report.json'
+REPORT_HTML = 'report.html'
 PLANT_YAML = 'plant.yaml'
 
 
 def write_report(case: ExplainedCase, folder: Path) -> None:
-    """Write report.json, plant.yaml and, where there is one, the next experiment's motion.
+    """Write report.json, report.html, plant.yaml and, where there is one, the next experiment's motion.
 
     Parameters
     ----------
@@ -28,6 +30,7 @@ def write_report(case: ExplainedCase, folder: Path) -> None:
     """
     content = json.dumps(report_mapping(case), indent=1, allow_nan=False)
     (folder / REPORT_JSON).write_text(content + '\n', encoding='utf-8')
+    (folder / REPORT_HTML).write_text(html_page(case), encoding='utf-8')
     save_plant(case.plant, folder / PLANT_YAML)
     if case.next_experiment is not None:
         experiment = case.next_experiment

@@ -1,0 +1,128 @@
+"""Hysteresis loops and signals in the passage that tells most."""
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from endoscope_explain.predicted_signals import RecordedView, SignalView
+from endoscope_explain.report.figures.style import (
+    RUNG_COLOUR,
+    RUNG_TITLE,
+    STYLE,
+    svg,
+    thinned,
+)
+
+Array = NDArray[np.float64]
+
+PASSAGE_S = 8.0
+SHOWN = ('nominal', 'augmented')
+
+
+def telling_passage(recorded: RecordedView, joint: str) -> tuple[float, float]:
+    """Find the passage in which the nominal prediction is furthest off.
+
+    Parameters
+    ----------
+    recorded : RecordedView
+    joint : str
+
+    Returns
+    -------
+    (float, float)
+        Begin and end in s.
+    """
+    views = recorded.of_joint(joint)
+    first, last = float(views[0].time[0]), float(views[0].time[-1])
+    if last - first <= PASSAGE_S:
+        return first, last
+    begins = np.arange(first, last - PASSAGE_S, 0.5)
+    weight = np.zeros(len(begins))
+    for one in views:
+        if one.quantity not in ('tension', 'bending'):
+            continue
+        misses = one.residual('nominal') ** 2
+        cumulative = np.r_[0.0, np.cumsum(misses)]
+        lower = np.searchsorted(one.time, begins)
+        upper = np.searchsorted(one.time, begins + PASSAGE_S)
+        found = cumulative[upper] - cumulative[lower]
+        weight += found / max(float(found.max()), 1e-12)
+    begin = float(begins[np.argmax(weight)])
+    return begin, begin + PASSAGE_S
+
+
+def loops_figure(
+    recorded: RecordedView, command: tuple[Array, Array], joint: str, passage: tuple[float, float]
+) -> str:
+    """Plot angle and tensions against the command, measured and predicted.
+
+    Parameters
+    ----------
+    recorded : RecordedView
+    command : (array (N,), array (N,))
+        Stamps in s and command in rad, joint-equivalent.
+    joint : str
+    passage : (float, float)
+        In s.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
+    views = _shown(recorded, joint)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.6, 3.5), layout='constrained')
+        for axis, one in zip(figure.subplots(1, len(views)), views, strict=True):
+            inside = (one.time >= passage[0]) & (one.time <= passage[1])
+            time = one.time[inside]
+            angle = np.degrees(np.interp(time, *command))
+            for name, values, width in _curves(one, inside):
+                x, y = thinned(angle, values)
+                axis.plot(x, y, color=RUNG_COLOUR[name], lw=width,
+                          label=RUNG_TITLE[name], zorder=1 if name == 'measured' else 2)
+            axis.set_title(_title(one))
+            axis.set_xlabel('command (deg)')
+        figure.legend(
+            *axis.get_legend_handles_labels(), loc='outside upper right', ncols=3, fontsize=8)
+        return svg(figure)
+
+
+def signals_figure(recorded: RecordedView, joint: str, passage: tuple[float, float]) -> str:
+    """Plot angle and tensions over time, measured and predicted, in a passage."""
+    views = _shown(recorded, joint)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.6, 1.5 * len(views) + 0.4), layout='constrained')
+        axes = figure.subplots(len(views), 1, sharex=True)
+        for axis, one in zip(axes, views, strict=True):
+            inside = (one.time >= passage[0]) & (one.time <= passage[1])
+            for name, values, width in _curves(one, inside):
+                x, y = thinned(one.time[inside], values)
+                axis.plot(x, y, color=RUNG_COLOUR[name], lw=width, label=RUNG_TITLE[name],
+                          zorder=1 if name == 'measured' else 2)
+            axis.set_title(_title(one))
+        axes[0].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8)
+        axes[-1].set_xlabel('time (s)')
+        axes[-1].set_xlim(passage)
+        return svg(figure)
+
+
+def _shown(recorded: RecordedView, joint: str) -> list[SignalView]:
+    order = {'bending': 0, 'tension': 1}
+    views = [v for v in recorded.of_joint(joint) if v.quantity in order]
+    return sorted(views, key=lambda v: order[v.quantity])
+
+
+def _curves(one: SignalView, inside: NDArray[np.bool_]) -> list[tuple[str, Array, float]]:
+    convert = np.degrees if one.quantity == 'bending' else np.asarray
+    curves = [('measured', convert(one.measured[inside]), 2.2)]
+    curves += [(name, convert(one.predicted[name][inside]), 1.0) for name in SHOWN]
+    return curves
+
+
+def _title(one: SignalView) -> str:
+    name = one.signal.partition(':')[2]
+    return f'{name}, bending (deg)' if one.quantity == 'bending' else f'{name}, tension (N)'
+
+

@@ -1,0 +1,74 @@
+import dataclasses
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from endoscope_explain.case import NextExperiment
+from endoscope_explain.explanation import Candidate, Estimate, UnknownTerm, Verdict
+from endoscope_explain.report.chain_drawing import STAGES, chain_svg
+from endoscope_explain.report.html_page import html_page
+from endoscope_explain.report.sentences import HEADLINES, verdict_sentence
+
+
+@pytest.fixture(scope='module')
+def page(stribeck_case):
+    ranked = (Candidate((('stribeck_friction', 'bend_x'),), 10.0, 1.0), Candidate((), 90.0, 9.0))
+    explanation = dataclasses.replace(stribeck_case.explanation, candidates=ranked)
+    return html_page(dataclasses.replace(stribeck_case, explanation=explanation))
+
+
+def test_a_page_needs_no_other_file(page):
+    assert not re.findall(r'(?:src|href)\s*=\s*["\'](?!#)', page)
+    assert '@import' not in page
+    # Fragments of the same page, and namespaces, are not fetched.
+    assert not re.findall(r'url\((?!#)', page)
+
+
+def test_a_page_says_what_was_left_out_and_where(page):
+    text = re.sub(r'<[^>]+>', ' ', page)
+    assert 'The simulation leaves out physics' in text
+    assert 'stribeck_friction on bend_x, 97 %' in text
+    assert 'cannot tell it from viscous_friction' in ' '.join(text.split())
+    assert 'nominal, refitted' in text
+
+
+def test_every_drawing_is_whole(page):
+    drawings = re.findall(r'<svg.*?</svg>', page, re.DOTALL)
+    assert len(drawings) >= 6
+    for drawing in drawings:
+        ET.fromstring(drawing)
+
+
+def test_only_the_guilty_stage_is_marked():
+    drawing = chain_svg({'joint': ['joint_stop (bend_x)']})
+    assert drawing.count('#8c1d18') == 1
+    assert all(title in drawing for title in ('Servo', 'Bending joint', 'Recording'))
+    assert chain_svg({}).count('#8c1d18') == 0
+    assert len(STAGES) == 6
+
+
+@pytest.mark.parametrize('verdict', list(Verdict))
+def test_every_verdict_has_its_sentence(stribeck_case, verdict):
+    case = dataclasses.replace(stribeck_case, verdict=verdict)
+    assert verdict in HEADLINES
+    assert verdict_sentence(case).endswith('.')
+
+
+def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case):
+    time = np.linspace(0.0, 10.0, 200)
+    term = UnknownTerm(
+        'bend_x', 'moment', 'N m', 'a exp(-((q - b) / c)**2)', {'q': 'bending angle, rad'},
+        (Estimate(0.01, 0.009, 0.011, 'N m'),), 0.9, time, np.sin(time), np.sin(time), ('gravity',))
+    experiment = NextExperiment(
+        'It tells gravity from contact.', ('gravity', 'contact'), 'slow ramps', 'bend_x',
+        {'chirp': 1.0, 'slow ramps': 4.0}, tuple(time),
+        tuple((float(v), 0.0) for v in np.sin(time)), ('bend_x', 'bend_y'))
+    explanation = dataclasses.replace(stribeck_case.explanation, unknown=term)
+    page = html_page(dataclasses.replace(
+        stribeck_case, explanation=explanation, verdict=Verdict.UNKNOWN_PHYSICS,
+        next_experiment=experiment))
+    assert 'a exp(-((q - b) / c)**2)' in page
+    assert 'It tells gravity from contact.' in page
+    assert page.index('slow ramps') < page.index('>chirp<')
