@@ -5,10 +5,11 @@ from __future__ import annotations
 import bisect
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from endoscope_core.control.adaptive_backlash_law import (
     AdaptationState,
@@ -18,6 +19,8 @@ from endoscope_core.control.adaptive_backlash_law import (
     learnt_term,
     robust_term,
 )
+
+Vector = Sequence[float] | NDArray[np.float64]
 
 STALE_AFTER = 0.15
 FADE_TIME = 1.0
@@ -29,7 +32,7 @@ class TrackerMeasurement:
     """Bending angles (J,) in rad that held at `stamp` (s, on the clock of the desired angles)."""
 
     stamp: float
-    angle: NDArray[np.float64]
+    angle: Vector
 
 
 @dataclass(frozen=True)
@@ -106,8 +109,9 @@ class AdaptiveBacklashController:
         self._activated = False
 
     def forget(self) -> None:
-        """Drop what has been learnt, for a new tube shape or new feed-forward parameters. Call
-        while the weight is 0 or the correction jumps.
+        """Drop what has been learnt, for a new tube shape or new feed-forward parameters.
+
+        Call while the weight is 0, or the correction jumps.
         """
         self._states = [AdaptationState()] * self._joints
         self._robust = [0.0] * self._joints
@@ -119,8 +123,8 @@ class AdaptiveBacklashController:
     def step(
         self,
         time: float,
-        desired: ArrayLike,
-        velocity: ArrayLike,
+        desired: Vector,
+        velocity: Vector,
         measurement: TrackerMeasurement | None = None,
     ) -> NDArray[np.float64]:
         """Correction for this instant.
@@ -129,7 +133,7 @@ class AdaptiveBacklashController:
         ----------
         time : float
             s, later than at the step before.
-        desired, velocity : array_like, shape (J,)
+        desired, velocity : sequence of float, shape (J,)
             Desired angle and velocity, rad and rad/s.
         measurement : TrackerMeasurement, optional
             One that has arrived since the step before. One that is older than the last, from the
@@ -160,12 +164,12 @@ class AdaptiveBacklashController:
         now = self._history[-1]
         blend = min(1.0, dt / self.settings.filter_time)
         limit = self.settings.output_limit
-        correction = np.empty(self._joints)
+        correction = []
         for j, state in enumerate(self._states):
             self._robust[j] += blend * (robust_term(self.settings, state) - self._robust[j])
             raw = learnt_term(state, now.foreseen[j], now.direction[j]) + self._robust[j]
-            correction[j] = self._weight * min(limit, max(-limit, raw))
-        return correction
+            correction.append(self._weight * min(limit, max(-limit, raw)))
+        return np.array(correction)
 
     def _elapsed(self, time: float) -> float:
         if not math.isfinite(time):
@@ -194,11 +198,11 @@ class AdaptiveBacklashController:
             self._history.popleft()
 
     def _learn(self, measurement: TrackerMeasurement, time: float) -> None:
-        measured = np.asarray(measurement.angle, dtype=float)
+        measured = [float(angle) for angle in measurement.angle]
         stamp = measurement.stamp
         usable = (
-            measured.shape == (self._joints,)
-            and bool(np.all(np.isfinite(measured)))
+            len(measured) == self._joints
+            and all(map(math.isfinite, measured))
             and self._last_stamp < stamp <= time
         )
         if not usable:
@@ -214,7 +218,7 @@ class AdaptiveBacklashController:
             adapt(
                 self.settings,
                 state,
-                float(measured[j]) - then.angle[j],
+                measured[j] - then.angle[j],
                 answered.foreseen[j],
                 answered.direction[j],
                 dt,
@@ -227,8 +231,8 @@ class AdaptiveBacklashController:
         index = bisect.bisect_right(self._history, time, key=lambda item: item.time) - 1
         return self._history[index] if index >= 0 else None
 
-    def _checked(self, name: str, values: ArrayLike) -> list[float]:
-        array = np.asarray(values, dtype=float)
-        if array.shape != (self._joints,) or not np.all(np.isfinite(array)):
-            raise ValueError(f'{name} must be {self._joints} finite numbers, not {array.tolist()}')
-        return [float(value) for value in array]
+    def _checked(self, name: str, values: Vector) -> list[float]:
+        numbers = [float(value) for value in values]
+        if len(numbers) != self._joints or not all(map(math.isfinite, numbers)):
+            raise ValueError(f'{name} must be {self._joints} finite numbers, not {numbers}')
+        return numbers

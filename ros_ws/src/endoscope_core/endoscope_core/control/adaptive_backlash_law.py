@@ -1,5 +1,4 @@
-"""Adaptive law against backlash of unknown size, for one joint (second paper, section 2.4, with
-unknown bounds).
+"""Adaptive law against backlash of unknown size, for one joint (second paper, section 2.4).
 
 The correction ``v`` is added to a feed-forward ``u_ff``; a backlash-like transmission answers ``q =
 a (u_ff + v) + d`` with unknown ``a > 0``. What the feed-forward leaves is written with the desired
@@ -111,14 +110,16 @@ class AdaptiveBacklashSettings:
                 raise ValueError(f'{name} must be positive')
         if self.loop_gain >= 1.0:
             raise ValueError(
-                f'loop_gain = {self.loop_gain} must stay below 1: the loop through tanh would be algebraic'
+                f'loop_gain = {self.loop_gain} must stay below 1, '
+                'or the loop through tanh is algebraic'
             )
 
 
 @dataclass(frozen=True)
 class AdaptationState:
-    """Estimates of one joint: ``g``, ``D`` (rad), ``r`` (rad), ``lambda integral(e)`` (rad) and the
-    surface ``w`` (rad).
+    """Estimates of one joint.
+
+    ``g``, ``D`` (rad), ``r`` (rad), ``lambda integral(e)`` (rad) and the surface ``w`` (rad).
     """
 
     gain: float = 0.0

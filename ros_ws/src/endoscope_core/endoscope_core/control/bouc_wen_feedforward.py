@@ -1,6 +1,4 @@
-"""Feed-forward compensation of hysteresis by equation 5 of the first paper, for any number of
-joints.
-"""
+"""Feed-forward compensation of hysteresis by equation 5 of the first paper."""
 
 from __future__ import annotations
 
@@ -9,10 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from endoscope_core.hysteresis.bouc_wen import BoucWenParameters
 from endoscope_core.hysteresis.bouc_wen_kernel import bouc_wen_normalised_step
+
+Vector = Sequence[float] | NDArray[np.float64]
 
 MODES = ('none', 'bouc_wen')
 
@@ -56,6 +56,9 @@ class FeedforwardSettings:
         s by which the desired angle is foreseen, ``theta_d + lead theta_d'``: the servo's own lag,
         so that the motor has crossed the dead zone when the joint is to turn back. 0 gives equation
         5 as printed.
+    speed_limit : float
+        Greatest speed of the command in rad/s. A reversal at high acceleration asks for more; the
+        motor could not follow it and a gate before the motor would refuse it.
     offset_rate : float
         Greatest speed in rad/s at which the jump left by a switch is worked off.
     offset_time : float
@@ -65,6 +68,7 @@ class FeedforwardSettings:
     """
 
     lead: float = 0.06
+    speed_limit: float = 20.0
     offset_rate: float = 0.5
     offset_time: float = 0.3
     resting_travel: float = math.radians(1.0)
@@ -72,7 +76,7 @@ class FeedforwardSettings:
     def __post_init__(self) -> None:
         if not (0.0 <= self.lead <= 0.5):
             raise ValueError(f'lead = {self.lead} s must lie in [0, 0.5]')
-        for name in ('offset_rate', 'offset_time', 'resting_travel'):
+        for name in ('speed_limit', 'offset_rate', 'offset_time', 'resting_travel'):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f'{name} = {value} must be positive and finite')
@@ -80,29 +84,35 @@ class FeedforwardSettings:
 
 @dataclass(frozen=True)
 class FeedforwardState:
-    """What the feed-forward remembers of one joint.
+    """What the feed-forward remembers of one joint; angles in rad.
 
     Parameters
     ----------
-    driver : float
-        Foreseen desired angle of the last step, rad.
+    desired, foreseen : float
+        Desired angle of the last step, as it was and `lead` later.
+    command : float
+        Joint-equivalent motor angle that it gave.
     hysteresis : float
         ``h / h_max`` in [-1, 1]. Kept normalised, so that it means the same after a change of
         parameters.
     offset : float
-        rad that the last switch has left to be worked off; part of the command.
+        What the last switch has left to be worked off; part of the command.
     """
 
-    driver: float
+    desired: float
+    foreseen: float
+    command: float
     hysteresis: float = 0.0
     offset: float = 0.0
 
 
-def compensated_angle(parameters: BoucWenParameters | None, state: FeedforwardState) -> float:
-    """Equation 5 without the offset; the driver itself where there are no parameters."""
+def compensated_angle(
+    parameters: BoucWenParameters | None, foreseen: float, hysteresis: float, desired: float
+) -> float:
+    """Equation 5 without the offset; the desired angle where there are no parameters."""
     if parameters is None:
-        return state.driver
-    return (state.driver + parameters.lag * state.hysteresis) / parameters.alpha
+        return desired
+    return (foreseen + parameters.lag * hysteresis) / parameters.alpha
 
 
 def feedforward_step(
@@ -113,7 +123,7 @@ def feedforward_step(
     desired: float,
     velocity: float,
     dt: float,
-) -> tuple[FeedforwardState, float]:
+) -> FeedforwardState:
     """One step of one joint.
 
     Parameters
@@ -131,24 +141,27 @@ def feedforward_step(
 
     Returns
     -------
-    state : FeedforwardState
-    command : float
-        Joint-equivalent motor angle in rad.
+    FeedforwardState
+        With the new command.
     """
-    driver = desired + (settings.lead * velocity if active else 0.0)
-    travel = settings.resting_travel if parameters is None else parameters.travel
-    rho = 0.0 if parameters is None else parameters.rho
-    n = 1.0 if parameters is None else parameters.n
-    hysteresis = bouc_wen_normalised_step(state.hysteresis, driver - state.driver, travel, rho, n)
-    limit = settings.offset_rate * dt
-    decay = min(limit, max(-limit, state.offset * min(1.0, dt / settings.offset_time)))
-    new = FeedforwardState(driver, hysteresis, state.offset - decay)
-    return new, compensated_angle(parameters if active else None, new) + new.offset
+    foreseen = desired + settings.lead * velocity
+    moved = foreseen - state.foreseen
+    if parameters is None:
+        hysteresis = bouc_wen_normalised_step(
+            state.hysteresis, moved, settings.resting_travel, 0.0, 1.0)
+    else:
+        hysteresis = bouc_wen_normalised_step(
+            state.hysteresis, moved, parameters.travel, parameters.rho, parameters.n)
+    worked_off = _limit(
+        state.offset * min(1.0, dt / settings.offset_time), settings.offset_rate * dt)
+    offset = state.offset - worked_off
+    wanted = compensated_angle(parameters if active else None, foreseen, hysteresis, desired)
+    step = _limit(wanted + offset - state.command, settings.speed_limit * dt)
+    return FeedforwardState(desired, foreseen, state.command + step, hysteresis, offset)
 
 
 class BoucWenFeedforward:
-    """Feed-forward of all joints, whose law can be changed while it runs without a jump of the
-    command.
+    """Feed-forward of all joints; its law can be changed while it runs without a jump.
 
     Parameters
     ----------
@@ -168,21 +181,17 @@ class BoucWenFeedforward:
         self.law = FeedforwardLaw()
         self._joints = joints
         self._states: list[FeedforwardState] = []
-        self._command: list[float] = []
+        self._start: list[float] | None = None
 
     @property
     def command(self) -> NDArray[np.float64] | None:
         """Last command (J,) in rad, None before the first step."""
-        return np.array(self._command) if self._command else None
+        return np.array([s.command for s in self._states]) if self._states else None
 
     @property
     def offset(self) -> NDArray[np.float64]:
-        """What is left of the last switch, (J,) in rad."""
-        return (
-            np.array([state.offset for state in self._states])
-            if self._states
-            else np.zeros(self._joints)
-        )
+        """What is left of the last switch, (J,) in rad; zero before the first step."""
+        return np.array([s.offset for s in self._states] or [0.0] * self._joints)
 
     def select(self, law: FeedforwardLaw) -> None:
         """Put another law in force from the next step on; the command goes on from where it is.
@@ -194,13 +203,12 @@ class BoucWenFeedforward:
         """
         if law.parameters and len(law.parameters) != self._joints:
             raise ValueError(
-                f'parameters for {len(law.parameters)} joints given, {self._joints} wanted'
-            )
+                f'parameters for {len(law.parameters)} joints given, {self._joints} wanted')
         self.law = law
-        if self._command:
-            self.rebase(self._command)
+        if self._states:
+            self.rebase([state.command for state in self._states])
 
-    def rebase(self, command: Sequence[float] | NDArray[np.float64]) -> None:
+    def rebase(self, command: Vector) -> None:
         """Go on from this command (J,) in rad, sent by someone else meanwhile, without a jump.
 
         Raises
@@ -210,22 +218,19 @@ class BoucWenFeedforward:
         """
         start = self._checked('command', command)
         if not self._states:
-            self._states = [FeedforwardState(angle) for angle in start]
-        self._command = start
-        active = self.law.mode == 'bouc_wen'
+            self._start = start
+            return
         self._states = [
-            replace(state, offset=angle - compensated_angle(parameters if active else None, state))
-            for state, parameters, angle in zip(
-                self._states, self._parameters(), start, strict=True
-            )
+            replace(state, command=angle, offset=angle - self._uncorrected(j, state))
+            for j, (state, angle) in enumerate(zip(self._states, start, strict=True))
         ]
 
-    def step(self, desired: ArrayLike, velocity: ArrayLike, dt: float) -> NDArray[np.float64]:
+    def step(self, desired: Vector, velocity: Vector, dt: float) -> NDArray[np.float64]:
         """Command for the desired angle.
 
         Parameters
         ----------
-        desired, velocity : array_like, shape (J,)
+        desired, velocity : sequence of float, shape (J,)
             Desired angle and velocity, rad and rad/s.
         dt : float
             s since the last step, positive.
@@ -245,23 +250,40 @@ class BoucWenFeedforward:
         speeds = self._checked('velocity', velocity)
         if not (math.isfinite(dt) and dt > 0.0):
             raise ValueError(f'dt = {dt} s must be positive and finite')
-        states = self._states or [FeedforwardState(angle) for angle in angles]
+        if not self._states:
+            self._begin(angles, speeds)
         active = self.law.mode == 'bouc_wen'
-        results = [
-            feedforward_step(parameters, active, self.settings, state, angle, speed, dt)
-            for parameters, state, angle, speed in zip(
-                self._parameters(), states, angles, speeds, strict=True
-            )
+        self._states = [
+            feedforward_step(self._parameters(j), active, self.settings, state, angle, speed, dt)
+            for j, (state, angle, speed) in enumerate(
+                zip(self._states, angles, speeds, strict=True))
         ]
-        self._states = [result[0] for result in results]
-        self._command = [result[1] for result in results]
-        return np.array(self._command)
+        return np.array([state.command for state in self._states])
 
-    def _parameters(self) -> Sequence[BoucWenParameters | None]:
-        return self.law.parameters or [None] * self._joints
+    def _begin(self, angles: list[float], speeds: list[float]) -> None:
+        lead = self.settings.lead
+        self._states = [
+            FeedforwardState(angle, angle + lead * speed, angle)
+            for angle, speed in zip(angles, speeds, strict=True)
+        ]
+        start = self._start
+        if start is None:
+            start = [self._uncorrected(j, state) for j, state in enumerate(self._states)]
+        self.rebase(start)
 
-    def _checked(self, name: str, values: ArrayLike) -> list[float]:
-        array = np.asarray(values, dtype=float)
-        if array.shape != (self._joints,) or not np.all(np.isfinite(array)):
-            raise ValueError(f'{name} must be {self._joints} finite numbers, not {array.tolist()}')
-        return [float(value) for value in array]
+    def _parameters(self, joint: int) -> BoucWenParameters | None:
+        return self.law.parameters[joint] if self.law.parameters else None
+
+    def _uncorrected(self, joint: int, state: FeedforwardState) -> float:
+        parameters = self._parameters(joint) if self.law.mode == 'bouc_wen' else None
+        return compensated_angle(parameters, state.foreseen, state.hysteresis, state.desired)
+
+    def _checked(self, name: str, values: Vector) -> list[float]:
+        numbers = [float(value) for value in values]
+        if len(numbers) != self._joints or not all(map(math.isfinite, numbers)):
+            raise ValueError(f'{name} must be {self._joints} finite numbers, not {numbers}')
+        return numbers
+
+
+def _limit(value: float, bound: float) -> float:
+    return min(bound, max(-bound, value))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,8 +23,7 @@ GREATEST_EXPONENT = 5.0
 
 @dataclass(frozen=True)
 class BoucWenParameters:
-    """The six parameters of equations 3 to 5, refused unless the inverse they give is safe to drive
-    a motor with.
+    """The six parameters of equations 3 to 5, refused unless their inverse is safe to drive with.
 
     ``theta_a = alpha theta + beta h`` and ``h' = A theta' - B |theta'| |h|^(n-1) h - C theta'
     |h|^n``.
@@ -92,34 +92,31 @@ class BoucWenParameters:
             )
         if self.inverse_slope > GREATEST_INVERSE_SLOPE * (1.0 + 1e-9):
             raise ValueError(
-                f'Bouc-Wen inverse is too steep: {self.inverse_slope:.1f} exceeds {GREATEST_INVERSE_SLOPE:g}'
+                f'Bouc-Wen inverse is too steep: {self.inverse_slope:.1f} '
+                f'exceeds {GREATEST_INVERSE_SLOPE:g}'
             )
 
-    @property
+    @cached_property
     def h_max(self) -> float:
         """Bound of ``|h|``."""
         return (self.A / (self.B + self.C)) ** (1.0 / self.n)
 
-    @property
+    @cached_property
     def lag(self) -> float:
-        """``|beta| h_max`` in rad: half the width of a saturated loop, measured along the actual
-        angle.
-        """
+        """``|beta| h_max`` in rad: half the width of a saturated loop along the actual angle."""
         return -self.beta * self.h_max
 
-    @property
+    @cached_property
     def travel(self) -> float:
         """``h_max / A`` in rad: distance over which the state builds up."""
         return self.h_max / self.A
 
-    @property
+    @cached_property
     def rho(self) -> float:
-        """``(B - C) / (B + C)``: how much faster the state leaves saturation than it would from
-        rest.
-        """
+        """``(B - C) / (B + C)``: how much faster the state leaves saturation than from rest."""
         return (self.B - self.C) / (self.B + self.C)
 
-    @property
+    @cached_property
     def inverse_slope(self) -> float:
         """Greatest slope of ``theta_FF`` over ``theta_d``."""
         return (1.0 - self.beta * self.A * max(1.0, 1.0 + self.rho)) / self.alpha
@@ -170,7 +167,8 @@ class BoucWenParameters:
         if set(values) != wanted:
             odd = ', '.join(sorted(set(values) ^ wanted))
             raise ValueError(
-                f'Bouc-Wen parameters must be exactly {", ".join(sorted(wanted))}; wrong or missing: {odd}'
+                f'Bouc-Wen parameters must be exactly {", ".join(sorted(wanted))}; '
+                f'wrong or missing: {odd}'
             )
         return cls(**{name: float(value) for name, value in values.items()})
 
@@ -193,9 +191,7 @@ def bouc_wen_step(parameters: BoucWenParameters, h: float, delta: float) -> floa
 def bouc_wen_forward(
     parameters: BoucWenParameters, theta: ArrayLike, h0: float = 0.0
 ) -> NDArray[np.float64]:
-    """Actual angle (N,) by equation 3 for a driving angle (N,) in rad, `h` being `h0` at the first
-    sample.
-    """
+    """Actual angle (N,) by equation 3 for a driving angle (N,), both in rad; `h` begins at `h0`."""
     driver = np.ascontiguousarray(theta, dtype=float)
     state = _path(parameters, driver, h0)
     return parameters.alpha * driver + parameters.beta * state
@@ -204,8 +200,9 @@ def bouc_wen_forward(
 def bouc_wen_inverse(
     parameters: BoucWenParameters, theta_d: ArrayLike, h0: float = 0.0
 ) -> NDArray[np.float64]:
-    """Feed-forward command (N,) by equation 5 for a desired angle (N,) in rad; equation 4 is driven
-    by the desired angle.
+    """Feed-forward command (N,) by equation 5 for a desired angle (N,), both in rad.
+
+    Equation 4 is driven by the desired angle; `h` begins at `h0`.
     """
     driver = np.ascontiguousarray(theta_d, dtype=float)
     state = _path(parameters, driver, h0)
@@ -217,7 +214,8 @@ def _path(
 ) -> NDArray[np.float64]:
     if driver.ndim != 1 or driver.size == 0 or not np.all(np.isfinite(driver)):
         raise ValueError(
-            f'the driving angle must be a non-empty series of finite numbers, not of shape {driver.shape}'
+            'the driving angle must be a non-empty series of finite numbers; '
+            f'its shape is {driver.shape}'
         )
     scale = parameters.h_max
     y0 = min(1.0, max(-1.0, h0 / scale))

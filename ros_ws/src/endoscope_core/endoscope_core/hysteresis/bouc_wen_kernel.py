@@ -81,7 +81,7 @@ def bouc_wen_normalised_step(y: float, delta: float, travel: float, rho: float, 
     distance = abs(delta) / travel
     if n == 1.0:
         return side * min(1.0, _exact_linear(g, rho, distance))
-    substeps = min(_MOST_SUBSTEPS, max(1, int(math.ceil(min(distance, 1e6) / _LONGEST_SUBSTEP))))
+    substeps = min(_MOST_SUBSTEPS, max(1, math.ceil(min(distance, 1e6) / _LONGEST_SUBSTEP)))
     dx = distance / substeps
     for _ in range(substeps):
         half = 1.0 - (1.0 - g) * math.exp(-0.5 * dx * _approach_rate(g, rho, n))
@@ -97,7 +97,7 @@ def bouc_wen_normalised_path(
     rho: float,
     n: float,
 ) -> NDArray[np.float64]:
-    """Normalised state along a recorded driving angle (N,), beginning at `y0` on the first sample."""
+    """Normalised state along a recorded driving angle (N,), `y0` at the first sample."""
     states = np.empty(driver.size)
     y = y0
     previous = driver[0]

@@ -55,7 +55,7 @@ def _crossings(
     offset: NDArray[np.float64],
     band: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values of u where offset passes zero on its way from beyond -band to beyond +band, and back."""
+    """Values of u where offset passes zero between beyond -band and beyond +band, and back."""
     outside = np.flatnonzero(np.abs(offset) > band)
     side = np.sign(offset[outside])
     turns = np.flatnonzero(side[1:] != side[:-1])

@@ -30,7 +30,8 @@ def _same_shape(
     b = np.asarray(second, dtype=float)
     if a.shape != b.shape:
         raise ValueError(
-            f'{first_name} has shape {a.shape}, {second_name} has shape {b.shape}: they must be equal'
+            f'{first_name} has shape {a.shape}, {second_name} has shape {b.shape}: '
+            'they must be equal'
         )
     if a.size == 0:
         raise ValueError(f'{first_name} and {second_name} hold no samples')

@@ -1,6 +1,4 @@
-"""A motion rich enough to tell the causes of a mismatch apart, for first use of a rig and for
-`explain`.
-"""
+"""A motion rich enough to tell the causes of a mismatch apart."""
 
 from __future__ import annotations
 
@@ -14,8 +12,7 @@ CORNER = 0.1
 
 
 def triangle(amplitude: float, speed: float) -> Signal:
-    """One slow triangle 0, +a, -a, 0 (rad) at constant `speed` (rad/s) with corners rounded over
-    0.1 s.
+    """One slow triangle 0, +a, -a, 0 (rad) at constant `speed` (rad/s), corners rounded.
 
     Constant speed shows friction without inertia or servo lag; a slow one separates creep and
     Stribeck friction from them.
@@ -40,8 +37,9 @@ def triangle(amplitude: float, speed: float) -> Signal:
 
 
 def steps_with_holds(angles: tuple[float, ...], rise: float = 0.15, rest: float = 0.6) -> Signal:
-    """Quick moves to each angle (rad) in turn with a rest after each, then back to zero: shows
-    creep, delay and ringing.
+    """Quick moves to each angle (rad) in turn and back to zero, with a rest after each.
+
+    Shows creep, delay and ringing.
     """
     parts: list[Signal] = []
     here = 0.0
@@ -52,8 +50,9 @@ def steps_with_holds(angles: tuple[float, ...], rise: float = 0.15, rest: float 
 
 
 def multisine(amplitude: float, duration: float, lowest: float = 0.2, lines: int = 8) -> Signal:
-    """Sines at odd multiples of a base frequency (Hz) with Schroeder phases and amplitudes falling
-    as 1/f, peak `amplitude` rad.
+    """Sines at odd multiples of a base frequency (Hz), `amplitude` rad at most.
+
+    Their amplitudes fall as 1/f; Schroeder phases keep the peak low.
     """
     order = 2 * np.arange(lines) + 1
     omega = 2.0 * np.pi * lowest * order
@@ -74,8 +73,9 @@ def multisine(amplitude: float, duration: float, lowest: float = 0.2, lines: int
 
 
 def chirp(amplitude: float, duration: float, start: float = 0.2, stop: float = 4.0) -> Signal:
-    """Exponential sweep from `start` to `stop` Hz whose amplitude (rad) falls as the square root of
-    the frequency rises.
+    """Exponential sweep from `start` to `stop` Hz.
+
+    The amplitude (rad) falls as the square root of the frequency rises.
     """
     growth = np.log(stop / start) / duration
 
@@ -93,8 +93,9 @@ def chirp(amplitude: float, duration: float, start: float = 0.2, stop: float = 4
 
 
 def teleoperation_like(seed: int, reaches: int, reach: float, end: float = 0.0) -> Signal:
-    """Minimum-jerk reaches to random angles within +-`reach` rad with random pauses, as a person's
-    hand moves; same seed, same motion.
+    """Minimum-jerk reaches to random angles within +-`reach` rad with pauses, like a hand's.
+
+    The same seed gives the same motion.
     """
     generator = np.random.default_rng(seed)
     parts: list[Signal] = []
@@ -110,8 +111,7 @@ def teleoperation_like(seed: int, reaches: int, reach: float, end: float = 0.0) 
 
 
 def commissioning_motion(seed: int = 1) -> Motion:
-    """Calibration sinusoid, rest, slow triangle, steps with holds, multisine, chirp,
-    teleoperation-like; then the other joint.
+    """Calibration sinusoid, rest, slow triangle, steps, multisine, chirp, teleoperation-like.
 
     `bend_x` moves alone through the first five pieces, so that whatever appears at `bend_y` then is
     coupling; during the last two both move.

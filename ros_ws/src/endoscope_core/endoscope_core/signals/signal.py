@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -132,7 +133,7 @@ def sequence(name: str, parts: Sequence[Signal]) -> Signal:
         If two neighbours do not meet: a jump would be commanded.
     """
     starts = np.concatenate(([0.0], np.cumsum([part.duration for part in parts])))
-    for before, after in zip(parts, parts[1:], strict=False):
+    for before, after in pairwise(parts):
         gap = float(after(0.0)[0] - before(before.duration)[0])
         if abs(gap) > 1e-6:
             raise ValueError(

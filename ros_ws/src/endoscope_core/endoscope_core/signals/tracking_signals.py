@@ -1,4 +1,4 @@
-"""The signals on which both papers' compensators are judged (first paper, section 4.2 and Table 5)."""
+"""The signals on which compensators are judged (first paper, section 4.2 and Table 5)."""
 
 from __future__ import annotations
 

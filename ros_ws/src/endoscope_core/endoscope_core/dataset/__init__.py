@@ -1,0 +1,32 @@
+"""Simulated calibration recordings of known backlash size."""
+
+from endoscope_core.dataset.calibration_dataset import (
+    CLASSES_DEG,
+    CalibrationDataset,
+    DatasetError,
+    is_dataset,
+    load_dataset,
+    make_dataset,
+    save_dataset,
+)
+from endoscope_core.dataset.calibration_recording import CalibrationRecording, record_calibration
+from endoscope_core.dataset.rig_variation import (
+    TubeConfiguration,
+    configuration_of_size,
+    random_rig,
+)
+
+__all__ = [
+    'CLASSES_DEG',
+    'CalibrationDataset',
+    'CalibrationRecording',
+    'DatasetError',
+    'TubeConfiguration',
+    'configuration_of_size',
+    'is_dataset',
+    'load_dataset',
+    'make_dataset',
+    'random_rig',
+    'record_calibration',
+    'save_dataset',
+]

@@ -1,0 +1,199 @@
+"""The data set of the first paper (section 3.1): calibrations of known backlash size."""
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.atomic_output import atomic_directory
+from endoscope_core.dataset.calibration_recording import record_calibration
+from endoscope_core.dataset.rig_variation import (
+    TubeConfiguration,
+    configuration_of_size,
+    random_rig,
+)
+from endoscope_core.errors import EndoscopeError
+
+CLASSES_DEG = (40, 50, 60, 70, 80, 90, 100)
+PER_CLASS = 30
+SIZE_SPREAD_DEG = 1.0
+ARRAYS_FILE = 'recordings.npz'
+MANIFEST_FILE = 'manifest.json'
+_MOST_RIGS = 50
+
+
+class DatasetError(EndoscopeError, ValueError):
+    """A data set cannot be made as asked, or what lies in a folder is none."""
+
+
+@dataclass(frozen=True)
+class CalibrationDataset:
+    """R recordings of calibrations, N = 9000 samples at 1 kHz, J = 2 joints.
+
+    Parameters
+    ----------
+    tension : ndarray, shape (R, N, 4), float32
+        N.
+    desired_angle, desired_velocity : ndarray, shape (N,)
+        rad and rad/s.
+    actual_angle : ndarray, shape (R, N, J), float32
+        rad, from the tracker.
+    class_deg : ndarray of int, shape (R,)
+        Class of the backlash size.
+    backlash_size : ndarray, shape (R,)
+        True size in rad, mean of both joints.
+    configuration : ndarray of int, shape (R,)
+        Number of the tube configuration, by which folds are grouped.
+    manifest : dict
+        Seed, spreads, plants; see `manifest_hash`.
+    """
+
+    tension: NDArray[np.float32]
+    desired_angle: NDArray[np.float64]
+    desired_velocity: NDArray[np.float64]
+    actual_angle: NDArray[np.float32]
+    class_deg: NDArray[np.int64]
+    backlash_size: NDArray[np.float64]
+    configuration: NDArray[np.int64]
+    manifest: dict[str, Any]
+
+    @property
+    def manifest_hash(self) -> str:
+        """SHA-256 of the manifest, which holds a hash of the arrays."""
+        text = json.dumps(self.manifest, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def make_dataset(
+    seed: int, per_class: int = PER_CLASS, progress: Callable[[int, int], None] | None = None
+) -> CalibrationDataset:
+    """Simulate the data set; each recording is another rig in another tube.
+
+    Parameters
+    ----------
+    seed : int
+        The same seed gives the same recordings, and more of them with a greater `per_class`.
+    per_class : int
+        Recordings of each class.
+    progress : callable, optional
+        Called with the number of recordings done and to be done.
+
+    Raises
+    ------
+    DatasetError
+        If `per_class` is not positive or `seed` is negative.
+    """
+    if per_class < 1 or seed < 0:
+        raise DatasetError(
+            f'per_class = {per_class} must be positive and seed = {seed} not negative')
+    total = per_class * len(CLASSES_DEG)
+    configurations: list[TubeConfiguration] = []
+    recordings = []
+    classes: list[int] = []
+    for class_deg in CLASSES_DEG:
+        for k in range(per_class):
+            generator = np.random.default_rng([seed, class_deg, k])
+            configuration = _draw(generator, class_deg)
+            noise_seed = int(generator.integers(2**31))
+            recordings.append(record_calibration(configuration.plant, noise_seed))
+            configurations.append(configuration)
+            classes.append(class_deg)
+            if progress is not None:
+                progress(len(recordings), total)
+    arrays: dict[str, NDArray[Any]] = {
+        'tension': np.stack([r.tension for r in recordings]).astype(np.float32),
+        'desired_angle': recordings[0].desired_angle,
+        'desired_velocity': recordings[0].desired_velocity,
+        'actual_angle': np.stack([r.actual_angle for r in recordings]).astype(np.float32),
+        'class_deg': np.array(classes, dtype=np.int64),
+        'backlash_size': np.array([c.backlash_size for c in configurations]),
+        'configuration': np.arange(total, dtype=np.int64),
+    }
+    manifest = {
+        'schema': 1,
+        'seed': seed,
+        'per_class': per_class,
+        'classes_deg': list(CLASSES_DEG),
+        'size_spread_deg': SIZE_SPREAD_DEG,
+        'arrays_sha256': _arrays_hash(arrays),
+        'recordings': [
+            {
+                'configuration': k,
+                'class_deg': classes[k],
+                'backlash_size': configuration.backlash_size,
+                'capstan_exponent': configuration.exponent,
+                'joints': {
+                    name: asdict(joint) for name, joint in configuration.plant.joints.items()},
+            }
+            for k, configuration in enumerate(configurations)
+        ],
+    }
+    return CalibrationDataset(**arrays, manifest=manifest)
+
+
+def save_dataset(dataset: CalibrationDataset, folder: str | Path) -> None:
+    """Write a data set to a new folder, whole or not at all.
+
+    Raises
+    ------
+    OutputExistsError
+        If there is something at `folder` already.
+    """
+    arrays = {name: value for name, value in vars(dataset).items() if name != 'manifest'}
+    with atomic_directory(folder) as partial:
+        np.savez_compressed(partial / ARRAYS_FILE, **arrays)
+        text = json.dumps(dataset.manifest, indent=1, sort_keys=True)
+        (partial / MANIFEST_FILE).write_text(text + '\n', encoding='utf-8')
+
+
+def is_dataset(folder: str | Path) -> bool:
+    """Whether `folder` looks like a data set rather than a bag."""
+    return (Path(folder) / MANIFEST_FILE).is_file()
+
+
+def load_dataset(folder: str | Path) -> CalibrationDataset:
+    """Read a data set.
+
+    Raises
+    ------
+    DatasetError
+        If the folder holds none, or its arrays are not those that the manifest was written for.
+    """
+    folder = Path(folder)
+    for name in (MANIFEST_FILE, ARRAYS_FILE):
+        if not (folder / name).is_file():
+            raise DatasetError(
+                f'{folder} is no data set: it has no {name}; make one with `endoscope dataset`')
+    try:
+        manifest = json.loads((folder / MANIFEST_FILE).read_text(encoding='utf-8'))
+        with np.load(folder / ARRAYS_FILE, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        intact = _arrays_hash(arrays) == manifest['arrays_sha256']
+        dataset = CalibrationDataset(**arrays, manifest=manifest)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DatasetError(f'{folder} cannot be read as a data set: {error}') from error
+    if not intact:
+        raise DatasetError(f'{folder}: {ARRAYS_FILE} is not what {MANIFEST_FILE} was written for')
+    return dataset
+
+
+def _draw(generator: np.random.Generator, class_deg: int) -> TubeConfiguration:
+    size = np.deg2rad(class_deg + SIZE_SPREAD_DEG * generator.uniform(-1.0, 1.0))
+    for _ in range(_MOST_RIGS):
+        configuration = configuration_of_size(random_rig(generator), float(size))
+        if configuration is not None:
+            return configuration
+    raise DatasetError(f'no rig of {_MOST_RIGS} reaches a backlash size of {class_deg} deg')
+
+
+def _arrays_hash(arrays: dict[str, NDArray[Any]]) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        digest.update(name.encode())
+        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
+    return digest.hexdigest()

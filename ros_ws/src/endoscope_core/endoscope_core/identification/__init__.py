@@ -1,0 +1,32 @@
+"""Parameters of hysteresis models from recordings."""
+
+from endoscope_core.identification.bouc_wen_fit import (
+    IdentificationError,
+    ModelFit,
+    Recording,
+    fit_model,
+)
+from endoscope_core.identification.class_parameters import (
+    ClassParameterError,
+    identify_classes,
+    load_class_parameters,
+    parameters_for_class,
+    save_class_parameters,
+)
+from endoscope_core.identification.feedforward_fit import FeedforwardFit, fit_feedforward
+from endoscope_core.identification.servo_lag import Servo
+
+__all__ = [
+    'ClassParameterError',
+    'FeedforwardFit',
+    'IdentificationError',
+    'ModelFit',
+    'Recording',
+    'Servo',
+    'fit_feedforward',
+    'fit_model',
+    'identify_classes',
+    'load_class_parameters',
+    'parameters_for_class',
+    'save_class_parameters',
+]

@@ -1,0 +1,23 @@
+"""The position servo between a command and the motor: second order, as in the nominal plant."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import cont2discrete, lfilter
+
+
+@dataclass(frozen=True)
+class Servo:
+    """Bandwidth in rad/s and damping ratio of the position loop."""
+
+    bandwidth: float = 60.0
+    damping_ratio: float = 0.9
+
+    def answer(self, command: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
+        """Motor angle (N,) for a command (N,) held for `dt` s each, beginning at rest on it."""
+        w, z = self.bandwidth, self.damping_ratio
+        numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2.0 * z * w, w * w]), dt)
+        start = command[0]
+        moved: NDArray[np.float64] = lfilter(numerator[0], denominator, command - start)
+        return start + moved
