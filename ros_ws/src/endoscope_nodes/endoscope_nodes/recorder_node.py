@@ -5,6 +5,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
@@ -96,7 +97,8 @@ class RecorderNode(EndoscopeNode):
             self.ticker.add(self._on_tick)
         else:
             self.ticker.every(p.drain_period, self._drain)
-        self.ticker.every(1.0, self._look_around)
+        # The graph is looked at in real time: publishers come before simulated time begins.
+        self.create_timer(1.0, self._look_around, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.diagnostics.add('recording', self._report)
         if p.autostart:
             try:
@@ -179,7 +181,8 @@ class RecorderNode(EndoscopeNode):
                 self.get_logger().error(f'{topic} is not recorded: {error}')
 
     def _subscribe(self, topic: str) -> None:
-        known = INTERFACE_TOPICS.get(topic)
+        namespace = self.get_namespace().rstrip('/') + '/'
+        known = INTERFACE_TOPICS.get(topic) or INTERFACE_TOPICS.get(topic.removeprefix(namespace))
         if known is not None:
             self._add_source(topic, *known)
             return

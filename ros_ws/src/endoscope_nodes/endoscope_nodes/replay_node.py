@@ -4,7 +4,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
@@ -22,6 +21,9 @@ from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_NS
 
 _CLOCK = '/clock'
+# A reader that asks for what is not offered never connects.
+_LONGEST_WAIT_NS = 5_000_000_000
+_LINGER_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class ReplayParameters:
     topics: tuple[str, ...] = parameter(('',), 'full names to publish; an empty one for all')
     clock: bool = parameter(True, 'publish the time of the recording on /clock')
     delay: float = parameter(
-        1.0, 'time for readers to be found before the first message', unit='s', low=0.0
+        1.0, 'time from finding all readers to the first message', unit='s', low=0.0
     )
     beside_live_nodes: bool = parameter(
         False, 'replay even where other nodes publish the same topics'
@@ -69,9 +71,11 @@ class ReplayNode(EndoscopeNode):
         self._start_ns = self._next.log_ns // TICK_NS * TICK_NS
         self._clock_ns = self._start_ns - TICK_NS
         self._clock_out = (
-            self.create_publisher(ClockMessage, _CLOCK, LOCK_STEP) if (p.clock) else None
+            self.create_publisher(ClockMessage, _CLOCK, LOCK_STEP) if p.clock else None
         )
-        self._begin_ns = time.monotonic_ns() + round(p.delay * 1e9)
+        self._delay_ns = round(p.delay * 1e9)
+        self._begin_ns = time.monotonic_ns() + self._delay_ns
+        self._wait_until_ns = self._begin_ns + _LONGEST_WAIT_NS
         self._checked = p.beside_live_nodes
         self.published = 0
         self.diagnostics.add('replay', self._report)
@@ -107,6 +111,8 @@ class ReplayNode(EndoscopeNode):
 
     def _go_on(self) -> None:
         now = time.monotonic_ns()
+        if not self.published and now < self._wait_until_ns and not self._connected():
+            self._begin_ns = now + self._delay_ns
         if now < self._begin_ns or self._next is None:
             return
         if not self._checked:
@@ -126,8 +132,6 @@ class ReplayNode(EndoscopeNode):
                 self._clock_out.publish(encode_clock(self._clock_ns))
             self._publish_until(self._clock_ns + TICK_NS)
         if self._next is None:
-            for publisher in self._outputs.values():
-                publisher.wait_for_all_acked(Duration(seconds=1))
             self._end(f'{self._parameters_.bag}: {self.published} messages replayed', failed=False)
 
     def _publish_until(self, end_ns: int) -> None:
@@ -137,6 +141,13 @@ class ReplayNode(EndoscopeNode):
             self.published += 1
             message = next(self._messages, None)
         self._next = message
+
+    def _connected(self) -> bool:
+        """Whether all readers that are known to be there are connected."""
+        return all(
+            publisher.get_subscription_count() >= self.count_subscribers(topic)
+            for topic, publisher in self._outputs.items()
+        )
 
     def _live_nodes(self) -> str:
         """Name a node that the replay would talk over; empty if there is none."""
@@ -158,7 +169,8 @@ class ReplayNode(EndoscopeNode):
             self.get_logger().error(text)
         else:
             self.get_logger().info(text)
-        self._runtime.stop()
+        # Readers forget what a process sent that is gone before they looked.
+        self.ticker.every(_LINGER_S, self._runtime.stop)
 
     def _report(self) -> Report:
         done = max(0, self._clock_ns - self._start_ns) * 1e-9

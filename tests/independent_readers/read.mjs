@@ -1,0 +1,74 @@
+// Reads an MCAP file with Foxglove's decoders, by its index and as a stream, and prints what it
+// found as JSON. Times are strings: they do not fit into a number.
+import { open } from 'node:fs/promises';
+import { parse } from '@foxglove/rosmsg';
+import { MessageReader } from '@foxglove/rosmsg2-serialization';
+import { McapIndexedReader, McapStreamReader } from '@mcap/core';
+import { FileHandleReadable } from '@mcap/nodejs';
+import { loadDecompressHandlers } from '@mcap/support';
+
+const plain = (key, value) => {
+  if (typeof value === 'bigint') return value.toString();
+  if (ArrayBuffer.isView(value)) return Array.from(value);
+  if (value instanceof Map) return Object.fromEntries(value);
+  return value;
+};
+
+async function throughIndex(path, decompressHandlers) {
+  const file = await open(path, 'r');
+  const reader = await McapIndexedReader.Initialize({
+    readable: new FileHandleReadable(file),
+    decompressHandlers,
+  });
+  const decoders = new Map();
+  const topics = {};
+  for await (const message of reader.readMessages({ validateCrcs: true })) {
+    const channel = reader.channelsById.get(message.channelId);
+    const schema = reader.schemasById.get(channel.schemaId);
+    if (!decoders.has(channel.id)) {
+      const text = new TextDecoder().decode(schema.data);
+      decoders.set(channel.id, new MessageReader(parse(text, { ros2: true })));
+    }
+    const decoded = decoders.get(channel.id).readMessage(message.data);
+    topics[channel.topic] ??= {
+      type: schema.name,
+      schemaEncoding: schema.encoding,
+      messageEncoding: channel.messageEncoding,
+      metadata: channel.metadata,
+      count: 0,
+      sequences: 0,
+      sum: 0,
+      first: { logTime: message.logTime, publishTime: message.publishTime, decoded },
+    };
+    const topic = topics[channel.topic];
+    topic.count += 1;
+    topic.sequences += message.sequence;
+    for (const name of ['position', 'velocity', 'effort']) {
+      for (const value of decoded[name] ?? []) topic.sum += value;
+    }
+    topic.last = { logTime: message.logTime, publishTime: message.publishTime, decoded };
+  }
+  await file.close();
+  return { header: reader.header, statistics: reader.statistics, topics };
+}
+
+async function asStream(path, decompressHandlers) {
+  const file = await open(path, 'r');
+  const reader = new McapStreamReader({ decompressHandlers, validateCrcs: true });
+  const counts = {};
+  for await (const block of file.createReadStream()) {
+    reader.append(block);
+    for (let record; (record = reader.nextRecord()); ) {
+      counts[record.type] = (counts[record.type] ?? 0) + 1;
+    }
+  }
+  return { counts, done: reader.done() };
+}
+
+const [path] = process.argv.slice(2);
+const handlers = await loadDecompressHandlers();
+const result = {
+  index: await throughIndex(path, handlers),
+  stream: await asStream(path, handlers),
+};
+process.stdout.write(JSON.stringify(result, plain));

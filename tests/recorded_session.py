@@ -1,0 +1,147 @@
+"""A recorder in the process of a test, real topics that it hears, and what was sent on them."""
+
+import itertools
+import os
+import time
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.task import Future
+from sensor_msgs.msg import JointState, Joy
+from std_msgs.msg import String
+
+from endoscope_bags.cdr_encoding import encode_joint_state, encode_poses
+from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
+from endoscope_nodes.recorder_node import RecorderNode
+from endoscope_nodes.runtime import Runtime
+
+PATIENCE_S = 60.0
+_DOMAINS = itertools.cycle(range(100, 230))
+_FIRST = os.getpid() % 130
+
+
+def private_domain() -> int:
+    """Give a ROS domain that neither a person nor another test uses."""
+    return (next(_DOMAINS) + _FIRST) % 130 + 100
+
+
+class RecordedSession:
+    """A recorder, and a node that publishes to it.
+
+    Parameters
+    ----------
+    overrides
+        Parameters of the recorder.
+    simulated
+        Whether `/clock` gives the time.
+    replay
+        Parameters of a replay that may be added.
+    """
+
+    def __init__(self, *, simulated=False, replay=None, **overrides) -> None:
+        arguments = ['--ros-args', '--log-level', 'fatal']
+        arguments += ['-p', 'use_sim_time:=true'] if simulated else []
+        self.runtime = Runtime(
+            arguments,
+            context=Context(),
+            domain_id=private_domain(),
+            overrides={'recorder': overrides, 'replay': replay or {}},
+        )
+        self.recorder = self.runtime.add(RecorderNode)
+        self.probe = Node('probe', context=self.runtime.context, namespace='endoscope')
+        self.runtime.executor.add_node(self.probe)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+
+    def wait(self, condition) -> None:
+        """Serve the nodes until something has come true."""
+        future = Future()
+
+        def look() -> None:
+            if not future.done() and condition():
+                future.set_result(None)
+
+        timer = self.probe.create_timer(0.002, look, clock=self._steady)
+        assert self.runtime.spin_until(future, PATIENCE_S), 'it does not come to it'
+        self.probe.destroy_timer(timer)
+
+    def serve(self, seconds: float) -> None:
+        """Serve the nodes for a while."""
+        self.runtime.spin_until(Future(), seconds)
+
+    def publisher(self, kind: type, topic: str, qos):
+        """Publish on a topic once the recorder hears it."""
+        publisher = self.probe.create_publisher(kind, topic, qos)
+        self.wait(publisher.get_subscription_count)
+        # The reader has to find the writer, too.
+        self.serve(0.2)
+        return publisher
+
+    def close(self):
+        """End the recording like a process does, and return its report."""
+        self.probe.destroy_node()
+        self.runtime.close()
+        return self.recorder.last_report
+
+    def __enter__(self) -> 'RecordedSession':
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+SERVO = '/endoscope/motor/servo_jp'
+WIRES = '/endoscope/wires/measured_js'
+TRACKER = '/endoscope/tracker/measured_cp'
+CLUTCH = '/endoscope/master/clutch'
+STATE = '/endoscope/slave/operating_state'
+DIAGNOSTICS = '/diagnostics'
+N = 400
+
+
+def record_all_types(path: Path):
+    """Record one of each kind of topic; return what was sent by topic, and the report.
+
+    The state is published before the recorder starts, as latched states are.
+    """
+    sent = {topic: [] for topic in (SERVO, WIRES, TRACKER, CLUTCH, STATE)}
+    with RecordedSession(bag=str(path), autostart=False) as session:
+        state = session.probe.create_publisher(String, STATE, RESULT)
+        state.publish(String(data='ENABLED'))
+        sent[STATE].append('ENABLED')
+        session.serve(0.2)
+        session.recorder.start()
+        session.wait(state.get_subscription_count)
+        servo = session.publisher(JointState, SERVO, COMMAND)
+        wires = session.publisher(JointState, WIRES, SENSOR_OFFERED)
+        tracker = session.publisher(PoseStamped, TRACKER, SENSOR_OFFERED)
+        clutch = session.publisher(Joy, CLUTCH, EVENT)
+        diagnostics = session.publisher(DiagnosticArray, DIAGNOSTICS, EVENT)
+        diagnostics.publish(DiagnosticArray())
+
+        def publish() -> None:
+            k = len(sent[SERVO])
+            if k == N:
+                return
+            now = time.time_ns()
+            sent[SERVO].append((now, [0.5 * k, -k]))
+            servo.publish(encode_joint_state(['motor_x', 'motor_y'], now, position=[0.5 * k, -k]))
+            tensions = [5.0 + k, 5.0 - k]
+            sent[WIRES].append((now, tensions))
+            wires.publish(encode_joint_state(['wire_x_pos', 'wire_x_neg'], now, effort=tensions))
+            if k % 25 == 0:
+                sent[TRACKER].append((now, [k, 0.1, 0.2]))
+                pose = encode_poses([now], [[k, 0.1, 0.2]], [[0, 0, 0, 1]], frame_id='base')
+                tracker.publish(pose[0])
+            if k % 100 == 0:
+                sent[CLUTCH].append(k // 100 % 2)
+                clutch.publish(Joy(buttons=[k // 100 % 2]))
+
+        session.probe.create_timer(0.001, publish)
+        session.wait(lambda: len(sent[SERVO]) == N)
+        session.serve(0.3)
+        report = session.recorder.stop()
+    return sent, report

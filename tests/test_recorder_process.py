@@ -1,0 +1,188 @@
+"""`endoscope record` as a process: signals, a kill, a full disk, losses."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from recorded_session import private_domain
+from rosbags.highlevel import AnyReader
+from sensor_msgs.msg import JointState
+
+from endoscope_bags import open_bag
+from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.errors import TruncatedBagError
+from endoscope_bags.information import bag_information
+from endoscope_bags.recovery import recover
+from endoscope_nodes.qos import SENSOR_OFFERED
+
+TOPIC = '/endoscope/motor/measured_js'
+
+
+class RecorderProcess:
+    """`endoscope record` and a publisher that it hears."""
+
+    def __init__(self, bag):
+        domain = private_domain()
+        self.sent = 0
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node('sender', context=self.context)
+        self.publisher = self.node.create_publisher(JointState, TOPIC, SENSOR_OFFERED)
+        self.process = subprocess.Popen(
+            [sys.executable, '-m', 'endoscope_bringup.cli', 'record', '--out', str(bag)],
+            env=os.environ | {'ROS_DOMAIN_ID': str(domain)},
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        deadline = time.monotonic() + 60
+        while not self.publisher.get_subscription_count():
+            assert self.process.poll() is None, self.process.stderr.read()
+            assert time.monotonic() < deadline, 'the recorder does not listen'
+            time.sleep(0.02)
+        time.sleep(0.5)
+
+    def send(self, n, period_s=0.001):
+        for _ in range(n):
+            stamp = time.time_ns()
+            self.publisher.publish(encode_joint_state(['motor_x'], stamp, position=[self.sent]))
+            self.sent += 1
+            time.sleep(period_s)
+        return stamp
+
+    def end(self, number):
+        self.process.send_signal(number)
+        _, errors = self.process.communicate(timeout=60)
+        return self.process.returncode, errors
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.communicate()
+        self.node.destroy_node()
+        self.context.shutdown()
+
+
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_finishes_the_recording(tmp_path, number):
+    with RecorderProcess(tmp_path / 'bag') as recorder:
+        recorder.send(500)
+        time.sleep(0.2)
+        code, errors = recorder.end(number)
+    assert code == 0, errors
+    assert 'Traceback' not in errors
+    bag = open_bag(tmp_path / 'bag')
+    assert bag.topics[TOPIC].message_count == 500
+    with AnyReader([tmp_path / 'bag']) as reader:
+        counts = {c.topic: c.msgcount for c in reader.connections}
+    assert counts[TOPIC] == 500
+
+
+def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path):
+    with RecorderProcess(tmp_path / 'bag') as recorder:
+        last_stamp = recorder.send(3000)
+        recorder.end(signal.SIGKILL)
+    file = tmp_path / 'bag' / 'bag_0.mcap'
+    before = file.read_bytes()
+    with pytest.raises(TruncatedBagError, match=r'bag_0\.mcap: ends in the middle'):
+        open_bag(tmp_path / 'bag')
+    assert open_bag(tmp_path / 'bag', salvage=True).message_count > 0
+    report = recover(tmp_path / 'bag', tmp_path / 'saved')
+    assert file.read_bytes() == before
+    bag = open_bag(tmp_path / 'saved')
+    series = bag.joint_state('motor/measured_js')
+    assert report.counts[TOPIC] == len(series)
+    assert series.position[:, 0].tolist() == list(range(len(series)))
+    assert last_stamp - series.stamp_ns[-1] < 1e9
+    with AnyReader([tmp_path / 'saved']) as reader:
+        connections = [c for c in reader.connections if c.topic == TOPIC]
+        assert sum(1 for _ in reader.messages(connections)) == len(series)
+
+
+def test_a_full_disk_is_said_and_survived(tmp_path):
+    with RecorderProcess(tmp_path / 'bag') as recorder:
+        recorder.send(300)
+        limit = (200_000, resource.RLIM_INFINITY)
+        resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, limit)
+        recorder.send(6000, 0.0003)
+        assert recorder.process.poll() is None
+        code, errors = recorder.end(signal.SIGTERM)
+    assert code == 1
+    assert 'File too large; recording ended there' in errors
+    assert 'Traceback' not in errors
+    bag = open_bag(tmp_path / 'bag')
+    series = bag.joint_state('motor/measured_js')
+    assert 300 <= len(series) < recorder.sent
+    assert series.position[:, 0].tolist() == list(range(len(series)))
+    assert (tmp_path / 'bag' / 'bag_0.mcap').stat().st_size <= 200_000
+    assert 'File too large' in bag_information(bag).notes['ended']
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    disk = tmp_path / 'disk'
+    disk.mkdir()
+    mounted = subprocess.run(
+        ['mount', '-t', 'tmpfs', '-o', 'size=256k', 'tmpfs', str(disk)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if mounted.returncode:
+        pytest.skip(f'cannot mount a small disk here: {mounted.stderr.strip()}')
+    yield disk
+    subprocess.run(['umount', '--lazy', str(disk)], check=True)
+
+
+def test_a_small_disk_fills_up(small_disk):
+    with RecorderProcess(small_disk / 'bag') as recorder:
+        recorder.send(9000, 0.0003)
+        code, errors = recorder.end(signal.SIGTERM)
+    assert code == 1
+    assert 'No space left on device; recording ended there' in errors
+    bag = open_bag(small_disk / 'bag')
+    assert 0 < bag.topics[TOPIC].message_count < recorder.sent
+    assert (small_disk / 'bag' / 'metadata.yaml').is_file()
+
+
+def test_losses_are_counted_exactly_and_exit_1(tmp_path):
+    with RecorderProcess(tmp_path / 'bag') as recorder:
+        recorder.send(200)
+        time.sleep(0.5)
+        # A recorder that stands still for longer than its queues last has to lose messages.
+        recorder.process.send_signal(signal.SIGSTOP)
+        recorder.send(6000, 0.0001)
+        recorder.process.send_signal(signal.SIGCONT)
+        time.sleep(1.0)
+        recorder.send(200)
+        time.sleep(0.5)
+        code, errors = recorder.end(signal.SIGTERM)
+    bag = open_bag(tmp_path / 'bag')
+    topic = next(t for t in bag_information(bag).topics if t.name == TOPIC)
+    assert topic.lost > 0
+    assert topic.message_count + topic.lost == recorder.sent
+    assert code == 1
+    assert f'{topic.lost} lost ({TOPIC} {topic.lost})' in errors
+
+
+def test_an_existing_bag_is_one_line_and_exit_2(tmp_path):
+    (tmp_path / 'bag').mkdir()
+    (tmp_path / 'bag' / 'precious').write_text('x')
+    done = subprocess.run(
+        [sys.executable, '-m', 'endoscope_bringup.cli', 'record', '--out', str(tmp_path / 'bag')],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert 'exists already' in line
+    assert [p.name for p in (tmp_path / 'bag').iterdir()] == ['precious']
