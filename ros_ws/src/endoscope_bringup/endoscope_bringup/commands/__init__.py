@@ -5,4 +5,6 @@ gives the exit status. It imports nothing heavy at module level: every start of 
 all of them.
 """
 
-COMMANDS: tuple[str, ...] = ('simulate', 'record', 'replay', 'bag', 'bench')
+COMMANDS: tuple[str, ...] = (
+    'simulate', 'record', 'replay', 'bag', 'dataset', 'train', 'identify', 'bench',
+)

@@ -41,6 +41,11 @@ class CrossValidation:
     accuracy: tuple[float, ...]
     confusion: NDArray[np.int64]
 
+    @property
+    def mean_accuracy(self) -> float:
+        """Share of right classes over all recordings."""
+        return float(np.trace(self.confusion) / np.sum(self.confusion))
+
 
 def as_input(tension: NDArray[np.float32]) -> Tensor:
     """Tensor (R, 4, N) of tensions (R, N, 4)."""

@@ -3,13 +3,31 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import torch
 
 from endoscope_core.atomic_output import atomic_file, write_text
 from endoscope_core.classifier.tension_cnn import CHANNELS, TensionCnn
 from endoscope_core.classifier.training import CrossValidation, TrainingSettings
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
+from endoscope_core.errors import EndoscopeError
+
+
+class WeightsFileError(EndoscopeError, ValueError):
+    """A name under which weights cannot be kept."""
+
+
+def weights_path(path: str | Path) -> Path:
+    """Check the name of a weights file before long work.
+
+    Raises
+    ------
+    WeightsFileError
+        If its suffix is .json, which the file beside it needs, or it is a folder.
+    """
+    path = Path(path)
+    if path.suffix == '.json' or path.is_dir():
+        raise WeightsFileError(f'{path} cannot hold weights: name a file with suffix .pt')
+    return path
 
 
 def save_classifier(
@@ -32,7 +50,7 @@ def save_classifier(
     seed : int
         Of the training.
     """
-    path = Path(path)
+    path = weights_path(path)
     settings = TrainingSettings()
     with atomic_file(path) as partial:
         torch.save(network.state_dict(), partial)
@@ -51,7 +69,7 @@ def save_classifier(
         'held_out': {
             'grouped_by': 'tube configuration',
             'accuracy': list(validation.accuracy),
-            'mean_accuracy': float(np.mean(validation.accuracy)),
+            'mean_accuracy': validation.mean_accuracy,
             'confusion': validation.confusion.tolist(),
         },
     }

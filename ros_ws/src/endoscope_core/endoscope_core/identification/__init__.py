@@ -8,10 +8,10 @@ from endoscope_core.identification.bouc_wen_fit import (
 )
 from endoscope_core.identification.class_parameters import (
     ClassParameterError,
+    class_parameter_sets,
     identify_classes,
     load_class_parameters,
     parameters_for_class,
-    save_class_parameters,
 )
 from endoscope_core.identification.feedforward_fit import FeedforwardFit, fit_feedforward
 from endoscope_core.identification.servo_lag import Servo
@@ -23,10 +23,10 @@ __all__ = [
     'ModelFit',
     'Recording',
     'Servo',
+    'class_parameter_sets',
     'fit_feedforward',
     'fit_model',
     'identify_classes',
     'load_class_parameters',
     'parameters_for_class',
-    'save_class_parameters',
 ]

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from endoscope_core.atomic_output import write_text
 from endoscope_core.dataset import CalibrationDataset
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.hysteresis import BoucWenParameters
@@ -73,12 +72,11 @@ def identify_classes(
     return found
 
 
-def save_class_parameters(
-    path: str | Path, identified: list[ClassIdentification], command: str, dataset_hash: str,
-    lead: float,
-) -> None:
-    """Write the sets with the command that made them, as JSON."""
-    content = {
+def class_parameter_sets(
+    identified: list[ClassIdentification], command: str, dataset_hash: str, lead: float
+) -> dict[str, object]:
+    """The content of a parameter file, with the command that made it."""
+    return {
         'schema': 1,
         'model': 'bouc_wen',
         'command': command,
@@ -93,7 +91,6 @@ def save_class_parameters(
             for item in identified
         },
     }
-    write_text(path, json.dumps(content, indent=1) + '\n')
 
 
 def load_class_parameters(path: str | Path | None = None) -> dict[int, BoucWenParameters]:
@@ -102,7 +99,7 @@ def load_class_parameters(path: str | Path | None = None) -> dict[int, BoucWenPa
     Parameters
     ----------
     path : path, optional
-        A file of `save_class_parameters`; the sets that come with this package if not given.
+        A file of `endoscope identify DATASET`; the sets that come with this package if not given.
 
     Raises
     ------

@@ -1,0 +1,81 @@
+"""`endoscope identify`: hysteresis parameters from a bag, or a set for each class of a data set."""
+
+import argparse
+import sys
+from pathlib import Path
+
+MODELS = ('bouc_wen',)
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `identify`."""
+    parser = subparsers.add_parser(
+        'identify',
+        help='fit a hysteresis model to a recording',
+        description='Fits a hysteresis model to each joint of a bag, or to each class of a data '
+        'set, and the feed-forward that goes with it. Prints JSON, or writes it to FILE.')
+    parser.add_argument('source', type=Path, metavar='BAG|DATASET',
+                        help='rosbag2 folder, .mcap, or data set of `endoscope dataset`')
+    parser.add_argument('--model', choices=MODELS, required=True, help='the model')
+    parser.add_argument('--out', type=Path, metavar='FILE', help='JSON file to write')
+    parser.add_argument('--seed', type=int, default=0, help='of the search (0)')
+    parser.add_argument('--gear', type=float, default=0.5,
+                        help='motor shaft angle for one radian at the joint (0.5)')
+    parser.add_argument('--per-class', type=int, default=30, metavar='N',
+                        help='of a data set, use at most N recordings of each class (30)')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Identify and write; return 0."""
+    import json
+
+    from endoscope_core.atomic_output import write_text
+    from endoscope_core.dataset import is_dataset
+
+    content = _of_dataset(args) if is_dataset(args.source) else _of_bag(args)
+    text = json.dumps(content, indent=1) + '\n'
+    if args.out is None:
+        sys.stdout.write(text)
+    else:
+        write_text(args.out, text)
+        print(f'{args.out}: written', file=sys.stderr)
+    return 0
+
+
+def _of_dataset(args: argparse.Namespace) -> dict[str, object]:
+    from endoscope_core.control import FeedforwardSettings
+    from endoscope_core.dataset import load_dataset
+    from endoscope_core.identification import class_parameter_sets, identify_classes
+
+    dataset = load_dataset(args.source)
+    lead = FeedforwardSettings().lead
+    found = identify_classes(dataset, lead, args.seed, args.per_class, _report)
+    made = dataset.manifest
+    command = (f'endoscope dataset --seed {made["seed"]} --per-class {made["per_class"]} '
+               f'--out DATA && endoscope identify DATA --model {args.model} --seed {args.seed} '
+               f'--per-class {args.per_class}')
+    return class_parameter_sets(found, command, dataset.manifest_hash, lead)
+
+
+def _of_bag(args: argparse.Namespace) -> dict[str, object]:
+    from endoscope_bags import open_bag
+    from endoscope_bringup.learning.hysteresis_of_bag import hysteresis_of_bag
+    from endoscope_core.control import FeedforwardSettings
+    from endoscope_core.identification import Servo, fit_feedforward, fit_model
+
+    lead = FeedforwardSettings().lead
+    joints: dict[str, object] = {}
+    for joint, recording in hysteresis_of_bag(open_bag(args.source), args.gear).items():
+        model = fit_model([recording], args.seed)
+        feedforward = fit_feedforward(model.parameters, Servo(), lead, args.seed)
+        _report(f'{joint}: {model}')
+        joints[joint] = {
+            'feedforward': feedforward.parameters.to_dict(),
+            'model': model.parameters.to_dict(),
+            'model_rmse': model.rmse,
+        }
+    return {'schema': 1, 'model': args.model, 'lead': lead, 'seed': args.seed, 'joints': joints}
+
+
+def _report(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,1 @@
+"""What identification takes from bags."""
