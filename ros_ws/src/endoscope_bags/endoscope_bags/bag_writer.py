@@ -11,16 +11,15 @@ import numpy as np
 from endoscope_bags.bag_files import METADATA
 from endoscope_bags.chunk_sink import ChunkSink, TopicRecord
 from endoscope_bags.errors import (
-    BagError,
     BagExistsError,
-    BagFullError,
+    BagWriteError,
     MalformedMessageError,
 )
 from endoscope_bags.mcap_chunk import MESSAGE_OVERHEAD, ChunkMessage
 from endoscope_bags.message_stream import MessageStream
 from endoscope_bags.message_types import MessageType, message_type
 from endoscope_bags.qos_profile import QosProfile
-from endoscope_bags.room_on_disk import raise_if_full
+from endoscope_bags.room_on_disk import write_error
 from endoscope_bags.rosbag2_metadata import (
     TopicSummary,
     metadata_document,
@@ -62,10 +61,8 @@ class BagWriter:
     ------
     BagExistsError
         Something is there already.
-    BagFullError
-        There is no room even for the beginning.
-    BagError
-        The place cannot be written to.
+    BagWriteError
+        The place cannot be written to, or has no room even for the beginning.
     """
 
     def __init__(
@@ -96,12 +93,12 @@ class BagWriter:
         file_path = self._home if self._bare else self._home / self._file_name
         try:
             self._sink = ChunkSink(file_path, threaded=threaded)
-        except BagFullError:
+        except BagWriteError:
             self._remove_home()
             raise
         except OSError as error:
             self._remove_home()
-            raise BagError(f'{file_path}: cannot be made: {error.strerror}') from error
+            raise BagWriteError(f'{file_path}: cannot be made: {error.strerror}') from error
 
     def _make_home(self, atomic: bool) -> Path:
         hidden = self.path.with_name(f'.partial-{os.getpid()}-{self.path.name}')
@@ -111,8 +108,7 @@ class BagWriter:
             if not self._bare:
                 home.mkdir()
         except OSError as error:
-            raise_if_full(error, str(home))
-            raise BagError(f'{self.path}: cannot be made: {error.strerror}') from error
+            raise BagWriteError(f'{self.path}: cannot be made: {error.strerror}') from error
         return home
 
     @property
@@ -182,7 +178,7 @@ class BagWriter:
 
         Raises
         ------
-        BagFullError
+        BagWriteError
             The disk is full; the chunks before are kept. Close the writer.
         MalformedMessageError
             A time is negative.
@@ -218,7 +214,7 @@ class BagWriter:
 
         Raises
         ------
-        BagFullError
+        BagWriteError
             The disk is full.
         """
         if not streams:
@@ -242,7 +238,7 @@ class BagWriter:
 
         Raises
         ------
-        BagFullError
+        BagWriteError
             There was no room for this chunk or, when threaded, for one before; its messages are
             dropped and no longer counted.
         """
@@ -262,18 +258,18 @@ class BagWriter:
 
         Raises
         ------
-        BagFullError
+        BagWriteError
             The last chunk, or the index, had no room. The recording is finished all the same in
             the first case, and can be recovered in the second.
         """
         if self.closed:
             return
         self.closed = True
-        full: BagFullError | None = None
+        full: BagWriteError | None = None
         try:
             self.flush()
             self._sink.wait()
-        except BagFullError as error:
+        except BagWriteError as error:
             full = error
         custom = dict(custom_data or {})
         document = self._document(custom)
@@ -283,8 +279,7 @@ class BagWriter:
             if not self._bare:
                 write_metadata(self._home / METADATA, document)
         except OSError as error:
-            raise_if_full(error, str(self._home / METADATA))
-            raise
+            raise write_error(error, str(self._home / METADATA)) from error
         if self._home != self.path:
             self._home.rename(self.path)
         self.finished = True

@@ -10,12 +10,12 @@ from pathlib import Path
 
 from mcap.records import Channel, Schema
 
-from endoscope_bags.errors import BagFullError
+from endoscope_bags.errors import BagWriteError
 from endoscope_bags.mcap_chunk import ChunkMessage, encode_chunk
 from endoscope_bags.mcap_file import McapFile
 from endoscope_bags.message_types import MessageType
 from endoscope_bags.qos_profile import QosProfile, qos_as_yaml
-from endoscope_bags.room_on_disk import raise_if_full, require_room
+from endoscope_bags.room_on_disk import require_room, write_error
 
 LIBRARY = 'endoscope_bags'
 # What the index of a chunk, and the two descriptions of a topic, take at the end of the file.
@@ -57,7 +57,7 @@ class ChunkSink:
 
     Raises
     ------
-    BagFullError
+    BagWriteError
         There is no room for the beginning.
     """
 
@@ -68,7 +68,7 @@ class ChunkSink:
         self._path = path
         self._n_topics = 0
         self._n_chunks = 0
-        self._refused: BagFullError | None = None
+        self._refused: BagWriteError | None = None
         self._schemas: dict[str, Schema] = {}
         self._worker = ThreadPoolExecutor(1, 'bag_writer') if threaded else None
         self._jobs: list[Future[None]] = []
@@ -76,7 +76,7 @@ class ChunkSink:
         try:
             self._require_room(0)
             self._mcap = McapFile(self._file, LIBRARY)
-        except (BagFullError, OSError):
+        except (BagWriteError, OSError):
             self.abandon()
             raise
 
@@ -96,7 +96,7 @@ class ChunkSink:
 
         Raises
         ------
-        BagFullError
+        BagWriteError
             There is no room for this chunk, or was not for an earlier one.
         """
         if self._worker is None:
@@ -119,13 +119,12 @@ class ChunkSink:
         try:
             self._try_to_write(topics, messages, size)
         except OSError as error:
-            self._refused = BagFullError(f'{self._path}: {error.strerror}; recording ended there')
+            self._refused = write_error(error, str(self._path))
             # What was written of the chunk would make the rest of the file unreadable.
             self._file.truncate(self._mcap.position)
             self._file.seek(self._mcap.position)
-            raise_if_full(error, str(self._path))
-            raise
-        except BagFullError as error:
+            raise self._refused from error
+        except BagWriteError as error:
             self._refused = error
             raise
         finally:
@@ -179,7 +178,7 @@ class ChunkSink:
 
         Raises
         ------
-        BagFullError
+        BagWriteError
             The room for it was taken by somebody else; the file can be recovered.
         """
         if self._worker is not None:
@@ -190,8 +189,7 @@ class ChunkSink:
             self._mcap.finish()
             os.fsync(self._file.fileno())
         except OSError as error:
-            raise_if_full(error, str(self._path))
-            raise
+            raise write_error(error, str(self._path)) from error
         finally:
             self._file.close()
 

@@ -40,8 +40,12 @@ class BagExistsError(BagError, FileExistsError):
     __str__ = Exception.__str__
 
 
-class BagFullError(BagError):
-    """The disk or the quota is full; what was recorded until then is kept."""
+class BagWriteError(BagError):
+    """The disk does not take the recording; what was recorded until then is kept."""
+
+
+class BagFullError(BagWriteError):
+    """The disk or the quota is full."""
 
 
 class MissingTopicError(BagError):

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from endoscope_bags.bag_writer import CHUNK_SECONDS, BagWriter
-from endoscope_bags.errors import BagFullError
+from endoscope_bags.errors import BagWriteError
 from endoscope_bags.information import LOST_PREFIX
 from endoscope_bags.qos_profile import QosProfile
 from endoscope_bags.sequence_gaps import SequenceGaps
@@ -112,7 +112,7 @@ class RecordingSession:
     ------
     BagExistsError
         `path` is taken.
-    BagFullError
+    BagWriteError
         There is no room even for the beginning.
     """
 
@@ -162,7 +162,7 @@ class RecordingSession:
                 self._writer.write_raw(
                     source.topic, source.type, data, received_ns, published_ns, sequence
                 )
-            except BagFullError as error:
+            except BagWriteError as error:
                 self._end_full(error)
 
     def _announce(self, source: _Source) -> None:
@@ -182,17 +182,17 @@ class RecordingSession:
             return
         try:
             self._writer.flush()
-        except BagFullError as error:
+        except BagWriteError as error:
             self._end_full(error)
 
-    def _end_full(self, error: BagFullError) -> None:
+    def _end_full(self, error: BagWriteError) -> None:
         self._full = str(error)
         self._finish()
 
     def _finish(self) -> None:
         try:
             self._writer.close(self._notes())
-        except BagFullError as error:
+        except BagWriteError as error:
             self._full = str(error)
 
     def _notes(self) -> dict[str, str]:

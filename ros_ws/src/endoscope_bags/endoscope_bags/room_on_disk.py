@@ -3,7 +3,7 @@
 import errno
 import os
 
-from endoscope_bags.errors import BagFullError
+from endoscope_bags.errors import BagFullError, BagWriteError
 
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _NOT_OFFERED = {errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
@@ -28,6 +28,8 @@ def require_room(descriptor: int, name: str, n_bytes: int) -> None:
     ------
     BagFullError
         It cannot grow that much.
+    BagWriteError
+        The disk refuses for another reason.
     """
     end = os.lseek(descriptor, 0, os.SEEK_CUR)
     try:
@@ -35,13 +37,12 @@ def require_room(descriptor: int, name: str, n_bytes: int) -> None:
     except OSError as error:
         if error.errno in _NOT_OFFERED:
             return
-        raise_if_full(error, name)
-        raise
+        raise write_error(error, name) from error
     finally:
         os.ftruncate(descriptor, end)
 
 
-def raise_if_full(error: OSError, name: str) -> None:
-    """Turn the errors of a full disk, quota or file size limit into `BagFullError`."""
-    if error.errno in _FULL:
-        raise BagFullError(f'{name}: {error.strerror}; recording ended there') from error
+def write_error(error: OSError, name: str) -> BagWriteError:
+    """Return what to raise for an error of the file `name`; a full disk has its own class."""
+    kind = BagFullError if error.errno in _FULL else BagWriteError
+    return kind(f'{name}: {error.strerror}; recording ended there')

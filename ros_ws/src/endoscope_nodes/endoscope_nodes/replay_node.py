@@ -126,21 +126,24 @@ class ReplayNode(EndoscopeNode):
                 return
             self._checked = True
         until = self._start_ns + round((now - self._begin_ns) * self._parameters_.speed)
-        while self._next is not None and self._clock_ns + TICK_NS <= until:
+        more = True
+        while more and self._clock_ns + TICK_NS <= until:
             self._clock_ns += TICK_NS
             if self._clock_out is not None:
                 self._clock_out.publish(encode_clock(self._clock_ns))
-            self._publish_until(self._clock_ns + TICK_NS)
-        if self._next is None:
+            more = self._publish_until(self._clock_ns + TICK_NS)
+        if not more:
             self._end(f'{self._parameters_.bag}: {self.published} messages replayed', failed=False)
 
-    def _publish_until(self, end_ns: int) -> None:
+    def _publish_until(self, end_ns: int) -> bool:
+        """Publish what was received before `end_ns`; tell whether there is more."""
         message = self._next
         while message is not None and message.log_ns < end_ns:
             self._outputs[message.topic].publish(message.data)
             self.published += 1
             message = next(self._messages, None)
         self._next = message
+        return message is not None
 
     def _connected(self) -> bool:
         """Whether all readers that are known to be there are connected."""
