@@ -1,13 +1,12 @@
 """Search over compositions of effects on one recording: all singles, then a beam that adds more."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE, Stage
-from endoscope_explain.evaluate import packed_joint
+from endoscope_core.effects import CATALOGUE
 from endoscope_explain.fit import Fit, JointModel, fit, jacobian
 from endoscope_explain.free_parameters import nominal_parameters
 from endoscope_explain.observation import JointObservation
@@ -17,14 +16,18 @@ from endoscope_explain.score import score
 from endoscope_explain.screen import Promise, promises, with_effect
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 AUDITED = frozenset({'recording_gap', 'tracker_outliers'})
 """Effects that lose or replace single samples: the audit finds them, no simulation can."""
-STARTS_PER_EFFECT = 2
-POLISHED = 8
-BEAM = 2
-PAIRS_LOOKED_AT = 10
-PAIRS_POLISHED = 4
+LOOKED_AT = 16
+"""Effects that get a cheap fit, of all that were screened."""
+LOOKED_AT_TWICE = 6
+"""Effects of these that get one from their second best start as well."""
+WORTH_POLISHING = 5.0
+"""A look is worth a full fit while its cost is below this multiple of the best full fit's."""
+NOISE_ALONE = 1.15
+"""Mean squared residual in noise units below which no further effect is looked for."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +48,20 @@ class Composition:
     score: float
 
 
+Parent = tuple[Composition, tuple[Fit, ...]]
+
+
 def searchable_effects() -> tuple[str, ...]:
     """Effects of the catalogue that a simulation can show, in the order of the chain."""
     return tuple(effect_id for effect_id in CATALOGUE if effect_id not in AUDITED)
 
 
-def nominal_anchors(observation: JointObservation, base: Array, flags: Array) -> tuple[Fit, Fit]:
+def nominal_model(observation: JointObservation, base: Array, flags: Flags) -> JointModel:
+    """Return the plant as described, its nominal parameters free."""
+    return JointModel(observation, base, flags, nominal_parameters(base))
+
+
+def nominal_anchors(observation: JointObservation, base: Array, flags: Flags) -> tuple[Fit, Fit]:
     """The nominal plant refitted, and as described, each with its derivative.
 
     Parameters
@@ -63,7 +74,7 @@ def nominal_anchors(observation: JointObservation, base: Array, flags: Array) ->
     -------
     refitted, described : Fit
     """
-    model = JointModel(observation, base, flags, nominal_parameters(base))
+    model = nominal_model(observation, base, flags)
     theta = np.array([
         item.mean if item.logarithmic else item.coordinate(1.0) for item in model.free])
     residuals = model.residuals(theta)
@@ -73,11 +84,7 @@ def nominal_anchors(observation: JointObservation, base: Array, flags: Array) ->
 
 
 def grow(
-    parents: Sequence[tuple[Composition, tuple[Fit, ...]]],
-    effect_ids: Sequence[str],
-    jobs: int,
-    looked_at: int | None,
-    polished: int,
+    parents: Sequence[Parent], effect_ids: Sequence[str], jobs: int, polished: int
 ) -> list[Composition]:
     """Compositions with one more effect than their parents, the most promising ones refitted.
 
@@ -87,54 +94,72 @@ def grow(
         Anchors are fits of the parent's own model; see `rank.look`.
     effect_ids : sequence of str
     jobs : int
-    looked_at : int or None
-        How many effects to look at for each parent; all if None.
+        Processes side by side.
     polished : int
-        How many to fit fully, over all parents.
+        How many to fit fully, at most, over all parents.
 
     Returns
     -------
     list of Composition
         Best first.
     """
-    def screened(index_and_effect: tuple[int, str]) -> list[Promise]:
-        index, effect_id = index_and_effect
-        return promises(parents[index][1][0], [effect_id])
+    looks = _looks(parents, _screened(parents, effect_ids, jobs), jobs)
+    grown: list[Composition] = []
+    batch = max(jobs, 2)
+    while looks and len(grown) < polished:
+        best = min((c.fit.cost for c in grown), default=float('inf'))
+        now = [item for item in looks[:batch] if item.cost < WORTH_POLISHING * best]
+        looks = looks[batch:]
+        if not now:
+            break
+        grown += _polished(now, jobs)
+    return sorted(grown, key=lambda c: c.score)
 
+
+def _screened(
+    parents: Sequence[Parent], effect_ids: Sequence[str], jobs: int
+) -> list[tuple[int, Promise]]:
     tasks = [(index, effect_id) for index, (parent, _) in enumerate(parents)
              for effect_id in effect_ids if effect_id not in parent.effects]
-    found = parallel_map(screened, tasks, jobs)
-    chosen: list[tuple[int, Promise]] = []
-    for index in range(len(parents)):
-        own = [p for (i, _), p in zip(tasks, found, strict=True) if i == index]
-        own.sort(key=lambda p: -p[0].gain)
-        chosen += [(index, q) for p in own[:looked_at] for q in p[:STARTS_PER_EFFECT]]
 
-    def looked(index_and_promise: tuple[int, Promise]) -> tuple[Array, float]:
-        index, promise = index_and_promise
-        parent, anchors = parents[index]
-        item = look(anchors, parent.effects, promise)
+    def screened(task: tuple[int, str]) -> list[Promise]:
+        return promises(parents[task[0]][1][0], [task[1]])
+
+    found = parallel_map(screened, tasks, jobs)
+    chosen = []
+    for index in range(len(parents)):
+        own = sorted((p for (i, _), p in zip(tasks, found, strict=True) if i == index),
+                     key=lambda p: -p[0].gain)[:LOOKED_AT]
+        chosen += [(index, p[0]) for p in own if p[0].gain > 0.0]
+        chosen += [(index, p[1]) for p in own[:LOOKED_AT_TWICE] if len(p) > 1]
+    return chosen
+
+
+def _looks(
+    parents: Sequence[Parent], chosen: Sequence[tuple[int, Promise]], jobs: int
+) -> list[Look]:
+    def looked(task: tuple[int, Promise]) -> tuple[Array, float]:
+        parent, anchors = parents[task[0]]
+        item = look(anchors, parent.effects, task[1])
         return item.theta, item.cost
 
-    best: dict[tuple[int, str], Look] = {}
+    best: dict[frozenset[str], Look] = {}
     for (index, promise), (theta, cost) in zip(
             chosen, parallel_map(looked, chosen, jobs), strict=True):
         parent, anchors = parents[index]
-        key = (index, promise.effect_id)
+        effects = (*parent.effects, promise.effect_id)
+        key = frozenset(effects)
         if key not in best or cost < best[key].cost:
             model = with_effect(anchors[0].model, promise.effect_id, promise.start)
-            best[key] = Look((*parent.effects, promise.effect_id), model, theta, cost)
-    unique: dict[frozenset[str], Look] = {}
-    for item in sorted(best.values(), key=lambda item: item.cost):
-        unique.setdefault(frozenset(item.effects), item)
-    kept = list(unique.values())[:polished]
+            best[key] = Look(effects, model, theta, cost)
+    return sorted(best.values(), key=lambda item: item.cost)
 
-    def polished_fit(index: int) -> tuple[Array, Array, Array, float]:
-        done = polish(kept[index])
+
+def _polished(looks: Sequence[Look], jobs: int) -> list[Composition]:
+    def numbers(index: int) -> tuple[Array, Array, Array, float]:
+        done = polish(looks[index])
         return done.theta, done.residuals, done.jacobian, done.cost
 
-    fits = [Fit(item.model, *numbers) for item, numbers in zip(
-        kept, parallel_map(polished_fit, range(len(kept)), jobs), strict=True)]
-    grown = [Composition(item.effects, f, score(f))
-             for item, f in zip(kept, fits, strict=True)]
-    return sorted(grown, key=lambda c: c.score)
+    fits = [Fit(item.model, *found) for item, found in zip(
+        looks, parallel_map(numbers, range(len(looks)), jobs), strict=True)]
+    return [Composition(item.effects, f, score(f)) for item, f in zip(looks, fits, strict=True)]

@@ -45,10 +45,16 @@ def simulate_joint(
     return out[0]
 
 
-def residuals(observation: JointObservation, outputs: Array, lead: float = 0.0) -> Array:
-    """Simulated minus measured, in units of the known noise, all channels in a row (size,)."""
+def residuals(
+    observation: JointObservation, outputs: Array, lead: float = 0.0, skew: float = 0.0
+) -> Array:
+    """Return simulated minus measured, in units of the known noise, all channels in a row (size,).
+
+    `lead` in ticks and `skew` of the tracker's clock are as in `Channel.predicted`.
+    """
     return np.concatenate([
-        (channel.predicted(outputs, lead) - channel.value) / channel.noise
+        (channel.predicted(outputs, lead, skew if channel.quantity == 'bending' else 0.0)
+         - channel.value) / channel.noise
         for channel in observation.channels
     ])
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.effects import CATALOGUE
 from endoscope_explain.evaluate import residuals, simulate_joint
 from endoscope_explain.free_parameters import LEAD, FreeParameter
 from endoscope_explain.observation import JointObservation
@@ -14,6 +15,7 @@ from endoscope_explain.observation import JointObservation
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+CLOCK_SKEW = CATALOGUE['clock_skew']
 STEP = 1.0e-2
 """Difference step of a coordinate: large against the integrator's error, small against bends."""
 
@@ -50,8 +52,9 @@ class JointModel:
     def residuals(self, theta: Array) -> Array:
         """Residuals in noise units, all channels in a row."""
         parameters, lead = self.packed(theta)
-        return residuals(
-            self.observation, simulate_joint(self.observation, parameters, self.flags), lead)
+        skew = parameters[CLOCK_SKEW.first_parameter] if self.flags[CLOCK_SKEW.flag] else 0.0
+        outputs = simulate_joint(self.observation, parameters, self.flags)
+        return residuals(self.observation, outputs, lead, skew)
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest coordinates."""

@@ -14,6 +14,7 @@ from endoscope_core.plant import PlantDescription, SensorParameters
 from endoscope_core.plant.kernel import (
     IN_COMMAND,
     IN_MOTOR,
+    IN_OTHER_JOINT,
     INPUTS,
     OUT_BENDING,
     OUT_EFFORT,
@@ -68,16 +69,22 @@ class Channel:
     value: Array
     noise: Array
 
-    def predicted(self, outputs: Array, lead: float = 0.0) -> Array:
-        """This channel's analysis samples (M,) from simulated outputs (N, OUTPUTS).
+    def predicted(self, outputs: Array, lead: float = 0.0, skew: float = 0.0) -> Array:
+        """Return the analysis samples (M,) that simulated outputs (N, OUTPUTS) predict.
 
         `lead` in [0, 1] is by how many ticks a reading is younger than its stamp says: a loop
-        that stamps, commands and then reads has a lead of up to one tick.
+        that stamps, commands and then reads has a lead of up to one tick. `skew` is by how much
+        the device's clock runs fast.
         """
         column = outputs[:, self.output]
-        left = column[self.tick]
-        raw = left + (self.share + lead) * (column[self.tick + 1] - left)
-        return self.scale * np.add.reduceat(raw, self.first) / self.count
+        tick, share = self.tick, self.share + lead
+        if skew != 0.0:
+            place = np.clip((tick + self.share) / (1.0 + skew) + lead, 0.0, len(column) - 1.001)
+            tick = place.astype(np.int64)
+            share = place - tick
+        left = column[tick]
+        raw = left + share * (column[tick + 1] - left)
+        return np.asarray(self.scale * np.add.reduceat(raw, self.first) / self.count)
 
 
 @dataclass(frozen=True)
@@ -108,6 +115,13 @@ class JointObservation:
         """Place of each channel in a residual vector of all channels."""
         ends = np.cumsum([0, *(len(channel.time) for channel in self.channels)])
         return tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+
+
+def couple(observations: tuple[JointObservation, ...], bending: tuple[Array, ...]) -> None:
+    """Enter each joint's simulated bending angle (N,) as the other joint's input, in place."""
+    if len(observations) == 2:
+        for observation, other in zip(observations, reversed(bending), strict=True):
+            observation.inputs[0, :, IN_OTHER_JOINT] = other
 
 
 def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObservation, ...]:

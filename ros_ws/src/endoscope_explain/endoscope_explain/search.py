@@ -1,0 +1,102 @@
+"""Which effects a joint's recording shows: nominal refit, singles, and a beam of more."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.plant.kernel import OUT_JOINT
+from endoscope_explain.compose import (
+    Composition,
+    Parent,
+    grow,
+    nominal_anchors,
+    nominal_model,
+    searchable_effects,
+)
+from endoscope_explain.evaluate import simulate_joint
+from endoscope_explain.fit import Fit
+from endoscope_explain.observation import JointObservation, couple
+from endoscope_explain.parallel import parallel_map
+from endoscope_explain.score import score
+from endoscope_explain.whiteness import is_noise
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+SINGLES_POLISHED = 6
+PAIRS_POLISHED = 4
+BEAM = 2
+
+
+@dataclass(frozen=True)
+class JointSearch:
+    """What was tried on one joint.
+
+    Attributes
+    ----------
+    nominal : Composition
+        No effect added.
+    levels : tuple of tuple of Composition
+        Compositions of one, two, ... effects, each best first.
+    """
+
+    nominal: Composition
+    levels: tuple[tuple[Composition, ...], ...]
+
+    def tried(self) -> list[Composition]:
+        """Return all compositions, the nominal one first."""
+        return [self.nominal, *(c for level in self.levels for c in level)]
+
+
+def all_anchors(
+    observations: tuple[JointObservation, ...], packed: dict[str, tuple[Array, Flags]], jobs: int
+) -> list[tuple[Fit, Fit]]:
+    """Refit the nominal plant of every joint, and let the joints see each other's angle."""
+    def numbers(index: int) -> tuple[tuple[Array, Array, Array, float], ...]:
+        observation = observations[index]
+        fits = nominal_anchors(observation, *packed[observation.joint])
+        return tuple((f.theta, f.residuals, f.jacobian, f.cost) for f in fits)
+
+    anchors = []
+    for observation, (refitted, described) in zip(
+            observations, parallel_map(numbers, range(len(observations)), jobs), strict=True):
+        model = nominal_model(observation, *packed[observation.joint])
+        anchors.append((Fit(model, *refitted), Fit(model, *described)))
+    angles = []
+    for observation, (refitted, _) in zip(observations, anchors, strict=True):
+        parameters, _ = refitted.model.packed(refitted.theta)
+        angles.append(simulate_joint(observation, parameters, refitted.model.flags)[:, OUT_JOINT])
+    couple(observations, tuple(angles))
+    return anchors
+
+
+def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = 2) -> JointSearch:
+    """Search the compositions of effects on one joint.
+
+    Parameters
+    ----------
+    anchors : (Fit, Fit)
+        Nominal plant refitted, and as described.
+    jobs : int
+        Processes side by side.
+    depth : int
+        Largest number of effects.
+
+    Returns
+    -------
+    JointSearch
+    """
+    nominal = Composition((), anchors[0], score(anchors[0]))
+    levels: list[tuple[Composition, ...]] = []
+    if is_noise(nominal.fit):
+        return JointSearch(nominal, ())
+    parents: list[Parent] = [(nominal, anchors)]
+    for level in range(depth):
+        polished = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
+        grown = grow(parents, searchable_effects(), jobs, polished)
+        levels.append(tuple(grown))
+        if not grown or is_noise(grown[0].fit):
+            break
+        parents = [(c, (c.fit,)) for c in grown[:BEAM]]
+    return JointSearch(nominal, tuple(levels))

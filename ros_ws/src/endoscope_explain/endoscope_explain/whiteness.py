@@ -1,0 +1,38 @@
+"""Whether a residual is what the sensors' noise alone leaves."""
+
+import numpy as np
+
+from endoscope_explain.fit import Fit
+
+BLOCK = 50
+"""Samples of a block whose mean tells slow misfit that single samples hide."""
+LIMIT = 5.0
+"""Standard deviations of the noise's own scatter that a mean square may exceed."""
+WHITE = frozenset({'tension', 'bending'})
+"""Quantities whose noise is white; rounding errors of the others are not."""
+
+
+def excess(fit: Fit) -> dict[str, float]:
+    """Return by how many standard deviations each white channel is above noise alone.
+
+    The larger of two tests for each signal: of single samples, and of means over blocks.
+    """
+    found = {}
+    observation = fit.model.observation
+    for channel, part in zip(observation.channels, observation.slices(), strict=True):
+        if channel.quantity not in WHITE:
+            continue
+        values = fit.residuals[part]
+        count = len(values) // BLOCK
+        means = values[:count * BLOCK].reshape(count, BLOCK).mean(axis=1) * np.sqrt(BLOCK)
+        found[channel.signal] = max(_z(values), _z(means))
+    return found
+
+
+def is_noise(fit: Fit) -> bool:
+    """Return whether no white channel shows more than noise."""
+    return all(z < LIMIT for z in excess(fit).values())
+
+
+def _z(values: np.ndarray) -> float:
+    return float((np.mean(values**2) - 1.0) / np.sqrt(2.0 / max(len(values), 1)))
