@@ -22,16 +22,18 @@ def test_returns_rests_and_moves_without_a_jump():
     run = CalibrationRun((0.4, -1.0), 4, MS, return_speed=1.0, rest=0.5)
     table, steps = commands_of(run)
     assert list(dict.fromkeys(steps)) == [
-        CalibrationStep.RETURNING, CalibrationStep.RESTING, CalibrationStep.MOVING]
+        CalibrationStep.RETURNING,
+        CalibrationStep.RESTING,
+        CalibrationStep.MOVING,
+    ]
     assert run.step is CalibrationStep.DONE
     np.testing.assert_allclose(table[0, 1:3], (0.4, -1.0))
     steps_taken = np.abs(np.diff(table[:, 1:3], axis=0)) / 1e-3
     returning = steps.count(CalibrationStep.RETURNING)
-    assert steps_taken[:returning - 1].max() <= 1.0 + 1e-6
+    assert steps_taken[: returning - 1].max() <= 1.0 + 1e-6
     assert steps_taken.max() < 6.0
     np.testing.assert_allclose(table[-1, 1:], 0.0, atol=1e-9)
-    np.testing.assert_allclose(
-        np.gradient(table[:, 1], 1e-3)[5:-5], table[5:-5, 3], atol=0.05)
+    np.testing.assert_allclose(np.gradient(table[:, 1], 1e-3)[5:-5], table[5:-5, 3], atol=0.05)
 
 
 def test_the_record_begins_with_the_sinusoid():
@@ -41,7 +43,8 @@ def test_the_record_begins_with_the_sinusoid():
     assert run.record.start_ns == round(table[first, 0] * 1e9)
     time = np.arange(CALIBRATION_SAMPLES) * 1e-3
     np.testing.assert_allclose(
-        table[first:first + CALIBRATION_SAMPLES, 1], calibration_sinusoid()(time)[0], atol=1e-12)
+        table[first : first + CALIBRATION_SAMPLES, 1], calibration_sinusoid()(time)[0], atol=1e-12
+    )
 
 
 def test_missed_ticks_do_not_stretch_the_motion():

@@ -26,21 +26,28 @@ def test_a_regular_stream_is_obeyed():
     assert sum(gate.refused.values()) == 0
 
 
-@pytest.mark.parametrize(('change', 'reason'), [
-    ({'position': (math.nan, 0.0)}, Refusal.NOT_FINITE),
-    ({'position': (0.0, math.inf)}, Refusal.NOT_FINITE),
-    ({'velocity': (0.0, math.nan)}, Refusal.NOT_FINITE),
-    ({'position': (0.0,)}, Refusal.MALFORMED),
-    ({'stamp_ns': 1 * MS}, Refusal.STAMP),
-    ({'stamp_ns': 0}, Refusal.STAMP),
-    ({'position': (1.5, 0.0)}, Refusal.RANGE),
-    ({'position': (0.05, 0.0)}, Refusal.RATE),
-    ({'received_ns': 500 * MS + 110 * MS}, Refusal.LATE),
-])
+@pytest.mark.parametrize(
+    ('change', 'reason'),
+    [
+        ({'position': (math.nan, 0.0)}, Refusal.NOT_FINITE),
+        ({'position': (0.0, math.inf)}, Refusal.NOT_FINITE),
+        ({'velocity': (0.0, math.nan)}, Refusal.NOT_FINITE),
+        ({'position': (0.0,)}, Refusal.MALFORMED),
+        ({'stamp_ns': 1 * MS}, Refusal.STAMP),
+        ({'stamp_ns': 0}, Refusal.STAMP),
+        ({'position': (1.5, 0.0)}, Refusal.RANGE),
+        ({'position': (0.05, 0.0)}, Refusal.RATE),
+        ({'received_ns': 500 * MS + 110 * MS}, Refusal.LATE),
+    ],
+)
 def test_each_reason_is_refused_counted_and_leaves_the_stream_as_it_was(change, reason):
     gate = gate_after()
-    command = {'stamp_ns': 2 * MS, 'position': (0.001, 0.0), 'velocity': (0.0, 0.0),
-               'received_ns': 502 * MS}
+    command = {
+        'stamp_ns': 2 * MS,
+        'position': (0.001, 0.0),
+        'velocity': (0.0, 0.0),
+        'received_ns': 502 * MS,
+    }
     assert gate.check(**(command | change)) is reason
     assert gate.refused[reason] == 1
     assert gate.accepted == 1
@@ -49,7 +56,7 @@ def test_each_reason_is_refused_counted_and_leaves_the_stream_as_it_was(change, 
 
 
 def test_the_senders_clock_may_be_anything():
-    for offset in (-10**18, 0, 10**15):
+    for offset in (-(10**18), 0, 10**15):
         gate = CommandGate(LIMITS)
         for k in range(1, 200):
             assert gate.check(10**18 + k * MS, (0.0, 0.0), (), 10**18 + offset + k * MS) is None
@@ -88,8 +95,14 @@ def test_reset_forgets_the_stream_but_not_the_counts():
 numbers = st.floats(allow_nan=True, allow_infinity=True, width=64)
 
 
-@given(st.lists(st.tuples(st.integers(-10**12, 10**12), numbers, numbers, numbers,
-                          st.integers(0, 10**12)), max_size=30))
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(-(10**12), 10**12), numbers, numbers, numbers, st.integers(0, 10**12)
+        ),
+        max_size=30,
+    )
+)
 def test_whatever_comes_nothing_unsafe_is_obeyed(stream):
     gate = CommandGate(LIMITS)
     last = None

@@ -37,12 +37,15 @@ def test_orientation_is_the_rotation_by_both_angles(x, y):
     assert (expected.inv() * Rotation.from_quat(orientation)).magnitude() < 1e-9
 
 
-@pytest.mark.parametrize(('bending', 'tip'), [
-    ((0.0, 0.0), (0.0, 0.0, 0.02)),
-    ((math.pi / 2, 0.0), (0.04 / math.pi, 0.0, 0.04 / math.pi)),
-    ((0.0, math.pi / 2), (0.0, 0.04 / math.pi, 0.04 / math.pi)),
-    ((0.0, -math.pi / 2), (0.0, -0.04 / math.pi, 0.04 / math.pi)),
-])
+@pytest.mark.parametrize(
+    ('bending', 'tip'),
+    [
+        ((0.0, 0.0), (0.0, 0.0, 0.02)),
+        ((math.pi / 2, 0.0), (0.04 / math.pi, 0.0, 0.04 / math.pi)),
+        ((0.0, math.pi / 2), (0.0, 0.04 / math.pi, 0.04 / math.pi)),
+        ((0.0, -math.pi / 2), (0.0, -0.04 / math.pi, 0.04 / math.pi)),
+    ],
+)
 def test_tip_of_known_arcs(bending, tip):
     np.testing.assert_allclose(tip_pose(bending, 0.02)[0], tip, atol=1e-12)
 
@@ -58,7 +61,7 @@ def test_position_is_the_integral_of_the_tangent_along_the_arc(x, y):
 
 @pytest.mark.parametrize('bad', [(0, 0, 0, 0), (math.nan, 0, 0, 1), (1, 0, 0, 0)])
 def test_refuses_what_has_no_bending(bad):
-    with pytest.raises(ValueError, match='orientation|straight back'):
+    with pytest.raises(ValueError, match=r'orientation|straight back'):
         bending_from_orientation(bad)
 
 

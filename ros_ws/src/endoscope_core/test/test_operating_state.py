@@ -6,8 +6,10 @@ from endoscope_core.safety import OperatingState, OperatingStateMachine
 def machine_in(state):
     machine = OperatingStateMachine()
     paths = {
-        OperatingState.DISABLED: [], OperatingState.ENABLED: ['enable'],
-        OperatingState.PAUSED: ['enable', 'pause'], OperatingState.FAULT: ['enable'],
+        OperatingState.DISABLED: [],
+        OperatingState.ENABLED: ['enable'],
+        OperatingState.PAUSED: ['enable', 'pause'],
+        OperatingState.FAULT: ['enable'],
     }
     for command in paths[state]:
         assert machine.command(command).accepted
@@ -18,28 +20,39 @@ def machine_in(state):
     return machine
 
 
-@pytest.mark.parametrize(('start', 'command', 'end'), [
-    (OperatingState.DISABLED, 'enable', OperatingState.ENABLED),
-    (OperatingState.ENABLED, 'pause', OperatingState.PAUSED),
-    (OperatingState.PAUSED, 'resume', OperatingState.ENABLED),
-    (OperatingState.PAUSED, 'disable', OperatingState.DISABLED),
-    (OperatingState.ENABLED, 'disable', OperatingState.DISABLED),
-    (OperatingState.ENABLED, 'home', OperatingState.ENABLED),
-    (OperatingState.FAULT, 'enable', OperatingState.ENABLED),
-])
+@pytest.mark.parametrize(
+    ('start', 'command', 'end'),
+    [
+        (OperatingState.DISABLED, 'enable', OperatingState.ENABLED),
+        (OperatingState.ENABLED, 'pause', OperatingState.PAUSED),
+        (OperatingState.PAUSED, 'resume', OperatingState.ENABLED),
+        (OperatingState.PAUSED, 'disable', OperatingState.DISABLED),
+        (OperatingState.ENABLED, 'disable', OperatingState.DISABLED),
+        (OperatingState.ENABLED, 'home', OperatingState.ENABLED),
+        (OperatingState.FAULT, 'enable', OperatingState.ENABLED),
+    ],
+)
 def test_commands_that_are_carried_out(start, command, end):
     machine = machine_in(start)
     assert machine.command(command).accepted
     assert machine.state is end
 
 
-@pytest.mark.parametrize(('start', 'command'), [
-    (OperatingState.DISABLED, 'pause'), (OperatingState.DISABLED, 'resume'),
-    (OperatingState.DISABLED, 'home'), (OperatingState.PAUSED, 'enable'),
-    (OperatingState.PAUSED, 'home'), (OperatingState.FAULT, 'disable'),
-    (OperatingState.FAULT, 'resume'), (OperatingState.FAULT, 'pause'),
-    (OperatingState.ENABLED, 'go'), (OperatingState.ENABLED, ''),
-])
+@pytest.mark.parametrize(
+    ('start', 'command'),
+    [
+        (OperatingState.DISABLED, 'pause'),
+        (OperatingState.DISABLED, 'resume'),
+        (OperatingState.DISABLED, 'home'),
+        (OperatingState.PAUSED, 'enable'),
+        (OperatingState.PAUSED, 'home'),
+        (OperatingState.FAULT, 'disable'),
+        (OperatingState.FAULT, 'resume'),
+        (OperatingState.FAULT, 'pause'),
+        (OperatingState.ENABLED, 'go'),
+        (OperatingState.ENABLED, ''),
+    ],
+)
 def test_commands_that_are_refused_change_nothing(start, command):
     machine = machine_in(start)
     answer = machine.command(command)

@@ -27,8 +27,9 @@ def test_a_full_record_is_given_back_sample_by_sample():
 
 def test_stamps_between_the_grid_are_interpolated():
     record = filled(range(START - MS // 2, START + 1001 * MS, MS))
-    np.testing.assert_allclose(record.resampled(), [tension(START + k * MS) for k in range(1000)],
-                               atol=1e-9)
+    np.testing.assert_allclose(
+        record.resampled(), [tension(START + k * MS) for k in range(1000)], atol=1e-9
+    )
 
 
 def test_short_gaps_are_bridged():
@@ -36,9 +37,14 @@ def test_short_gaps_are_bridged():
     np.testing.assert_allclose(filled(stamps).resampled()[:, 0], np.arange(1000), atol=1e-9)
 
 
-@pytest.mark.parametrize(('hole', 'words'), [
-    (range(100, 130), r'31 ms from 0\.099 s'), (range(25), 'no tension'),
-    (range(975, 1001), 'no tension')])
+@pytest.mark.parametrize(
+    ('hole', 'words'),
+    [
+        (range(100, 130), r'31 ms from 0\.099 s'),
+        (range(25), 'no tension'),
+        (range(975, 1001), 'no tension'),
+    ],
+)
 def test_a_long_gap_is_refused_with_its_place(hole, words):
     stamps = [START + k * MS for k in range(1001) if k not in hole]
     with pytest.raises(TensionGapError, match=words):

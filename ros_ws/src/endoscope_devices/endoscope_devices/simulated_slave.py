@@ -70,7 +70,8 @@ class SimulatedSlave:
         return MotorReading(
             tuple(sensors.shaft_position(sample.shaft_position).tolist()),
             tuple(sensors.shaft_velocity(sample.shaft_velocity).tolist()),
-            tuple(sensors.shaft_effort(sample.shaft_effort).tolist()))
+            tuple(sensors.shaft_effort(sample.shaft_effort).tolist()),
+        )
 
     def health(self) -> tuple[str, dict[str, object]]:
         """A simulation has nothing to complain about."""

@@ -2,11 +2,26 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.time import Time
 
-from endoscope_core.safety import BumplessOutput, CommandGate, CommandLimits, Refusal
+from endoscope_core.control import (
+    MODES,
+    BoucWenFeedforward,
+    FeedforwardLaw,
+    FeedforwardSettings,
+)
+from endoscope_core.hysteresis import BoucWenParameters
+from endoscope_core.identification.class_parameters import (
+    ClassParameterError,
+    load_class_parameters,
+    parameters_for_class,
+)
+from endoscope_core.safety import CommandGate, CommandLimits, Refusal
+from endoscope_nodes.calibration_result import class_of
 from endoscope_nodes.command_report import CommandReport
-from endoscope_nodes.diagnostics import OK, Report
+from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report, status
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import (
     JointPublisher,
@@ -16,6 +31,7 @@ from endoscope_nodes.joint_stream import (
 )
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
+    CALIBRATION_RESULT,
     COMPENSATOR_STATE,
     CORRECTION,
     JOINTS,
@@ -33,70 +49,150 @@ CONSOLE = 'console'
 CALIBRATION = 'calibration'
 NOBODY = 'nobody'
 
+_NOTHING = np.zeros(len(JOINTS))
+
 
 @dataclass(frozen=True)
 class CompensatorParameters:
     """Parameters of the compensator."""
 
     mode: str = parameter(
-        'bouc_wen', 'feed-forward model in force', choices=('none', 'bouc_wen'), dynamic=True)
-    gear: float = parameter(
-        0.5, 'shaft angle for one radian at the joint', low=0.01, high=100.0)
+        'bouc_wen',
+        'feed-forward model in force once its parameters are known',
+        choices=MODES,
+        dynamic=True,
+    )
+    parameter_sets: str = parameter(
+        '',
+        'file with a parameter set for each class, as `endoscope identify` writes it; empty '
+        'for the one that comes with the project',
+    )
+    lead: float = parameter(
+        0.06,
+        "time by which the desired angle is foreseen: the servo's own lag",
+        unit='s',
+        low=0.0,
+        high=0.5,
+    )
+    gear: float = parameter(0.5, 'shaft angle for one radian at the joint', low=0.01, high=100.0)
     joint_limit: float = parameter(
-        1.75, 'largest desired bending obeyed, either way', unit='rad', low=0.1, high=3.1)
+        1.75, 'largest desired bending obeyed, either way', unit='rad', low=0.1, high=3.1
+    )
     drive_limit: float = parameter(
-        3.0, 'largest joint-equivalent motor angle put out, either way', unit='rad', low=0.1,
-        high=10.0)
-    max_speed: float = parameter(
-        30.0, 'largest speed between two commands', unit='rad/s', low=0.0)
-    max_step: float = parameter(
-        1.0, 'largest distance of the first command from the last one obeyed', unit='rad', low=0.0)
+        3.0,
+        'largest joint-equivalent motor angle put out, either way',
+        unit='rad',
+        low=0.1,
+        high=10.0,
+    )
+    max_speed: float = parameter(30.0, 'largest speed between two commands', unit='rad/s', low=0.0)
     command_timeout: float = parameter(
-        0.1, 'a command older than this is not obeyed', unit='s', low=0.001, high=1.0)
-    blend_time: float = parameter(
-        0.5, 'shortest time in which a change of source, model or feedback is faded in', unit='s',
-        low=0.01, high=10.0)
-    blend_speed: float = parameter(
-        1.0, 'largest speed that such a fade adds', unit='rad/s', low=0.01, high=10.0)
+        0.1, 'a command or correction older than this is not obeyed', unit='s', low=0.001, high=1.0
+    )
+    calibration_timeout: float = parameter(
+        0.05,
+        'silence after which calibration no longer goes before the console',
+        unit='s',
+        low=0.001,
+        high=1.0,
+    )
 
 
 class CompensatorNode(EndoscopeNode):
     """The only publisher of ``motor/servo_jp``.
 
     Calibration goes before the console while its commands are fresh, and passes uncompensated.
-    Every change of source, model, parameters or feedback is faded in from what was put out before,
-    or from where the motors are after a pause.
+    Whatever changes, source, model, parameters or feedback, the motors go on from what was put out
+    before, or after a pause from where they are.
     """
 
     def __init__(self, runtime: Runtime) -> None:
         super().__init__('compensator', runtime)
         p = self.parameters(CompensatorParameters, self._on_parameters)
         self._settings = p
-        limits = CommandLimits((-p.joint_limit,) * 2, (p.joint_limit,) * 2, p.max_speed, p.max_step,
-                               round(p.command_timeout * 1e9))
-        self.gate = CommandGate(limits)
-        self.calibration_gate = CommandGate(limits)
-        self._blend = BumplessOutput(len(JOINTS), p.blend_time, p.blend_speed)
+        self.gate = CommandGate(self._limits(p.command_timeout))
+        self.calibration_gate = CommandGate(self._limits(p.calibration_timeout))
+        self._feedforward = BoucWenFeedforward(len(JOINTS), FeedforwardSettings(lead=p.lead))
+        self._passing = BoucWenFeedforward(len(JOINTS))
+        self._sets, self._trouble = self._load_sets(p.parameter_sets)
+        self._class_deg: int | None = None
         self._source = NOBODY
         self._last_stamp_ns = 0
+        self._drive_before = _NOTHING
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
         self._saturated = 0
+        self._state_is_news = True
         self._motors = JointPublisher(self, MOTOR_COMMAND, MOTORS, ('position',), COMMAND)
         self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
         self._state = StateWatch(self, self.ticker, lambda _: self._start_anew())
         self._shafts = LatestJointState(self, MOTOR_MEASURED, MOTORS, SENSOR_ASKED)
-        JointSubscription(self, CALIBRATION_COMMAND, JOINTS, self._on_calibration, COMMAND,
-                          exact=True, on_malformed=self._on_malformed)
-        JointSubscription(self, SLAVE_COMMAND, JOINTS, self._on_console, COMMAND, exact=True,
-                          on_malformed=self._on_malformed)
+        JointSubscription(
+            self,
+            CALIBRATION_COMMAND,
+            JOINTS,
+            self._on_calibration,
+            COMMAND,
+            exact=True,
+            on_malformed=self._on_malformed,
+        )
+        JointSubscription(
+            self,
+            SLAVE_COMMAND,
+            JOINTS,
+            self._on_console,
+            COMMAND,
+            exact=True,
+            on_malformed=self._on_malformed,
+        )
         JointSubscription(self, CORRECTION, JOINTS, self._on_correction, COMMAND)
+        self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
         self.diagnostics.add('commands', CommandReport(self.gate))
+        self.diagnostics.add('calibration commands', CommandReport(self.calibration_gate))
         self.diagnostics.add('output', self._report)
+        self.ticker.every(0.1, self._publish_state)
+
+    def _limits(self, timeout: float) -> CommandLimits:
+        reach = (self._settings.joint_limit,) * len(JOINTS)
+        return CommandLimits(
+            tuple(-x for x in reach),
+            reach,
+            self._settings.max_speed,
+            2.0 * self._settings.joint_limit,
+            round(timeout * 1e9),
+        )
 
     def _on_parameters(self, parameters: CompensatorParameters) -> None:
         self._settings = parameters
-        self._blend.change()
+        self._select_law()
+
+    def _on_result(self, message: DiagnosticArray) -> None:
+        found = class_of(message)
+        if found is not None:
+            self._class_deg = found
+            self._select_law()
+
+    @staticmethod
+    def _load_sets(path: str) -> tuple[dict[int, BoucWenParameters], str]:
+        try:
+            return load_class_parameters(path or None), ''
+        except ClassParameterError as error:
+            return {}, str(error)
+
+    def _select_law(self) -> None:
+        """Put mode and class in force; without a class nothing is compensated."""
+        law = FeedforwardLaw()
+        if self._class_deg is not None and self._sets:
+            try:
+                chosen = parameters_for_class(self._sets, self._class_deg)
+            except ClassParameterError as error:
+                self._trouble = str(error)
+            else:
+                self._trouble = ''
+                law = FeedforwardLaw(self._settings.mode, (chosen,) * len(JOINTS))
+        if law != self._feedforward.law:
+            self._feedforward.select(law)
+        self._state_is_news = True
 
     def _start_anew(self) -> None:
         self.gate.reset()
@@ -116,42 +212,115 @@ class CompensatorNode(EndoscopeNode):
             return
         if self.calibration_gate.is_fresh(now):
             return
-        if self.gate.check(sample.stamp_ns, sample.position, sample.velocity, now) is None:
-            self._drive(CONSOLE, sample.stamp_ns, sample.position, now)
+        if self.gate.check(sample.stamp_ns, sample.position, sample.velocity, now) is not None:
+            return
+        dt = self._take_over(CONSOLE, sample.stamp_ns)
+        correction = self._correction(sample.stamp_ns)
+        if dt is None or (correction is None and self._corrected):
+            self._corrected = False
+            self._feedforward.rebase(
+                self._drive_before - (_NOTHING if correction is None else correction)
+            )
+        velocity = sample.velocity or (0.0,) * len(JOINTS)
+        drive = self._feedforward.step(sample.position, velocity, dt or 1e-3)
+        if correction is not None:
+            self._corrected = True
+            drive = drive + correction
+        self._put_out(sample.stamp_ns, drive)
 
     def _on_calibration(self, sample: JointSample) -> None:
         now = self.ticker.monotonic_ns()
         if not self._state.enabled:
             self.calibration_gate.refuse(Refusal.NOT_ENABLED)
             return
-        if self.calibration_gate.check(
-                sample.stamp_ns, sample.position, sample.velocity, now) is None:
-            self._drive(CALIBRATION, sample.stamp_ns, sample.position, now)
+        if (
+            self.calibration_gate.check(sample.stamp_ns, sample.position, sample.velocity, now)
+            is not None
+        ):
+            return
+        dt = self._take_over(CALIBRATION, sample.stamp_ns)
+        if dt is None:
+            self._passing.rebase(self._drive_before)
+        velocity = sample.velocity or (0.0,) * len(JOINTS)
+        self._put_out(sample.stamp_ns, self._passing.step(sample.position, velocity, dt or 1e-3))
 
-    def _drive(self, source: str, stamp_ns: int, wanted: tuple[float, ...], now_ns: int) -> None:
-        p = self._settings
+    def _take_over(self, source: str, stamp_ns: int) -> float | None:
+        """Seconds since the command before, None if this one is the first of its source."""
         dt = (stamp_ns - self._last_stamp_ns) * 1e-9
-        paused = not 0.0 < dt <= p.command_timeout
-        if source != self._source or paused:
-            self._blend.change(self._shaft_angles() if self._source == NOBODY or paused else None)
-            self._source = source
         self._last_stamp_ns = stamp_ns
-        drive = self._blend.step(wanted, 0.001 if paused else dt)
-        limit = p.drive_limit
-        if max(drive) > limit or min(drive) < -limit:
-            self._saturated += 1
-            drive = tuple(min(limit, max(-limit, d)) for d in drive)
-        self._motors.publish(stamp_ns, *(p.gear * d for d in drive))
+        paused = not 0.0 < dt <= self._settings.command_timeout or self._source == NOBODY
+        if not paused and source == self._source:
+            return dt
+        self._source = source
+        if paused:
+            shafts = self._shafts.read()
+            if shafts is not None and shafts.position:
+                self._drive_before = np.array(shafts.position) / self._settings.gear
+        return None
 
-    def _shaft_angles(self) -> tuple[float, ...] | None:
-        shafts = self._shafts.read()
-        if shafts is None or not shafts.position:
-            return None
-        return tuple(x / self._settings.gear for x in shafts.position)
+    def _correction(self, stamp_ns: int) -> np.ndarray | None:
+        """Newest correction from before this command: which one must not depend on chance."""
+        for sample in reversed(self._corrections):
+            if sample is not None and sample.stamp_ns < stamp_ns:
+                age = (stamp_ns - sample.stamp_ns) * 1e-9
+                correction = np.array(sample.position)
+                if age > self._settings.command_timeout or not np.isfinite(correction).all():
+                    return None
+                return correction if correction.shape == _NOTHING.shape else None
+        return None
+
+    def _put_out(self, stamp_ns: int, drive: np.ndarray) -> None:
+        limit = self._settings.drive_limit
+        self._drive_before = drive
+        shafts = (drive * self._settings.gear).tolist()
+        if max(shafts) > limit * self._settings.gear or min(shafts) < -limit * self._settings.gear:
+            self._saturated += 1
+            shafts = (np.clip(drive, -limit, limit) * self._settings.gear).tolist()
+        self._motors.publish(stamp_ns, *shafts)
+
+    def _publish_state(self) -> None:
+        now = self.ticker.now_ns()
+        if now == 0 or not self._state_is_news:
+            return
+        self._state_is_news = False
+        law = self._feedforward.law
+        values: dict[str, object] = {
+            'mode': law.mode,
+            'wanted_mode': self._settings.mode,
+            'lead': self._settings.lead,
+            'gear': self._settings.gear,
+        }
+        if self._class_deg is not None:
+            values['class_deg'] = self._class_deg
+        for joint, parameters in zip(JOINTS, law.parameters, strict=False):
+            values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
+        message = DiagnosticArray()
+        message.header.stamp = Time(nanoseconds=now).to_msg()
+        message.status = [status('compensator: model', OK, self._model_in_words(), values)]
+        self._states.publish(message)
+
+    def _model_in_words(self) -> str:
+        if self._settings.mode == 'none':
+            return 'no feed-forward'
+        if self._trouble:
+            return f'no feed-forward: {self._trouble}'
+        if self._class_deg is None:
+            return f'no feed-forward: {self._settings.mode} waits for {CALIBRATION_RESULT}'
+        return f'{self._settings.mode}, class {self._class_deg} deg'
 
     def _report(self) -> Report:
-        return OK, f'{self._source} drives', {
-            'published': self._motors.count, 'saturated': self._saturated}
+        waiting = self._settings.mode != 'none' and self._class_deg is None
+        level = ERROR if self._trouble else WARN if waiting else OK
+        return (
+            level,
+            self._model_in_words(),
+            {
+                'source': self._source,
+                'published': self._motors.count,
+                'corrected': self._corrected,
+                'saturated': self._saturated,
+            },
+        )
 
 
 def main() -> int:

@@ -29,8 +29,15 @@ from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.sampling import SampleClock
 from endoscope_nodes.ticker import TICK_NS
 
-FOLLOWED = (SLAVE_COMMAND, CALIBRATION_COMMAND, CORRECTION, MOTOR_COMMAND, SLAVE_MEASURED,
-            MOTOR_MEASURED, WIRES_MEASURED)
+FOLLOWED = (
+    SLAVE_COMMAND,
+    CALIBRATION_COMMAND,
+    CORRECTION,
+    MOTOR_COMMAND,
+    SLAVE_MEASURED,
+    MOTOR_MEASURED,
+    WIRES_MEASURED,
+)
 _STAMP = struct.Struct('<iI')
 
 
@@ -43,21 +50,33 @@ class ConductorParameters:
     """Parameters of the conductor."""
 
     wait_for: tuple[str, ...] = parameter(
-        (MOTOR_MEASURED, WIRES_MEASURED), 'topics without whose answer time never goes on',
-        choices=FOLLOWED)
+        (MOTOR_MEASURED, WIRES_MEASURED),
+        'topics without whose answer time never goes on',
+        choices=FOLLOWED,
+    )
     start: float = parameter(1.0, 'simulated time of the first tick', unit='s', low=0.001)
     duration: float = parameter(
-        0.0, 'how long to run when started as a process of its own; 0 for ever', unit='s', low=0.0)
+        0.0, 'how long to run when started as a process of its own; 0 for ever', unit='s', low=0.0
+    )
     speed: float = parameter(
-        0.0, 'simulated seconds in a real one; 0 for as fast as possible', low=0.0, high=100.0)
+        0.0, 'simulated seconds in a real one; 0 for as fast as possible', low=0.0, high=100.0
+    )
     tracker_rate: float = parameter(
-        40.0, 'rate of slave/measured_js, to know in which ticks to expect it', unit='Hz', low=0.1,
-        high=1000.0)
+        40.0,
+        'rate of slave/measured_js, to know in which ticks to expect it',
+        unit='Hz',
+        low=0.1,
+        high=1000.0,
+    )
     timeout: float = parameter(
-        10.0, 'real time after which a missing answer is an error', unit='s', low=0.1)
+        10.0, 'real time after which a missing answer is an error', unit='s', low=0.1
+    )
     grace: float = parameter(
-        0.05, 'real time after which a stream that is not waited for is taken as ended', unit='s',
-        low=0.001)
+        0.05,
+        'real time after which a stream that is not waited for is taken as ended',
+        unit='s',
+        low=0.001,
+    )
 
 
 class ConductorNode(EndoscopeNode):
@@ -85,8 +104,7 @@ class ConductorNode(EndoscopeNode):
         self.failure: BarrierTimeout | None = None
         self._clock_out = self.create_publisher(ClockMessage, '/clock', LOCK_STEP)
         for topic in FOLLOWED:
-            self.create_subscription(
-                JointState, topic, self._answer_to(topic), LOCK_STEP, raw=True)
+            self.create_subscription(JointState, topic, self._answer_to(topic), LOCK_STEP, raw=True)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(min(p.grace, p.timeout) / 2, self._look, clock=steady)
         if p.speed > 0.0:
@@ -165,7 +183,8 @@ class ConductorNode(EndoscopeNode):
         self.failure = BarrierTimeout(
             f'simulated time stands still at {self._now_ns * 1e-9:.3f} s: waited '
             f'{self._settings.timeout:g} s for {topics}; start the node that publishes it, or '
-            "leave it out of the conductor's parameter 'wait_for'")
+            "leave it out of the conductor's parameter 'wait_for'"
+        )
         self.exit_code = 1
         future, self._future = self._future, None
         if future is not None:

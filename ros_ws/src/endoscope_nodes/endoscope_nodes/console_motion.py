@@ -1,21 +1,16 @@
 """Commands that the console plays: a named motion or a file, sampled once, read tick by tick."""
 
-import csv
 import math
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.errors import EndoscopeError
 from endoscope_core.signals import Motion, motion_by_name, move
+from endoscope_core.signals.command_file import read_command_file
 from endoscope_nodes.names import JOINTS
 
 Array = NDArray[np.float64]
-
-
-class CommandFileError(EndoscopeError, ValueError):
-    """A command file that cannot be played; the message names the line."""
 
 
 class SampledMotion:
@@ -38,8 +33,9 @@ class SampledMotion:
         return self._rows[min(tick, len(self._rows) - 1)]
 
 
-def sample_motion(name: str, joints: tuple[str, ...], start: tuple[float, ...], tick: float,
-                  approach_speed: float) -> SampledMotion:
+def sample_motion(
+    name: str, joints: tuple[str, ...], start: tuple[float, ...], tick: float, approach_speed: float
+) -> SampledMotion:
     """Sample a named motion for some of the joints, with an approach from where they are.
 
     Parameters
@@ -77,52 +73,28 @@ def _columns(motion: Motion, time: NDArray[np.floating]) -> tuple[Array, Array]:
     return angle, velocity
 
 
-def load_command_file(path: Path, start: tuple[float, ...], tick: float, approach_speed: float
-                      ) -> SampledMotion:
-    """Sample a CSV file with the columns ``time`` (s), ``bend_x`` and ``bend_y`` (rad).
-
-    Between its rows the angle is interpolated; velocities are the differences of the result.
+def load_command_file(
+    path: Path, start: tuple[float, ...], tick: float, approach_speed: float
+) -> SampledMotion:
+    """Sample a command file, interpolating between its rows.
 
     Raises
     ------
     CommandFileError
-        The file cannot be read, lacks a column, or a value is not a number or out of order.
+        The file cannot be played.
     """
-    try:
-        with path.open(newline='') as file:
-            reader = csv.DictReader(file)
-            missing = [c for c in ('time', *JOINTS) if c not in (reader.fieldnames or [])]
-            if missing:
-                raise CommandFileError(f'{path}: no column {", ".join(missing)}')
-            rows = [_numbers(path, reader.line_num, row) for row in reader]
-    except (OSError, UnicodeDecodeError) as error:
-        raise CommandFileError(f'{path} cannot be read: {error}') from error
-    if len(rows) < 2:
-        raise CommandFileError(f'{path}: fewer than two rows')
-    table = np.array(rows)
-    if not np.all(np.diff(table[:, 0]) > 0):
-        line = int(np.argmax(np.diff(table[:, 0]) <= 0)) + 3
-        raise CommandFileError(f'{path}: time does not increase at line {line}')
-    time = np.arange(math.floor((table[-1, 0] - table[0, 0]) / tick) + 1) * tick + table[0, 0]
-    angle = np.stack([np.interp(time, table[:, 0], table[:, 1 + j]) for j in range(len(JOINTS))],
-                     axis=1)
+    table = read_command_file(path, JOINTS)
+    first, last = table.time[0], table.time[-1]
+    time = np.arange(math.floor((last - first) / tick + 1e-6) + 1) * tick + first
+    angle = np.stack([np.interp(time, table.time, column) for column in table.angle.T], axis=1)
     velocity = np.gradient(angle, tick, axis=0) if len(time) > 1 else np.zeros_like(angle)
     velocity[-1] = 0.0
     return _with_approach(angle, velocity, start, tick, approach_speed)
 
 
-def _numbers(path: Path, line: int, row: dict[str, str]) -> list[float]:
-    try:
-        values = [float(row[c]) for c in ('time', *JOINTS)]
-    except (TypeError, ValueError) as error:
-        raise CommandFileError(f'{path}: line {line} holds something else than numbers') from error
-    if not all(math.isfinite(v) for v in values):
-        raise CommandFileError(f'{path}: line {line} holds a value that is not finite')
-    return values
-
-
-def _with_approach(angle: Array, velocity: Array, start: tuple[float, ...], tick: float,
-                   speed: float) -> SampledMotion:
+def _with_approach(
+    angle: Array, velocity: Array, start: tuple[float, ...], tick: float, speed: float
+) -> SampledMotion:
     distance = float(np.max(np.abs(angle[0] - np.asarray(start))))
     if distance == 0.0:
         return SampledMotion(angle, velocity)

@@ -7,8 +7,8 @@ from sensor_msgs.msg import Joy
 
 from endoscope_core.safety import ClutchFollower
 from endoscope_core.signals import MOTIONS
+from endoscope_core.signals.command_file import CommandFileError
 from endoscope_nodes.console_motion import (
-    CommandFileError,
     SampledMotion,
     load_command_file,
     sample_motion,
@@ -21,6 +21,7 @@ from endoscope_nodes.parameters import ParameterError, parameter
 from endoscope_nodes.qos import COMMAND, EVENT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.state_watch import StateWatch
+from endoscope_nodes.ticker import TICK_NS
 
 CLUTCH_TIMEOUT_NS = 350_000_000
 HANDLE_TIMEOUT_NS = 100_000_000
@@ -31,22 +32,37 @@ class ConsoleParameters:
     """Parameters of the console."""
 
     source: str = parameter(
-        'none', 'where commands come from; setting it starts a motion or file anew',
-        choices=('none', 'motion', 'file', 'master'), dynamic=True)
+        'none',
+        'where commands come from; setting it starts a motion or file anew',
+        choices=('none', 'motion', 'file', 'master'),
+        dynamic=True,
+    )
     motion: str = parameter(
-        'periodic', 'motion that is played', choices=tuple(MOTIONS), dynamic=True)
+        'periodic', 'motion that is played', choices=tuple(MOTIONS), dynamic=True
+    )
     joints: tuple[str, ...] = parameter(
-        JOINTS, 'joints that the motion moves', choices=JOINTS, dynamic=True)
+        JOINTS, 'joints that the motion moves', choices=JOINTS, dynamic=True
+    )
     command_file: str = parameter(
-        '', 'CSV file that is played, columns time [s], bend_x and bend_y [rad]', dynamic=True)
+        '', 'CSV file that is played, columns time [s], bend_x and bend_y [rad]', dynamic=True
+    )
     scale: float = parameter(
-        1.0, 'slave motion for one radian of handle motion', low=0.01, high=10.0, dynamic=True)
+        1.0, 'slave motion for one radian of handle motion', low=0.01, high=10.0, dynamic=True
+    )
     approach_speed: float = parameter(
-        1.0, 'largest speed on the way to the first angle of a motion', unit='rad/s', low=0.01,
-        high=10.0)
+        1.0,
+        'largest speed on the way to the first angle of a motion',
+        unit='rad/s',
+        low=0.01,
+        high=10.0,
+    )
     joint_limit: float = parameter(
-        1.75, 'bending at which following the handle ends, either way', unit='rad', low=0.1,
-        high=3.1)
+        1.75,
+        'bending at which following the handle ends, either way',
+        unit='rad',
+        low=0.1,
+        high=3.1,
+    )
 
 
 class ConsoleNode(EndoscopeNode):
@@ -66,13 +82,12 @@ class ConsoleNode(EndoscopeNode):
         self._clutch_ns = -CLUTCH_TIMEOUT_NS
         self._handle: JointSample | None = None
         self._handle_ns = -HANDLE_TIMEOUT_NS
-        self._settings = self.parameters(
-            ConsoleParameters, self._on_parameters, self._load)
+        self._settings = self.parameters(ConsoleParameters, self._on_parameters, self._load)
         limits = (self._settings.joint_limit,) * len(JOINTS)
-        self._follower = ClutchFollower(
-            self._settings.scale, [-limit for limit in limits], limits)
+        self._follower = ClutchFollower(self._settings.scale, [-limit for limit in limits], limits)
         self._commands = JointPublisher(
-            self, SLAVE_COMMAND, JOINTS, ('position', 'velocity'), COMMAND)
+            self, SLAVE_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
+        )
         self._clutch_out = self.create_publisher(Joy, MASTER_CLUTCH, EVENT)
         self._state = StateWatch(self, self.ticker)
         JointSubscription(self, MASTER_MEASURED, JOINTS, self._on_handle, SENSOR_ASKED)
@@ -88,15 +103,17 @@ class ConsoleNode(EndoscopeNode):
         return self._played is not None and self._next >= len(self._played)
 
     def _load(self, parameters: ConsoleParameters) -> SampledMotion | None:
-        here = tuple(self._command[:len(JOINTS)])
-        tick = self.ticker.period_ns * 1e-9
+        here = tuple(self._command[: len(JOINTS)])
+        tick = TICK_NS * 1e-9
         if parameters.source == 'motion':
             return sample_motion(
-                parameters.motion, parameters.joints, here, tick, parameters.approach_speed)
+                parameters.motion, parameters.joints, here, tick, parameters.approach_speed
+            )
         if parameters.source == 'file':
             try:
                 return load_command_file(
-                    Path(parameters.command_file), here, tick, parameters.approach_speed)
+                    Path(parameters.command_file), here, tick, parameters.approach_speed
+                )
             except CommandFileError as error:
                 raise ParameterError(f"console: parameter 'command_file': {error}") from error
         return None
@@ -129,7 +146,7 @@ class ConsoleNode(EndoscopeNode):
                 self._command = self._played.row(self._next)
                 self._next += periods
             else:
-                self._command = [*self._command[:len(JOINTS)], *(0.0,) * len(JOINTS)]
+                self._command = [*self._command[: len(JOINTS)], *(0.0,) * len(JOINTS)]
             self._commands.publish(stamp_ns, *self._command)
         elif self._settings.source == 'master':
             self._follow(stamp_ns, periods)
@@ -141,20 +158,23 @@ class ConsoleNode(EndoscopeNode):
         if not (held and alive and self._state.enabled) or self._handle is None:
             self._follower.release()
             return
-        before = self._command[:len(JOINTS)]
+        before = self._command[: len(JOINTS)]
         if not self._follower.engaged:
             self._follower.scale = self._settings.scale
             self._follower.engage(self._handle.position, before)
         position = self._follower.follow(self._handle.position)
-        dt = periods * self.ticker.period_ns * 1e-9
+        dt = periods * TICK_NS * 1e-9
         self._command = [*position, *((p - b) / dt for p, b in zip(position, before, strict=True))]
         self._commands.publish(stamp_ns, *self._command)
 
     def _report(self) -> Report:
         source = self._settings.source
         values: dict[str, object] = {
-            'source': source, 'published': self._commands.count,
-            'clutch held': self._clutch, 'following': self._follower.engaged}
+            'source': source,
+            'published': self._commands.count,
+            'clutch held': self._clutch,
+            'following': self._follower.engaged,
+        }
         if self._played is not None:
             values['progress [s]'] = min(self._next, len(self._played)) * 1e-3
             values['length [s]'] = len(self._played) * 1e-3

@@ -17,11 +17,17 @@ STALE = DiagnosticStatus.STALE
 Report = tuple[bytes, str, Mapping[str, object]]
 
 
-def status(name: str, level: bytes, message: str, values: Mapping[str, object],
-           hardware_id: str = '') -> DiagnosticStatus:
+def status(
+    name: str, level: bytes, message: str, values: Mapping[str, object], hardware_id: str = ''
+) -> DiagnosticStatus:
     """Make one status; every value is written as text, floats with nine digits."""
-    return DiagnosticStatus(name=name, level=level, message=message, hardware_id=hardware_id,
-                            values=[KeyValue(key=k, value=_text(v)) for k, v in values.items()])
+    return DiagnosticStatus(
+        name=name,
+        level=level,
+        message=message,
+        hardware_id=hardware_id,
+        values=[KeyValue(key=k, value=_text(v)) for k, v in values.items()],
+    )
 
 
 def _text(value: object) -> str:
@@ -58,6 +64,7 @@ class Diagnostics:
             return
         message = DiagnosticArray()
         message.header.stamp = Time(nanoseconds=now).to_msg()
-        message.status = [status(name, *report(), hardware_id)
-                          for name, hardware_id, report in self._reports]
+        message.status = [
+            status(name, *report(), hardware_id) for name, hardware_id, report in self._reports
+        ]
         self._publisher.publish(message)

@@ -25,15 +25,18 @@ class EmTrackerParameters:
 
     device: str = parameter('simulated', 'what is read', choices=('simulated',))
     plant_file: str = parameter(
-        '', 'plant.yaml with the noise and rate of the simulated tracker; empty for the nominal '
-        'one')
+        '', 'plant.yaml with the noise and rate of the simulated tracker; empty for the nominal one'
+    )
     seed: int = parameter(3, 'seed of the simulated sensor noise', low=0)
     section_length: float = parameter(
-        0.02, 'length of the bending section', unit='m', low=0.001, high=0.5)
+        0.02, 'length of the bending section', unit='m', low=0.001, high=0.5
+    )
     base_frame: str = parameter('endoscope_base', 'frame of the poses')
     in_volume: bool = parameter(
-        True, 'false makes the simulated tracker lose its sensor, which then is silent',
-        dynamic=True)
+        True,
+        'false makes the simulated tracker lose its sensor, which then is silent',
+        dynamic=True,
+    )
 
 
 class EmTrackerNode(EndoscopeNode):
@@ -51,8 +54,7 @@ class EmTrackerNode(EndoscopeNode):
         self._pose = PoseStamped()
         self._pose.header.frame_id = p.base_frame
         self._poses = self.create_publisher(PoseStamped, TRACKER_POSE, SENSOR_OFFERED)
-        self._measured = JointPublisher(
-            self, SLAVE_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
+        self._measured = JointPublisher(self, SLAVE_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
         JointSubscription(self, SIMULATED_BENDING, JOINTS, self._on_bending, LOCK_STEP)
         self.diagnostics.add('tracker', self._report, p.device)
 
@@ -75,8 +77,9 @@ class EmTrackerNode(EndoscopeNode):
         pose = self._pose.pose
         self._pose.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
         pose.position.x, pose.position.y, pose.position.z = position.tolist()
-        (pose.orientation.x, pose.orientation.y, pose.orientation.z,
-         pose.orientation.w) = orientation.tolist()
+        (pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w) = (
+            orientation.tolist()
+        )
         self._poses.publish(self._pose)
 
     def _report(self) -> Report:

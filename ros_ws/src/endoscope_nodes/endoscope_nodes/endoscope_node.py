@@ -33,14 +33,22 @@ class EndoscopeNode(Node):
     """
 
     def __init__(self, name: str, runtime: 'Runtime') -> None:
-        super().__init__(name, context=runtime.context, namespace='endoscope',
-                         parameter_overrides=runtime.overrides_of(name))
+        super().__init__(
+            name,
+            context=runtime.context,
+            namespace='endoscope',
+            parameter_overrides=runtime.overrides_of(name),
+        )
         self.exit_code = 0
         self.ticker = runtime.ticker_of(self)
         self.diagnostics = Diagnostics(self, self.ticker)
 
-    def parameters[P](self, kind: type[P], on_change: Callable[[P], None] | None = None,
-                      check: Callable[[P], object] | None = None) -> P:
+    def parameters[P](
+        self,
+        kind: type[P],
+        on_change: Callable[[P], None] | None = None,
+        check: Callable[[P], object] | None = None,
+    ) -> P:
         """Declare the parameters of the dataclass ``kind``; see :func:`declare_parameters`."""
         return declare_parameters(self, kind, on_change, check)
 

@@ -50,8 +50,9 @@ class JointPublisher:
         Which of ``position``, ``velocity``, ``effort`` the messages carry, in this order.
     """
 
-    def __init__(self, node: Node, topic: str, names: Sequence[str], fields: Sequence[str],
-                 qos: QoSProfile) -> None:
+    def __init__(
+        self, node: Node, topic: str, names: Sequence[str], fields: Sequence[str], qos: QoSProfile
+    ) -> None:
         zeros: dict[str, Any] = dict.fromkeys(fields, [0.0] * len(names))
         self._message = bytearray(encode_joint_state(names, 0, **zeros))
         columns = joint_state_layout(bytes(self._message)).columns
@@ -114,7 +115,8 @@ class JointReader:
         if wrong or (self._exact and len(layout.names) != len(self._names)):
             raise MalformedMessageError(
                 f'is for {", ".join(layout.names) or "no joint"} instead of '
-                f'{", ".join(self._names)}')
+                f'{", ".join(self._names)}'
+            )
         n = len(layout.names)
         present = [layout.columns[q][0] if q in layout.columns else None for q in QUANTITIES]
         starts = [start for start in present if start is not None]
@@ -152,10 +154,17 @@ class JointSubscription:
         How many messages were unreadable or of other joints.
     """
 
-    def __init__(self, node: Node, topic: str, names: Sequence[str],
-                 callback: Callable[[JointSample], None], qos: QoSProfile, *,
-                 exact: bool = False,
-                 on_malformed: Callable[[str], None] | None = None) -> None:
+    def __init__(
+        self,
+        node: Node,
+        topic: str,
+        names: Sequence[str],
+        callback: Callable[[JointSample], None],
+        qos: QoSProfile,
+        *,
+        exact: bool = False,
+        on_malformed: Callable[[str], None] | None = None,
+    ) -> None:
         self.malformed = 0
         self._reader = JointReader(names, exact)
         self._callback = callback

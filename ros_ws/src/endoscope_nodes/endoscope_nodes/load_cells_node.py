@@ -20,12 +20,16 @@ class LoadCellsParameters:
 
     device: str = parameter('simulated', 'what is read', choices=('simulated',))
     plant_file: str = parameter(
-        '', 'plant.yaml with the noise, resolution and rate of the simulated cells; empty for '
-        'the nominal ones')
+        '',
+        'plant.yaml with the noise, resolution and rate of the simulated cells; empty for '
+        'the nominal ones',
+    )
     seed: int = parameter(2, 'seed of the simulated sensor noise', low=0)
     connected: bool = parameter(
-        True, 'false makes the simulated cells fall silent, as an unplugged cable does',
-        dynamic=True)
+        True,
+        'false makes the simulated cells fall silent, as an unplugged cable does',
+        dynamic=True,
+    )
 
 
 class LoadCellsNode(EndoscopeNode):

@@ -32,18 +32,26 @@ class MotorDriverParameters:
 
     device: str = parameter('simulated', 'what is driven', choices=('simulated',))
     plant_file: str = parameter(
-        '', 'plant.yaml of the simulated slave; empty for the nominal plant')
+        '', 'plant.yaml of the simulated slave; empty for the nominal plant'
+    )
     seed: int = parameter(1, 'seed of the simulated sensor noise', low=0)
     shaft_limit: float = parameter(
-        1.6, 'largest shaft angle obeyed, either way', unit='rad', low=0.0, high=20.0)
+        1.6, 'largest shaft angle obeyed, either way', unit='rad', low=0.0, high=20.0
+    )
     max_speed: float = parameter(
-        40.0, 'largest speed of the shaft between two commands', unit='rad/s', low=0.0)
+        40.0, 'largest speed of the shaft between two commands', unit='rad/s', low=0.0
+    )
     max_step: float = parameter(
-        0.1, 'largest distance of the first command from the measured position', unit='rad',
-        low=0.0)
+        0.1, 'largest distance of the first command from the measured position', unit='rad', low=0.0
+    )
     command_timeout: float = parameter(
-        0.1, 'a command older than this is not obeyed, and without a newer one the measured '
-        'position is held', unit='s', low=0.001, high=1.0)
+        0.1,
+        'a command older than this is not obeyed, and without a newer one the measured '
+        'position is held',
+        unit='s',
+        low=0.001,
+        high=1.0,
+    )
 
 
 class MotorDriverNode(EndoscopeNode):
@@ -59,11 +67,18 @@ class MotorDriverNode(EndoscopeNode):
         super().__init__('motor_driver', runtime)
         self._settings = self.parameters(MotorDriverParameters)
         p = self._settings
-        self.gate = CommandGate(CommandLimits(
-            (-p.shaft_limit,) * 2, (p.shaft_limit,) * 2, p.max_speed, p.max_step,
-            round(p.command_timeout * 1e9)))
+        self.gate = CommandGate(
+            CommandLimits(
+                (-p.shaft_limit,) * 2,
+                (p.shaft_limit,) * 2,
+                p.max_speed,
+                p.max_step,
+                round(p.command_timeout * 1e9),
+            )
+        )
         self._slave = SimulatedSlave(
-            load_plant_parameter('motor_driver', p.plant_file), MOTORS, p.seed)
+            load_plant_parameter('motor_driver', p.plant_file), MOTORS, p.seed
+        )
         self._device: MotorDevice = self._slave
         self._device.open()
         self._goal: tuple[float, ...] = (0.0,) * len(MOTORS)
@@ -72,13 +87,20 @@ class MotorDriverNode(EndoscopeNode):
         self._holds = 0
         self.latency_ns: deque[int] = deque(maxlen=1000)
         self._measured = JointPublisher(
-            self, MOTOR_MEASURED, MOTORS, ('position', 'velocity', 'effort'), SENSOR_OFFERED)
+            self, MOTOR_MEASURED, MOTORS, ('position', 'velocity', 'effort'), SENSOR_OFFERED
+        )
         self._wires = JointPublisher(self, SIMULATED_WIRES, WIRES, ('effort',), LOCK_STEP)
         self._bending = JointPublisher(self, SIMULATED_BENDING, JOINTS, ('position',), LOCK_STEP)
         self._state = StateWatch(self, self.ticker, self._on_state)
         JointSubscription(
-            self, MOTOR_COMMAND, MOTORS, self._on_command, COMMAND, exact=True,
-            on_malformed=self._on_malformed)
+            self,
+            MOTOR_COMMAND,
+            MOTORS,
+            self._on_command,
+            COMMAND,
+            exact=True,
+            on_malformed=self._on_malformed,
+        )
         self.diagnostics.add('commands', CommandReport(self.gate))
         self.diagnostics.add('device', self._report_device, p.device)
         self.ticker.add(self._on_tick)
@@ -104,8 +126,12 @@ class MotorDriverNode(EndoscopeNode):
             self.gate.refuse(Refusal.NOT_ENABLED)
             return
         held = self._goal if self._reading is None else self._reading.position
-        if self.gate.check(sample.stamp_ns, sample.position, sample.velocity,
-                           self.ticker.monotonic_ns(), held) is None:
+        if (
+            self.gate.check(
+                sample.stamp_ns, sample.position, sample.velocity, self.ticker.monotonic_ns(), held
+            )
+            is None
+        ):
             self._goal = sample.position
             self._holding = False
             if not self.ticker.simulated:
@@ -113,7 +139,8 @@ class MotorDriverNode(EndoscopeNode):
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         if not self._holding and not (
-                self.gate.is_fresh(self.ticker.monotonic_ns()) and self._state.enabled):
+            self.gate.is_fresh(self.ticker.monotonic_ns()) and self._state.enabled
+        ):
             self._hold()
         reading = self._device.exchange(self._goal, periods)
         if reading is None:
@@ -125,9 +152,13 @@ class MotorDriverNode(EndoscopeNode):
 
     def _report_device(self) -> Report:
         trouble, values = self._device.health()
-        values |= {'ticks': self.ticker.ticks, 'missed ticks': self.ticker.missed,
-                   'published': self._measured.count, 'times held': self._holds,
-                   'holding': self._holding}
+        values |= {
+            'ticks': self.ticker.ticks,
+            'missed ticks': self.ticker.missed,
+            'published': self._measured.count,
+            'times held': self._holds,
+            'holding': self._holding,
+        }
         if self.latency_ns:
             ordered = sorted(self.latency_ns)
             values['command latency p50 [ms]'] = ordered[len(ordered) // 2] * 1e-6

@@ -20,9 +20,16 @@ class ParameterError(ValueError):
     """A parameter that a node refuses to start with."""
 
 
-def parameter(default: Any, description: str, *, unit: str = '', low: float | None = None,
-              high: float | None = None, choices: tuple[str, ...] = (),
-              dynamic: bool = False) -> Any:
+def parameter(
+    default: Any,
+    description: str,
+    *,
+    unit: str = '',
+    low: float | None = None,
+    high: float | None = None,
+    choices: tuple[str, ...] = (),
+    dynamic: bool = False,
+) -> Any:
     """Describe one parameter as a dataclass field.
 
     Parameters
@@ -38,14 +45,25 @@ def parameter(default: Any, description: str, *, unit: str = '', low: float | No
     dynamic
         Whether it may change while the node runs.
     """
-    return dataclasses.field(default=default, metadata={
-        'description': description, 'unit': unit, 'low': low, 'high': high,
-        'choices': choices, 'dynamic': dynamic})
+    return dataclasses.field(
+        default=default,
+        metadata={
+            'description': description,
+            'unit': unit,
+            'low': low,
+            'high': high,
+            'choices': choices,
+            'dynamic': dynamic,
+        },
+    )
 
 
-def declare_parameters[P](node: Node, kind: type[P],
-                          on_change: Callable[[P], None] | None = None,
-                          check: Callable[[P], object] | None = None) -> P:
+def declare_parameters[P](
+    node: Node,
+    kind: type[P],
+    on_change: Callable[[P], None] | None = None,
+    check: Callable[[P], object] | None = None,
+) -> P:
     """Declare every field of the dataclass ``kind`` on ``node`` and return its checked values.
 
     Parameters
@@ -69,8 +87,11 @@ def declare_parameters[P](node: Node, kind: type[P],
         if field.metadata['unit']:
             text += f' [{field.metadata["unit"]}]'
         descriptor = ParameterDescriptor(
-            description=text, read_only=not field.metadata['dynamic'], dynamic_typing=True,
-            additional_constraints=_constraints(field))
+            description=text,
+            read_only=not field.metadata['dynamic'],
+            dynamic_typing=True,
+            additional_constraints=_constraints(field),
+        )
         given = node.declare_parameter(name, default, descriptor).value
         values[name] = _checked(node.get_name(), field, hints[name], given)
     current = kind(**values)
@@ -79,14 +100,22 @@ def declare_parameters[P](node: Node, kind: type[P],
     return current
 
 
-def _watch(node: Node, fields: dict[str, dataclasses.Field], hints: dict[str, Any], current: Any,
-           on_change: Callable[[Any], None] | None,
-           check_all: Callable[[Any], object] | None) -> None:
+def _watch(
+    node: Node,
+    fields: dict[str, dataclasses.Field],
+    hints: dict[str, Any],
+    current: Any,
+    on_change: Callable[[Any], None] | None,
+    check_all: Callable[[Any], object] | None,
+) -> None:
     state = [current]
 
     def changed(parameters: list[Parameter]) -> dict[str, Any]:
-        return {p.name: _checked(node.get_name(), fields[p.name], hints[p.name], p.value)
-                for p in parameters if p.name in fields}
+        return {
+            p.name: _checked(node.get_name(), fields[p.name], hints[p.name], p.value)
+            for p in parameters
+            if p.name in fields
+        }
 
     def check(parameters: list[Parameter]) -> SetParametersResult:
         try:
@@ -131,8 +160,12 @@ def _checked(node: str, field: dataclasses.Field, hint: Any, value: Any) -> Any:
 
 def _checked_one(where: str, field: dataclasses.Field, kind: Any, value: Any) -> Any:
     constraint = _constraints(field)
-    wanted = {bool: 'true or false', int: 'a whole number', float: 'a finite number',
-              str: 'a text'}[kind]
+    wanted = {
+        bool: 'true or false',
+        int: 'a whole number',
+        float: 'a finite number',
+        str: 'a text',
+    }[kind]
     wanted += f', {constraint}' if constraint else ''
     if kind is float and type(value) is int:
         value = float(value)
@@ -140,8 +173,11 @@ def _checked_one(where: str, field: dataclasses.Field, kind: Any, value: Any) ->
         raise ParameterError(f'{where} is {value!r}; give {wanted}')
     if kind in (int, float):
         low, high = field.metadata['low'], field.metadata['high']
-        if not math.isfinite(value) or (low is not None and value < low) or (
-                high is not None and value > high):
+        if (
+            not math.isfinite(value)
+            or (low is not None and value < low)
+            or (high is not None and value > high)
+        ):
             raise ParameterError(f'{where} is {value!r}; give {wanted}')
     if kind is str and field.metadata['choices'] and value not in field.metadata['choices']:
         raise ParameterError(f'{where} is {value!r}; give {wanted}{_nearest(value, field)}')
@@ -174,6 +210,9 @@ def check_overrides(nodes: list[Node]) -> None:
             if known_elsewhere and all(name in given[other] for other in nodes):
                 continue
             near = difflib.get_close_matches(name, sorted(declared[node]), 1, 0.4)
-            hint = f"; did you mean '{near[0]}'?" if near else (
-                '; it has ' + ', '.join(sorted(declared[node])))
+            hint = (
+                f"; did you mean '{near[0]}'?"
+                if near
+                else ('; it has ' + ', '.join(sorted(declared[node])))
+            )
             raise ParameterError(f"{node.get_name()}: unknown parameter '{name}'{hint}")

@@ -22,5 +22,6 @@ def load_plant_parameter(node_name: str, path: str) -> PlantDescription:
     if plant.joint_names() != JOINTS:
         raise ParameterError(
             f"{node_name}: parameter 'plant_file': {path} describes {', '.join(plant.joints)}; "
-            f'the nodes need {", ".join(JOINTS)} in this order')
+            f'the nodes need {", ".join(JOINTS)} in this order'
+        )
     return plant

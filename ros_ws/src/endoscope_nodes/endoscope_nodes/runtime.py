@@ -1,8 +1,9 @@
 """The one place that starts, spins and shuts down ROS, for one node or for many in a process."""
 
+import gc
 import sys
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Self, TypeVar
 
@@ -21,13 +22,28 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.parameters import ParameterError, check_overrides
+from endoscope_nodes.parameters import (
+    ParameterError,
+    check_overrides,
+    declare_parameters,
+    parameter,
+)
 from endoscope_nodes.stop_signals import StopSignals
 from endoscope_nodes.ticker import Ticker
 
 # An unbounded spin of the EventsExecutor never returns in the Jazzy wheels; a bounded one does.
 # Eleven days.
 FOREVER_S = 1e6
+
+
+@dataclass(frozen=True)
+class BeatParameters:
+    """Parameters of the first node of a process, for all of them."""
+
+    tick_rate: int = parameter(
+        1000, 'beats of this process in real time; a divisor of 1000', unit='Hz', low=10, high=1000
+    )
+
 
 N = TypeVar('N', bound=EndoscopeNode)
 
@@ -58,19 +74,28 @@ class Runtime:
     ...     runtime.spin()
     """
 
-    def __init__(self, args: Sequence[str] | None = None, context: Context | None = None,
-                 domain_id: int | None = None,
-                 overrides: Mapping[str, Mapping[str, object]] | None = None) -> None:
+    def __init__(
+        self,
+        args: Sequence[str] | None = None,
+        context: Context | None = None,
+        domain_id: int | None = None,
+        overrides: Mapping[str, Mapping[str, object]] | None = None,
+    ) -> None:
         self.context = rclpy.get_default_context() if context is None else context
         try:
-            rclpy.init(args=None if args is None else list(args), context=self.context,
-                       domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+            rclpy.init(
+                args=None if args is None else list(args),
+                context=self.context,
+                domain_id=domain_id,
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
         except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
             raise ParameterError(str(error).partition(', at /')[0]) from error
         self.executor = EventsExecutor(context=self.context)
         self.nodes: list[EndoscopeNode] = []
         self._ticker: Ticker | None = None
         self._overrides = overrides or {}
+        self._exit_codes: list[int] = []
         self._stop = Future()
         self._closed = False
 
@@ -81,10 +106,21 @@ class Runtime:
         self.executor.add_node(node)
         return node
 
+    def remove(self, node: EndoscopeNode) -> None:
+        """Close a node and take it out of the process; the others go on."""
+        self.nodes.remove(node)
+        try:
+            node.close()
+        finally:
+            self._exit_codes.append(node.exit_code)
+            if self._ticker is not None:
+                self._ticker.forget((node, node.diagnostics))
+            self.executor.remove_node(node)
+            node.destroy_node()
+
     def overrides_of(self, name: str) -> list[Parameter]:
         """Parameter values that this process was told to give the node called ``name``."""
-        return [Parameter(key, value=value)
-                for key, value in self._overrides.get(name, {}).items()]
+        return [Parameter(key, value=value) for key, value in self._overrides.get(name, {}).items()]
 
     def ticker_of(self, node: EndoscopeNode) -> Ticker:
         """Give the process's ticker; the first node to ask decides whether time is simulated.
@@ -96,15 +132,26 @@ class Runtime:
         """
         simulated = node.get_parameter('use_sim_time').value is True
         if self._ticker is None:
-            self._ticker = Ticker(node, simulated)
+            self._ticker = Ticker(node, simulated, self._stride_of(node))
         if self._ticker.simulated != simulated:
-            raise ParameterError(f"{node.get_name()}: parameter 'use_sim_time' differs from that "
-                                 'of the other nodes in this process; give all the same')
+            raise ParameterError(
+                f"{node.get_name()}: parameter 'use_sim_time' differs from that "
+                'of the other nodes in this process; give all the same'
+            )
         if simulated:
             # rclpy would subscribe each node to /clock, at the price of a node's own work.
             node._time_source.detach_node()
             self._ticker.follow(node.get_clock())
         return self._ticker
+
+    @staticmethod
+    def _stride_of(node: EndoscopeNode) -> int:
+        rate = declare_parameters(node, BeatParameters).tick_rate
+        if 1000 % rate:
+            raise ParameterError(
+                f"{node.get_name()}: parameter 'tick_rate' is {rate}; give a rate that divides 1000"
+            )
+        return 1000 // rate
 
     @property
     def ticker(self) -> Ticker:
@@ -118,15 +165,21 @@ class Runtime:
         names = [node.get_name() for node in self.nodes]
         for name in self._overrides:
             if name not in names:
-                raise ParameterError(f"there are parameters for '{name}', but only "
-                                     f'{", ".join(names)} run here')
+                raise ParameterError(
+                    f"there are parameters for '{name}', but only {', '.join(names)} run here"
+                )
         check_overrides(list(self.nodes))
 
     def connected(self) -> bool:
         """Whether every publisher of this process has found every subscription of this process."""
-        wanted = Counter(s.topic_name for node in self.nodes for s in node.subscriptions)
-        return all(p.get_subscription_count() >= wanted[p.topic_name]
-                   for node in self.nodes for p in node.publishers)
+        here = {(node.get_name(), node.get_namespace()) for node in self.nodes}
+        for node in self.nodes:
+            for publisher in node.publishers:
+                readers = node.get_subscriptions_info_by_topic(publisher.topic_name)
+                local = sum((r.node_name, r.node_namespace) in here for r in readers)
+                if publisher.get_subscription_count() < local:
+                    return False
+        return True
 
     def stop(self) -> None:
         """Let :meth:`spin` return; may be called from any thread, before or while it spins."""
@@ -135,6 +188,9 @@ class Runtime:
 
     def spin(self) -> None:
         """Serve all nodes until :meth:`stop` is called or the context is shut down."""
+        # A collection that walks over all that was imported would cost many ticks.
+        gc.collect()
+        gc.freeze()
         try:
             self.spin_until(self._stop, FOREVER_S)
         except ExternalShutdownException:
@@ -147,8 +203,8 @@ class Runtime:
 
     @property
     def exit_code(self) -> int:
-        """The gravest exit code of all nodes."""
-        return max((node.exit_code for node in self.nodes), default=0)
+        """The gravest exit code of all nodes, those that have ended included."""
+        return max(self._exit_codes + [node.exit_code for node in self.nodes], default=0)
 
     def close(self) -> None:
         """Close and destroy every node, then shut the context down, whatever goes wrong between."""
@@ -156,36 +212,35 @@ class Runtime:
             return
         self._closed = True
         try:
-            self._close_nodes(list(self.nodes))
+            self._close_nodes()
         finally:
             try:
                 self.executor.shutdown()
             finally:
                 self.context.try_shutdown()
 
-    def _close_nodes(self, nodes: list[EndoscopeNode]) -> None:
-        if not nodes:
-            return
-        node = nodes.pop()
-        try:
-            node.close()
-        finally:
+    def _close_nodes(self) -> None:
+        if self.nodes:
             try:
-                self.executor.remove_node(node)
-                node.destroy_node()
+                self.remove(self.nodes[-1])
             finally:
-                self._close_nodes(nodes)
+                self._close_nodes()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.close()
 
 
-def run_nodes(factories: Sequence[Callable[[Runtime], EndoscopeNode]],
-              args: Sequence[str] | None = None) -> int:
+def run_nodes(
+    factories: Sequence[Callable[[Runtime], EndoscopeNode]], args: Sequence[str] | None = None
+) -> int:
     """Run nodes composed in this process until SIGINT or SIGTERM stops them.
 
     Parameters
@@ -200,6 +255,7 @@ def run_nodes(factories: Sequence[Callable[[Runtime], EndoscopeNode]],
     int
         0, the exit code that a node asked for, or 2 for parameters or arguments that were refused.
     """
+
     def compose(runtime: Runtime) -> None:
         for factory in factories:
             runtime.add(factory)
@@ -214,8 +270,12 @@ def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -
             compose(runtime)
             runtime.check_parameters()
             runtime.spin()
-    except (ParameterError, InvalidNodeNameException, InvalidNamespaceException,
-            InvalidParameterTypeException) as error:
+    except (
+        ParameterError,
+        InvalidNodeNameException,
+        InvalidNamespaceException,
+        InvalidParameterTypeException,
+    ) as error:
         print(error, file=sys.stderr)
         return 2
     return runtime.exit_code

@@ -23,8 +23,9 @@ class StateWatch:
         Called with the new state after each change.
     """
 
-    def __init__(self, node: Node, ticker: Ticker,
-                 on_change: Callable[[OperatingState], None] | None = None) -> None:
+    def __init__(
+        self, node: Node, ticker: Ticker, on_change: Callable[[OperatingState], None] | None = None
+    ) -> None:
         self._node = node
         self._ticker = ticker
         self._on_change = on_change
@@ -37,7 +38,8 @@ class StateWatch:
             state = OperatingState(message.data)
         except ValueError:
             self._node.get_logger().error(
-                f"'{message.data}' on {OPERATING_STATE} is no operating state: taken as FAULT")
+                f"'{message.data}' on {OPERATING_STATE} is no operating state: taken as FAULT"
+            )
             state = OperatingState.FAULT
         self._heard_ns = self._ticker.monotonic_ns()
         if state != self.state:
@@ -49,4 +51,5 @@ class StateWatch:
     def enabled(self) -> bool:
         """Whether motion is allowed now: enabled, and the supervisor alive."""
         return self.state is OperatingState.ENABLED and (
-            self._ticker.monotonic_ns() - self._heard_ns < SILENCE_NS)
+            self._ticker.monotonic_ns() - self._heard_ns < SILENCE_NS
+        )

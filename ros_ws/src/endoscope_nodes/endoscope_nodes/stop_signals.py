@@ -49,8 +49,12 @@ class StopSignals:
             if any(number in data for number in _STOPPING):
                 self._on_stop()
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         signal.set_wakeup_fd(self._former_fd)
         for number, handler in self._former_handlers.items():
             signal.signal(number, handler)

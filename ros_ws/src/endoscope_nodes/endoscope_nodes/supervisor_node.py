@@ -28,12 +28,18 @@ class SupervisorParameters:
     """Parameters of the supervisor."""
 
     tension_ceiling: float = parameter(
-        60.0, 'tension of a wire at which the slave goes to FAULT', unit='N', low=0.1, high=500.0)
+        60.0, 'tension of a wire at which the slave goes to FAULT', unit='N', low=0.1, high=500.0
+    )
     stream_timeout: float = parameter(
-        0.25, 'silence of motors or load cells at which the slave goes to FAULT', unit='s',
-        low=0.005, high=10.0)
+        0.25,
+        'silence of motors or load cells at which the slave goes to FAULT',
+        unit='s',
+        low=0.005,
+        high=10.0,
+    )
     check_period: float = parameter(
-        0.02, 'how often silence is looked for', unit='s', low=0.001, high=1.0)
+        0.02, 'how often silence is looked for', unit='s', low=0.001, high=1.0
+    )
 
 
 class SupervisorNode(EndoscopeNode):
@@ -46,6 +52,7 @@ class SupervisorNode(EndoscopeNode):
         self.machine = OperatingStateMachine()
         self._guard = TensionGuard(WIRES, p.tension_ceiling)
         self._last_refusal = ''
+        self._said: OperatingState | None = None
         self._states = self.create_publisher(String, OPERATING_STATE, RESULT)
         self._motor = StreamWatch(self, self.ticker, JointState, MOTOR_MEASURED, SENSOR_ASKED)
         self._wires = StreamWatch(self, self.ticker, JointState, WIRES_MEASURED, SENSOR_ASKED)
@@ -55,10 +62,10 @@ class SupervisorNode(EndoscopeNode):
         self.ticker.every(p.check_period, self._check_streams)
         self.ticker.every(1.0, self._publish)
         self._check_streams()
-        self._publish()
 
     def _publish(self) -> None:
-        self._states.publish(String(data=str(self.machine.state)))
+        self._said = self.machine.state
+        self._states.publish(String(data=str(self._said)))
 
     def _on_command(self, message: String) -> None:
         before = self.machine.state
@@ -86,6 +93,8 @@ class SupervisorNode(EndoscopeNode):
                 self._report_cause(watch.topic, trouble)
             else:
                 self.machine.clear_cause(watch.topic)
+        if self._said is None and self.ticker.now_ns():
+            self._publish()
 
     def _report_cause(self, name: str, description: str) -> None:
         if self.machine.report_cause(name, description):
@@ -95,14 +104,16 @@ class SupervisorNode(EndoscopeNode):
     def _report(self) -> Report:
         machine = self.machine
         values: dict[str, object] = {
-            'state': machine.state, 'cause': machine.cause,
+            'state': machine.state,
+            'cause': machine.cause,
             'present causes': '; '.join(machine.present_causes.values()),
-            'last refusal': self._last_refusal, 'peak tension [N]': self._guard.peak}
+            'last refusal': self._last_refusal,
+            'peak tension [N]': self._guard.peak,
+        }
         if machine.state is OperatingState.FAULT:
             return ERROR, machine.cause, values
         if machine.present_causes:
-            return WARN, 'cannot be enabled: ' + '; '.join(
-                machine.present_causes.values()), values
+            return WARN, 'cannot be enabled: ' + '; '.join(machine.present_causes.values()), values
         return OK, str(machine.state), values
 
     def close(self) -> None:

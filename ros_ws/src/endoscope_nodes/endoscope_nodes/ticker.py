@@ -2,11 +2,12 @@
 
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.time import Time
+from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from endoscope_nodes.qos import CLOCK_ASKED
@@ -15,10 +16,11 @@ TICK_NS = 1_000_000
 TickCallback = Callable[[int, int], None]
 
 _STAMP = struct.Struct('<iI')
+_SLOW_NS = 20_000_000
 
 
 class Ticker:
-    """Calls its listeners once a period and says how many periods went by.
+    """Calls its listeners at each beat and says how many milliseconds went by.
 
     In real time a timer of the steady clock beats; in simulated time each message on ``/clock``
     is a beat, so that a conductor can run the whole graph in lock-step.  One ticker serves all
@@ -31,19 +33,19 @@ class Ticker:
         Hosts the timer or the subscription.
     simulated
         Whether ``/clock`` gives the time.
-    period_ns
-        Length of a tick in nanoseconds.
+    stride
+        Milliseconds from beat to beat in real time; simulated time beats as ``/clock`` does.
 
     Attributes
     ----------
     ticks, missed
-        Beats delivered, and periods that went by without one.
+        Beats delivered, and beats that were due but came too late to be told from the next.
     """
 
-    def __init__(self, node: Node, simulated: bool, period_ns: int = TICK_NS) -> None:
+    def __init__(self, node: Node, simulated: bool, stride: int = 1) -> None:
         self._node = node
         self.simulated = simulated
-        self.period_ns = period_ns
+        self._stride = 1 if simulated else stride
         self.ticks = 0
         self.missed = 0
         self._listeners: tuple[TickCallback, ...] = ()
@@ -52,6 +54,7 @@ class Ticker:
         self._sim_ns = 0
         self._last_ns = 0
         self._timer_started = False
+        self._slow_started = False
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         # Stamps follow the steady clock from one reading of the system clock: a step of the
         # system clock must not look like a step of the motion.
@@ -72,29 +75,50 @@ class Ticker:
         self._clocks.append(clock)
 
     def add(self, listener: TickCallback) -> None:
-        """Call ``listener(stamp_ns, periods)`` every tick; ``periods`` is 1 if none was missed."""
+        """Call ``listener(stamp_ns, periods)`` at each beat.
+
+        ``periods`` is how many milliseconds have passed since the beat before: 1 at full rate.
+        """
         self._listeners += (listener,)
         if not self.simulated and not self._timer_started:
             self._timer_started = True
             self._last_ns = time.monotonic_ns()
-            self._node.create_timer(self.period_ns * 1e-9, self._on_timer, clock=self._steady)
+            self._node.create_timer(
+                self._stride * TICK_NS * 1e-9, self._on_timer, clock=self._steady
+            )
 
-    def remove(self, listener: TickCallback) -> None:
-        """Stop calling a listener."""
-        self._listeners = tuple(x for x in self._listeners if x != listener)
+    def forget(self, owners: Sequence[object]) -> None:
+        """Stop calling the methods of these objects."""
+
+        def kept(callback: object) -> bool:
+            return not any(getattr(callback, '__self__', None) is owner for owner in owners)
+
+        self._listeners = tuple(x for x in self._listeners if kept(x))
+        for item in self._periodic:
+            if not kept(item.callback) and item.timer is not None:
+                self._node.destroy_timer(item.timer)
+        self._periodic = [item for item in self._periodic if kept(item.callback)]
 
     def every(self, seconds: float, callback: Callable[[], None]) -> None:
-        """Call ``callback()`` at a slower pace, without asking for the 1 kHz beat."""
-        if self.simulated:
-            self._periodic.append(_Periodic(round(seconds * 1e9), callback))
-        else:
-            self._node.create_timer(seconds, callback, clock=self._steady)
+        """Call ``callback()`` at a slower pace, without asking for the 1 kHz beat.
+
+        Callbacks of the same pace come one after the other rather than all in the same tick.
+        """
+        period_ns = round(seconds * 1e9)
+        item = _Periodic(period_ns, len(self._periodic) * _SLOW_NS % period_ns, callback)
+        if not self.simulated and period_ns < 2 * _SLOW_NS:
+            item.timer = self._node.create_timer(seconds, callback, clock=self._steady)
+        elif not self.simulated and not self._slow_started:
+            self._slow_started = True
+            self._node.create_timer(_SLOW_NS * 1e-9, self._on_slow_timer, clock=self._steady)
+        self._periodic.append(item)
 
     def _on_timer(self) -> None:
-        periods = (time.monotonic_ns() - self._last_ns) // self.period_ns
-        if periods <= 0:
+        beats = (time.monotonic_ns() - self._last_ns) // (self._stride * TICK_NS)
+        if beats <= 0:
             return
-        self._last_ns += periods * self.period_ns
+        periods = beats * self._stride
+        self._last_ns += periods * TICK_NS
         self._beat(self._last_ns + self._offset_ns, periods)
 
     def _on_clock(self, data: bytes) -> None:
@@ -103,34 +127,46 @@ class Ticker:
         if stamp == self._sim_ns or stamp <= 0:
             return
         backwards = stamp < self._sim_ns
-        periods = max(1, round((stamp - self._sim_ns) / self.period_ns))
+        periods = max(1, round((stamp - self._sim_ns) / TICK_NS))
         if backwards or self._sim_ns == 0:
             periods = 1
         if backwards:
             self._node.get_logger().warning('simulated time went back: watches start anew')
             for item in self._periodic:
-                item.due_ns = stamp
+                item.due_ns = None
         self._sim_ns = stamp
         now = Time(nanoseconds=stamp, clock_type=ClockType.ROS_TIME)
         for clock in self._clocks:
             clock.set_ros_time_override(now)  # type: ignore[attr-defined]
         self._beat(stamp, periods)
-        for item in self._periodic:
-            if stamp >= item.due_ns:
-                item.due_ns = stamp + item.period_ns
+        self._call_periodic(stamp)
+
+    def _on_slow_timer(self) -> None:
+        self._call_periodic(time.monotonic_ns())
+
+    def _call_periodic(self, now_ns: int) -> None:
+        for item in tuple(self._periodic):
+            if item.timer is not None:
+                continue
+            if item.due_ns is None:
+                item.due_ns = now_ns + item.turn_ns
+            if now_ns >= item.due_ns:
+                item.due_ns = max(item.due_ns + item.period_ns, now_ns)
                 item.callback()
 
     def _beat(self, stamp_ns: int, periods: int) -> None:
         self.ticks += 1
-        self.missed += periods - 1
+        self.missed += periods // self._stride - 1
         for listener in self._listeners:
             listener(stamp_ns, periods)
 
 
 class _Periodic:
-    __slots__ = ('callback', 'due_ns', 'period_ns')
+    __slots__ = ('callback', 'due_ns', 'period_ns', 'timer', 'turn_ns')
 
-    def __init__(self, period_ns: int, callback: Callable[[], None]) -> None:
+    def __init__(self, period_ns: int, turn_ns: int, callback: Callable[[], None]) -> None:
         self.period_ns = period_ns
+        self.turn_ns = turn_ns
         self.callback = callback
-        self.due_ns = 0
+        self.due_ns: int | None = None
+        self.timer: Timer | None = None

@@ -9,6 +9,10 @@ from endoscope_core.calibration.calibration_run import (
 from endoscope_core.calibration.tension_record import TensionGapError, TensionRecord
 
 __all__ = [
-    'BendingRecord', 'CalibrationCommand', 'CalibrationRun', 'CalibrationStep', 'TensionGapError',
+    'BendingRecord',
+    'CalibrationCommand',
+    'CalibrationRun',
+    'CalibrationStep',
+    'TensionGapError',
     'TensionRecord',
 ]

@@ -32,7 +32,7 @@ class CalibrationStep(StrEnum):
 
 @dataclass(frozen=True)
 class CalibrationCommand:
-    """What to command in one tick: joint-equivalent angle (J,) in rad and velocity (J,) in rad/s."""
+    """What to command in one tick: joint-equivalent angle in rad and velocity in rad/s, (J,)."""
 
     position: tuple[float, ...]
     velocity: tuple[float, ...]
@@ -60,8 +60,15 @@ class CalibrationRun:
         Whether to end after the return to zero.
     """
 
-    def __init__(self, start: Sequence[float], wires: int, tick_ns: int, return_speed: float,
-                 rest: float, homing: bool = False) -> None:
+    def __init__(
+        self,
+        start: Sequence[float],
+        wires: int,
+        tick_ns: int,
+        return_speed: float,
+        rest: float,
+        homing: bool = False,
+    ) -> None:
         self._tick_ns = tick_ns
         self._wires = wires
         tick = tick_ns * 1e-9
@@ -100,16 +107,17 @@ class CalibrationRun:
         return self._next / len(self._rows)
 
     def command(self, stamp_ns: int, periods: int) -> CalibrationCommand | None:
-        """Command for the tick at ``stamp_ns``, ``periods`` after the one before; None when done."""
+        """Command for the tick at ``stamp_ns``, ``periods`` ms after the last; None when done."""
         if self._next >= len(self._rows):
             return None
         if self._next >= self._moving_from and self.record is None:
             into = (self._next - self._moving_from) * self._tick_ns
             self.record = TensionRecord(
-                self._wires, stamp_ns - into, self._tick_ns, CALIBRATION_SAMPLES)
+                self._wires, stamp_ns - into, self._tick_ns, CALIBRATION_SAMPLES
+            )
         row = self._rows[self._next].tolist()
         self._next += periods
-        return CalibrationCommand(tuple(row[:self._joints]), tuple(row[self._joints:]))
+        return CalibrationCommand(tuple(row[: self._joints]), tuple(row[self._joints :]))
 
     def add_tension(self, stamp_ns: int, tension: Sequence[float]) -> None:
         """Take a reading of all wires in N, shape (W,)."""

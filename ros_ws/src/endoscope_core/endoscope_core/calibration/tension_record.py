@@ -29,8 +29,15 @@ class TensionRecord:
         Largest share of instants without a reading of their own.
     """
 
-    def __init__(self, wires: int, start_ns: int, period_ns: int, samples: int,
-                 longest_gap: int = 20, most_missing: float = 0.02) -> None:
+    def __init__(
+        self,
+        wires: int,
+        start_ns: int,
+        period_ns: int,
+        samples: int,
+        longest_gap: int = 20,
+        most_missing: float = 0.02,
+    ) -> None:
         self.start_ns = start_ns
         self._period_ns = period_ns
         self._samples = samples
@@ -70,7 +77,7 @@ class TensionRecord:
         TensionGapError
             A gap is too long, or too many instants have no reading of their own.
         """
-        periods = (self._stamps[:self._count] - self.start_ns) / self._period_ns
+        periods = (self._stamps[: self._count] - self.start_ns) / self._period_ns
         grid = np.arange(self._samples)
         edges = np.concatenate(([-1.0], periods, [float(self._samples)]))
         longest = float(np.max(np.diff(edges)))
@@ -79,13 +86,15 @@ class TensionRecord:
             raise TensionGapError(
                 f'no tension for {longest * self._period_ns * 1e-6:.0f} ms from '
                 f'{where:.3f} s on; at most {self._longest_gap * self._period_ns * 1e-6:.0f} ms '
-                'can be bridged')
+                'can be bridged'
+            )
         nearest = np.unique(np.floor(periods + 0.5).astype(int))
         present = np.count_nonzero((nearest >= 0) & (nearest < self._samples))
         missing = 1.0 - present / self._samples
         if missing > self._most_missing:
             raise TensionGapError(
                 f'{100 * missing:.1f} % of the tensions are missing; at most '
-                f'{100 * self._most_missing:g} % can be bridged')
-        values = self._values[:self._count]
+                f'{100 * self._most_missing:g} % can be bridged'
+            )
+        values = self._values[: self._count]
         return np.stack([np.interp(grid, periods, column) for column in values.T], axis=1)

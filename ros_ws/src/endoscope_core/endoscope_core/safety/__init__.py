@@ -1,6 +1,5 @@
-"""What stands between a command and motion: states, gates, guards and bumpless changes."""
+"""What stands between a command and motion: states, gates, guards and clutch."""
 
-from endoscope_core.safety.bumpless_output import BumplessOutput
 from endoscope_core.safety.clutch_follower import ClutchFollower
 from endoscope_core.safety.command_gate import CommandGate, CommandLimits, Refusal
 from endoscope_core.safety.operating_state import (
@@ -12,6 +11,13 @@ from endoscope_core.safety.operating_state import (
 from endoscope_core.safety.tension_guard import TensionGuard
 
 __all__ = [
-    'Answer', 'BumplessOutput', 'ClutchFollower', 'CommandGate', 'CommandLimits', 'OperatingState',
-    'OperatingStateMachine', 'Refusal', 'StateCommand', 'TensionGuard',
+    'Answer',
+    'ClutchFollower',
+    'CommandGate',
+    'CommandLimits',
+    'OperatingState',
+    'OperatingStateMachine',
+    'Refusal',
+    'StateCommand',
+    'TensionGuard',
 ]

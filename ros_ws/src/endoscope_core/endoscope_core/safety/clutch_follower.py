@@ -50,4 +50,6 @@ class ClutchFollower:
         return tuple(
             min(high, max(low, anchor + self.scale * (h - start)))
             for h, anchor, start, (low, high) in zip(
-                handle, self._slave_anchor, self._handle_anchor, self._limits, strict=True))
+                handle, self._slave_anchor, self._handle_anchor, self._limits, strict=True
+            )
+        )

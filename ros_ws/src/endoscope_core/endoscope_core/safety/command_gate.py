@@ -90,8 +90,14 @@ class CommandGate:
         self.last_reason = f'{refusal}: {words}' if words else str(refusal)
         return refusal
 
-    def check(self, stamp_ns: int, position: Sequence[float], velocity: Sequence[float],
-              received_ns: int, held: Sequence[float] | None = None) -> Refusal | None:
+    def check(
+        self,
+        stamp_ns: int,
+        position: Sequence[float],
+        velocity: Sequence[float],
+        received_ns: int,
+        held: Sequence[float] | None = None,
+    ) -> Refusal | None:
         """Judge one command.
 
         Parameters
@@ -128,9 +134,11 @@ class CommandGate:
             if not low <= value <= high:
                 return self.refuse(Refusal.RANGE, f'{value:.4g} outside {low:.4g} to {high:.4g}')
         streaming = self._received_ns is not None and (
-            received_ns - self._received_ns <= self.limits.max_age_ns)
-        refusal = (self._check_rate(stamp_ns, position) if streaming
-                   else self._check_step(position, held))
+            received_ns - self._received_ns <= self.limits.max_age_ns
+        )
+        refusal = (
+            self._check_rate(stamp_ns, position) if streaming else self._check_step(position, held)
+        )
         if refusal is not None:
             return refusal
         self._position = tuple(position)
@@ -142,7 +150,8 @@ class CommandGate:
     def is_fresh(self, now_ns: int) -> bool:
         """Whether the last obeyed command still holds at local monotonic time ``now_ns``."""
         return self._received_ns is not None and (
-            now_ns - self._received_ns <= self.limits.max_age_ns)
+            now_ns - self._received_ns <= self.limits.max_age_ns
+        )
 
     def _lateness_ns(self, stamp_ns: int, received_ns: int) -> int:
         difference = received_ns - stamp_ns
@@ -161,8 +170,9 @@ class CommandGate:
                 return self.refuse(Refusal.RATE, f'{speed:.4g} rad/s')
         return None
 
-    def _check_step(self, position: Sequence[float], held: Sequence[float] | None
-                    ) -> Refusal | None:
+    def _check_step(
+        self, position: Sequence[float], held: Sequence[float] | None
+    ) -> Refusal | None:
         if held is None:
             return None
         for value, here in zip(position, held, strict=True):

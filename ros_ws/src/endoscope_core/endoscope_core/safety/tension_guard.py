@@ -49,8 +49,10 @@ class TensionGuard:
             if math.isfinite(value):
                 self.peak = max(self.peak, value)
             if self._run[wire] >= self._samples and not self.trouble:
-                self.trouble = (f'tension of {self._names[wire]} is {value:.1f} N, '
-                                f'over the ceiling of {self._ceiling:.1f} N')
+                self.trouble = (
+                    f'tension of {self._names[wire]} is {value:.1f} N, '
+                    f'over the ceiling of {self._ceiling:.1f} N'
+                )
         if self.trouble:
             self._clear = 0 if high else self._clear + 1
             if self._clear >= self._samples:

@@ -1,0 +1,291 @@
+"""Finds the tube's hysteresis class: moves the slave as calibration asks, judges its wires."""
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from endoscope_core.calibration import (
+    BendingRecord,
+    CalibrationRun,
+    CalibrationStep,
+    TensionGapError,
+)
+from endoscope_core.classifier.inference import (
+    ClassificationResult,
+    ClassifierError,
+    TensionClassifier,
+)
+from endoscope_core.safety import OperatingState, StateCommand, TensionGuard
+from endoscope_core.signals import CALIBRATION_SAMPLES
+from endoscope_nodes.calibration_result import aborted_result, successful_result
+from endoscope_nodes.diagnostics import ERROR, OK, Report
+from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.joint_stream import (
+    JointPublisher,
+    JointSample,
+    JointSubscription,
+    LatestJointState,
+)
+from endoscope_nodes.names import (
+    CALIBRATION_COMMAND,
+    CALIBRATION_RESULT,
+    CALIBRATION_RUN,
+    JOINTS,
+    MOTOR_MEASURED,
+    MOTORS,
+    SLAVE_MEASURED,
+    STATE_COMMAND,
+    WIRES,
+    WIRES_MEASURED,
+)
+from endoscope_nodes.parameters import parameter
+from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
+from endoscope_nodes.runtime import Runtime, run_nodes
+from endoscope_nodes.state_watch import StateWatch
+from endoscope_nodes.stream_watch import StreamWatch
+from endoscope_nodes.ticker import TICK_NS
+
+
+@dataclass(frozen=True)
+class CalibrationParameters:
+    """Parameters of the calibration."""
+
+    weights: str = parameter(
+        '',
+        'classifier weights as `endoscope train` writes them; empty for those that come with '
+        'the project',
+    )
+    gear: float = parameter(0.5, 'shaft angle for one radian at the joint', low=0.01, high=100.0)
+    return_speed: float = parameter(
+        1.0, 'largest speed on the way to zero', unit='rad/s', low=0.01, high=10.0
+    )
+    rest: float = parameter(0.5, 'rest at zero before the sinusoid', unit='s', low=0.0, high=60.0)
+    tension_ceiling: float = parameter(
+        55.0, 'tension of a wire at which calibration is aborted', unit='N', low=0.1, high=500.0
+    )
+    stream_timeout: float = parameter(
+        0.1,
+        'silence of motors or load cells at which calibration is aborted',
+        unit='s',
+        low=0.005,
+        high=10.0,
+    )
+
+
+class CalibrationNode(EndoscopeNode):
+    """Serves ``calibration/run`` and the ``home`` command; publishes ``calibration/result``.
+
+    The service answers at once, with the reason if it refuses; the result follows on its topic.
+    Whatever makes the recording worthless or motion doubtful aborts: the commands stop, the slave
+    holds or goes back to the console by a ramp, and the result says why.
+    """
+
+    def __init__(self, runtime: Runtime) -> None:
+        super().__init__('calibration', runtime)
+        p = self.parameters(CalibrationParameters)
+        self._settings = p
+        self._timeout_ns = round(p.stream_timeout * 1e9)
+        self._classifier, self._no_classifier = self._load_classifier(p.weights)
+        self._thread = None if self.ticker.simulated else ThreadPoolExecutor(1)
+        self._run: CalibrationRun | None = None
+        self._homing = False
+        self._began_ns = 0
+        self._bending = BendingRecord(len(JOINTS))
+        self._judging: Future[ClassificationResult] | None = None
+        self._runs = 0
+        self._aborts = 0
+        self._last = ''
+        self._guard = TensionGuard(WIRES, p.tension_ceiling)
+        self._commands = JointPublisher(
+            self, CALIBRATION_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
+        )
+        self._results = self.create_publisher(DiagnosticArray, CALIBRATION_RESULT, RESULT)
+        self._state = StateWatch(self, self.ticker, self._on_state)
+        self._shafts = LatestJointState(self, MOTOR_MEASURED, MOTORS, SENSOR_ASKED)
+        self._streams = [
+            StreamWatch(self, self.ticker, JointState, topic, SENSOR_ASKED)
+            for topic in (MOTOR_MEASURED, WIRES_MEASURED)
+        ]
+        JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
+        JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_bending, SENSOR_ASKED)
+        self.create_subscription(String, STATE_COMMAND, self._on_state_command, EVENT)
+        self.create_service(Trigger, CALIBRATION_RUN, self._on_run)
+        self.diagnostics.add('procedure', self._report)
+        self.ticker.add(self._on_tick)
+
+    @property
+    def active(self) -> bool:
+        """Whether the slave is being moved for a calibration or home."""
+        return self._run is not None
+
+    @staticmethod
+    def _load_classifier(weights: str) -> tuple[TensionClassifier | None, str]:
+        torch.set_num_threads(1)
+        try:
+            classifier = (
+                TensionClassifier.load(weights) if weights else TensionClassifier.load_default()
+            )
+        except ClassifierError as error:
+            return None, str(error)
+        # The first inference sets up the network's memory, which takes longer than a tick.
+        classifier.classify(np.zeros((CALIBRATION_SAMPLES, len(WIRES))))
+        return classifier, ''
+
+    def _on_run(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.message = self._start(homing=False)
+        response.success = not response.message
+        response.message = response.message or f'begun; {CALIBRATION_RESULT} will say how it went'
+        return response
+
+    def _on_state_command(self, message: String) -> None:
+        if message.data == StateCommand.HOME:
+            trouble = self._start(homing=True)
+            if trouble:
+                self.get_logger().warning(f'home: {trouble}')
+
+    def _start(self, homing: bool) -> str:
+        """Begin, or say why not."""
+        if self._run is not None:
+            return f'busy: {self._run.step}'
+        if self._no_classifier and not homing:
+            return self._no_classifier
+        if not self._state.enabled:
+            return f'the slave is {self._state.state}; it has to be ENABLED'
+        trouble = self._trouble()
+        shafts = self._shafts.read()
+        if trouble or shafts is None or len(shafts.position) != len(MOTORS):
+            return trouble or f'{MOTOR_MEASURED} has no position'
+        self._run = CalibrationRun(
+            [x / self._settings.gear for x in shafts.position],
+            len(WIRES),
+            TICK_NS,
+            self._settings.return_speed,
+            self._settings.rest,
+            homing,
+        )
+        self._homing = homing
+        self._began_ns = self.ticker.now_ns()
+        self._bending = BendingRecord(len(JOINTS))
+        self._judging = None
+        return ''
+
+    def _trouble(self) -> str:
+        if self._guard.trouble:
+            return self._guard.trouble
+        for stream in self._streams:
+            trouble = stream.trouble(self._timeout_ns)
+            if trouble:
+                return trouble
+        return ''
+
+    def _on_state(self, state: OperatingState) -> None:
+        if self._run is not None and state is not OperatingState.ENABLED:
+            self._abort(f'the slave became {state}')
+
+    def _on_wires(self, sample: JointSample) -> None:
+        if len(sample.effort) != len(WIRES):
+            return
+        self._guard.update(sample.effort)
+        if self._run is not None:
+            self._run.add_tension(sample.stamp_ns, sample.effort)
+
+    def _on_bending(self, sample: JointSample) -> None:
+        if self._run is not None and len(sample.position) == len(JOINTS):
+            self._bending.add(sample.stamp_ns, sample.position)
+
+    def _on_tick(self, stamp_ns: int, periods: int) -> None:
+        run = self._run
+        if run is None:
+            return
+        trouble = self._trouble() or ('' if self._state.enabled else 'the supervisor is silent')
+        if trouble:
+            self._abort(trouble)
+            return
+        command = run.command(stamp_ns, periods)
+        if command is not None:
+            self._commands.publish(stamp_ns, *command.position, *command.velocity)
+        if run.record is not None and run.record.complete and self._judging is None:
+            self._judge(run)
+        if self._run is not None and run.step is CalibrationStep.DONE:
+            self._finish(run)
+
+    def _judge(self, run: CalibrationRun) -> None:
+        if run.record is None or self._classifier is None:
+            return
+        try:
+            tension = run.record.resampled()
+        except TensionGapError as error:
+            self._abort(str(error))
+            return
+        if self._thread is not None:
+            self._judging = self._thread.submit(self._classifier.classify, tension)
+        else:
+            self._judging = Future()
+            self._judging.set_result(self._classifier.classify(tension))
+
+    def _finish(self, run: CalibrationRun) -> None:
+        if self._homing:
+            self._run = None
+            self._last = 'home reached'
+            return
+        if self._judging is None:
+            if run.record is None or not run.record.complete:
+                self._abort('the tensions of the last samples did not come')
+            return
+        if not self._judging.done():
+            return
+        verdict = self._judging.result()
+        backlash = None
+        if run.record is not None:
+            backlash = self._bending.backlash_size(run.record.start_ns)
+        now = self.ticker.now_ns()
+        self._results.publish(
+            successful_result(now, verdict, backlash, (now - self._began_ns) * 1e-9)
+        )
+        self._run = None
+        self._runs += 1
+        self._last = f'class {verdict.class_deg} deg'
+        self.get_logger().info(f'{self._last}, probability {verdict.probability:.3f}')
+
+    def _abort(self, reason: str) -> None:
+        run, self._run = self._run, None
+        if run is None:
+            return
+        self._aborts += 1
+        self._last = f'aborted while {run.step}: {reason}'
+        self.get_logger().error(self._last)
+        if not self._homing:
+            now = self.ticker.now_ns()
+            self._results.publish(
+                aborted_result(now, reason, str(run.step), (now - self._began_ns) * 1e-9)
+            )
+
+    def _report(self) -> Report:
+        values: dict[str, object] = {
+            'completed': self._runs,
+            'aborted': self._aborts,
+            'last': self._last,
+            'peak tension [N]': self._guard.peak,
+        }
+        if self._no_classifier:
+            return ERROR, self._no_classifier, values
+        if self._run is None:
+            return OK, 'waiting', values
+        values['progress'] = self._run.progress
+        return OK, str(self._run.step), values
+
+    def close(self) -> None:
+        """Let the classifier's thread end."""
+        if self._thread is not None:
+            self._thread.shutdown()
+
+
+def main() -> int:
+    """Run the calibration in a process of its own."""
+    return run_nodes([CalibrationNode])

@@ -1,0 +1,65 @@
+"""The message ``calibration/result``: how it is written, and how it is read."""
+
+import math
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.time import Time
+
+from endoscope_core.classifier.inference import ClassificationResult
+from endoscope_nodes.diagnostics import ERROR, OK, status
+
+NAME = 'calibration: hysteresis class'
+
+
+def successful_result(
+    stamp_ns: int, verdict: ClassificationResult, backlash: float | None, duration: float
+) -> DiagnosticArray:
+    """Say which class was found.
+
+    Parameters
+    ----------
+    backlash
+        Size in rad as the tracker measured it; None where it could not.
+    duration
+        Of the whole calibration, in s.
+    """
+    values: dict[str, object] = {'class_deg': verdict.class_deg, 'probability': verdict.probability}
+    values |= {f'probability_{size}_deg': p for size, p in verdict.probabilities.items()}
+    size = verdict.expected_size if backlash is None else backlash
+    values |= {
+        'backlash_size': size,
+        'backlash_size_deg': math.degrees(size),
+        'backlash_size_from': 'classifier' if backlash is None else 'tracker',
+        'duration': duration,
+    }
+    message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
+    return _array(stamp_ns, OK, message, values)
+
+
+def aborted_result(stamp_ns: int, reason: str, step: str, duration: float) -> DiagnosticArray:
+    """Say that a calibration was aborted, where and why; ``duration`` in s."""
+    return _array(
+        stamp_ns,
+        ERROR,
+        f'aborted: {reason}',
+        {'reason': reason, 'step': step, 'duration': duration},
+    )
+
+
+def class_of(message: DiagnosticArray) -> int | None:
+    """Read the class in degrees out of a result; None where it tells of no success."""
+    for item in message.status:
+        if item.name == NAME and item.level == OK:
+            values = {v.key: v.value for v in item.values}
+            try:
+                return int(values['class_deg'])
+            except (KeyError, ValueError):
+                return None
+    return None
+
+
+def _array(stamp_ns: int, level: bytes, text: str, values: dict[str, object]) -> DiagnosticArray:
+    message = DiagnosticArray()
+    message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+    message.status = [status(NAME, level, text, values)]
+    return message

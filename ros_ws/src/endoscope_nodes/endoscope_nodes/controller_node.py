@@ -1,0 +1,176 @@
+"""Feedback from the tracker: what the feed-forward leaves over, learnt while it moves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
+
+from endoscope_core.control import AdaptiveBacklashController, TrackerMeasurement
+from endoscope_core.safety import CommandGate, CommandLimits, OperatingState, Refusal
+from endoscope_nodes.calibration_result import class_of
+from endoscope_nodes.command_report import CommandReport
+from endoscope_nodes.diagnostics import OK, WARN, Report
+from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
+from endoscope_nodes.names import (
+    CALIBRATION_COMMAND,
+    CALIBRATION_RESULT,
+    CORRECTION,
+    JOINTS,
+    SLAVE_COMMAND,
+    SLAVE_MEASURED,
+)
+from endoscope_nodes.parameters import parameter
+from endoscope_nodes.qos import COMMAND, RESULT, SENSOR_ASKED
+from endoscope_nodes.runtime import Runtime, run_nodes
+from endoscope_nodes.state_watch import StateWatch
+from endoscope_nodes.stream_watch import StreamWatch
+
+
+@dataclass(frozen=True)
+class ControllerParameters:
+    """Parameters of the controller."""
+
+    active: bool = parameter(
+        True, 'whether to learn and correct while the tracker is fresh', dynamic=True
+    )
+    tracker_timeout: float = parameter(
+        0.15,
+        'silence of the tracker after which the correction fades out',
+        unit='s',
+        low=0.03,
+        high=5.0,
+    )
+    fade_time: float = parameter(
+        1.0, 'time from no correction to the whole and back', unit='s', low=0.05, high=30.0
+    )
+    joint_limit: float = parameter(
+        1.75, 'largest desired bending followed, either way', unit='rad', low=0.1, high=3.1
+    )
+    max_speed: float = parameter(30.0, 'largest speed between two commands', unit='rad/s', low=0.0)
+    command_timeout: float = parameter(
+        0.1, 'a command older than this is not followed', unit='s', low=0.001, high=1.0
+    )
+    calibration_timeout: float = parameter(
+        0.05, 'silence after which a calibration counts as over', unit='s', low=0.001, high=1.0
+    )
+
+
+class ControllerNode(EndoscopeNode):
+    """Publishes ``controller/correction_js``, to be added to the joint-equivalent motor command.
+
+    It answers every command of the console that may be obeyed, with a correction of zero while it
+    does not act: without a fresh tracker, during a calibration, or when it is not active.
+    """
+
+    def __init__(self, runtime: Runtime) -> None:
+        super().__init__('controller', runtime)
+        p = self.parameters(ControllerParameters, self._on_parameters)
+        self._settings = p
+        self.controller = AdaptiveBacklashController(
+            len(JOINTS), stale_after=p.tracker_timeout, fade_time=p.fade_time
+        )
+        reach = (p.joint_limit,) * len(JOINTS)
+        self._gate = CommandGate(
+            CommandLimits(
+                tuple(-x for x in reach),
+                reach,
+                p.max_speed,
+                2.0 * p.joint_limit,
+                round(p.command_timeout * 1e9),
+            )
+        )
+        self._measurement: JointSample | None = None
+        self._last_stamp_ns = 0
+        self._forget = False
+        self._corrections = JointPublisher(self, CORRECTION, JOINTS, ('position',), COMMAND)
+        self._state = StateWatch(self, self.ticker, self._on_state)
+        self._calibration = StreamWatch(self, self.ticker, JointState, CALIBRATION_COMMAND, COMMAND)
+        JointSubscription(
+            self,
+            SLAVE_COMMAND,
+            JOINTS,
+            self._on_command,
+            COMMAND,
+            exact=True,
+            on_malformed=self._on_malformed,
+        )
+        JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_measured, SENSOR_ASKED)
+        self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
+        self.diagnostics.add('commands', CommandReport(self._gate))
+        self.diagnostics.add('feedback', self._report)
+
+    def _on_parameters(self, parameters: ControllerParameters) -> None:
+        self._settings = parameters
+
+    def _on_state(self, state: OperatingState) -> None:
+        if state is OperatingState.ENABLED:
+            self._gate.reset()
+
+    def _on_malformed(self, reason: str) -> None:
+        self._gate.refuse(Refusal.MALFORMED, reason)
+
+    def _on_result(self, message: DiagnosticArray) -> None:
+        self._forget = self._forget or class_of(message) is not None
+
+    def _on_measured(self, sample: JointSample) -> None:
+        if len(sample.position) == len(JOINTS):
+            self._measurement = sample
+
+    def _on_command(self, sample: JointSample) -> None:
+        now = self.ticker.monotonic_ns()
+        if not self._state.enabled:
+            self._gate.refuse(Refusal.NOT_ENABLED)
+            return
+        if self._gate.check(sample.stamp_ns, sample.position, sample.velocity, now) is not None:
+            return
+        if sample.stamp_ns <= self._last_stamp_ns:
+            self._gate.refuse(Refusal.STAMP, 'older than before the last pause')
+            return
+        self._last_stamp_ns = sample.stamp_ns
+        self._choose_whether_to_act()
+        velocity = sample.velocity or (0.0,) * len(JOINTS)
+        correction = self.controller.step(
+            sample.stamp_ns * 1e-9, sample.position, velocity, self._fresh(sample.stamp_ns)
+        )
+        self._corrections.publish(sample.stamp_ns, *correction.tolist())
+
+    def _choose_whether_to_act(self) -> None:
+        timeout = round(self._settings.calibration_timeout * 1e9)
+        calibrating = not self._calibration.trouble(timeout)
+        if self._settings.active and not calibrating:
+            self.controller.activate()
+        else:
+            self.controller.deactivate()
+        if self._forget and self.controller.weight == 0.0:
+            self.controller.forget()
+            self._forget = False
+
+    def _fresh(self, stamp_ns: int) -> TrackerMeasurement | None:
+        """A measurement from before this command that has not been used yet."""
+        sample = self._measurement
+        if sample is None or sample.stamp_ns >= stamp_ns:
+            return None
+        self._measurement = None
+        return TrackerMeasurement(sample.stamp_ns * 1e-9, np.array(sample.position))
+
+    def _report(self) -> Report:
+        controller = self.controller
+        values: dict[str, object] = {
+            'published': self._corrections.count,
+            'weight': controller.weight,
+            'measurements refused': controller.refused,
+        }
+        for joint, estimate in zip(JOINTS, controller.estimates, strict=True):
+            values |= {f'{joint}.gain': estimate.gain, f'{joint}.backlash': estimate.backlash}
+        if not self._settings.active:
+            return OK, 'not active', values
+        if not controller.tracker_fresh(self._last_stamp_ns * 1e-9):
+            return WARN, f'{SLAVE_MEASURED} is silent: feed-forward alone', values
+        return OK, 'in the loop', values
+
+
+def main() -> int:
+    """Run the controller in a process of its own."""
+    return run_nodes([ControllerNode])

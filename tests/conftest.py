@@ -1,0 +1,12 @@
+"""Settings for all tests across packages."""
+
+import os
+import sys
+from pathlib import Path
+
+# pytest imports each test file by its path; what they share is imported by name.
+sys.path.insert(0, str(Path(__file__).parent))
+# Wrong types in messages are errors in tests; rclpy reads this when message classes are imported.
+os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+# Tests talk to nobody outside this machine.
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'

@@ -1,0 +1,125 @@
+"""Calibration through the whole graph, and what makes it abort."""
+
+import math
+
+import numpy as np
+import pytest
+from simulated_graph import SimulatedGraph
+
+from endoscope_core.dataset import configuration_of_size, random_rig
+from endoscope_core.plant import save_plant
+
+NODES_WITH_A_PLANT = ('motor_driver', 'load_cells', 'em_tracker')
+
+
+def plant_of_size(tmp_path, size_deg, seed):
+    """A rig that no data set holds, in a tube of known backlash size."""
+    configuration = configuration_of_size(
+        random_rig(np.random.default_rng(seed)), math.radians(size_deg)
+    )
+    path = tmp_path / 'plant.yaml'
+    save_plant(configuration.plant, path)
+    return {node: {'plant_file': str(path)} for node in NODES_WITH_A_PLANT}
+
+
+@pytest.mark.parametrize(('size_deg', 'seed'), [(50, 901), (80, 902)])
+def test_finds_the_class_of_a_known_tube(tmp_path, size_deg, seed):
+    with SimulatedGraph(overrides=plant_of_size(tmp_path, size_deg, seed)) as graph:
+        graph.enable()
+        values = graph.calibrate()
+        assert float(values['class_deg']) == size_deg
+        probabilities = [float(v) for k, v in values.items() if k.startswith('probability_')]
+        assert len(probabilities) == 7
+        assert sum(probabilities) == pytest.approx(1.0, abs=1e-6)
+        assert float(values['probability']) == max(probabilities)
+        assert float(values['backlash_size_deg']) == pytest.approx(size_deg, abs=3.0)
+        assert float(values['duration']) < 11.0
+        state = graph.nodes['compensator']
+        assert state._class_deg == size_deg
+
+
+def test_a_calibration_from_anywhere_gives_the_same_class():
+    with SimulatedGraph() as graph:
+        graph.enable()
+        at_rest = graph.calibrate()
+        graph.set('console', source='motion', motion='non_periodic')
+        graph.advance(4.3)
+        moved = graph.calibrate()
+        assert moved['class_deg'] == at_rest['class_deg']
+
+
+def test_refused_unless_enabled():
+    with SimulatedGraph() as graph:
+        graph.advance(0.1)
+        answer = graph.call_calibration()
+        assert not answer.success
+        assert 'DISABLED' in answer.message
+
+
+def test_refused_while_one_is_running():
+    with SimulatedGraph() as graph:
+        graph.enable()
+        assert graph.call_calibration().success
+        graph.advance(0.5)
+        answer = graph.call_calibration()
+        assert not answer.success
+        assert 'busy' in answer.message
+
+
+def abort_reason(graph):
+    status = graph.results[-1].status[0]
+    assert status.level == b'\x02', status.message
+    return {v.key: v.value for v in status.values}['reason']
+
+
+def test_stale_load_cells_abort_and_the_slave_stands_still():
+    # The supervisor is made patient here: otherwise it would go to FAULT at the same time.
+    overrides = {
+        'conductor': {'wait_for': ['motor/measured_js']},
+        'supervisor': {'stream_timeout': 5.0},
+    }
+    with SimulatedGraph(overrides=overrides) as graph:
+        graph.enable()
+        assert graph.call_calibration().success
+        graph.advance(3.0)
+        shafts = graph.listen('motor/measured_js', ('motor_x', 'motor_y'))
+        graph.set('load_cells', connected=False)
+        graph.advance(1.0)
+        assert 'wires/measured_js has been silent' in abort_reason(graph)
+        positions = np.array([s.position for s in shafts])
+        assert np.ptp(positions[-500:], axis=0).max() < 0.003
+        assert graph.states[-1] == 'ENABLED'
+        assert graph.nodes['compensator']._class_deg is None
+
+
+def test_leaving_enabled_aborts():
+    with SimulatedGraph() as graph:
+        graph.enable()
+        assert graph.call_calibration().success
+        graph.advance(2.0)
+        assert graph.command('pause') == 'PAUSED'
+        assert 'PAUSED' in abort_reason(graph)
+        assert not graph.nodes['calibration'].active
+
+
+def test_over_tension_aborts_and_is_a_fault():
+    overrides = {'calibration': {'tension_ceiling': 8.0}, 'supervisor': {'tension_ceiling': 9.0}}
+    with SimulatedGraph(overrides=overrides) as graph:
+        graph.enable()
+        assert graph.call_calibration().success
+        graph.advance(4.0)
+        assert 'over the ceiling of 8.0 N' in abort_reason(graph)
+        assert 'wire_' in abort_reason(graph)
+
+
+def test_home_returns_to_zero():
+    with SimulatedGraph() as graph:
+        graph.enable()
+        graph.set('console', source='motion')
+        graph.advance(1.5)
+        graph.set('console', source='none')
+        graph.advance(0.3)
+        graph.command('home')
+        shafts = graph.listen('motor/measured_js', ('motor_x', 'motor_y'))
+        graph.advance(4.0)
+        assert np.abs(shafts[-1].position).max() < 0.003

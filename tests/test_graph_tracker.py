@@ -1,0 +1,48 @@
+"""A tracker that goes blind, or dies."""
+
+import numpy as np
+from simulated_graph import SimulatedGraph
+
+
+def weight(graph):
+    return graph.nodes['controller'].controller.weight
+
+
+def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
+    with SimulatedGraph() as graph:
+        graph.enable()
+        graph.calibrate()
+        graph.set('console', source='motion', motion='non_periodic')
+        graph.advance(4.0)
+        assert weight(graph) == 1.0
+        drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
+        corrections = graph.listen('controller/correction_js')
+        graph.set('em_tracker', in_volume=False)
+        graph.advance(2.0)
+        assert weight(graph) == 0.0
+        assert corrections[-1].position == (0.0, 0.0)
+        assert np.abs(corrections[0].position).max() > 0.01
+        graph.advance(1.0)
+        assert len(drives) == 3000
+        assert 'feed-forward alone' in graph.diagnostics['controller: feedback'][-1].message
+        assert graph.diagnostics['em_tracker: tracker'][-1].level == b'\x03'
+        graph.set('em_tracker', in_volume=True)
+        graph.advance(2.0)
+        assert weight(graph) == 1.0
+        change = np.abs(np.diff([c.position for c in corrections], axis=0))
+        assert change.max() < 0.01
+        assert graph.states[-1] == 'ENABLED'
+
+
+def test_a_dead_tracker_node_leaves_the_feed_forward_going():
+    with SimulatedGraph() as graph:
+        graph.enable()
+        graph.calibrate()
+        graph.set('console', source='motion')
+        graph.advance(3.0)
+        graph.kill('em_tracker')
+        drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
+        graph.advance(2.0)
+        assert len(drives) == 2000
+        assert weight(graph) == 0.0
+        assert graph.states[-1] == 'ENABLED'
