@@ -22,7 +22,7 @@ from endoscope_bags import BagError, open_bag
 from endoscope_bags.cdr_encoding import encode_clock, encode_joint_state, encode_string
 from endoscope_bags.message_types import message_type
 from endoscope_nodes.parameters import ParameterError
-from endoscope_nodes.qos import LOCK_STEP, SENSOR_OFFERED
+from endoscope_nodes.qos import EVENT, LOCK_STEP, SENSOR_ASKED, SENSOR_OFFERED
 
 MS = 10**6
 
@@ -125,6 +125,20 @@ def test_other_topics_are_recorded_once_their_type_is_known(tmp_path):
     bag = open_bag(tmp_path / 'bag')
     assert bag.topics['/endoscope/own'].type == 'std_msgs/msg/String'
     assert bag.message_count == 1
+
+
+def test_a_publisher_that_offers_less_is_heard_all_the_same(tmp_path):
+    with RecordedSession(bag=str(tmp_path / 'bag')) as session:
+        wires = session.publisher(JointState, WIRES, SENSOR_ASKED)
+        state = session.publisher(String, STATE, EVENT)
+        for _ in range(10):
+            wires.publish(encode_joint_state(['a'], 1, effort=[1.0]))
+        state.publish(String(data='ENABLED'))
+        session.serve(0.2)
+    bag = open_bag(tmp_path / 'bag')
+    assert [q.reliability for q in bag.topics[WIRES].qos] == ['best_effort']
+    assert [q.durability for q in bag.topics[STATE].qos] == ['volatile']
+    assert (bag.topics[WIRES].message_count, bag.topics[STATE].message_count) == (10, 1)
 
 
 def simulate(path, n=60):

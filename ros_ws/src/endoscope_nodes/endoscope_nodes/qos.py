@@ -23,7 +23,7 @@ SENSOR_ASKED = QoSProfile(
 RECORDER_ASKED = QoSProfile(
     depth=2000,
     history=HistoryPolicy.KEEP_LAST,
-    reliability=ReliabilityPolicy.BEST_EFFORT,
+    reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.VOLATILE,
 )
 COMMAND = QoSProfile(
