@@ -56,8 +56,10 @@ class JointPublisher:
         zeros: dict[str, Any] = dict.fromkeys(fields, [0.0] * len(names))
         self._message = bytearray(encode_joint_state(names, 0, **zeros))
         columns = joint_state_layout(bytes(self._message)).columns
+        n = len(names)
+        self._pack = struct.Struct(f'<{n}d').pack_into
         starts = [columns[field][0] for field in QUANTITIES if field in fields]
-        self._struct, self._at = _values_struct(starts, len(names))
+        self._parts = [(start, slice(k * n, k * n + n)) for k, start in enumerate(starts)]
         self._stamp = struct.Struct('<iI')
         self._publisher = node.create_publisher(JointState, topic, qos)
         self.count = 0
@@ -66,7 +68,8 @@ class JointPublisher:
         """Publish one message: the J numbers of the first field, then those of the next."""
         seconds, nanoseconds = divmod(stamp_ns, _SECOND)
         self._stamp.pack_into(self._message, 4, seconds, nanoseconds)
-        self._struct.pack_into(self._message, self._at, *values)
+        for start, part in self._parts:
+            self._pack(self._message, start, *values[part])
         self._publisher.publish(bytes(self._message))
         self.count += 1
 
@@ -211,8 +214,3 @@ def _values_format(starts: Sequence[int], count: int) -> tuple[str, int]:
     for before, after in pairwise(starts):
         text += f'{after - before - 8 * count}x{count}d'
     return text, starts[0]
-
-
-def _values_struct(starts: Sequence[int], count: int) -> tuple[struct.Struct, int]:
-    text, at = _values_format(starts, count)
-    return struct.Struct('<' + text), at
