@@ -177,7 +177,7 @@ class _GraphSession:
         """Track one motion in one mode."""
         progress(f'{tube.name}: tracking {motion}, {mode}')
         self._set('compensator', mode='none' if mode is Mode.NONE else 'bouc_wen')
-        self._set('controller', enabled=mode is Mode.ADAPTIVE)
+        self._set('controller', active=mode is Mode.ADAPTIVE)
         self._advance(SETTLING_S)
         self._set('console', source='motion', motion=motion)
         start = self._now()
