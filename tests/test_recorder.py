@@ -87,7 +87,7 @@ def test_the_offered_qos_is_written_down(recorded):
 
 def test_start_and_stop_by_service(tmp_path):
     first = tmp_path / 'first'
-    with RecordedSession(bag=str(first), autostart=False) as session:
+    with RecordedSession(bag=str(first), autostart=False, topics=[SERVO]) as session:
         start = session.probe.create_client(Trigger, 'recorder/start')
         stop = session.probe.create_client(Trigger, 'recorder/stop')
         session.wait(lambda: start.service_is_ready() and stop.service_is_ready())
