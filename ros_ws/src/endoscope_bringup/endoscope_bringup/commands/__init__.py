@@ -6,5 +6,5 @@ all of them.
 """
 
 COMMANDS: tuple[str, ...] = (
-    'simulate', 'record', 'replay', 'bag', 'dataset', 'train', 'identify', 'bench',
+    'simulate', 'convert', 'record', 'replay', 'bag', 'dataset', 'train', 'identify', 'bench',
 )

@@ -1,0 +1,100 @@
+import math
+import re
+
+import numpy as np
+import pytest
+
+from endoscope_bags import BagError, open_bag
+from endoscope_bags.table_mapping import TableMappingError, load_table_mapping
+from endoscope_bags.text_table import TableError, convert_table
+
+MAPPING = """
+time: {column: 1, unit: s}
+start_s: 100.0
+topics:
+  slave/servo_jp:
+    position: {bend_x: {column: 2, unit: deg}}
+  slave/measured_js:
+    position: {bend_x: {column: 3, unit: deg, offset: 1.0}}
+  wires/measured_js:
+    effort: {wire_x_pos: {column: 4, unit: N}, wire_x_neg: {column: 5, unit: N, scale: 2.0}}
+"""
+
+
+@pytest.fixture
+def mapping(tmp_path):
+    path = tmp_path / 'mapping.yaml'
+    path.write_text(MAPPING)
+    return load_table_mapping(path)
+
+
+@pytest.fixture
+def table(tmp_path):
+    path = tmp_path / 'table.txt'
+    time = np.repeat(np.arange(40) * 0.025, 3)
+    rows = [
+        f'{t:.6f}, {60 * math.sin(t):.6f}, {30 * math.sin(t):.6f}, {5 + t:.6f}, {5 - t:.6f} '
+        for t in time
+    ]
+    path.write_text('\n'.join(rows) + '\n')
+    return path
+
+
+def test_columns_become_topics_in_si_and_repeats_go(table, mapping, tmp_path):
+    done = convert_table(table, mapping, tmp_path / 'bag')
+    assert (done.rows, done.repeated, done.messages) == (120, 80, 120)
+    bag = open_bag(tmp_path / 'bag')
+    command, bending = bag.joint_state('slave/servo_jp'), bag.joint_state('slave/measured_js')
+    wires = bag.joint_state('wires/measured_js')
+    time = np.arange(40) * 0.025
+    assert command.topic == '/endoscope/slave/servo_jp'
+    assert command.stamp_ns * 1e-9 == pytest.approx(100.0 + time, abs=1e-6)
+    assert command.position[:, 0] == pytest.approx(np.radians(60 * np.sin(time)), abs=1e-6)
+    assert bending.position[:, 0] == pytest.approx(np.radians(30 * np.sin(time) + 1), abs=1e-6)
+    assert wires.names == ('wire_x_pos', 'wire_x_neg')
+    assert wires.effort == pytest.approx(np.stack([5 + time, 2 * (5 - time)], axis=1), abs=1e-6)
+
+
+def test_repeats_are_kept_where_asked(table, tmp_path):
+    path = tmp_path / 'mapping.yaml'
+    path.write_text(MAPPING + 'drop_repeats: false\n')
+    assert convert_table(table, load_table_mapping(path), tmp_path / 'bag.mcap').repeated == 0
+
+
+@pytest.mark.parametrize(('old', 'new', 'message'), [
+    ('time: {column: 1, unit: s}', '', 'time is missing'),
+    ('unit: deg}', 'unit: degrees}', "unit is 'degrees': valid are"),
+    ('column: 3', 'colum: 3', 'unknown key colum'),
+    ('column: 3', 'column: 0', 'from 1'),
+    ('position: {bend_x: {column: 2', 'angle: {bend_x: {column: 2', 'unknown key angle'),
+    ('start_s: 100.0', 'start_s: soon', "start_s is 'soon'"),
+])
+def test_a_wrong_mapping_is_refused_by_its_key(tmp_path, old, new, message):
+    path = tmp_path / 'mapping.yaml'
+    path.write_text(MAPPING.replace(old, new, 1))
+    with pytest.raises(TableMappingError, match=re.escape(message)):
+        load_table_mapping(path)
+
+
+@pytest.mark.parametrize(('text', 'error', 'message'), [
+    ('0,1,1,5,5\n1,1,1,5\n', TableError, 'line 2 has 4 columns, 5 are needed'),
+    ('0,1,1,5,5\n1,one,1,5,5\n', TableError, 'line 2 holds something else than numbers'),
+    ('0,1,1,5,5\n', TableError, 'fewer than two rows'),
+    ('1,1,1,5,5\n0,1,1,5,5\n', TableError, 'time runs backwards after 101 s'),
+    ('0,1,1,5,5\n1,1,nan,5,5\n', BagError, 'position of slave/measured_js is not finite in row 2'),
+])
+def test_a_wrong_table_is_refused_and_nothing_is_written(
+        tmp_path, mapping, text, error, message):
+    path = tmp_path / 'table.txt'
+    path.write_text(text)
+    with pytest.raises(error, match=re.escape(message)):
+        convert_table(path, mapping, tmp_path / 'bag')
+    assert not (tmp_path / 'bag').exists()
+
+
+def test_lines_of_text_may_stand_above(tmp_path, mapping):
+    path = tmp_path / 'mapping.yaml'
+    path.write_text(MAPPING + 'header_lines: 2\ndelimiter: whitespace\n')
+    table = tmp_path / 'table.txt'
+    table.write_text('# rig\n# t u q a b\n0 1 1 5 5\n\n1 1 1 5 5\n')
+    assert convert_table(table, load_table_mapping(path), tmp_path / 'bag').rows == 2

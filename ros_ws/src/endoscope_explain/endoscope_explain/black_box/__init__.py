@@ -1,0 +1,1 @@
+"""Black boxes on the residual: what prediction alone can reach, without any physics."""

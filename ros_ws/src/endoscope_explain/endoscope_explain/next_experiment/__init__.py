@@ -1,0 +1,1 @@
+"""The motion that would tell rival explanations apart."""

@@ -1,0 +1,57 @@
+"""Recordings that were never made: what a plant would answer to a motion."""
+
+import numpy as np
+from endoscope_core.plant import PlantDescription, simulate
+from numpy.typing import NDArray
+
+from endoscope_explain.next_experiment.waveforms import Waveform
+from endoscope_explain.observation import TICK
+from endoscope_explain.recording import Recording, Series
+
+Array = NDArray[np.float64]
+
+
+def imagine(plant: PlantDescription, waveform: Waveform) -> Recording:
+    """Record a plant's noise-free answer to a motion.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+    waveform : Waveform
+
+    Returns
+    -------
+    Recording
+        Fast signals every tick, the tracker's at its rate.
+    """
+    time = np.arange(0.0, waveform.time[-1], TICK)
+    joints = plant.joint_names()
+    gear = np.array([plant.joints[name].gear for name in joints])
+    desired = np.zeros((len(time), len(joints)))
+    desired[:, joints.index(waveform.joint)] = np.interp(time, waveform.time, waveform.angle)
+    answer = simulate(plant, desired * gear, substeps=3)
+    slow = slice(None, None, max(1, round(1.0 / (plant.sensors.tracker_rate * TICK))))
+    return Recording(
+        waveform.name, 0.0, joints,
+        Series.of('motor/servo_jp', time, desired * gear),
+        Series.of('wires/measured_js', time, answer.tension),
+        Series.of('slave/measured_js', time[slow], answer.bending[slow]),
+        Series.of('motor/measured_js', time, answer.shaft_position),
+        Series.of('motor/measured_js', time, answer.shaft_velocity),
+        Series.of('motor/measured_js', time, answer.shaft_effort))
+
+
+def is_safe(recording: Recording, tension_limit: float, bending_limit: float) -> bool:
+    """Tell whether an imagined motion stays within what the rig has been through.
+
+    Parameters
+    ----------
+    recording : Recording
+    tension_limit : float
+        In N.
+    bending_limit : float
+        In rad.
+    """
+    return bool(
+        recording.tension.values.max() <= tension_limit
+        and np.abs(recording.bending.values).max() <= bending_limit)

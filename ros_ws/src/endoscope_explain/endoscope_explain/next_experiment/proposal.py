@@ -1,0 +1,144 @@
+"""Choose the motion that separates the rivals of an explanation best.
+
+The smallest distance between any two rivals, each refitted to the other, is maximised over a
+family of safe motions (Hunter, Reiner, Technometrics 7, 1965; Chen, Asprey, Ind. Eng. Chem. Res.
+42, 2003).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.plant import EffectSpec, PlantDescription
+from endoscope_core.signals.command_file import JOINTS
+from numpy.typing import NDArray
+
+from endoscope_explain.case import NextExperiment
+from endoscope_explain.explanation import NamedEffect
+from endoscope_explain.next_experiment.distance import distance, refit, with_fit
+from endoscope_explain.next_experiment.imagined import imagine, is_safe
+from endoscope_explain.next_experiment.waveforms import Waveform, family
+from endoscope_explain.observation import observe
+from endoscope_explain.parallel import parallel_map
+from endoscope_explain.recording import Recording
+from endoscope_explain.screen import promises
+
+Array = NDArray[np.float64]
+
+MOST_RIVALS = 3
+MARGIN = 1.15
+"""How far a proposed motion may go beyond the tensions and angles that were recorded."""
+
+
+def propose(
+    recording: Recording, plant: PlantDescription, effect: NamedEffect, jobs: int = 1
+) -> NextExperiment | None:
+    """Propose the motion that tells an effect from its alternatives.
+
+    Parameters
+    ----------
+    recording : Recording
+        As audited.
+    plant : PlantDescription
+        With the effect in it.
+    effect : NamedEffect
+    jobs : int
+        Processes side by side.
+
+    Returns
+    -------
+    NextExperiment or None
+        None where there is no rival that could be fitted, or no motion separates them.
+    """
+    plants = {effect.id: plant} | {
+        rival: fitted
+        for rival in effect.alternatives[:MOST_RIVALS - 1]
+        if (fitted := rival_plant(recording, plant, effect, rival)) is not None
+    }
+    if len(plants) < 2:
+        return None
+    motions = safe_family(recording, list(plants.values()), effect.joint)
+
+    def smallest(waveform: Waveform) -> float:
+        imagined = {name: imagine(p, waveform) for name, p in plants.items()}
+        return min(
+            distance(imagined[a], plants[b], effect.joint) for a, b in permutations(plants, 2))
+
+    found = parallel_map(smallest, motions, jobs)
+    distances = {m.name: d for m, d in zip(motions, found, strict=True)}
+    best = motions[int(np.argmax(found))]
+    columns = np.zeros((len(best.time), len(JOINTS)))
+    columns[:, JOINTS.index(best.joint)] = best.angle
+    rivals = ' and '.join(plants)
+    return NextExperiment(
+        f'{best.name.capitalize()} of {best.joint} would tell {rivals} apart: there their '
+        f'predictions differ by {distances[best.name]:.1f} times the noise at least, after each '
+        'has been refitted to the other.',
+        tuple(plants), best.name, best.joint, distances, tuple(map(float, best.time)),
+        tuple((float(row[0]), float(row[1])) for row in columns), JOINTS)
+
+
+def rival_plant(
+    recording: Recording, plant: PlantDescription, effect: NamedEffect, rival: str
+) -> PlantDescription | None:
+    """Fit a rival in an effect's place.
+
+    Parameters
+    ----------
+    recording : Recording
+    plant : PlantDescription
+    effect : NamedEffect
+        Taken out.
+    rival : str
+        Put in.
+
+    Returns
+    -------
+    PlantDescription or None
+        None where the rival has no simulation.
+    """
+    if rival not in CATALOGUE:
+        return None
+    others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
+    bare = replace(plant, effects=others)
+    observation = next(o for o in observe(recording, bare) if o.joint == effect.joint)
+    ranked = promises(refit(bare, observation, 0.2, 2), [rival])
+    if not ranked:
+        return None
+    spec = EffectSpec(rival, effect.joint, ranked[0].start)
+    candidate = replace(bare, effects=(*others, spec))
+    return with_fit(candidate, effect.joint, refit(candidate, observation, 0.2, 6))
+
+
+def safe_family(
+    recording: Recording, plants: Sequence[PlantDescription], joint: str
+) -> list[Waveform]:
+    """List motions that keep every rival within what the rig has been through.
+
+    Parameters
+    ----------
+    recording : Recording
+    plants : sequence of PlantDescription
+        The rivals: whichever is right, the motion must be safe.
+    joint : str
+
+    Returns
+    -------
+    list of Waveform
+    """
+    j = recording.joints.index(joint)
+    gear = plants[0].joints[joint].gear
+    reach = float(np.abs(recording.command.values[:, j]).max()) / gear
+    tension = MARGIN * float(recording.tension.values[recording.tension.valid].max())
+    bending = MARGIN * float(np.abs(recording.bending.values[recording.bending.valid]).max())
+    others = tuple(name for name in recording.joints if name != joint)
+    safe: list[Waveform] = []
+    for full in family(joint, others, reach):
+        for share in (1.0, 0.75, 0.5, 0.3):
+            waveform = replace(full, angle=share * full.angle)
+            if all(is_safe(imagine(p, waveform), tension, bending) for p in plants):
+                safe.append(waveform)
+                break
+    return safe
