@@ -109,7 +109,7 @@ def test_an_effect_shows_from_its_stage_on_and_nowhere_before(name):
     assert not all(quiet.values())
 
 
-@pytest.mark.parametrize('name', sorted(set(EFFECTS) - {'recording_gap', 'torque_limit'}))
+@pytest.mark.parametrize('name', sorted(set(EFFECTS) - {'recording_gap'}))
 def test_a_tenth_of_an_effect_is_less_of_it(name):
     # Same effect, another seed per stratum: compare what a tenth leaves with a generous margin.
     usual = draw_case(7, 'single', 'calibration', effects=(name,), joint=_seen(name))

@@ -27,6 +27,7 @@ COLOURED_SHARE = {
     'foreign': 0.25,
 }
 FIRST_JOINT_SHARE = 0.75
+MOVING = 0.05  # rad/s of the shaft
 
 # The second joint's slow sinusoid never rings.
 NEEDS_FAST_MOTION = frozenset({'joint_inertia', 'rate_limit'})
@@ -152,10 +153,12 @@ def _conceal(
     """Hide the effects one after the other, each drawn for the rig without any of them."""
     for effect in effects:
         index = _joint_of(effect, draft, joint)
+        moving = np.abs(before.shaft_speed[:, index]) > MOVING
+        torque = np.abs(before.torque[moving, index]) if moving.any() else np.zeros(1)
         cells = before.tension[:, 2 * index : 2 * index + 2].max(axis=0)
         peaks = Peaks(
             shaft_speed=float(np.abs(before.shaft_speed[:, index]).max()),
-            torque=float(np.abs(before.torque[:, index]).max()),
+            torque=float(np.quantile(torque, 0.98)),
             tension=(float(cells[0]), float(cells[1])),
             lowest=float(before.bending[:, index].min()),
             highest=float(before.bending[:, index].max()),

@@ -27,7 +27,8 @@ def _rate_limit(s: Setting) -> Comparable:
 
 
 def _torque_limit(s: Setting) -> Comparable:
-    s.put(torque_limit=s.beyond(s.within(0.75, 0.92), s.peaks.torque))
+    # Friction makes the torque nearly constant in motion: a lower limit never lets the joint go.
+    s.put(torque_limit=s.beyond(s.within(0.94, 0.985), s.peaks.torque))
     return {}
 
 

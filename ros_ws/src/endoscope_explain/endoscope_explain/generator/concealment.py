@@ -64,7 +64,8 @@ class Peaks:
     shaft_speed
         rad/s.
     torque
-        N m.
+        N m; not the peak but what is exceeded in a fiftieth of the time in motion: steps and
+        accelerations go beyond.
     tension
         N, of the positive and the negative wire.
     lowest, highest
