@@ -12,7 +12,7 @@ from endoscope_explain.free_parameters import nominal_parameters
 from endoscope_explain.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.rank import Look, look, polish
-from endoscope_explain.score import score
+from endoscope_explain.score import FLOOR_PER_PARAMETER, score
 from endoscope_explain.screen import Promise, promises, with_effect
 
 Array = NDArray[np.float64]
@@ -20,9 +20,9 @@ Flags = NDArray[np.bool_]
 
 AUDITED = frozenset({'recording_gap', 'tracker_outliers'})
 """Effects that lose or replace single samples: the audit finds them, no simulation can."""
-LOOKED_AT = 16
+LOOKED_AT = 14
 """Effects that get a cheap fit, of all that were screened."""
-LOOKED_AT_TWICE = 6
+LOOKED_AT_TWICE = 4
 """Effects of these that get one from their second best start as well."""
 WORTH_POLISHING = 5.0
 """A look is worth a full fit while its cost is below this multiple of the best full fit's."""
@@ -46,6 +46,10 @@ class Composition:
     effects: tuple[str, ...]
     fit: Fit
     score: float
+
+    def floor(self) -> float:
+        """Return the score that this composition would have if nothing but noise were left."""
+        return FLOOR_PER_PARAMETER * len(self.fit.theta)
 
 
 Parent = tuple[Composition, tuple[Fit, ...]]

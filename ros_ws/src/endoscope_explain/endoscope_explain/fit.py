@@ -1,7 +1,6 @@
 """Output-error least squares of one joint: Levenberg-Marquardt with bounds and priors."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +17,8 @@ Flags = NDArray[np.bool_]
 CLOCK_SKEW = CATALOGUE['clock_skew']
 STEP = 1.0e-2
 """Difference step of a coordinate: large against the integrator's error, small against bends."""
+SLOW = 0.2
+"""An approximate derivative is renewed once a step lowers the cost by less than this share."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,6 @@ def fit(
     iterations: int = 8,
     tolerance: float = 1e-3,
     known_jacobian: Array | None = None,
-    stop: Callable[[float], bool] | None = None,
 ) -> Fit:
     """Fit the free parameters of a joint.
 
@@ -167,13 +167,11 @@ def fit(
     weight : array (size,), optional
         Factors on the residuals (at most 1 where an error of form is allowed for).
     iterations : int
-        Largest number of accepted steps.
+        Largest number of steps.
     tolerance : float
         Stop when a step lowers the cost by less than this share.
     known_jacobian : array (size, n), optional
         Used for the first step.
-    stop : callable, optional
-        Called with the cost after each step; ends the fit early when it says so.
 
     Returns
     -------
@@ -190,36 +188,35 @@ def fit(
 
     cost = cost_of(current, theta)
     damping = 1e-4
-    derivative = known_jacobian
+    derivative = jacobian(model, theta, current) if known_jacobian is None else known_jacobian.copy()
+    exact = known_jacobian is None
     for _ in range(iterations):
-        if derivative is None:
-            derivative = jacobian(model, theta, current)
         weighted = derivative * weight[:, None]
         gradient = weighted.T @ (weight * current) + prior_weight * model.prior(theta)
         normal = weighted.T @ weighted + np.diag(prior_weight**2)
         scale = np.maximum(np.diag(normal), 1e-9)
-        accepted = False
-        before = cost
-        for _ in range(6):
+        before, accepted = cost, False
+        for _ in range(6 if exact else 2):
             step = bounded_step(normal + damping * np.diag(scale), gradient, theta, low, high)
+            length = float(step @ step)
+            if length < 1e-14:
+                break
             trial = model.residuals(theta + step)
             trial_cost = cost_of(trial, theta + step)
             if trial_cost < cost:
+                # Broyden's rank-one update saves the simulations of a new derivative.
+                derivative += np.outer((trial - current - derivative @ step) / length, step)
                 theta, current, cost = theta + step, trial, trial_cost
                 damping = max(damping / 10.0, 1e-7)
                 accepted = True
                 break
             damping = max(damping * 10.0, 1e-3)
-        if not accepted:
-            if known_jacobian is not None and derivative is known_jacobian:
-                derivative = None
-                continue
+        gained = before - cost
+        if exact and (not accepted or gained < tolerance * before):
             break
-        if stop is not None and stop(cost):
-            break
-        if before - cost < tolerance * before and damping < 0.1:
-            break
-        derivative = None
-    if derivative is None:
+        exact = gained < SLOW * before
+        if exact:
+            derivative = jacobian(model, theta, current)
+    if not exact:
         derivative = jacobian(model, theta, current)
     return Fit(model, theta, current, derivative, cost)

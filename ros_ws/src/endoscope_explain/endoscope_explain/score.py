@@ -18,6 +18,8 @@ EFFECTIVE_SAMPLES = 100.0
 """Independent samples that a channel's correlated misfit is worth over a recording."""
 PARAMETER_PRICE = 2.0
 """Score of one more free parameter."""
+FLOOR_PER_PARAMETER = PARAMETER_PRICE + 0.5
+"""Score of a parameter where only noise is left: its price, and its prior on average."""
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,11 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SINGLES_POLISHED = 6
-PAIRS_POLISHED = 4
-BEAM = 2
+PAIRS_POLISHED = 3
+RIVALS = 60.0
+"""Score within which the second best single is worth adding to as well."""
+HOPELESS = 0.1
+"""Where no single effect removes this share of the excess misfit, no second one is tried."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,8 @@ def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = 2) -> JointSearch:
         polished = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
         grown = grow(parents, searchable_effects(), jobs, polished)
         levels.append(tuple(grown))
-        if not grown or is_noise(grown[0].fit):
+        if not grown or is_noise(grown[0].fit) or (
+                grown[0].score > nominal.score - HOPELESS * (nominal.score - grown[0].floor())):
             break
-        parents = [(c, (c.fit,)) for c in grown[:BEAM]]
+        parents = [(c, (c.fit,)) for c in grown[:2] if c.score < grown[0].score + RIVALS]
     return JointSearch(nominal, tuple(levels))

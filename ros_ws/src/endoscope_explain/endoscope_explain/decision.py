@@ -1,0 +1,91 @@
+"""From the compositions tried on one joint to what is said about it."""
+
+from dataclasses import dataclass
+
+from endoscope_explain.compose import Composition
+from endoscope_explain.search import JointSearch
+from endoscope_explain.whiteness import is_noise
+
+NAMED = 20.0
+"""Fall of the score that a first effect must bring; noise alone brings a few."""
+ADDED = 30.0
+"""Fall of the score that a further effect must bring."""
+ADDED_SHARE = 0.2
+"""Share of the fall so far that a further effect must bring: less is an error of form."""
+EXPLAINED = 0.5
+"""Share of the misfit's logarithm that the catalogue must explain to be called adequate."""
+NEARLY_NOISE = 100.0
+"""Score above noise alone at which an error of form needs no further explanation."""
+RIVAL = 25.0
+"""Score within which another effect in the same place cannot be told apart."""
+RIVAL_SHARE = 0.08
+"""The same as a share of the fall that the effect brings: errors of form blur the ranking."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What is said about one joint.
+
+    Attributes
+    ----------
+    chosen : Composition
+        Named effects; none for the nominal plant.
+    adequate : bool
+        Whether the chosen plant leaves noise or a small error of form.
+    explained : float
+        Share of the excess score that the chosen composition removes; 1 where none was there.
+    alternatives : dict of effect id to tuple of str
+        Rivals of each chosen effect, nearest first.
+    margins, gaps : dict of effect id to float
+        Score lost without the effect, and with the best rival in its place.
+    """
+
+    chosen: Composition
+    adequate: bool
+    explained: float
+    alternatives: dict[str, tuple[str, ...]]
+    margins: dict[str, float]
+    gaps: dict[str, float]
+
+
+def decide(search: JointSearch) -> Decision:
+    """Choose a composition, judge whether it is adequate, and list its rivals."""
+    nominal = search.nominal
+    chosen = nominal
+    if not is_noise(nominal.fit):
+        for level in search.levels:
+            better = _better(chosen, nominal, level)
+            if better is None:
+                break
+            chosen = better
+    above = nominal.score - nominal.floor()
+    left = chosen.score - chosen.floor()
+    explained = 1.0 if above <= 0.0 or is_noise(chosen.fit) else 1.0 - left / above
+    adequate = is_noise(chosen.fit) or left < NEARLY_NOISE or (
+        bool(chosen.effects) and explained >= EXPLAINED)
+    margins, gaps, alternatives = {}, {}, {}
+    tried = search.tried()
+    for effect_id in chosen.effects:
+        rest = frozenset(chosen.effects) - {effect_id}
+        without = [c.score for c in tried if frozenset(c.effects) == rest]
+        margins[effect_id] = min(without, default=nominal.score) - chosen.score
+        rivals = sorted(
+            (c.score - chosen.score, next(iter(frozenset(c.effects) - rest)))
+            for c in tried
+            if len(c.effects) == len(chosen.effects) and rest < frozenset(c.effects)
+            and effect_id not in c.effects)
+        gaps[effect_id] = rivals[0][0] if rivals else margins[effect_id]
+        reach = max(RIVAL, RIVAL_SHARE * margins[effect_id])
+        alternatives[effect_id] = tuple(name for gap, name in rivals if gap < reach)
+    return Decision(chosen, adequate, explained, alternatives, margins, gaps)
+
+
+def _better(
+    chosen: Composition, nominal: Composition, level: tuple[Composition, ...]
+) -> Composition | None:
+    so_far = nominal.score - chosen.score
+    needed = max(ADDED, ADDED_SHARE * so_far) if chosen.effects else NAMED
+    for candidate in level:
+        if candidate.score < chosen.score - needed:
+            return candidate
+    return None

@@ -1,0 +1,53 @@
+"""How well a fitted joint predicts blocks of samples that the fit has not seen."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_explain.explanation import ChannelFit
+from endoscope_explain.fit import Fit, fit
+from endoscope_explain.observation import JointObservation
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+BLOCK_S = 2.0
+EVERY = 4
+GAP_S = 0.2
+"""Left out on both sides of a held-out block, for the memory of wires and tracker."""
+REFIT_STEPS = 2
+
+
+def held_out_masks(observation: JointObservation) -> tuple[Mask, Mask]:
+    """Samples to judge on and samples to fit on, over all channels in a row (size,) each."""
+    time = np.concatenate([channel.time for channel in observation.channels])
+    phase = np.mod(time, BLOCK_S * EVERY)
+    judged = phase >= BLOCK_S * (EVERY - 1)
+    near = judged | (phase >= BLOCK_S * (EVERY - 1) - GAP_S) | (phase < GAP_S)
+    return judged, ~near
+
+
+def held_out_fit(final: Fit) -> dict[str, ChannelFit]:
+    """Refit without the held-out blocks and return the fit of every signal on them.
+
+    A recording without a whole held-out block is judged on all its samples.
+    """
+    judged, used = held_out_masks(final.model.observation)
+    if not judged.any():
+        return on_samples(final.model.observation, final.residuals, np.ones_like(judged))
+    again = fit(final.model, final.theta, weight=used.astype(float), iterations=REFIT_STEPS,
+                known_jacobian=final.jacobian)
+    return on_samples(final.model.observation, again.residuals, judged)
+
+
+def on_samples(
+    observation: JointObservation, residuals: Array, judged: Mask
+) -> dict[str, ChannelFit]:
+    """Return rmse and noise of every signal on the judged samples (size,)."""
+    result = {}
+    for channel, part in zip(observation.channels, observation.slices(), strict=True):
+        use = judged[part]
+        use = use if use.any() else np.ones_like(use)
+        error = residuals[part][use] * channel.noise[use]
+        result[channel.signal] = ChannelFit(
+            float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(channel.noise[use]**2))))
+    return result
