@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from diagnostic_msgs.msg import DiagnosticArray
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -107,11 +106,11 @@ class CalibrationNode(EndoscopeNode):
         )
         self._results = self.create_publisher(DiagnosticArray, CALIBRATION_RESULT, RESULT)
         self._state = StateWatch(self, self.ticker, self._on_state)
-        self._shafts = LatestJointState(self, MOTOR_MEASURED, MOTORS, SENSOR_ASKED)
-        self._streams = [
-            StreamWatch(self, self.ticker, JointState, topic, SENSOR_ASKED)
-            for topic in (MOTOR_MEASURED, WIRES_MEASURED)
-        ]
+        self._motors = StreamWatch(self.ticker, MOTOR_MEASURED)
+        self._shafts = LatestJointState(
+            self, MOTOR_MEASURED, MOTORS, SENSOR_ASKED, self._motors.note
+        )
+        self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
         JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
         JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_bending, SENSOR_ASKED)
         self.create_subscription(String, STATE_COMMAND, self._on_state_command, EVENT)
@@ -178,7 +177,7 @@ class CalibrationNode(EndoscopeNode):
     def _trouble(self) -> str:
         if self._guard.trouble:
             return self._guard.trouble
-        for stream in self._streams:
+        for stream in (self._motors, self._wires):
             trouble = stream.trouble(self._timeout_ns)
             if trouble:
                 return trouble
@@ -191,6 +190,7 @@ class CalibrationNode(EndoscopeNode):
     def _on_wires(self, sample: JointSample) -> None:
         if len(sample.effort) != len(WIRES):
             return
+        self._wires.note()
         self._guard.update(sample.effort)
         if self._run is not None:
             self._run.add_tension(sample.stamp_ns, sample.effort)

@@ -86,7 +86,10 @@ class ControllerNode(EndoscopeNode):
         self._forget = False
         self._corrections = JointPublisher(self, CORRECTION, JOINTS, ('position',), COMMAND)
         self._state = StateWatch(self, self.ticker, self._on_state)
-        self._calibration = StreamWatch(self, self.ticker, JointState, CALIBRATION_COMMAND, COMMAND)
+        self._calibration = StreamWatch(self.ticker, CALIBRATION_COMMAND)
+        self.create_subscription(
+            JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True
+        )
         JointSubscription(
             self,
             SLAVE_COMMAND,

@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from rclpy.clock import ClockType, ROSClock
 from rclpy.node import Node
+from rclpy.time import Time
 
 from endoscope_nodes.diagnostics import Diagnostics
 from endoscope_nodes.parameters import declare_parameters
@@ -51,6 +53,16 @@ class EndoscopeNode(Node):
     ) -> P:
         """Declare the parameters of the dataclass ``kind``; see :func:`declare_parameters`."""
         return declare_parameters(self, kind, on_change, check)
+
+    def get_clock(self) -> ROSClock:
+        """Return the node's clock, which in simulated time shows that of the ticker."""
+        clock = super().get_clock()
+        ticker = getattr(self, 'ticker', None)
+        if ticker is not None and ticker.simulated:
+            clock.set_ros_time_override(
+                Time(nanoseconds=ticker.now_ns(), clock_type=ClockType.ROS_TIME)
+            )
+        return clock
 
     def close(self) -> None:
         """Finish what must not be cut off; called once, before the node is destroyed."""

@@ -186,15 +186,31 @@ class JointSubscription:
 
 
 class LatestJointState:
-    """Keeps the newest message of a topic and reads it only when it is wanted."""
+    """Keeps the newest message of a topic and reads it only when it is wanted.
 
-    def __init__(self, node: Node, topic: str, names: Sequence[str], qos: QoSProfile) -> None:
+    Parameters
+    ----------
+    on_message
+        Called at each message.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topic: str,
+        names: Sequence[str],
+        qos: QoSProfile,
+        on_message: Callable[[], None] | None = None,
+    ) -> None:
+        self._on_message = on_message
         self._reader = JointReader(names)
         self._data: bytes | None = None
         node.create_subscription(JointState, topic, self._keep, qos, raw=True)
 
     def _keep(self, data: bytes) -> None:
         self._data = data
+        if self._on_message is not None:
+            self._on_message()
 
     def read(self) -> JointSample | None:
         """Read the newest message, or None while there is none of these joints."""

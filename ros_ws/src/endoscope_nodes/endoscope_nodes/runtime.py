@@ -141,7 +141,6 @@ class Runtime:
         if simulated:
             # rclpy would subscribe each node to /clock, at the price of a node's own work.
             node._time_source.detach_node()
-            self._ticker.follow(node.get_clock())
         return self._ticker
 
     @staticmethod

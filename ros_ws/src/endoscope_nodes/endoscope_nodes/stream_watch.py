@@ -1,28 +1,26 @@
-"""Whether a topic is alive, at the price of a few microseconds a message."""
-
-from rclpy.node import Node
-from rclpy.qos import QoSProfile
+"""Whether a topic is alive."""
 
 from endoscope_nodes.ticker import Ticker
 
 
 class StreamWatch:
-    """Notes when a topic was heard last, without reading its messages.
+    """Notes when a topic was heard last.
 
     Parameters
     ----------
-    kind
-        Message type of the topic.
+    ticker
+        Gives the time.
+    topic
+        Name for its troubles.
     """
 
-    def __init__(self, node: Node, ticker: Ticker, kind: type, topic: str, qos: QoSProfile) -> None:
+    def __init__(self, ticker: Ticker, topic: str) -> None:
         self.topic = topic
         self._ticker = ticker
         self._heard_ns: int | None = None
-        node.create_subscription(kind, topic, self.note, qos, raw=True)
 
-    def note(self, _: bytes) -> None:
-        """Take a message as heard now."""
+    def note(self, _: object = None) -> None:
+        """Take the topic as heard now; fit to be the callback of a raw subscription."""
         self._heard_ns = self._ticker.monotonic_ns()
 
     def trouble(self, timeout_ns: int) -> str:

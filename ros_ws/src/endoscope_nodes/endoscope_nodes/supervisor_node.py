@@ -54,8 +54,11 @@ class SupervisorNode(EndoscopeNode):
         self._last_refusal = ''
         self._said: OperatingState | None = None
         self._states = self.create_publisher(String, OPERATING_STATE, RESULT)
-        self._motor = StreamWatch(self, self.ticker, JointState, MOTOR_MEASURED, SENSOR_ASKED)
-        self._wires = StreamWatch(self, self.ticker, JointState, WIRES_MEASURED, SENSOR_ASKED)
+        self._motor = StreamWatch(self.ticker, MOTOR_MEASURED)
+        self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
+        self.create_subscription(
+            JointState, MOTOR_MEASURED, self._motor.note, SENSOR_ASKED, raw=True
+        )
         JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
         self.create_subscription(String, STATE_COMMAND, self._on_command, EVENT)
         self.diagnostics.add('operating state', self._report)
@@ -79,6 +82,7 @@ class SupervisorNode(EndoscopeNode):
             self._publish()
 
     def _on_wires(self, sample: JointSample) -> None:
+        self._wires.note()
         tension = sample.effort or (math.nan,) * len(WIRES)
         trouble = self._guard.update(tension)
         if trouble:

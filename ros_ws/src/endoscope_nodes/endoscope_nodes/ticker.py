@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.time import Time
 from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock as ClockMessage
 
@@ -50,7 +49,6 @@ class Ticker:
         self.missed = 0
         self._listeners: tuple[TickCallback, ...] = ()
         self._periodic: list[_Periodic] = []
-        self._clocks: list[Clock] = []
         self._sim_ns = 0
         self._last_ns = 0
         self._timer_started = False
@@ -69,10 +67,6 @@ class Ticker:
     def monotonic_ns(self) -> int:
         """Time for ages and watchdogs: the steady clock, or simulated time."""
         return self._sim_ns if self.simulated else time.monotonic_ns()
-
-    def follow(self, clock: Clock) -> None:
-        """Let a node's own clock show the simulated time of this ticker."""
-        self._clocks.append(clock)
 
     def add(self, listener: TickCallback) -> None:
         """Call ``listener(stamp_ns, periods)`` at each beat.
@@ -135,9 +129,6 @@ class Ticker:
             for item in self._periodic:
                 item.due_ns = None
         self._sim_ns = stamp
-        now = Time(nanoseconds=stamp, clock_type=ClockType.ROS_TIME)
-        for clock in self._clocks:
-            clock.set_ros_time_override(now)  # type: ignore[attr-defined]
         self._beat(stamp, periods)
         self._call_periodic(stamp)
 
