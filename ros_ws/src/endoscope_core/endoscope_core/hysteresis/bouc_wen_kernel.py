@@ -40,7 +40,7 @@ def _exact_linear(g: float, rho: float, distance: float) -> float:
     if g < 0.0:
         to_zero = math.log1p(-rho * g) / rho if abs(rho) > 1e-12 else -g
         if distance < to_zero:
-            grown = math.expm1(rho * distance) / rho if abs(rho) > 1e-12 else distance
+            grown = -math.expm1(-rho * distance) / rho if abs(rho) > 1e-12 else distance
             return g + (1.0 - rho * g) * grown
         distance -= to_zero
         g = 0.0

@@ -18,7 +18,7 @@ from endoscope_core.identification.servo_lag import Servo
 from endoscope_core.signals import CALIBRATION_RATE
 
 DEFAULT_FILE = 'bouc_wen_classes.json'
-_SAMPLE_STEP = 5
+_SAMPLE_STEP = 10
 
 
 class ClassParameterError(EndoscopeError, ValueError):

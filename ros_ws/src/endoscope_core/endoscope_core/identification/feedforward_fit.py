@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 _STEP = 0.004
 _RHO = -0.9
+# Parameters rounded for a file must still pass the limit.
+_SLOPE = 0.99 * GREATEST_INVERSE_SLOPE
 _DEG = float(np.pi / 180.0)
 
 
@@ -52,9 +54,10 @@ def fit_feedforward(
     """Choose the parameters of equation 5 for the least tracking error on an identified model.
 
     The search (differential evolution, as for the model) runs over `alpha`, lag and `n` within a
-    box. The steeper the inverse, the better it crosses the dead zone; it is therefore as steep as
-    `BoucWenParameters` allows, and the travel follows from that, so that every candidate is safe by
-    construction. `rho` hardly matters and is kept where the state leaves saturation gently.
+    box. The steeper the inverse, the better it crosses the dead zone; it is therefore nearly as
+    steep as `BoucWenParameters` allows, and the travel follows from that, so that every candidate
+    is safe by construction. `rho` hardly matters and is kept where the state leaves saturation
+    gently.
 
     Parameters
     ----------
@@ -84,7 +87,7 @@ def fit_feedforward(
 
 def _candidate(x: Array) -> BoucWenParameters:
     alpha, lag, n = (float(value) for value in x)
-    travel = lag / (alpha * GREATEST_INVERSE_SLOPE - 1.0)
+    travel = lag / (alpha * _SLOPE - 1.0)
     return BoucWenParameters.from_shape(alpha, lag, travel, _RHO, n)
 
 

@@ -1,6 +1,7 @@
 """The position servo between a command and the motor: second order, as in the nominal plant."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,13 @@ class Servo:
 
     def answer(self, command: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
         """Motor angle (N,) for a command (N,) held for `dt` s each, beginning at rest on it."""
-        w, z = self.bandwidth, self.damping_ratio
-        numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2.0 * z * w, w * w]), dt)
+        numerator, denominator = _filter(self.bandwidth, self.damping_ratio, dt)
         start = command[0]
-        moved: NDArray[np.float64] = lfilter(numerator[0], denominator, command - start)
+        moved: NDArray[np.float64] = lfilter(numerator, denominator, command - start)
         return start + moved
+
+
+@lru_cache
+def _filter(w: float, z: float, dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2.0 * z * w, w * w]), dt)
+    return numerator[0], denominator

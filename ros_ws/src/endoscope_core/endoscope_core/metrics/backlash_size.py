@@ -42,7 +42,12 @@ def width_at_mid_height(desired: ArrayLike, actual: ArrayLike) -> float:
         raise ValueError('the actual angle does not move: there is no loop to measure')
     height = np.ptp(q)
     offset = q - 0.5 * (np.max(q) + np.min(q))
-    rising, falling = _crossings(u, offset, 0.1 * height)
+    band = 0.1 * height
+    if abs(u[-1] - u[0]) <= 0.1 * np.ptp(u) and abs(offset[-1] - offset[0]) <= band:
+        # A closed loop may begin anywhere, even on its way through the middle.
+        turn = -int(np.argmax(np.abs(offset)))
+        u, offset = np.roll(u, turn), np.roll(offset, turn)
+    rising, falling = _crossings(u, offset, band)
     if rising.size == 0 or falling.size == 0:
         raise ValueError(
             'the recording holds no whole loop: the actual angle passes its middle one way only'

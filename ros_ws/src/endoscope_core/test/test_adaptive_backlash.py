@@ -1,0 +1,213 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from endoscope_core.control import (
+    AdaptiveBacklashController,
+    AdaptiveBacklashSettings,
+    TrackerMeasurement,
+)
+from endoscope_core.control.adaptive_backlash_law import (
+    AdaptationState,
+    adapt,
+    learnt_term,
+    robust_term,
+)
+
+TICK = 1e-3
+PERIOD = 25
+
+
+class Rig:
+    """A play with gain, behind a first-order servo, seen by a late tracker at 40 Hz."""
+
+    def __init__(self, half_gap, gain=0.9, tracker_delay=20):
+        self.motor = 0.0
+        self.joint = 0.0
+        self.half_gap = half_gap
+        self.gain = gain
+        self.delay = tracker_delay
+        self.past = []
+
+    def advance(self, command):
+        self.motor += (command - self.motor) * TICK / 0.03
+        reach = self.gain * self.motor
+        self.joint = min(max(self.joint, reach - self.half_gap), reach + self.half_gap)
+
+    def measure(self, tick):
+        self.past.append(self.joint)
+        at = tick - self.delay
+        if tick % PERIOD or at < 0:
+            return None
+        return TrackerMeasurement(at * TICK, [self.past[at]])
+
+
+def drive(controller, rig, ticks, first=0, tracker=True, amplitude=1.0):
+    errors, corrections = [], []
+    for k in range(first, first + ticks):
+        angle, speed = amplitude * math.sin(k * TICK), amplitude * math.cos(k * TICK)
+        measurement = rig.measure(k)
+        correction = controller.step(
+            k * TICK, [angle], [speed], measurement if tracker else None)[0]
+        rig.advance(angle + correction)
+        errors.append(rig.joint - angle)
+        corrections.append(correction)
+    return np.array(errors), np.array(corrections)
+
+
+@pytest.mark.parametrize('half_gap', [0.1, 0.4, 0.7])
+def test_it_learns_a_backlash_of_unknown_size(half_gap):
+    alone, _ = drive(AdaptiveBacklashController(1), Rig(half_gap), 20000)
+    controller = AdaptiveBacklashController(1)
+    controller.activate()
+    helped, _ = drive(controller, Rig(half_gap), 20000)
+    late = slice(13000, None)
+    assert np.std(helped[late]) < 0.25 * np.std(alone[late])
+
+
+def test_it_follows_a_tube_that_changes_shape():
+    controller = AdaptiveBacklashController(1)
+    controller.activate()
+    rig = Rig(0.2)
+    drive(controller, rig, 10000)
+    rig.half_gap = 0.6
+    errors, _ = drive(controller, rig, 20000, first=10000)
+    assert np.std(errors[13000:]) < 0.4 * np.std(errors[:3000])
+
+
+def test_nothing_comes_out_before_it_is_activated():
+    _, corrections = drive(AdaptiveBacklashController(1), Rig(0.4), 3000)
+    assert np.all(corrections == 0.0)
+
+
+def test_it_comes_and_goes_without_a_jump():
+    controller = AdaptiveBacklashController(1)
+    controller.activate()
+    rig = Rig(0.4)
+    _, learning = drive(controller, rig, 14000)
+    controller.deactivate()
+    _, fading = drive(controller, rig, 1500, first=14000)
+    controller.activate()
+    _, returning = drive(controller, rig, 3000, first=15500)
+    assert fading[-1] == 0.0
+    assert np.max(np.abs(returning)) > 0.2
+    joined = np.concatenate([learning[-1:], fading, returning])
+    assert np.max(np.abs(np.diff(joined))) < 0.04
+
+
+def test_a_dying_tracker_freezes_what_was_learnt_and_fades_the_correction():
+    controller = AdaptiveBacklashController(1)
+    controller.activate()
+    rig = Rig(0.4)
+    drive(controller, rig, 14000)
+    drive(controller, rig, 200, first=14000, tracker=False)
+    frozen = controller.estimates
+    _, corrections = drive(controller, rig, 1500, first=14200, tracker=False)
+    assert controller.estimates == frozen
+    assert not controller.tracker_fresh(15.7)
+    assert corrections[-1] == 0.0
+    assert np.max(np.abs(np.diff(corrections))) < 0.04
+
+
+def test_late_measurements_are_compared_with_what_was_desired_then():
+    controller = AdaptiveBacklashController(1)
+    controller.activate()
+    for k in range(3000):
+        angle = math.sin(k * TICK)
+        stamp = (k - 100) * TICK
+        measurement = (
+            TrackerMeasurement(stamp, [math.sin(stamp)]) if k % PERIOD == 0 and k > 200 else None)
+        controller.step(k * TICK, [angle], [math.cos(k * TICK)], measurement)
+    assert abs(controller.estimates[0].backlash) < 1e-6
+    assert abs(controller.estimates[0].gain) < 1e-6
+
+
+@given(st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-50.0, 50.0)), min_size=1, max_size=60))
+def test_the_correction_is_bounded_whatever_the_tracker_says(samples):
+    settings_ = AdaptiveBacklashSettings()
+    controller = AdaptiveBacklashController(1, settings_)
+    controller.activate()
+    for k, (angle, measured) in enumerate(samples):
+        time = 0.025 * (k + 1)
+        correction = controller.step(time, [angle], [0.0], TrackerMeasurement(time, [measured]))
+        assert abs(correction[0]) <= settings_.output_limit
+    estimate = controller.estimates[0]
+    assert abs(estimate.gain) <= settings_.gain_limit
+    assert abs(estimate.backlash) <= settings_.backlash_limit
+    assert 0.0 <= estimate.bound <= settings_.loop_gain * settings_.boundary_layer
+
+
+@pytest.mark.parametrize('measurement', [
+    TrackerMeasurement(0.5, [math.nan]),
+    TrackerMeasurement(0.5, [0.0, 0.0]),
+    TrackerMeasurement(0.3, [0.0]),
+    TrackerMeasurement(9.0, [0.0]),
+    TrackerMeasurement(math.nan, [0.0]),
+])
+def test_an_unusable_measurement_is_counted_and_ignored(measurement):
+    controller = AdaptiveBacklashController(1)
+    controller.activate()
+    controller.step(0.4, [0.1], [0.0], TrackerMeasurement(0.4, [0.2]))
+    before = controller.estimates
+    controller.step(0.6, [0.1], [0.0], measurement)
+    assert controller.refused == 1
+    assert controller.estimates == before
+
+
+@pytest.mark.parametrize('inputs', [
+    (0.1, [0.0], [0.0]), (math.nan, [0.0], [0.0]), (0.3, [math.inf], [0.0]), (0.3, [0.0], []),
+])
+def test_bad_input_is_refused(inputs):
+    controller = AdaptiveBacklashController(1)
+    controller.step(0.2, [0.0], [0.0])
+    with pytest.raises(ValueError, match='must'):
+        controller.step(*inputs)
+    controller.step(0.21, [0.0], [0.0])
+
+
+def test_settings_that_close_an_algebraic_loop_are_refused():
+    with pytest.raises(ValueError, match='loop_gain'):
+        AdaptiveBacklashSettings(loop_gain=1.0)
+    with pytest.raises(ValueError, match='boundary_layer'):
+        AdaptiveBacklashSettings(boundary_layer=0.0)
+
+
+@given(
+    st.floats(0.5, 1.5), st.floats(-0.3, 0.3), st.floats(-0.5, 0.5), st.floats(0.0, 0.03),
+    st.integers(0, 2**31))
+def test_the_lyapunov_function_does_not_rise(gain, true_gain, true_backlash, rest, seed):
+    """The argument of the docstring, on the map that it is made for, to first order in dt."""
+    c = AdaptiveBacklashSettings(
+        leakage=0.0, bound_leakage=0.0, error_limit=10.0, integral_limit=10.0, gain_limit=10.0,
+        backlash_limit=10.0)
+    generator = np.random.default_rng(seed)
+    dt = 1e-5
+    state = AdaptationState(
+        gain=generator.uniform(-0.3, 0.3), backlash=generator.uniform(-0.5, 0.5),
+        bound=generator.uniform(0.0, 0.9) * c.loop_gain * c.boundary_layer,
+        integral=generator.uniform(-0.02, 0.02))
+
+    def value(s):
+        squares = ((s.gain - true_gain) ** 2 / c.gain_rate
+                   + (s.backlash - true_backlash) ** 2 / c.backlash_rate
+                   + (s.bound - rest) ** 2 / c.bound_rate)
+        return 0.5 * gain * squares + 0.5 * s.integral**2 / c.integral_weight
+
+    for _ in range(20):
+        theta, s = generator.uniform(-1.5, 1.5), generator.uniform(-1.0, 1.0)
+        eta = gain * rest * generator.uniform(-1.0, 1.0)
+        mismatch = (state.gain - true_gain) * theta + (state.backlash - true_backlash) * s
+        error = gain * mismatch + eta
+        for _ in range(60):  # the algebraic loop through tanh, a contraction for loop_gain < 1
+            surface = error + state.integral
+            now = AdaptationState(bound=state.bound, surface=surface)
+            error = gain * (mismatch + robust_term(c, now)) + eta
+        assert learnt_term(state, theta, s) - true_gain * theta - true_backlash * s == (
+            pytest.approx(mismatch))
+        after = adapt(c, state, error, theta, s, dt)
+        allowed = 0.2785 * c.boundary_layer * gain * state.bound - error**2
+        assert value(after) - value(state) <= dt * allowed + 1e-7 * dt + 50.0 * dt**2
+        state = after

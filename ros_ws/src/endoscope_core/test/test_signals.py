@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+
+from endoscope_core.signals import (
+    CALIBRATION_RATE,
+    CALIBRATION_RECORD_DURATION,
+    CALIBRATION_SAMPLES,
+    MOTIONS,
+    calibration_sinusoid,
+    hold,
+    motion_by_name,
+    move,
+    non_periodic_signal,
+    periodic_signal,
+    sequence,
+    sum_of_sines,
+)
+
+
+@pytest.mark.parametrize('name', MOTIONS)
+def test_velocity_is_the_slope_of_the_angle(name):
+    motion = motion_by_name(name)
+    step = 1e-4
+    time = np.arange(0.0, motion.duration, 0.0101)
+    ahead, _ = motion.sample(np.clip(time + step, 0.0, motion.duration))
+    behind, _ = motion.sample(np.clip(time - step, 0.0, motion.duration))
+    width = np.clip(time + step, 0.0, motion.duration) - np.clip(time - step, 0.0, motion.duration)
+    _, velocity = motion.sample(time)
+    np.testing.assert_allclose((ahead - behind) / width[:, None], velocity, atol=5e-3)
+
+
+@pytest.mark.parametrize('name', MOTIONS)
+def test_motion_starts_and_ends_at_rest_at_zero_and_holds_there(name):
+    motion = motion_by_name(name)
+    for when in (-1.0, 0.0, motion.duration, motion.duration + 1.0):
+        angle, velocity = motion.sample(when)
+        np.testing.assert_allclose(angle, 0.0, atol=1e-9)
+        np.testing.assert_allclose(velocity, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize('name', MOTIONS)
+def test_motion_is_one_that_a_rig_can_follow(name):
+    motion = motion_by_name(name)
+    time = np.arange(0.0, motion.duration, 0.001)
+    angle, velocity = motion.sample(time)
+    assert np.max(np.abs(angle)) <= np.deg2rad(90.01)
+    assert np.max(np.abs(velocity)) < 22.0
+    assert np.max(np.abs(np.diff(angle, axis=0))) < 0.022
+
+
+def test_calibration_is_the_papers_sinusoid_once_begun():
+    signal = calibration_sinusoid()
+    time = np.linspace(0.5, CALIBRATION_RECORD_DURATION - 1e-9, 500)
+    angle, velocity = signal(time)
+    np.testing.assert_allclose(angle, np.deg2rad(90.0) * np.sin(time))
+    np.testing.assert_allclose(velocity, np.deg2rad(90.0) * np.cos(time), atol=1e-6)
+    assert signal.steady[1] - signal.steady[0] == pytest.approx(2.0 * np.pi)
+    assert CALIBRATION_SAMPLES == round(CALIBRATION_RATE * CALIBRATION_RECORD_DURATION)
+    assert signal.duration < 11.0
+
+
+def test_papers_signals_have_their_form_while_steady():
+    time = np.linspace(*periodic_signal().steady, 300)
+    np.testing.assert_allclose(periodic_signal()(time)[0], np.deg2rad(60.0) * np.sin(time))
+    time = np.linspace(*non_periodic_signal().steady, 300)
+    expected = np.deg2rad(30.0) * (np.sin(time) + np.sin(np.sqrt(3.0) * time))
+    np.testing.assert_allclose(non_periodic_signal()(time)[0], expected, atol=1e-12)
+
+
+def test_commissioning_moves_one_joint_alone_first():
+    motion = motion_by_name('commissioning')
+    angle, _ = motion.sample(np.arange(0.0, 0.4 * motion.duration, 0.01))
+    assert np.ptp(angle[:, 0]) > 1.0
+    assert np.ptp(angle[:, 1]) == 0.0
+
+
+def test_scalar_time_gives_scalars():
+    angle, velocity = periodic_signal()(2.0)
+    assert angle.shape == velocity.shape == ()
+
+
+def test_a_jump_between_pieces_is_refused():
+    with pytest.raises(ValueError, match='jumpy: hold begins'):
+        sequence('jumpy', [move(0.0, 1.0, 1.0), hold(1.0)])
+
+
+def test_a_signal_without_steady_part_is_refused():
+    with pytest.raises(ValueError, match='too short'):
+        sum_of_sines('brief', [(1.0, 1.0)], 2.0)
+
+
+def test_an_unknown_motion_names_the_nearest():
+    with pytest.raises(ValueError, match="nearest is 'periodic'"):
+        motion_by_name('periodik')
