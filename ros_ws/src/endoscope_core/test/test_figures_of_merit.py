@@ -15,7 +15,7 @@ def play(angle, half_gap):
 
 
 TIME = np.arange(0.0, 4.0 * np.pi, 0.002)
-SETTLED = TIME >= 2.0 * np.pi
+SETTLED = 2.0 * np.pi <= TIME
 
 
 @given(st.floats(0.01, 0.6), st.floats(1.0, 2.0))

@@ -55,7 +55,7 @@ def test_calibration_is_the_papers_sinusoid_once_begun():
     np.testing.assert_allclose(angle, np.deg2rad(90.0) * np.sin(time))
     np.testing.assert_allclose(velocity, np.deg2rad(90.0) * np.cos(time), atol=1e-6)
     assert signal.steady[1] - signal.steady[0] == pytest.approx(2.0 * np.pi)
-    assert CALIBRATION_SAMPLES == round(CALIBRATION_RATE * CALIBRATION_RECORD_DURATION)
+    assert round(CALIBRATION_RATE * CALIBRATION_RECORD_DURATION) == CALIBRATION_SAMPLES
     assert signal.duration < 11.0
 
 
