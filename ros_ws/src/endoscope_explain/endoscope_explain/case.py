@@ -91,7 +91,7 @@ class ExplainedCase:
         Of engine and audit together, most certain first.
     places : tuple of Place
     plant : PlantDescription
-        The improved plant.
+        The improved plant: the engine's augmented one with what the audit found in it.
     ladder : Ladder
         On held-out blocks of the recording.
     validation : Ladder

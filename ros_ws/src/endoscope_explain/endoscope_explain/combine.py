@@ -1,11 +1,14 @@
 """Engine's and audit's findings in one verdict."""
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 from endoscope_core.effects import CATALOGUE
 from endoscope_core.plant import EffectSpec, PlantDescription
 from endoscope_explain.audit import AuditReport, Finding
-from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
+from endoscope_explain.explain_recording import CHANGED
+from endoscope_explain.explanation import Explanation, NamedEffect, NominalEstimate, Verdict
 
 AUDITED_EFFECTS = {
     'recording_gap': (
@@ -26,6 +29,9 @@ AUDITED_EFFECTS = {
     ),
 }
 """Equation and source of what the audit itself can name."""
+
+LASTING = ('clock_skew', 'load_cell_saturation')
+"""What a rig will show again; gaps and wrong samples are this recording's alone."""
 
 PHYSICAL = ('actuator', 'transmission', 'joint')
 
@@ -76,14 +82,36 @@ def improved_plant(explanation: Explanation, audit: AuditReport) -> PlantDescrip
     present = {(e.id, e.joint) for e in plant.effects}
     added = []
     for finding in audit.faults():
-        definition = CATALOGUE.get(finding.id)
-        if definition is None or (finding.id, finding.joint) in present:
+        if finding.id not in LASTING or (finding.id, finding.joint) in present:
             continue
+        definition = CATALOGUE[finding.id]
         names = {parameter.name for parameter in definition.parameters}
         values = {n: e.value for n, e in finding.parameters.items() if n in names}
         added.append(EffectSpec(finding.id, finding.joint, values))
         present.add((finding.id, finding.joint))
     return replace(plant, effects=plant.effects + tuple(added))
+
+
+def changed_parameters(
+    estimates: Mapping[str, NominalEstimate]
+) -> dict[str, NominalEstimate]:
+    """Return the parameters whose intervals exclude their described values, largest change first.
+
+    Parameters
+    ----------
+    estimates : mapping of str to NominalEstimate
+
+    Returns
+    -------
+    dict of str to NominalEstimate
+    """
+    changed = {
+        name: e for name, e in estimates.items()
+        if e.nominal > 0.0 and e.value > 0.0 and not e.low <= e.nominal <= e.high
+        and abs(math.log(e.value / e.nominal)) > CHANGED
+    }
+    return dict(sorted(
+        changed.items(), key=lambda item: -abs(math.log(item[1].value / item[1].nominal))))
 
 
 def _effect_of(finding: Finding) -> NamedEffect:

@@ -8,15 +8,17 @@ from pathlib import Path
 from endoscope_bags.errors import BagError
 from endoscope_core.plant import PlantDescription
 from endoscope_explain.audit import AuditReport, audit_recording
-from endoscope_explain.case import ExplainedCase, Place
+from endoscope_explain.case import ExplainedCase, NextExperiment, Place
 from endoscope_explain.combine import combined_effects, combined_verdict, improved_plant
 from endoscope_explain.explanation import Explanation, Verdict
+from endoscope_explain.ladder import ladders
 from endoscope_explain.locate.locating import (
     locate_effects,
     locate_findings,
     locate_parameters,
     locate_unknown,
 )
+from endoscope_explain.next_experiment.proposal import propose
 from endoscope_explain.recording import Recording, plant_of_joints, recording_from_bag
 
 Progress = Callable[[str], None]
@@ -105,7 +107,8 @@ def read_inputs(sources: Sources) -> Inputs:
 
 
 def explain_case(
-    inputs: Inputs, engine: Engine, *, jobs: int = 2, progress: Progress | None = None
+    inputs: Inputs, engine: Engine, *, jobs: int = 2, progress: Progress | None = None,
+    extras: bool = True,
 ) -> ExplainedCase:
     """Explain a recording.
 
@@ -118,6 +121,8 @@ def explain_case(
         Processes side by side.
     progress : callable, optional
         Told in a few words what is being done.
+    extras : bool
+        Whether to train the black boxes and to look for the next experiment.
 
     Returns
     -------
@@ -134,8 +139,27 @@ def explain_case(
     plant = improved_plant(explanation, audit)
     case = ExplainedCase(
         audit.recording, audit, explanation, combined_verdict(explanation, audit),
-        combined_effects(explanation, audit), (), plant, explanation.fit)
-    return replace(case, places=_places(case), runtime_s=time.monotonic() - begun)
+        combined_effects(explanation, audit), (), plant, {},
+        validation_name='' if inputs.validation is None else inputs.validation.name,
+        baseline_name='' if inputs.baseline is None else inputs.baseline.name)
+    case = replace(case, places=_places(case))
+    if extras:
+        # Before the black boxes, whose libraries start threads: a fork is not safe after that.
+        case = replace(case, next_experiment=_next(case, jobs, tell))
+    tell('judging beside black boxes' if extras else 'judging')
+    held_out, second = ladders(audit.recording, explanation, inputs.validation, extras)
+    return replace(
+        case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
+
+
+def _next(case: ExplainedCase, jobs: int, tell: Progress) -> NextExperiment | None:
+    for effect in case.effects:
+        if effect.alternatives:
+            tell(f'looking for the motion that tells {effect.id} from its rivals')
+            found = propose(case.recording, case.explanation.augmented, effect, jobs)
+            if found is not None:
+                return found
+    return None
 
 
 def _places(case: ExplainedCase) -> tuple[Place, ...]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from endoscope_core.plant import PlantDescription
 from endoscope_core.plant.kernel import OUTPUTS, run_joints
 from endoscope_core.plant.packing import pack, rest_state
+from endoscope_core.plant.recording import recording_faults
 from endoscope_explain.evaluate import SUBSTEPS
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.observation import TICK, JointObservation, observe
@@ -57,9 +58,8 @@ class RecordedView:
     observations : tuple of JointObservation
     signals : mapping of str to SignalView
         By name, joint after joint.
-    command, shaft, bending : mapping of joint to array (N,)
-        Command, measured motor (predicted where it was not recorded) and predicted bending angle
-        by the last plant given, joint-equivalent rad on 1 ms ticks.
+    outputs : mapping of joint to array (N, OUTPUTS)
+        What the last plant given predicts on 1 ms ticks.
     begin : float
         First command's stamp in s from the recording's first stamp.
     """
@@ -143,6 +143,7 @@ def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> Record
     observations = observe(recording, best)
     begin = float(recording.command.time[0])
     simulated = {name: simulate_rig(observations, plant) for name, plant in plants.items()}
+    skews = {name: recording_faults(plant).skew for name, plant in plants.items()}
     outputs = simulated[list(plants)[-1]]
     lead = reading_lead(observations, outputs)
     signals = {}
@@ -151,13 +152,15 @@ def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> Record
             signals[channel.signal] = SignalView(
                 channel.signal, observation.joint, channel.quantity, channel.unit,
                 channel.time + begin, channel.value, channel.noise,
-                {name: channel.predicted(out[j], lead) for name, out in simulated.items()})
+                {name: channel.predicted(
+                    out[j], lead, skews[name] if channel.quantity == 'bending' else 0.0)
+                 for name, out in simulated.items()})
     by_joint = {o.joint: outputs[j] for j, o in enumerate(observations)}
     return RecordedView(observations, signals, by_joint, begin)
 
 
 def rung(recorded: RecordedView, name: str) -> dict[str, ChannelFit]:
-    """Return rmse and noise of every signal under one of the plants of a view."""
+    """Return rmse and noise of every signal, on all samples, under one of a view's plants."""
     return {
         signal: ChannelFit(
             float(np.sqrt(np.mean((v.measured - v.predicted[name]) ** 2))),

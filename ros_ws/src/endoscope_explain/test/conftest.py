@@ -85,4 +85,4 @@ def stribeck_case(stribeck_recording):
         Verdict.MISSING_PHYSICS, (effect,), parameters, plant, plant, augmented,
         {name: rung(recorded, name) for name in ('nominal', 'refitted', 'augmented')})
     inputs = Inputs(plant, audit, None, None)
-    return explain_case(inputs, lambda *_, **__: explanation)
+    return explain_case(inputs, lambda *_, **__: explanation, extras=False)

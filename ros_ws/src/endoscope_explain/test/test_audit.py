@@ -99,6 +99,11 @@ def test_a_frozen_cell_is_found_and_not_judged(sound):
     assert report.recording.tension.valid.sum() == values.size - 399
 
 
+def test_a_coarse_tracker_that_stands_still_with_the_rig_is_no_fault(sound):
+    coarse = np.round(sound.bending.values / 0.03) * 0.03
+    assert named(sound.with_series({'bending': changed(sound.bending, values=coarse)})) == {}
+
+
 def test_clipping_is_named_with_wire_and_limit(sound):
     values = np.minimum(sound.tension.values, np.array([np.inf, 9.0])[None, None, :])
     values[:, 1] = sound.tension.values[:, 1]

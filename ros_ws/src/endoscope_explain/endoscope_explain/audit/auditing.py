@@ -132,7 +132,8 @@ def _audited_tension(
                 findings.append(saturation_finding(
                     joint, signal, series.time, at_limit, limit, sensors.load_cell_resolution,
                     wire))
-            repeated, _ = held(values, sensors.load_cell_noise, sensors.load_cell_resolution)
+            repeated, _ = held(
+                values, sensors.load_cell_noise, sensors.load_cell_resolution, interval)
             repeated &= ~at_limit
             if repeated.any():
                 findings.append(held_finding(
@@ -151,7 +152,7 @@ def _audited_bending(
     for j, joint in enumerate(recording.joints):
         signal = signal_name('bending', joint)
         values = series.values[:, j]
-        repeated, _ = held(values, plant.sensors.tracker_noise, 0.0)
+        repeated, _ = held(values, plant.sensors.tracker_noise, 0.0, interval)
         if repeated.any():
             findings.append(held_finding(
                 joint, signal, series.topic, series.time, repeated, interval))

@@ -10,6 +10,10 @@ from endoscope_explain.recording.series import Array, Mask
 
 Indices = NDArray[np.int64]
 
+COARSE = 0.1
+"""Share of repeated readings from which on a sensor is coarser than its noise."""
+COARSE_HOLD_S = 1.0
+
 
 def runs_of_equal(values: Array) -> tuple[Indices, Indices]:
     """Return starts and lengths of the runs of equal consecutive values of a 1-D array."""
@@ -24,7 +28,9 @@ def chance_of_repeat(noise: float, resolution: float) -> float:
     return min(1.0, resolution / (2.0 * noise * math.sqrt(math.pi)))
 
 
-def held(values: Array, noise: float, resolution: float) -> tuple[Mask, int]:
+def held(
+    values: Array, noise: float, resolution: float, interval: float
+) -> tuple[Mask, int]:
     """Find samples that repeat the one before for longer than chance allows.
 
     Parameters
@@ -32,6 +38,8 @@ def held(values: Array, noise: float, resolution: float) -> tuple[Mask, int]:
     values : array (N,)
     noise, resolution : float
         Noise (rms) and step of the sensor, in the values' unit.
+    interval : float
+        Between samples in s.
 
     Returns
     -------
@@ -42,12 +50,16 @@ def held(values: Array, noise: float, resolution: float) -> tuple[Mask, int]:
     """
     starts, lengths = runs_of_equal(values)
     period = int(np.median(lengths))
-    chance = max(chance_of_repeat(noise, resolution), 1e-3)
+    usual = float(np.mean(lengths > 1))
+    chance = max(chance_of_repeat(noise, resolution), usual, 1e-3)
     if chance > 0.5:
         return np.zeros(len(values), bool), 1
     # A run this long turns up by chance in fewer than one recording in ten thousand.
     bound = math.ceil(math.log(1e-4 / len(values)) / math.log(chance)) + 1
     bound = max(bound, 4 * period, 3)
+    if usual > COARSE:
+        # This sensor is coarser than described: it may stand still for as long as the rig does.
+        bound = max(bound, math.ceil(COARSE_HOLD_S / interval))
     repeated = np.zeros(len(values), bool)
     for start, length in zip(starts, lengths, strict=True):
         if length >= bound:

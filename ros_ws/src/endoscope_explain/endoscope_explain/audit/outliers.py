@@ -131,7 +131,7 @@ def outlier_finding(
         'deg rms',
         'wrong samples are not judged',
         parameters={
-            'share': Estimate(share, max(share - spread, 0.0), share + spread, '-'),
+            'rate': Estimate(share, max(share - spread, 0.0), share + spread, '-'),
             'size_rad': Estimate(typical, float(size.min()), float(size.max()), 'rad'),
         },
         evidence={'count': float(count)},

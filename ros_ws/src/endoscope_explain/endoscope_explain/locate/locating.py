@@ -6,6 +6,7 @@ from dataclasses import replace
 from endoscope_core.plant import PlantDescription
 from endoscope_explain.audit import AuditReport, Finding
 from endoscope_explain.case import Place
+from endoscope_explain.combine import changed_parameters
 from endoscope_explain.explanation import Explanation, NamedEffect
 from endoscope_explain.locate.band import band_hz
 from endoscope_explain.locate.conditions import conditions, drive
@@ -82,14 +83,14 @@ def locate_unknown(
 
 
 def locate_parameters(recording: Recording, explanation: Explanation) -> list[Place]:
-    """Say where parameters that left their band show, stage by stage."""
+    """Say where parameters that changed show, stage by stage."""
     recorded = view(
         recording, {'nominal': explanation.nominal, 'refitted': explanation.refitted})
     found = excess_between(list(recorded.signals.values()), 'nominal', 'refitted')
     stages: Mapping[tuple[str, str], float] = {
         (STAGE_OF_PARAMETER[name], joint): 0.0
         for joint, estimates in explanation.parameters.items()
-        for name, e in estimates.items() if not e.in_band
+        for name in changed_parameters(estimates)
     }
     return [
         place(recording, explanation.refitted, found, stage, joint) for stage, joint in stages

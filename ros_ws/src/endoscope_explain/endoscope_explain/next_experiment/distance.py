@@ -1,10 +1,10 @@
 """How far apart two rivals' predictions stay, each refitted to the other's."""
 
 import numpy as np
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription
 from numpy.typing import NDArray
 
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription
 from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.fit import Fit, JointModel, fit
 from endoscope_explain.free_parameters import LEAD, effect_parameters, nominal_parameters

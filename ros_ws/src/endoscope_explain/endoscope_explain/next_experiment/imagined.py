@@ -1,9 +1,9 @@
 """Recordings that were never made: what a plant would answer to a motion."""
 
 import numpy as np
-from endoscope_core.plant import PlantDescription, simulate
 from numpy.typing import NDArray
 
+from endoscope_core.plant import PlantDescription, simulate
 from endoscope_explain.next_experiment.waveforms import Waveform
 from endoscope_explain.observation import TICK
 from endoscope_explain.recording import Recording, Series

@@ -10,11 +10,11 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
+from numpy.typing import NDArray
+
 from endoscope_core.effects import CATALOGUE
 from endoscope_core.plant import EffectSpec, PlantDescription
 from endoscope_core.signals.command_file import JOINTS
-from numpy.typing import NDArray
-
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.next_experiment.distance import distance, refit, with_fit

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from endoscope_core.signals import Signal, hold, move, sequence
 from endoscope_core.signals.commissioning import chirp, multisine, steps_with_holds, triangle
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

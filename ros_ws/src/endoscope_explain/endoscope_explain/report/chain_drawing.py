@@ -32,10 +32,11 @@ def chain_svg(guilty: Mapping[str, Sequence[str]]) -> str:
     width = len(STAGES) * BOX + (len(STAGES) - 1) * GAP + 4
     below = max((len(words) for words in guilty.values()), default=0) * LINE + 10
     parts = [
-        f'<svg viewBox="0 0 {width} {TOP + HEIGHT + below}" role="img" '
-        'aria-label="chain from command to recording" font-family="system-ui, sans-serif">',
-        '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" '
-        'markerHeight="7" orient="auto"><path d="M0 0 L8 4 L0 8 z" fill="#627180"/></marker></defs>',
+        (f'<svg viewBox="0 0 {width} {TOP + HEIGHT + below}" role="img" '
+         'aria-label="chain from command to recording" font-family="system-ui, sans-serif">'),
+        ('<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" '
+         'markerHeight="7" orient="auto"><path d="M0 0 L8 4 L0 8 z" fill="#627180"/></marker>'
+         '</defs>'),
     ]
     for index, stage in enumerate(STAGES):
         x = 2 + index * (BOX + GAP)
@@ -56,12 +57,12 @@ def _box(stage: str, x: float, words: Sequence[str] | None) -> str:
     soft = '#ffe9e6' if marked else '#627180'
     middle = x + BOX / 2
     parts = [
-        f'<rect x="{x}" y="{TOP}" width="{BOX}" height="{HEIGHT}" rx="8" fill="{fill}" '
-        f'stroke="{edge}" stroke-width="1.4"/>',
-        f'<text x="{middle}" y="{TOP + 27}" text-anchor="middle" font-size="15" '
-        f'font-weight="600" fill="{ink}">{escape(title)}</text>',
-        f'<text x="{middle}" y="{TOP + 46}" text-anchor="middle" font-size="11.5" '
-        f'fill="{soft}">{escape(detail)}</text>',
+        (f'<rect x="{x}" y="{TOP}" width="{BOX}" height="{HEIGHT}" rx="8" fill="{fill}" '
+         f'stroke="{edge}" stroke-width="1.4"/>'),
+        (f'<text x="{middle}" y="{TOP + 27}" text-anchor="middle" font-size="15" '
+         f'font-weight="600" fill="{ink}">{escape(title)}</text>'),
+        (f'<text x="{middle}" y="{TOP + 46}" text-anchor="middle" font-size="11.5" '
+         f'fill="{soft}">{escape(detail)}</text>'),
     ]
     for line, text in enumerate(words or ()):
         y = TOP + HEIGHT + (line + 1) * LINE + 2

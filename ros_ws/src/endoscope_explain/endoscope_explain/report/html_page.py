@@ -52,7 +52,7 @@ def html_page(case: ExplainedCase) -> str:
     explanation = case.explanation
     recorded = view(case.recording, {
         'nominal': explanation.nominal, 'refitted': explanation.refitted,
-        'augmented': case.plant})
+        'augmented': explanation.augmented})
     joint = _joint_of_interest(case, recorded)
     j = case.recording.joints.index(joint)
     gear = explanation.nominal.joints[joint].gear
@@ -71,7 +71,8 @@ def html_page(case: ExplainedCase) -> str:
         timeline_svg=timeline_figure(recorded, command, joint, case.places),
         loops_svg=loops_figure(recorded, command, joint, passage),
         signals_svg=signals_figure(recorded, joint, passage),
-        ladder_svg=ladder_figure(case.ladder), tables=_tables(case, recorded),
+        ladder_svg=ladder_figure(case.ladder) if case.ladder['nominal'] else '',
+        tables=_tables(case, recorded),
         parameters_svg=parameters_figure(explanation.parameters) if explanation.parameters else '',
         candidates=_candidates(case), experiment=experiment,
         experiment_svg=experiment_figure(experiment) if experiment else '',

@@ -2,6 +2,7 @@
 
 from endoscope_core.effects import CATALOGUE
 from endoscope_explain.case import ExplainedCase, Ladder
+from endoscope_explain.combine import changed_parameters
 from endoscope_explain.explanation import NamedEffect, Verdict
 
 HEADLINES = {
@@ -22,6 +23,8 @@ def worst_ratio(ladder: Ladder, rung: str) -> float:
 
 def verdict_sentence(case: ExplainedCase) -> str:
     """Say in one sentence what was found and how much better the improved plant predicts."""
+    if case.verdict is Verdict.INSUFFICIENT_DATA:
+        return 'The rig moves too little, or too little was recorded, to tell causes apart.'
     before = worst_ratio(case.ladder, 'nominal')
     after = worst_ratio(case.ladder, 'augmented')
     better = (
@@ -35,8 +38,6 @@ def verdict_sentence(case: ExplainedCase) -> str:
         return f'{_differing(case)}; {better}.'
     if case.verdict is Verdict.UNKNOWN_PHYSICS:
         return _unknown(case, better)
-    if case.verdict is Verdict.INSUFFICIENT_DATA:
-        return 'The rig moves too little, or too little was recorded, to tell causes apart.'
     if not case.effects:
         faults = '; '.join(f.text for f in case.audit.faults())
         return f'{faults}.'
@@ -53,7 +54,7 @@ def _differing(case: ExplainedCase) -> str:
     apart = [
         f'{name} of {joint} is {e.value:.3g} instead of {e.nominal:.3g} {e.unit}'.rstrip(' -')
         for joint, estimates in case.explanation.parameters.items()
-        for name, e in estimates.items() if not e.in_band
+        for name, e in changed_parameters(estimates).items()
     ]
     return '; '.join(apart) if apart else 'Parameters differ within their tolerance'
 

@@ -15,7 +15,7 @@ PLANT_YAML = 'plant.yaml'
 
 
 def write_report(case: ExplainedCase, folder: Path) -> None:
-    """Write report.json, report.html, plant.yaml and, where there is one, the next experiment's motion.
+    """Write report.json, report.html, plant.yaml and the next experiment's motion, if any.
 
     Parameters
     ----------

@@ -1,0 +1,67 @@
+"""The ladder of fits: nominal, refitted and augmented plant beside two black boxes."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_explain.black_box.held_out_times import judged, trained_on
+from endoscope_explain.black_box.rungs import black_box_rungs
+from endoscope_explain.case import Ladder
+from endoscope_explain.explanation import ChannelFit, Explanation
+from endoscope_explain.predicted_signals import rung, view
+from endoscope_explain.recording import Recording
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+PHYSICS = ('nominal', 'refitted', 'augmented')
+
+
+def ladders(
+    recording: Recording,
+    explanation: Explanation,
+    validation: Recording | None,
+    black_boxes: bool,
+) -> tuple[Ladder, Ladder]:
+    """Judge all fits, on held-out blocks and on a second recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        As audited.
+    explanation : Explanation
+    validation : Recording or None
+        Of the same rig; the black boxes see all of the first recording before they are judged
+        on it.
+    black_boxes : bool
+        Whether to train them.
+
+    Returns
+    -------
+    held_out, second : Ladder
+        The latter empty without a second recording.
+    """
+    plants = {name: getattr(explanation, name) for name in PHYSICS}
+    held_out: dict[str, Mapping[str, ChannelFit]] = {
+        name: dict(explanation.fit.get(name, {})) for name in PHYSICS}
+    second: dict[str, Mapping[str, ChannelFit]] = {}
+    if not held_out['nominal']:
+        return held_out, second
+    seen = None if validation is None else view(validation, plants)
+    if seen is not None:
+        second = {name: rung(seen, name) for name in PHYSICS}
+    if black_boxes:
+        recorded = view(recording, plants)
+        begin = recorded.begin
+        held_out |= black_box_rungs(
+            recording, recorded, lambda t: trained_on(t - begin),
+            {'held out': (recording, recorded, lambda t: judged(t - begin))})['held out']
+        if validation is not None and seen is not None:
+            second |= black_box_rungs(
+                recording, recorded, _all, {'second': (validation, seen, _all)})['second']
+    return held_out, second
+
+
+def _all(time: Array) -> Mask:
+    return np.ones(len(time), bool)

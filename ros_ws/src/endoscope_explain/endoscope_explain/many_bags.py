@@ -1,0 +1,201 @@
+"""One bag or many: explained here, side by side, or on a Dask cluster."""
+
+import csv
+import io
+import json
+import multiprocessing
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+from endoscope_core.atomic_output import atomic_directory, require_free_directory
+from endoscope_core.errors import EndoscopeError
+from endoscope_explain.explain_recording import explain_recording
+from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
+from endoscope_explain.report.writing import REPORT_JSON, write_report
+
+SUMMARY_CSV = 'summary.csv'
+
+Say = Callable[[str], None]
+
+
+class ClusterError(EndoscopeError, ConnectionError):
+    """The Dask cluster cannot be reached."""
+
+    __str__ = Exception.__str__
+
+
+@dataclass(frozen=True)
+class Reported:
+    """A finished report.
+
+    Attributes
+    ----------
+    files : mapping of str to bytes
+        By name.
+    """
+
+    files: Mapping[str, bytes]
+
+    def content(self) -> dict[str, object]:
+        """Return what report.json says."""
+        parsed: dict[str, object] = json.loads(self.files[REPORT_JSON])
+        return parsed
+
+
+def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = None) -> Reported:
+    """Explain one bag.
+
+    Parameters
+    ----------
+    sources : Sources
+    jobs : int
+        Processes side by side.
+    progress : callable, optional
+
+    Returns
+    -------
+    Reported
+
+    Raises
+    ------
+    BagError
+        If a recording cannot be used.
+    """
+    inputs = read_inputs(sources)
+    for note in inputs.audit.recording.notes:
+        if progress is not None:
+            progress(f'note: {note}')
+    case = explain_case(inputs, explain_recording, jobs=jobs, progress=progress)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        write_report(case, folder)
+        return Reported({path.name: path.read_bytes() for path in sorted(folder.iterdir())})
+
+
+def explain_bags(
+    sources: Sequence[Sources],
+    out: Path,
+    *,
+    jobs: int = 2,
+    dask_address: str | None = None,
+    say: Say = print,
+) -> None:
+    """Explain bags and write their reports, all or none.
+
+    Parameters
+    ----------
+    sources : sequence of Sources
+    out : Path
+        New or empty folder: one report's own, or that of one folder for each bag.
+    jobs : int
+        Processes on this machine.
+    dask_address : str, optional
+        Scheduler of a cluster whose workers see the bags under the same paths.
+    say : callable
+        Told each line for the terminal.
+
+    Raises
+    ------
+    EndoscopeError
+        If a recording, the folder or the cluster cannot be used; nothing is written then.
+    """
+    require_free_directory(out)
+    if len(sources) == 1 and dask_address is None:
+        reported = explain_one(sources[0], jobs, say)
+        with atomic_directory(out) as folder:
+            _write(reported, folder)
+        say(sentence(reported))
+        return
+    if dask_address is None:
+        for one in sources:
+            read_inputs(one)
+    names = unique_names([one.bag for one in sources])
+    rows: dict[str, Reported] = {}
+    with atomic_directory(out) as folder:
+        finished = _on_dask(sources, dask_address) if dask_address else _here(sources, jobs)
+        for index, reported in finished:
+            name = names[index]
+            (folder / name).mkdir()
+            _write(reported, folder / name)
+            rows[name] = reported
+            say(f'{len(rows)}/{len(sources)} {name}: {sentence(reported)}')
+        table = summary_table({name: rows[name] for name in names})
+        (folder / SUMMARY_CSV).write_text(table, encoding='utf-8')
+
+
+def unique_names(bags: Sequence[Path]) -> list[str]:
+    """Return a folder name for each bag, with a number where bags share theirs."""
+    names: list[str] = []
+    for bag in bags:
+        stem = bag.name.removesuffix('.mcap')
+        name, count = stem, 1
+        while name in names:
+            count += 1
+            name = f'{stem}_{count}'
+        names.append(name)
+    return names
+
+
+def sentence(reported: Reported) -> str:
+    """Return verdict and named effects in one line."""
+    content = reported.content()
+    effects = content['effects']
+    if not isinstance(effects, list) or not effects:
+        return str(content['verdict'])
+    named = ', '.join(f'{e["id"]} on {e["joint"]} ({e["probability"]:.2f})' for e in effects)
+    return f'{content["verdict"]}: {named}'
+
+
+def summary_table(reports: Mapping[str, Reported]) -> str:
+    """Return one CSV line for each bag: verdict, effects, largest misfit before and after."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator='\n')
+    writer.writerow([
+        'bag', 'verdict', 'effects', 'probabilities', 'nominal_rmse_over_noise',
+        'augmented_rmse_over_noise', 'runtime_s'])
+    for name, reported in reports.items():
+        content = json.loads(reported.files[REPORT_JSON])
+        effects = content['effects']
+        writer.writerow([
+            name, content['verdict'],
+            ' '.join(f'{e["id"]}@{e["joint"]}' for e in effects),
+            ' '.join(f'{e["probability"]:.3f}' for e in effects),
+            *(f'{_worst(content["fit"][rung]):.2f}' for rung in ('nominal', 'augmented')),
+            f'{content["runtime_s"]:.1f}'])
+    return text.getvalue()
+
+
+def _worst(rung: Mapping[str, Mapping[str, float]]) -> float:
+    return max(fit['rmse_over_noise'] for fit in rung.values())
+
+
+def _write(reported: Reported, folder: Path) -> None:
+    for name, content in reported.files.items():
+        (folder / name).write_bytes(content)
+
+
+def _here(sources: Sequence[Sources], jobs: int) -> Iterator[tuple[int, Reported]]:
+    context = multiprocessing.get_context('spawn')
+    with ProcessPoolExecutor(min(jobs, len(sources)), mp_context=context) as pool:
+        futures = {pool.submit(explain_one, one): i for i, one in enumerate(sources)}
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+
+
+def _on_dask(sources: Sequence[Sources], address: str) -> Iterator[tuple[int, Reported]]:
+    from distributed import Client
+    from distributed import as_completed as dask_completed
+
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        raise ClusterError(f'no Dask scheduler at {address}: {error}') from error
+    with client:
+        # A report is a pure function of its sources, but nothing is gained by keeping results.
+        futures = {
+            client.submit(explain_one, one, pure=False): i for i, one in enumerate(sources)}
+        for future in dask_completed(futures):
+            yield futures[future], future.result()

@@ -1,0 +1,74 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.plant import EffectSpec, PlantDescription
+from endoscope_explain.explanation import NamedEffect
+from endoscope_explain.next_experiment.distance import distance
+from endoscope_explain.next_experiment.imagined import imagine, is_safe
+from endoscope_explain.next_experiment.proposal import propose
+from endoscope_explain.next_experiment.waveforms import family
+
+PLANT = PlantDescription()
+
+
+def with_effect(effect_id, **parameters):
+    return dataclasses.replace(PLANT, effects=(EffectSpec(effect_id, 'bend_x', parameters),))
+
+
+@pytest.fixture(scope='module')
+def motions():
+    return {w.name: w for w in family('bend_x', ('bend_y',), 1.0)}
+
+
+def test_every_motion_starts_and_ends_at_rest_and_within_reach(motions):
+    for waveform in motions.values():
+        assert waveform.angle[0] == pytest.approx(0.0, abs=1e-9)
+        assert waveform.angle[-1] == pytest.approx(0.0, abs=1e-9)
+        assert np.abs(waveform.angle).max() <= 1.0 + 1e-9
+        assert np.abs(np.diff(waveform.angle)).max() < 0.2
+
+
+def test_a_plant_is_no_distance_from_itself(motions):
+    truth = imagine(PLANT, motions['fast and slow'])
+    assert distance(truth, PLANT, 'bend_x') < 0.05
+
+
+def test_delay_and_lag_part_in_quick_moves_and_not_in_slow_ones(motions):
+    late, lagging = with_effect('transport_delay', delay_s=0.03), with_effect('actuator_lag')
+    apart = {
+        name: distance(imagine(late, motions[name]), lagging, 'bend_x')
+        for name in ('steps with holds', 'slow ramps')
+    }
+    assert apart['steps with holds'] > 3.0 * apart['slow ramps']
+
+
+def test_a_motion_beyond_what_the_rig_has_been_through_is_not_safe(motions):
+    answer = imagine(PLANT, motions['slow ramps'])
+    most, widest = answer.tension.values.max(), np.abs(answer.bending.values).max()
+    assert is_safe(answer, most, widest)
+    assert not is_safe(answer, 0.99 * most, widest)
+    assert not is_safe(answer, most, 0.99 * widest)
+
+
+def test_the_proposal_names_its_rivals_and_the_best_motion(record):
+    plant = with_effect('transport_delay', delay_s=0.03)
+    recording = record(plant, duration=6.0)
+    effect = NamedEffect(
+        'transport_delay', 'bend_x', str(CATALOGUE['transport_delay'].stage), 0.5, '', '', {},
+        ('actuator_lag',))
+    proposed = propose(recording, plant, effect)
+    assert proposed.separates == ('transport_delay', 'actuator_lag')
+    assert proposed.distances[proposed.waveform] == max(proposed.distances.values())
+    assert proposed.joints == ('bend_x', 'bend_y')
+    command = np.array(proposed.command)
+    assert command.shape == (len(proposed.time), 2)
+    assert not command[:, 1].any()
+
+
+def test_without_a_rival_there_is_nothing_to_separate(record):
+    effect = NamedEffect('transport_delay', 'bend_x', 'actuator', 0.9, '', '', {})
+    plant = with_effect('transport_delay')
+    assert propose(record(plant, duration=3.0), plant, effect) is None
