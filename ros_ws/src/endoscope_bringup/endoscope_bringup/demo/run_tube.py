@@ -1,6 +1,5 @@
 """Runs the whole procedure for one shape of the tube and records it."""
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -28,7 +27,7 @@ from endoscope_core.signals import calibration_sinusoid, motion_by_name
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.recorder_node import RecorderNode
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.runtime import FOREVER_S, Runtime
 
 Progress = Callable[[str], None]
 
@@ -119,7 +118,7 @@ class _GraphSession:
             self._runtime.spin_until(Future(), seconds)
             return
         done = self._conductor.advance(seconds)
-        self._runtime.spin_until(done, math.inf)
+        self._runtime.spin_until(done, FOREVER_S)
         done.result()
 
     def _wait_until(self, condition: Callable[[], bool], what: str) -> None:
