@@ -48,14 +48,14 @@ def loops_figure(results: DemoResults, tube: str) -> str:
         for row, motion in zip(axes, MOTIONS, strict=True):
             for axis, mode in zip(row, modes, strict=True):
                 run = results.run(tube, motion, mode)
-                axis.plot([-70, 70], [-70, 70], color='#9aa5b1', linewidth=0.8, linestyle=':')
+                axis.plot([-95, 95], [-95, 95], color='#9aa5b1', linewidth=0.8, linestyle=':')
                 axis.plot(run.desired_deg, run.actual_deg, color=MODE_COLOUR[mode], linewidth=1.2)
                 axis.set_title(f'{MOTION_TITLE[motion]} · {mode}')
                 axis.text(0.03, 0.96, f'RMSE {run.rmse_deg:.1f}°\nbacklash {run.backlash_deg:.1f}°',
                           transform=axis.transAxes, va='top', color=INK)
                 axis.set_aspect('equal')
-                axis.set_xlim(-70, 70)
-                axis.set_ylim(-70, 70)
+                axis.set_xlim(-95, 95)
+                axis.set_ylim(-95, 95)
         for axis in axes[-1]:
             axis.set_xlabel('desired angle (deg)')
         for row in axes:
