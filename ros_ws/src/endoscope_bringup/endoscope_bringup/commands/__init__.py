@@ -6,5 +6,5 @@ all of them.
 """
 
 COMMANDS: tuple[str, ...] = (
-    'simulate', 'explain', 'convert', 'record', 'replay', 'bag', 'dataset', 'train', 'identify', 'bench',
+    'demo', 'simulate', 'explain', 'convert', 'record', 'replay', 'bag', 'dataset', 'train', 'identify', 'bench',
 )
