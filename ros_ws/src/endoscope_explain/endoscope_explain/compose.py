@@ -24,6 +24,8 @@ LOOKED_AT = 14
 """Effects that get a cheap fit, of all that were screened."""
 LOOKED_AT_TWICE = 4
 """Effects of these that get one from their second best start as well."""
+LEAST_GAIN = 5.0
+"""Predicted fall of the half deviance below which an effect is not looked at."""
 WORTH_POLISHING = 5.0
 """A look is worth a full fit while its cost is below this multiple of the best full fit's."""
 NOISE_ALONE = 1.15
@@ -134,8 +136,9 @@ def _screened(
     for index in range(len(parents)):
         own = sorted((p for (i, _), p in zip(tasks, found, strict=True) if i == index),
                      key=lambda p: -p[0].gain)[:LOOKED_AT]
-        chosen += [(index, p[0]) for p in own if p[0].gain > 0.0]
-        chosen += [(index, p[1]) for p in own[:LOOKED_AT_TWICE] if len(p) > 1]
+        chosen += [(index, p[0]) for p in own if p[0].gain > LEAST_GAIN]
+        chosen += [(index, p[1]) for p in own[:LOOKED_AT_TWICE]
+                   if len(p) > 1 and p[1].gain > LEAST_GAIN]
     return chosen
 
 

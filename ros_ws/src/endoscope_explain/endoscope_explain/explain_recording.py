@@ -20,6 +20,7 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit import Fit
+from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.observation import JointObservation, observe
@@ -72,7 +73,7 @@ def explain_recording(
     """
     begun = time.monotonic()
     tell = progress or (lambda _: None)
-    observations = observe(recording, plant)
+    observations = with_held_noise(observe(recording, plant))
     if not _is_enough(observations):
         return Explanation(
             Verdict.INSUFFICIENT_DATA, (), {}, plant, plant, plant, {},
@@ -133,12 +134,18 @@ def _named(
                 {'margin': decision.margins[effect_id], 'gap': decision.gaps[effect_id],
                  'explained': decision.explained}))
     ordered = sorted(effects, key=lambda e: (-e.probability, -e.evidence['margin']))
-    # A clock belongs to a device, not to a joint: it is named once.
+    # A clock belongs to a device, not to a joint; a tracker's fault shows on both. Each id comes
+    # once before any comes again.
     once: dict[tuple[str, str], NamedEffect] = {}
     for effect in ordered:
         shared = CATALOGUE[effect.id].stage == Stage.RECORDING
         once.setdefault((effect.id, '' if shared else effect.joint), effect)
-    return tuple(once.values())
+    seen: set[str] = set()
+    first, again = [], []
+    for effect in once.values():
+        (again if effect.id in seen else first).append(effect)
+        seen.add(effect.id)
+    return tuple(first + again)
 
 
 def _verdict(

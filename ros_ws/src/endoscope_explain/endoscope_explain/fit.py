@@ -188,7 +188,8 @@ def fit(
 
     cost = cost_of(current, theta)
     damping = 1e-4
-    derivative = jacobian(model, theta, current) if known_jacobian is None else known_jacobian.copy()
+    derivative = (jacobian(model, theta, current) if known_jacobian is None
+                  else known_jacobian.copy())
     exact = known_jacobian is None
     for _ in range(iterations):
         weighted = derivative * weight[:, None]

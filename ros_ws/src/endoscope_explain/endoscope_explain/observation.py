@@ -5,6 +5,7 @@ it acts on simulated readings just the same); the tracker is taken at its own st
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import pi, sqrt
 
 import numpy as np
@@ -25,6 +26,7 @@ from endoscope_core.plant.kernel import (
 from endoscope_core.plant.on_stamps import hold_on_ticks
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.signals import QUANTITY_UNITS, signal_name
+from endoscope_explain.unresolved import fast_scatter
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -114,7 +116,7 @@ class JointObservation:
     def slices(self) -> tuple[slice, ...]:
         """Place of each channel in a residual vector of all channels."""
         ends = np.cumsum([0, *(len(channel.time) for channel in self.channels)])
-        return tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
 
 def couple(observations: tuple[JointObservation, ...], bending: tuple[Array, ...]) -> None:
@@ -181,7 +183,7 @@ def _channels(
         channels.append(_channel(
             signal_name(quantity, joint, wire), quantity, output, scale, time, values, period,
             sqrt(white**2 + (step**2 / 12.0 if dithered else 0.0)),
-            0.0 if dithered else step / sqrt(12.0)))
+            0.0 if dithered else step / sqrt(12.0), quantity == 'tension'))
     return tuple(channels)
 
 
@@ -197,7 +199,7 @@ def _valid_column(
 
 def _channel(
     signal: str, quantity: str, output: int, scale: float, time: Array, values: Array,
-    period: float, white: float, rounding: float,
+    period: float, white: float, rounding: float, may_chatter: bool,
 ) -> Channel:
     place = time / TICK
     # Stamps on a tick, to the nanosecond, take the tick's own row.
@@ -210,7 +212,12 @@ def _channel(
     else:
         first = np.arange(len(time))
     count = np.diff(np.r_[first, len(time)]).astype(float)
+    noise = np.sqrt(white**2 / count + rounding**2)
+    if may_chatter:
+        # Slips are no noise that an average removes.
+        scatter = np.add.reduceat(fast_scatter(values, white), first) / count
+        noise = np.sqrt(noise**2 + scatter**2)
     return Channel(
         signal, quantity, QUANTITY_UNITS[quantity], output, scale, tick, place - tick, first,
         count, np.add.reduceat(time, first) / count, np.add.reduceat(values, first) / count,
-        np.sqrt(white**2 / count + rounding**2))
+        noise)

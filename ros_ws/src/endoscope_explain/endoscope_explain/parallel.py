@@ -3,15 +3,12 @@
 import multiprocessing
 import threading
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
-
-Task = TypeVar('Task')
-Result = TypeVar('Result')
+from typing import Any
 
 _function: Callable[[Any], Any] | None = None
 
 
-def parallel_map(
+def parallel_map[Task, Result](
     function: Callable[[Task], Result], tasks: Sequence[Task], jobs: int
 ) -> list[Result]:
     """Results of `function` on every task, in order.
