@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,9 @@ class TensionClassifier:
             network = TensionCnn(len(classes), description['channels'])
             state = torch.load(weights, map_location='cpu', weights_only=True)
             network.load_state_dict(state)
+        except UnpicklingError as error:
+            raise ClassifierError(
+                f'{weights} holds no classifier weights: it is no PyTorch file') from error
         except (OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
             reason = str(error).splitlines()[0]
             raise ClassifierError(f'{weights} holds no classifier weights: {reason}') from error

@@ -1,6 +1,5 @@
 """Training of the tension classifier as the first paper does it (section 3.2)."""
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -132,4 +131,3 @@ def cross_validate(
 def use_one_thread() -> None:
     """Train on one core, so that sums are formed in the same order everywhere."""
     torch.set_num_threads(1)
-    os.environ.setdefault('OMP_NUM_THREADS', '1')

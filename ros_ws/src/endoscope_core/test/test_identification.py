@@ -1,0 +1,108 @@
+import json
+
+import numpy as np
+import pytest
+
+from endoscope_core.dataset import CLASSES_DEG
+from endoscope_core.hysteresis import BoucWenParameters, bouc_wen_forward
+from endoscope_core.identification import (
+    ClassParameterError,
+    IdentificationError,
+    Recording,
+    Servo,
+    fit_feedforward,
+    fit_model,
+    load_class_parameters,
+    parameters_for_class,
+)
+from endoscope_core.signals import calibration_sinusoid
+
+TRUE = BoucWenParameters.from_shape(alpha=0.91, lag=0.55, travel=0.42, rho=0.45, n=2.0)
+TIME = np.arange(0.0, 9.0, 0.02)
+DRIVER = calibration_sinusoid()(TIME)[0]
+
+
+def recording(noise, seed=0, offset=0.0, h0=0.0, rested=True):
+    measured = bouc_wen_forward(TRUE, DRIVER, h0) + offset
+    measured += np.random.default_rng(seed).normal(0.0, noise, TIME.size)
+    return Recording(DRIVER, measured, rested)
+
+
+def test_it_finds_the_parameters_that_made_a_recording():
+    fit = fit_model([recording(0.0)])
+    assert fit.rmse < 1e-4
+    for name, value in TRUE.to_dict().items():
+        found = fit.parameters.to_dict()[name]
+        assert found == pytest.approx(value * TRUE.A, rel=0.02, abs=0.02), name
+
+
+def test_noise_offset_and_an_unknown_start_are_borne():
+    many = [recording(0.005, k, offset=0.05 * k, h0=0.4 * TRUE.h_max, rested=False)
+            for k in range(3)]
+    fit = fit_model(many)
+    assert fit.rmse == pytest.approx(0.005, rel=0.1)
+    assert fit.parameters.lag == pytest.approx(TRUE.lag, rel=0.02)
+    assert fit.parameters.alpha == pytest.approx(TRUE.alpha, rel=0.02)
+
+
+def test_the_search_repeats_with_its_seed():
+    assert fit_model([recording(0.01)], 4).parameters == fit_model([recording(0.01)], 4).parameters
+
+
+def test_a_straight_line_has_no_lag_and_stays_in_bounds():
+    fit = fit_model([Recording(DRIVER, 0.8 * DRIVER)])
+    assert fit.parameters.lag < 0.01
+    assert fit.parameters.alpha == pytest.approx(0.8, rel=0.01)
+
+
+def test_the_feed_forward_makes_the_model_follow():
+    fit = fit_feedforward(TRUE, Servo(), lead=0.06)
+    assert fit.rmse < 0.2 * fit.uncompensated_rmse
+    assert fit.parameters.inverse_slope <= 40.0
+    assert 'alpha' in str(fit_model([recording(0.01)]))
+
+
+def test_the_servo_settles_on_its_command_and_lags_by_its_damping():
+    time = np.arange(0.0, 4.0, 0.004)
+    ramp = Servo().answer(0.7 * time, 0.004)
+    assert 0.7 * time[-1] - ramp[-1] == pytest.approx(0.7 * (2.0 * 0.9 / 60.0 + 0.002), rel=0.05)
+    still = Servo().answer(np.full(500, 0.3), 0.004)
+    np.testing.assert_allclose(still, 0.3)
+
+
+@pytest.mark.parametrize(('recordings', 'complaint'), [
+    ([], 'no recording'),
+    ([Recording(DRIVER[:50], DRIVER[:50])], 'at least 100'),
+    ([Recording(DRIVER, np.full(TIME.size, np.nan))], 'finite'),
+    ([Recording(DRIVER, np.zeros(TIME.size))], 'less than 1 deg'),
+    ([Recording(DRIVER, DRIVER[:-1])], 'differ in length'),
+])
+def test_a_recording_without_hysteresis_is_refused(recordings, complaint):
+    with pytest.raises(IdentificationError, match=complaint):
+        fit_model(recordings)
+
+
+def test_shipped_sets_cover_every_class_and_grow_with_it():
+    sets = load_class_parameters()
+    assert sorted(sets) == sorted(CLASSES_DEG)
+    lags = [sets[c].lag for c in CLASSES_DEG]
+    assert np.all(np.diff(lags) > 0.0)
+    assert parameters_for_class(sets, 70) is sets[70]
+
+
+def test_a_class_without_parameters_is_refused():
+    with pytest.raises(ClassParameterError, match='class 55'):
+        parameters_for_class(load_class_parameters(), 55)
+
+
+@pytest.mark.parametrize('content', [
+    'no json', '[]', '{}', '{"classes": {"40": {"feedforward": {"alpha": 1.0}}}}',
+    json.dumps({'classes': {'40': {'feedforward': {**TRUE.to_dict(), 'alpha': -1.0}}}}),
+])
+def test_a_file_without_safe_parameters_is_refused(tmp_path, content):
+    path = tmp_path / 'classes.json'
+    path.write_text(content)
+    with pytest.raises(ClassParameterError, match='holds no Bouc-Wen'):
+        load_class_parameters(path)
+    with pytest.raises(ClassParameterError, match='is missing'):
+        load_class_parameters(tmp_path / 'none.json')
