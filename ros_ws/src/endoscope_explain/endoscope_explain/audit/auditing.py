@@ -148,6 +148,7 @@ def _audited_bending(
     series = recording.bending
     interval = usual_interval(series.time)
     motor = recording.shaft_position or recording.command
+    isolated = np.zeros(series.valid.shape, bool)
     wrong = np.zeros(series.valid.shape, bool)
     for j, joint in enumerate(recording.joints):
         signal = signal_name('bending', joint)
@@ -159,7 +160,8 @@ def _audited_bending(
         travel = motor_travel(
             series.time, motor.time, motor.values[:, j] / plant.joints[joint].gear, 3.0 * interval)
         spikes = find_outliers(values, plant.sensors.tracker_noise, travel)
-        if spikes.any():
-            findings.append(outlier_finding(joint, signal, series.time, values, spikes))
-        wrong[:, j] = repeated | spikes
-    return series.without(wrong)
+        wrong[:, j] = repeated
+        isolated[:, j] = spikes
+    if isolated.any():
+        findings.append(outlier_finding(recording.joints, series, isolated))
+    return series.without(wrong | isolated)

@@ -1,11 +1,14 @@
 """Isolated wrong samples of the EM tracker."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.stats import norm, poisson
 
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.explanation import Estimate
-from endoscope_explain.recording.series import Array, Mask
+from endoscope_explain.recording.series import Array, Mask, Series
+from endoscope_explain.recording.signals import signal_name
 
 TRAVEL_FACTOR = 1.5
 """A spike is no motion of the joint where it exceeds the motor's travel by this factor."""
@@ -114,21 +117,40 @@ def motor_travel(
     return np.asarray(highest - lowest)
 
 
-def outlier_finding(
-    joint: str, signal: str, time: Array, values: Array, wrong: Mask
-) -> Finding:
-    """Describe the `tracker_outliers` of one joint."""
-    right = ~wrong
-    size = np.abs(values[wrong] - np.interp(time[wrong], time[right], values[right]))
-    count, n = int(wrong.sum()), len(values)
-    share = count / n
-    spread = 1.645 * np.sqrt(max(count, 1)) / n
+def outlier_finding(joints: Sequence[str], series: Series, wrong: Mask) -> Finding:
+    """Describe the `tracker_outliers` of a recording: one tracker reads all joints.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        J of them.
+    series : Series
+        The tracker's, values (N, J).
+    wrong : array (N, J) of bool
+        At least one sample.
+
+    Returns
+    -------
+    Finding
+        Of the joint that has most of them.
+    """
+    sizes = []
+    for j in range(len(joints)):
+        bad, values = wrong[:, j], series.values[:, j]
+        truth = np.interp(series.time[bad], series.time[~bad], values[~bad])
+        sizes.append(np.abs(values[bad] - truth))
+    size = np.concatenate(sizes)
+    count, n = int(wrong.any(axis=1).sum()), len(wrong)
+    share, spread = count / n, 1.645 * np.sqrt(count) / n
     typical = float(np.sqrt(np.mean(size**2)))
+    worst = int(np.argmax(wrong.sum(axis=0)))
+    befallen = [name for j, name in enumerate(joints) if wrong[:, j].any()]
+    signals = tuple(signal_name('bending', name) for name in befallen)
     return Finding(
-        'tracker_outliers', Severity.FAULT, joint, 'sensing', (signal,),
-        tuple((float(t), float(t)) for t in time[wrong]),
-        f'{count} of {n} samples of {signal} are isolated and wrong, by {np.degrees(typical):.1f} '
-        'deg rms',
+        'tracker_outliers', Severity.FAULT, joints[worst], 'sensing', signals,
+        tuple((float(t), float(t)) for t in series.time[wrong.any(axis=1)]),
+        f'{count} of {n} samples of {" and ".join(signals)} are isolated and wrong, by '
+        f'{np.degrees(typical):.1f} deg rms',
         'wrong samples are not judged',
         parameters={
             'rate': Estimate(share, max(share - spread, 0.0), share + spread, '-'),

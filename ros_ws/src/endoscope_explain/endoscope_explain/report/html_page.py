@@ -18,12 +18,16 @@ from endoscope_explain.report.figures.loops import (
     signals_figure,
     telling_passage,
 )
-from endoscope_explain.report.figures.style import RUNG_TITLE
 from endoscope_explain.report.figures.timeline import timeline_figure
 from endoscope_explain.report.report_mapping import EXPERIMENT_FILE
 from endoscope_explain.report.sentences import HEADLINES, verdict_sentence
 
 Array = NDArray[np.float64]
+
+SHORT_TITLES = {
+    'nominal': 'nominal', 'refitted': 'refitted', 'augmented': 'improved',
+    'gaussian_process': 'Gaussian process', 'neural_network': 'neural network',
+}
 
 GREEN, BLUE, AMBER, RED, GREY = '#136b4f', '#2f6fb7', '#a15c00', '#b3261e', '#52606d'
 COLOURS = {
@@ -149,7 +153,7 @@ def _table(title: str, ladder: Ladder, units: Mapping[str, str]) -> dict[str, An
         ]
         rows.append({'signal': signal.replace('/measured_js', ''), 'unit': units.get(signal, ''),
                      'cells': cells})
-    return {'title': title, 'rungs': [RUNG_TITLE[r] for r in rungs], 'rows': rows}
+    return {'title': title, 'rungs': [SHORT_TITLES[r] for r in rungs], 'rows': rows}
 
 
 def _candidates(case: ExplainedCase, most: int = 6) -> list[dict[str, str]]:
