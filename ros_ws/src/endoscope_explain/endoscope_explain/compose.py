@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.effects import CATALOGUE
 from endoscope_explain.fit import Fit, JointModel, fit, jacobian
-from endoscope_explain.free_parameters import nominal_parameters
+from endoscope_explain.free_parameters import BAND, nominal_parameters
 from endoscope_explain.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.rank import Look, look, polish
@@ -62,12 +62,16 @@ def searchable_effects() -> tuple[str, ...]:
     return tuple(effect_id for effect_id in CATALOGUE if effect_id not in AUDITED)
 
 
-def nominal_model(observation: JointObservation, base: Array, flags: Flags) -> JointModel:
-    """Return the plant as described, its nominal parameters free."""
-    return JointModel(observation, base, flags, nominal_parameters(base))
+def nominal_model(
+    observation: JointObservation, base: Array, flags: Flags, band: float = BAND
+) -> JointModel:
+    """Return the plant as described, its nominal parameters free within a band."""
+    return JointModel(observation, base, flags, nominal_parameters(base, band))
 
 
-def nominal_anchors(observation: JointObservation, base: Array, flags: Flags) -> tuple[Fit, Fit]:
+def nominal_anchors(
+    observation: JointObservation, base: Array, flags: Flags, band: float = BAND
+) -> tuple[Fit, Fit]:
     """The nominal plant refitted, and as described, each with its derivative.
 
     Parameters
@@ -75,12 +79,14 @@ def nominal_anchors(observation: JointObservation, base: Array, flags: Flags) ->
     observation : JointObservation
     base : array (parameters,), flags : array (flags,)
         Packed plant as described, with what effects it has.
+    band : float
+        Relative deviation of a healthy rig from its description.
 
     Returns
     -------
     refitted, described : Fit
     """
-    model = nominal_model(observation, base, flags)
+    model = nominal_model(observation, base, flags, band)
     theta = np.array([
         item.mean if item.logarithmic else item.coordinate(1.0) for item in model.free])
     residuals = model.residuals(theta)

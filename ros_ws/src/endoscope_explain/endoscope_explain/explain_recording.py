@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.effects import CATALOGUE, Stage
 from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription
+from endoscope_explain.baseline import against_baseline
 from endoscope_explain.decision import Decision, decide
 from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.explanation import (
@@ -20,6 +21,7 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit import Fit
+from endoscope_explain.free_parameters import BAND
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.intervals import effect_estimates, nominal_estimates
@@ -30,10 +32,13 @@ from endoscope_explain.score import misfit
 from endoscope_explain.search import JointSearch, all_anchors, search
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 Progress = Callable[[str], None]
 
 LEAST_DURATION_S = 2.0
 LEAST_MOTION_RAD = 0.02
+SAME_RIG = 0.03
+"""Relative tolerance of a nominal parameter from one recording of a rig to the next."""
 CHANGED = 0.04
 """Relative difference of a nominal parameter that is worth a verdict."""
 NOMINAL_UNITS = {
@@ -79,8 +84,12 @@ def explain_recording(
             Verdict.INSUFFICIENT_DATA, (), {}, plant, plant, plant, {},
             runtime_s=time.monotonic() - begun)
     tell('refitting the nominal plant')
-    anchors = all_anchors(
-        observations, {o.joint: packed_joint(plant, o.joint) for o in observations}, jobs)
+    packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
+    band = BAND
+    if baseline is not None:
+        observations, packed = _healthy(observations, baseline, plant, jobs)
+        band = SAME_RIG
+    anchors = all_anchors(observations, packed, jobs, band)
     searches, decisions = [], []
     for observation, pair in zip(observations, anchors, strict=True):
         tell(f'searching what {observation.joint} lacks')
@@ -107,6 +116,23 @@ def explain_recording(
         baseline is not None,
         time.monotonic() - begun,
     )
+
+
+def _healthy(
+    observations: tuple[JointObservation, ...], baseline: Recording, plant: PlantDescription,
+    jobs: int,
+) -> tuple[tuple[JointObservation, ...], dict[str, tuple[Array, Flags]]]:
+    before = with_held_noise(observe(baseline, plant))
+    packed = {o.joint: packed_joint(plant, o.joint) for o in before}
+    fits = {o.joint: refitted
+            for o, (refitted, _) in zip(before, all_anchors(before, packed, jobs), strict=True)}
+    seen = []
+    for observation in observations:
+        flags = packed[observation.joint][1]
+        observation, base = against_baseline(observation, fits[observation.joint])
+        seen.append(observation)
+        packed[observation.joint] = base, flags
+    return tuple(seen), packed
 
 
 def _is_enough(observations: tuple[JointObservation, ...]) -> bool:

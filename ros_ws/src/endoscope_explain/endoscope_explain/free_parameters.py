@@ -1,7 +1,7 @@
 """Which numbers of a joint a fit may move, on which scale, within which bounds and priors."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ FITTED_NOMINAL = tuple(key for key in NOMINAL_KEYS if key not in ('joint_radius'
 BAND = 0.15
 """Relative tolerance by which a healthy rig differs from its description."""
 BAND_SPREAD = 0.09
+SCALED = {'friction_run_in': ('capstan_exponent', 1.8)}
+"""Nominal parameter that an effect scales by so much that its described value is ambiguous."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,21 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
     mean, spread = LEAD_PRIOR
     free.append(FreeParameter(LEAD, 'reading_lead', False, 1.0, 0.0, 1.0, mean, spread))
     return tuple(free)
+
+
+def with_free_reference(
+    free: tuple[FreeParameter, ...], effect_id: str
+) -> tuple[FreeParameter, ...]:
+    """Widen the bounds of the nominal parameter that an effect scales over the recording.
+
+    Whether a described value holds before or after a run-in is a matter of definition.
+    """
+    if effect_id not in SCALED:
+        return free
+    name, reach = SCALED[effect_id]
+    return tuple(
+        replace(item, low=item.low / reach, high=item.high * reach) if item.name == name else item
+        for item in free)
 
 
 def effect_parameters(effect_id: str) -> tuple[FreeParameter, ...]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.effects import CATALOGUE
 from endoscope_explain.fit import Fit, JointModel
-from endoscope_explain.free_parameters import effect_parameters
+from endoscope_explain.free_parameters import effect_parameters, with_free_reference
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,8 @@ def with_effect(model: JointModel, effect_id: str, start: dict[str, float]) -> J
     flags[definition.flag] = True
     for i, parameter in enumerate(definition.parameters):
         base[definition.first_parameter + i] = start.get(parameter.name, parameter.typical)
-    return JointModel(model.observation, base, flags, model.free + effect_parameters(effect_id))
+    free = with_free_reference(model.free, effect_id) + effect_parameters(effect_id)
+    return JointModel(model.observation, base, flags, free)
 
 
 def promises(anchor: Fit, effect_ids: Iterable[str]) -> list[Promise]:

@@ -16,6 +16,7 @@ from endoscope_explain.compose import (
 )
 from endoscope_explain.evaluate import simulate_joint
 from endoscope_explain.fit import Fit
+from endoscope_explain.free_parameters import BAND
 from endoscope_explain.observation import JointObservation, couple
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.score import score
@@ -53,18 +54,21 @@ class JointSearch:
 
 
 def all_anchors(
-    observations: tuple[JointObservation, ...], packed: dict[str, tuple[Array, Flags]], jobs: int
+    observations: tuple[JointObservation, ...],
+    packed: dict[str, tuple[Array, Flags]],
+    jobs: int,
+    band: float = BAND,
 ) -> list[tuple[Fit, Fit]]:
     """Refit the nominal plant of every joint, and let the joints see each other's angle."""
     def numbers(index: int) -> tuple[tuple[Array, Array, Array, float], ...]:
         observation = observations[index]
-        fits = nominal_anchors(observation, *packed[observation.joint])
+        fits = nominal_anchors(observation, *packed[observation.joint], band)
         return tuple((f.theta, f.residuals, f.jacobian, f.cost) for f in fits)
 
     anchors = []
     for observation, (refitted, described) in zip(
             observations, parallel_map(numbers, range(len(observations)), jobs), strict=True):
-        model = nominal_model(observation, *packed[observation.joint])
+        model = nominal_model(observation, *packed[observation.joint], band)
         anchors.append((Fit(model, *refitted), Fit(model, *described)))
     angles = []
     for observation, (refitted, _) in zip(observations, anchors, strict=True):
