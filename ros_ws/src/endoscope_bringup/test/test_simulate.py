@@ -118,3 +118,20 @@ def test_a_command_that_is_not_a_number_is_refused(plant_file, tmp_path, capsys)
     assert run(plant_file, tmp_path / 'broken', tmp_path / 'answer') == 2
     assert 'nan' in capsys.readouterr().err
     assert not (tmp_path / 'answer').exists()
+
+
+@pytest.mark.parametrize('late', [0, 1])
+def test_the_answer_is_stamped_as_the_recording_stamps_its_readings(plant_file, tmp_path, late):
+    truth = simulate(PlantDescription(), SHAFT)
+    shaft = SensorModel(PlantDescription().sensors, 1).shaft_position(truth.shaft_position)
+    with BagWriter(tmp_path / 'recorded') as writer:
+        writer.write_streams([
+            stream('motor/servo_jp', ['motor_x', 'motor_y'], STAMPS, position=SHAFT),
+            stream('motor/measured_js', ['motor_x', 'motor_y'], STAMPS[:TICKS - late],
+                   position=shaft[late:]),
+        ])
+    assert run(plant_file, tmp_path / 'recorded', tmp_path / 'answer') == 0
+    bending = open_bag(tmp_path / 'answer').joint_state('slave/measured_js')
+    rows = np.arange(0, TICKS - 1, 25)
+    np.testing.assert_allclose(
+        bending.position[:len(rows)], truth.bending[rows + late], atol=1e-9)
