@@ -1,0 +1,84 @@
+"""One tracking experiment: a desired motion, compensated or not, on the simulated rig."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.control import (
+    AdaptiveBacklashController,
+    BoucWenFeedforward,
+    FeedforwardLaw,
+    TrackerMeasurement,
+)
+from endoscope_core.metrics import tracking_rmse
+from endoscope_core.plant import PlantDescription, PlantSimulator, SensorModel
+from endoscope_core.signals import Signal
+
+TICK = 1.0e-3
+
+
+@dataclass(frozen=True)
+class TrackingTrial:
+    """What came of it, N ticks of 1 ms, J joints; angles in rad.
+
+    Parameters
+    ----------
+    time, desired : ndarray, shape (N,)
+    bending : ndarray, shape (N, J)
+        True bending angle.
+    command : ndarray, shape (N, J)
+        Joint-equivalent motor command.
+    rmse : float
+        Of all joints in the signal's steady part.
+    """
+
+    time: NDArray[np.float64]
+    desired: NDArray[np.float64]
+    bending: NDArray[np.float64]
+    command: NDArray[np.float64]
+    rmse: float
+
+
+def run_tracking_trial(
+    plant: PlantDescription, signal: Signal, law: FeedforwardLaw, feedback: bool, seed: int
+) -> TrackingTrial:
+    """Drive every joint of a rig along a signal.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+    signal : Signal
+        Desired angle of every joint.
+    law : FeedforwardLaw
+    feedback : bool
+        Whether the adaptive controller corrects from the tracker's noisy readings.
+    seed : int
+        Of the tracker's noise.
+    """
+    rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, seed)
+    joints = len(rig.joints)
+    gears = np.array([plant.joints[name].gear for name in rig.joints])
+    feedforward, controller = BoucWenFeedforward(joints), AdaptiveBacklashController(joints)
+    feedforward.select(law)
+    if feedback:
+        controller.activate()
+    tracked_every = round(1.0 / (plant.sensors.tracker_rate * TICK))
+    time = np.arange(0.0, signal.steady[1], TICK)
+    angles, velocities = signal(time)
+    bending = np.empty((time.size, joints))
+    command = np.empty((time.size, joints))
+    for k, now in enumerate(time.tolist()):
+        sample = rig.sample
+        bending[k] = sample.bending_true
+        desired, velocity = [angles[k]] * joints, [velocities[k]] * joints
+        measured = None
+        if k % tracked_every == 0:
+            measured = TrackerMeasurement(now, sensors.bending(sample.bending))
+        correction = controller.step(now, desired, velocity, measured)
+        command[k] = feedforward.step(desired, velocity, TICK) + correction
+        rig.advance(gears * command[k])
+    steady = time >= signal.steady[0]
+    wanted = np.repeat(angles[steady, None], joints, axis=1)
+    rmse = tracking_rmse(wanted, bending[steady])
+    return TrackingTrial(time, angles, bending, command, rmse)

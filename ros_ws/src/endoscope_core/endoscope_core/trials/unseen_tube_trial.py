@@ -1,0 +1,82 @@
+"""The first paper's procedure on a tube that nothing was fitted on."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from endoscope_core.classifier.inference import TensionClassifier
+from endoscope_core.control import FeedforwardLaw
+from endoscope_core.dataset import random_rig, record_calibration
+from endoscope_core.dataset.rig_variation import backlash_sizes, in_tube
+from endoscope_core.hysteresis import BoucWenParameters
+from endoscope_core.identification import parameters_for_class
+from endoscope_core.signals import Signal
+from endoscope_core.trials.tracking_trial import run_tracking_trial
+
+EXPONENTS = (0.3, 1.75)
+# Data sets draw from the seed alone; this keeps tubes judged on apart from tubes learnt from.
+_UNSEEN = 424_242
+
+
+@dataclass(frozen=True)
+class UnseenTubeTrial:
+    """Result for one tube.
+
+    Parameters
+    ----------
+    exponent : float
+        Capstan exponent of the tube.
+    size : float
+        True backlash size, mean of the joints, in rad.
+    class_deg : int
+        Class that the classifier named.
+    uncompensated : dict of str to float
+        RMSE in rad by signal.
+    feedforward, feedback : dict of str to float
+        RMSE over the uncompensated one, without and with the tracker.
+    """
+
+    exponent: float
+    size: float
+    class_deg: int
+    uncompensated: dict[str, float]
+    feedforward: dict[str, float]
+    feedback: dict[str, float]
+
+    @property
+    def nearest_class(self) -> bool:
+        """Whether no other class is nearer to the true size."""
+        return abs(np.rad2deg(self.size) - self.class_deg) <= 5.0
+
+
+def run_unseen_tube_trial(
+    seed: int, number: int, signals: Sequence[Signal], classifier: TensionClassifier,
+    sets: Mapping[int, BoucWenParameters],
+) -> UnseenTubeTrial:
+    """Calibrate, classify, choose parameters and track, on a random rig in a random tube.
+
+    Parameters
+    ----------
+    seed, number : int
+        Together they choose rig, tube and noise.
+    signals : sequence of Signal
+    classifier : TensionClassifier
+    sets : mapping of int to BoucWenParameters
+        By class.
+    """
+    generator = np.random.default_rng([_UNSEEN, seed, number])
+    exponent = float(generator.uniform(*EXPONENTS))
+    plant = in_tube(random_rig(generator), exponent)
+    noise = int(generator.integers(2**31))
+    class_deg = classifier.classify(record_calibration(plant, noise).tension).class_deg
+    parameters = parameters_for_class(sets, class_deg)
+    law = FeedforwardLaw('bouc_wen', (parameters,) * len(plant.joints))
+    alone, helped, corrected = {}, {}, {}
+    for signal in signals:
+        name = signal.name
+        alone[name] = run_tracking_trial(plant, signal, FeedforwardLaw(), False, noise).rmse
+        helped[name] = run_tracking_trial(plant, signal, law, False, noise).rmse / alone[name]
+        corrected[name] = run_tracking_trial(plant, signal, law, True, noise).rmse / alone[name]
+    size = float(np.mean(backlash_sizes(plant)))
+    return UnseenTubeTrial(exponent, size, class_deg, alone, helped, corrected)
