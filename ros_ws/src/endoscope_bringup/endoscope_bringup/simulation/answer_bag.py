@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_bags import BagWriter, MessageStream, Recording
+from endoscope_bags import BagWriter, JointStateSeries, MessageStream, Recording
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bringup.simulation.commands_of_bag import (
@@ -19,11 +19,21 @@ from endoscope_bringup.simulation.commands_of_bag import (
     wire_names,
 )
 from endoscope_core.plant import PlantDescription, SensorModel
-from endoscope_core.plant.on_stamps import Answer, AnswerStamps, answer_commands
+from endoscope_core.plant.on_stamps import (
+    NANOSECONDS,
+    Answer,
+    AnswerStamps,
+    answer_commands,
+)
+from endoscope_core.plant.recording import TOPICS, recording_faults
+from endoscope_core.plant.simulator import TICK
 
 MOTOR_TOPIC = 'motor/measured_js'
 WIRES_TOPIC = 'wires/measured_js'
 BENDING_TOPIC = 'slave/measured_js'
+
+READ_DELAYS = (0.0, TICK)
+"""Seconds from a stamp to its reading that a rig at 1 kHz may have."""
 
 Stamps = NDArray[np.int64]
 
@@ -36,6 +46,11 @@ class _Times:
     stamp_ns: Stamps
     log_ns: Stamps
     publish_ns: Stamps
+
+    def only(self, kept: NDArray[np.bool_]) -> '_Times':
+        return replace(
+            self, stamp_ns=self.stamp_ns[kept], log_ns=self.log_ns[kept],
+            publish_ns=self.publish_ns[kept])
 
 
 def write_answer(
@@ -81,9 +96,13 @@ def write_answer(
                 (WIRES_TOPIC, plant.sensors.load_cell_rate),
                 (BENDING_TOPIC, plant.sensors.tracker_rate))
         }
-        answer = answer_commands(
-            driven, commands.stamp_ns, commands.shaft,
-            AnswerStamps(*(times[s].stamp_ns for s in (MOTOR_TOPIC, WIRES_TOPIC, BENDING_TOPIC))))
+        faults = recording_faults(driven)
+        for suffix, device in zip((MOTOR_TOPIC, WIRES_TOPIC, BENDING_TOPIC), TOPICS, strict=True):
+            since = (times[suffix].stamp_ns - commands.stamp_ns[0]) * NANOSECONDS
+            times[suffix] = times[suffix].only(faults.keeps(device, since))
+        stamps = AnswerStamps(
+            *(times[s].stamp_ns for s in (MOTOR_TOPIC, WIRES_TOPIC, BENDING_TOPIC)))
+        answer = _answer_as_stamped(driven, commands, stamps, _recorded_shaft(recording, commands))
         if noise_seed is not None:
             answer = _noisy(answer, SensorModel(plant.sensors, noise_seed))
         streams = [_copied(recording, suffix) for suffix in (SHAFT_TOPIC, ANGLE_TOPIC)
@@ -91,6 +110,42 @@ def write_answer(
         streams += _encoded(answer, times, commands.joints)
         writer.write_streams(streams)
         return writer.message_count
+
+
+def _recorded_shaft(recording: Recording, commands: BagCommands) -> JointStateSeries | None:
+    motors = [motor_name(joint) for joint in commands.joints]
+    if not recording.has(MOTOR_TOPIC):
+        return None
+    series = recording.joint_state(MOTOR_TOPIC, finite=())
+    if series.position is None or not set(motors) <= set(series.names):
+        return None
+    return series.select(motors)
+
+
+def _answer_as_stamped(
+    plant: PlantDescription,
+    commands: BagCommands,
+    stamps: AnswerStamps,
+    recorded: JointStateSeries | None,
+) -> Answer:
+    """Answer by the recording's own habit of stamping its readings.
+
+    A rig that stamps the beginning of its cycle, commands and then reads, records at a stamp what
+    the command of that stamp has already moved. The shafts, whose encoders are the finest clock,
+    tell which habit a recording has.
+    """
+    def answer(read_delay: float, at: AnswerStamps) -> Answer:
+        return answer_commands(
+            plant, commands.stamp_ns, commands.shaft, at, read_delay=read_delay)
+
+    if recorded is None:
+        return answer(0.0, stamps)
+    position = recorded.require('position')
+    misfits = [
+        float(np.nanmean((answer(delay, replace(stamps, motor=recorded.stamp_ns)).shaft_position
+                          - position) ** 2))
+        for delay in READ_DELAYS]
+    return answer(READ_DELAYS[int(np.argmin(misfits))], stamps)
 
 
 def _times(

@@ -22,7 +22,7 @@ FACTOR = TIME + 1
 
 
 @compiled
-def friction_factor(parameters: Array, time: float, duration: float) -> float:
-    """Mean factor on the capstan exponent over a step that begins at `time`."""
-    after = onset.share_after(parameters[TIME], time, duration)
+def friction_factor(parameters: Array, time: float, tick: float) -> float:
+    """Mean factor on the capstan exponent over the tick around `time`."""
+    after = onset.share_after(parameters[TIME], time, tick)
     return 1.0 + after * (parameters[FACTOR] - 1.0)

@@ -6,8 +6,21 @@ from endoscope_core.compiled import compiled
 
 
 @compiled
-def slid(slide: float, ratio: float) -> float:
-    """Dahl state after sliding `ratio` pre-sliding distances (signed); stays in [-1, 1]."""
-    size = abs(ratio)
+def path_length(way: float, shake: float) -> float:
+    """Length of a way that goes to and fro by `shake` while it makes headway `way`."""
+    return abs(way) if shake == 0.0 else math.hypot(way, shake)
+
+
+@compiled
+def slid(slide: float, ratio: float, ceiling: float, shake: float) -> float:
+    """Dahl state after sliding `ratio` pre-sliding distances (signed), towards +-`ceiling`.
+
+    Solves ``z' = v - s z / ceiling`` with the path's speed ``s``, which is ``|v|`` without
+    `shake`, the pre-sliding distances shaken to and fro meanwhile.
+    """
+    path = path_length(ratio, shake)
+    if path == 0.0:
+        return slide
+    size = path / ceiling
     share = 1.0 - math.exp(-size) if size > 0.02 else size * (1.0 - size * (0.5 - size / 6.0))
-    return slide + share * ((1.0 if ratio > 0.0 else -1.0) - slide)
+    return slide + share * (ceiling * ratio / path - slide)

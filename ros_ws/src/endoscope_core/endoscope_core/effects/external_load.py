@@ -11,7 +11,7 @@ DEFINITION = define(
     equation='tau = moment_nm for t >= time_s',
     source='Step disturbance: De Luca, Mattone, IEEE ICRA 2005',
     parameters=(
-        EffectParameter('moment_nm', 'N m', -0.1, 0.1, 0.005, off=0.0, starts=(-0.003, 0.003),
+        EffectParameter('moment_nm', 'N m', -0.1, 0.1, 0.005, off=0.0, starts=(0.003,),
                         comparable=True),
         EffectParameter('time_s', 's', 0.0, 3600.0, 15.0,
                         starts=(3.0, 8.0, 15.0, 22.0, 30.0, 40.0), comparable=True),
@@ -23,6 +23,6 @@ TIME = MOMENT + 1
 
 
 @compiled
-def mean_moment(parameters: Array, time: float, duration: float) -> float:
-    """Mean moment in N m over a step that begins at `time`."""
-    return parameters[MOMENT] * onset.share_after(parameters[TIME], time, duration)
+def mean_moment(parameters: Array, time: float, tick: float) -> float:
+    """Mean moment in N m over the tick around `time`."""
+    return parameters[MOMENT] * onset.share_after(parameters[TIME], time, tick)

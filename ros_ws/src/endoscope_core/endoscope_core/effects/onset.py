@@ -4,6 +4,9 @@ from endoscope_core.compiled import compiled
 
 
 @compiled
-def share_after(onset: float, start: float, duration: float) -> float:
-    """Share in [0, 1] of the interval from `start`, `duration` s long, that lies after `onset`."""
-    return min(1.0, max(0.0, (start + duration - onset) / duration))
+def share_after(onset: float, time: float, tick: float) -> float:
+    """Share in [0, 1] of the tick around `time`, all in s, that lies after `onset`.
+
+    Samples come once a tick: a step that takes as long shows in their sum wherever it lies.
+    """
+    return min(1.0, max(0.0, 0.5 + (time - onset) / tick))

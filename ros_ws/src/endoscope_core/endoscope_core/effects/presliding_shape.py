@@ -19,8 +19,8 @@ DEFINITION = define(
     source='Dahl, AIAA J. 14(12), 1976 (exponent); Al-Bender, Lampaert, Swevers, IEEE Trans. '
            'Autom. Control 50(11), 2005 (generalised Maxwell-slip)',
     parameters=(
-        EffectParameter('exponent', '-', 0.1, 4.0, 1.8, off=1.0, starts=(0.5, 1.0, 2.0)),
-        EffectParameter('memory', '-', 0.0, 1.0, 0.0, off=0.0, starts=(0.0, 0.7)),
+        EffectParameter('exponent', '-', 0.1, 4.0, 1.8, off=1.0, starts=(0.5, 2.0)),
+        EffectParameter('memory', '-', 0.0, 1.0, 0.0, off=0.0, starts=(0.1, 0.7)),
         EffectParameter('at_joint', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
 )
@@ -65,7 +65,7 @@ def slid(state: Array, parameters: Array, place: int, ratio: float) -> float:
     way = 1.0 if ratio > 0.0 else -1.0
     rest = 1.0 - state[place] * way
     if abs(excess) < 1e-6:
-        state[place] = dahl.slid(state[place], ratio)
+        state[place] = dahl.slid(state[place], ratio, 1.0, 0.0)
     elif rest > 0.0:
         state[place] = way * (1.0 - _rest_after(rest, abs(ratio), excess))
     mean = 0.0

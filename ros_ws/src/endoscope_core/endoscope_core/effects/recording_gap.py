@@ -6,7 +6,7 @@ DEFINITION = define(
     'recording_gap',
     Stage.RECORDING,
     physics='The samples of one topic are missing for a while.',
-    equation='no sample of `topic` with time_s <= t < time_s + duration_s',
+    equation='topic 0 motor, 1 wires, 2 tracker: no sample in time_s <= t < time_s + duration_s',
     source='Little, Rubin, Statistical Analysis with Missing Data, 3rd ed. 2019, ch. 1',
     parameters=(
         EffectParameter('time_s', 's', 0.0, 3600.0, 5.0, comparable=True),

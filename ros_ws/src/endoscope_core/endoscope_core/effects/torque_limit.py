@@ -11,7 +11,8 @@ DEFINITION = define(
     equation='|pulley_radius (Ta_proximal - Tb_proximal)| <= limit_nm; the motor yields there',
     source='Ideal torque source with saturation: Siciliano et al., Robotics, 2009, sec. 5.2',
     parameters=(
-        EffectParameter('limit_nm', 'N m', 1e-3, 10.0, 0.05, off=10.0, starts=(0.03, 0.045)),
+        EffectParameter('limit_nm', 'N m', 1e-3, 10.0, 0.055, off=10.0,
+                        starts=(0.03, 0.045, 0.055)),
     ),
 )
 ON = DEFINITION.flag

@@ -11,8 +11,8 @@ DEFINITION = define(
     source='Olsson et al., Eur. J. Control 4(3), 1998, eq. 2 (film); Do et al., '
            'Mechatronics 24, 2014 (friction coefficient growing with speed)',
     parameters=(
-        EffectParameter('coefficient', 'N s/m', 0.0, 5000.0, 200.0, off=0.0, starts=(100.0, 5.0)),
-        EffectParameter('load_factor', 's/m', 0.0, 1000.0, 0.0, off=0.0, starts=(1.0, 40.0)),
+        EffectParameter('coefficient', 'N s/m', 0.0, 5000.0, 200.0, off=0.0, starts=(100.0,)),
+        EffectParameter('load_factor', 's/m', 0.0, 500.0, 0.0, off=0.0, starts=(1.0,)),
     ),
 )
 ON = DEFINITION.flag

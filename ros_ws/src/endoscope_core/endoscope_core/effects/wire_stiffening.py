@@ -12,8 +12,8 @@ DEFINITION = define(
     equation='T = T0 + k ((exp(2 a s) - 1) / (2 a) + b s^3); a = growth_per_m, b = cubic_per_m2',
     source='Fung, Biomechanics, 2nd ed. 1993, sec. 7.5 (exponential); Duffing hardening (cubic)',
     parameters=(
-        EffectParameter('growth_per_m', '1/m', 0.0, 500.0, 80.0, off=0.0, starts=(50.0, 5.0)),
-        EffectParameter('cubic_per_m2', '1/m^2', 0.0, 5e5, 0.0, off=0.0, starts=(0.0, 2e4)),
+        EffectParameter('growth_per_m', '1/m', 0.0, 500.0, 80.0, off=0.0, starts=(50.0,)),
+        EffectParameter('cubic_per_m2', '1/m^2', 0.0, 5e5, 0.0, off=0.0, starts=(1e3,)),
     ),
 )
 ON = DEFINITION.flag

@@ -7,6 +7,7 @@ from endoscope_core.plant.parameters import (
     SensorParameters,
 )
 from endoscope_core.plant.plant_file import PlantFileError, load_plant, save_plant
+from endoscope_core.plant.recording import RecordingFaults, recording_faults
 from endoscope_core.plant.sensing import SensorModel
 from endoscope_core.plant.simulator import (
     PlantSample,
@@ -23,9 +24,11 @@ __all__ = [
     'PlantSample',
     'PlantSimulator',
     'PlantTrajectory',
+    'RecordingFaults',
     'SensorModel',
     'SensorParameters',
     'load_plant',
+    'recording_faults',
     'save_plant',
     'simulate',
 ]

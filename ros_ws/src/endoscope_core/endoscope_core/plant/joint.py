@@ -15,7 +15,7 @@ from endoscope_core.plant.inputs import IN_OTHER_JOINT, IN_PUSH_MOMENT
 
 @compiled
 def load(
-    p: Array, on: Flags, x: Array, q: float, time: float, duration: float,
+    p: Array, on: Flags, x: Array, q: float, time: float, tick: float,
 ) -> tuple[float, float]:
     """Moment in N m of all but wires, friction and damping, and minus its slope by the angle."""
     moment = x[IN_PUSH_MOMENT] - p[JOINT_STIFFNESS] * q
@@ -33,9 +33,9 @@ def load(
         moment += added
         slope += steeper
     if on[external_load.ON]:
-        moment += external_load.mean_moment(p, time, duration)
+        moment += external_load.mean_moment(p, time, tick)
     if on[cross_coupling.ON]:
         moment += cross_coupling.moment(p, x[IN_OTHER_JOINT])
     if on[breathing.ON]:
-        moment += breathing.moment(p, time + 0.5 * duration)
+        moment += breathing.moment(p, time)
     return moment, slope

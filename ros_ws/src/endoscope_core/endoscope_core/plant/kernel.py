@@ -10,17 +10,18 @@ import math
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.effects import (
     cogging,
-    dahl,
     distributed_friction,
     friction_run_in,
     gear_backlash,
     joint_backlash,
     joint_inertia,
-    presliding_shape,
+    stribeck_friction,
     torque_limit,
     viscous_friction,
     wire_creep,
 )
+from endoscope_core.effects.presliding_shape import JOINT as AT_JOINT
+from endoscope_core.effects.presliding_shape import WIRE_A, WIRE_B
 from endoscope_core.effects.slots import (
     COMMAND_HISTORY,
     HISTORY,
@@ -45,8 +46,9 @@ from endoscope_core.effects.slots import (
     TICKS,
     TIP,
     WIRE_END,
+    WIRE_END_SPEED,
 )
-from endoscope_core.plant import sheath_chain
+from endoscope_core.plant import presliding, sheath_chain
 from endoscope_core.plant.actuator import (
     pulley_angle,
     servo_command,
@@ -78,6 +80,7 @@ from endoscope_core.plant.transmission import (
     half_exponent,
     is_distributed,
     pretension_now,
+    sliding_law,
     wire_tension,
 )
 
@@ -124,16 +127,13 @@ def advance_tick(
     geared = on[gear_backlash.ON] or on[cogging.ON]
     chained = is_distributed(p, on)
     loaded_tip = joint_backlash.tip_is_loaded(p, on) and not chained
-    shaped_wires = presliding_shape.acts(p, on, presliding_shape.WIRE_A)
-    shaped_joint = presliding_shape.acts(p, on, presliding_shape.JOINT)
     shift = stretch_shift(p, on, x)
     m, dm, pulley, pulley_speed = state[MOTOR], state[MOTOR_SPEED], state[PULLEY], 0.0
     q, dq, wire_end = state[JOINT], state[JOINT_SPEED], state[WIRE_END]
-    wire_end_speed = state[JOINT_SPEED]
+    wire_end_speed = state[WIRE_END_SPEED]
     za, zb, zj = state[SLIDE_A], state[SLIDE_B], state[JOINT_SLIDE]
-    ca, cb = 0.0, 0.0
     for i in range(substeps):
-        time = start + i * dt
+        time = start + (i + 0.5) * dt
         pretension = pretension_now(p, on, time)
 
         if driven:
@@ -144,7 +144,7 @@ def advance_tick(
             if on[torque_limit.ON]:
                 state[SLIDE_A], state[SLIDE_B] = za, zb
                 v = 0.5 * r * (state[PULLEY_SPEED] + wire_end_speed)
-                phi = friction_exponent(state, p, on, v, time, dt)
+                phi = friction_exponent(state, p, on, time, tick)
                 stretch = r * (pulley - wire_end) + shift
                 loads = proximal_tensions(state, p, on, pretension, phi, v, stretch, shift)
                 step = torque_limit.yielding(p, m_new - m, loads)
@@ -154,41 +154,27 @@ def advance_tick(
         pulley_speed = (pulley_new - pulley) / dt
 
         v = 0.5 * r * (pulley_speed + wire_end_speed)
-        phi = friction_exponent(state, p, on, v, time, dt)
-        if on[wire_creep.ON]:
-            ca, cb = state[wire_creep.CREEP_A], state[wire_creep.CREEP_B]
+        phi = friction_exponent(state, p, on, time, tick)
+        ceiling, shudder = sliding_law(state, p, on, v)
+        shake = shudder * dt / xs
         wire_step = r * (pulley_new - pulley)
         stretch = r * (0.5 * (pulley + pulley_new) - wire_end) + shift
         if chained:
-            share = p[distributed_friction.SHARE]
-            ta, ka = sheath_chain.eliminate(
-                state, distributed_friction.WIRE_A, p, on, pretension, shift - ca,
-                share * phi, wire_step)
-            tb, kb = sheath_chain.eliminate(
-                state, distributed_friction.WIRE_B, p, on, pretension, -shift - cb,
-                share * phi, -wire_step)
-            # The chain is solved for the end of the substep, the joint for its middle.
-            ka *= 2.0
-            kb *= 2.0
-            phi *= 1.0 - share
+            ta, tb, ka, kb = sheath_chain.distal_tensions(
+                state, p, on, pretension, shift, phi, ceiling, wire_step)
+            phi *= 1.0 - p[distributed_friction.SHARE]
         else:
+            ca, cb = state[wire_creep.CREEP_A], state[wire_creep.CREEP_B]
             ta, ka = wire_tension(p, on, pretension, stretch - ca)
             tb, kb = wire_tension(p, on, pretension, -stretch - cb)
         ea, grip_a = half_exponent(p, on, phi, za, v)
         eb, grip_b = half_exponent(p, on, phi, zb, -v)
         da, db = math.exp(-ea), math.exp(-eb)
+        state[stribeck_friction.BRAKING] = abs(ta * da * za - tb * db * zb)
 
-        way = 1.0 if v > 0.0 else -1.0
-        way_joint = 1.0 if dq > 0.0 else -1.0
-        if shaped_wires:
-            steep_a = presliding_shape.steepness(state, p, presliding_shape.WIRE_A, way)
-            steep_b = presliding_shape.steepness(state, p, presliding_shape.WIRE_B, -way)
-        else:
-            steep_a, steep_b = 1.0 - za * way, 1.0 + zb * way
-        if shaped_joint:
-            steep_j = presliding_shape.steepness(state, p, presliding_shape.JOINT, way_joint)
-        else:
-            steep_j = 1.0 - zj * way_joint
+        steep_a = presliding.steepness(state, p, on, WIRE_A, za, v, ceiling, shudder)
+        steep_b = presliding.steepness(state, p, on, WIRE_B, zb, -v, ceiling, shudder)
+        steep_j = presliding.steepness(state, p, on, AT_JOINT, zj, dq, 1.0, 0.0)
         pull = r * (ta * da - tb * db)
         grip = 0.5 * r * r / xs * (grip_a * ta * da * steep_a + grip_b * tb * db * steep_b)
         pull_slope = r * r * (ka * da + kb * db) + grip
@@ -207,7 +193,7 @@ def advance_tick(
             pull_slope *= touching
             drag *= touching
 
-        moment, slope = load(p, on, x, q, time, dt)
+        moment, slope = load(p, on, x, q, time, tick)
         moment += pull - p[JOINT_FRICTION] * zj
         slope += pull_slope + p[JOINT_FRICTION] / qs * steep_j
         resistance = p[JOINT_DAMPING] + drag
@@ -222,20 +208,11 @@ def advance_tick(
         wire_end_speed = (q + offset - wire_end) / dt if loaded_tip else mean_dq
         wire_end = q + offset
         slid = 0.5 * r * (pulley_speed + wire_end_speed) * dt
-        if shaped_wires:
-            za = presliding_shape.slid(state, p, presliding_shape.WIRE_A, slid / xs)
-            zb = presliding_shape.slid(state, p, presliding_shape.WIRE_B, -slid / xs)
-        else:
-            za = dahl.slid(za, slid / xs)
-            zb = dahl.slid(zb, -slid / xs)
-        if shaped_joint:
-            zj = presliding_shape.slid(state, p, presliding_shape.JOINT, mean_dq * dt / qs)
-        else:
-            zj = dahl.slid(zj, mean_dq * dt / qs)
+        za = presliding.slid(state, p, on, WIRE_A, za, slid / xs, ceiling, shake)
+        zb = presliding.slid(state, p, on, WIRE_B, zb, -slid / xs, ceiling, shake)
+        zj = presliding.slid(state, p, on, AT_JOINT, zj, mean_dq * dt / qs, 1.0, 0.0)
         if chained:
-            end_step = r * mean_dq * dt
-            sheath_chain.follow(state, distributed_friction.WIRE_A, p, wire_step, end_step)
-            sheath_chain.follow(state, distributed_friction.WIRE_B, p, -wire_step, -end_step)
+            sheath_chain.follow(state, p, ceiling, shake, wire_step, r * mean_dq * dt)
         if on[wire_creep.ON]:
             wire_creep.advance(state, p, ta - pretension, tb - pretension, dt)
         if on[friction_run_in.ON]:
@@ -244,7 +221,8 @@ def advance_tick(
         state[PULLEY_SPEED] = pulley_speed
 
     state[MOTOR], state[MOTOR_SPEED], state[PULLEY] = m, dm, pulley
-    state[JOINT], state[JOINT_SPEED], state[WIRE_END] = q, dq, wire_end
+    state[JOINT], state[JOINT_SPEED] = q, dq
+    state[WIRE_END], state[WIRE_END_SPEED] = wire_end, wire_end_speed
     state[SLIDE_A], state[SLIDE_B], state[JOINT_SLIDE] = za, zb, zj
     play_behind_joint = on[joint_backlash.ON] and not loaded_tip
     state[TIP] = joint_backlash.tip(state, p, q) if play_behind_joint else q
@@ -253,7 +231,7 @@ def advance_tick(
         pulley_speed = dm
     v = 0.5 * r * (pulley_speed + (wire_end_speed if loaded_tip else dq))
     end = state[TICKS] * tick
-    phi = friction_exponent(state, p, on, v, end, dt)
+    phi = friction_exponent(state, p, on, end, tick)
     loads = proximal_tensions(
         state, p, on, pretension_now(p, on, end), phi, v, r * (pulley - wire_end) + shift, shift)
     state[TENSION_A], state[TENSION_B] = loads[0], loads[1]

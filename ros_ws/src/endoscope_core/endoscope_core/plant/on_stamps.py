@@ -1,12 +1,13 @@
 """The plant's answer to recorded commands, at the stamps of a recording."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.plant.parameters import PlantDescription
+from endoscope_core.plant.recording import recording_faults
 from endoscope_core.plant.simulator import TICK, PlantTrajectory, simulate
 
 Stamps = NDArray[np.int64]
@@ -23,10 +24,9 @@ class AnswerStamps:
     wires: Stamps
     tracker: Stamps
 
-    def first_and_last(self) -> tuple[int, int]:
-        """Earliest and latest stamp of all."""
-        stamps = np.concatenate([self.motor, self.wires, self.tracker])
-        return int(stamps.min()), int(stamps.max())
+    def first(self) -> int:
+        """Earliest stamp of all."""
+        return int(np.concatenate([self.motor, self.wires, self.tracker]).min())
 
 
 @dataclass(frozen=True)
@@ -91,8 +91,12 @@ def answer_commands(
     shaft_commands: Array,
     answer_stamps: AnswerStamps,
     start_shaft: Array | None = None,
+    read_delay: float = 0.0,
 ) -> Answer:
     """What the noise-free sensors of a rig read at given stamps under recorded commands.
+
+    The stamps are what the devices' clocks say: a plant whose tracker's clock is skewed answers
+    with the angle of the time at which that clock said so.
 
     Parameters
     ----------
@@ -105,6 +109,9 @@ def answer_commands(
     answer_stamps : AnswerStamps
     start_shaft : array (J,), optional
         Shaft angle in rad at which the rig rests at first; the first command if not given.
+    read_delay : float
+        Seconds from a stamp to the reading that carries it: zero, or the length of a cycle where
+        a rig stamps the cycle's beginning, sends the command and then reads.
 
     Returns
     -------
@@ -115,19 +122,26 @@ def answer_commands(
     ValueError
         If the stamps decrease, or a command is not finite.
     """
-    first, last = answer_stamps.first_and_last()
-    origin = min(first, int(command_stamps[0]))
+    origin = min(answer_stamps.first(), int(command_stamps[0]))
+    faults = recording_faults(plant)
+    answer_times = {
+        'motor': _seconds(answer_stamps.motor, origin) + read_delay,
+        'wires': _seconds(answer_stamps.wires, origin) + read_delay,
+        'tracker': faults.tracker_time(_seconds(answer_stamps.tracker, origin)) + read_delay,
+    }
+    last = max(float(stretch.max(initial=0.0)) for stretch in answer_times.values())
     # One tick more than the last stamp needs, so that interpolation has a right neighbour.
-    ticks = int(np.ceil((last - origin) * NANOSECONDS / TICK)) + 2
-    times = (command_stamps - origin) * NANOSECONDS
+    ticks = int(np.ceil(last / TICK)) + 2
+    times = _seconds(command_stamps, origin)
     command = hold_on_ticks(times, shaft_commands, ticks)
     start = shaft_commands[0] if start_shaft is None else start_shaft
     trajectory = simulate(plant, command, start_shaft=start)
-    return _at_stamps(trajectory, {
-        'motor': (answer_stamps.motor - origin) * NANOSECONDS,
-        'wires': (answer_stamps.wires - origin) * NANOSECONDS,
-        'tracker': (answer_stamps.tracker - origin) * NANOSECONDS,
-    })
+    answer = _at_stamps(trajectory, answer_times)
+    return replace(answer, bending=faults.spoilt(answer.bending, answer_times['tracker']))
+
+
+def _seconds(stamps: Stamps, origin: int) -> Array:
+    return np.asarray((stamps - origin) * NANOSECONDS, dtype=np.float64)
 
 
 def _at_stamps(trajectory: PlantTrajectory, times: Mapping[str, Array]) -> Answer:

@@ -17,6 +17,7 @@ from endoscope_core.plant.parameters import (
     PlantDescription,
     SensorParameters,
 )
+from endoscope_core.plant.recording import recording_faults
 
 JOINT_NAMES = ('bend_x', 'bend_y')
 
@@ -88,6 +89,7 @@ def plant_from_mapping(content: Any) -> PlantDescription:
         raise ValueError('effects must be a list')
     plant = PlantDescription(joints, sensors, tuple(_effect(i, e) for i, e in enumerate(listed)))
     pack(plant)
+    recording_faults(plant)
     return plant
 
 

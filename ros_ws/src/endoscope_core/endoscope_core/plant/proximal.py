@@ -76,6 +76,6 @@ def proximal_tensions(
     sliding_b = grip_b * negative / p[PRESLIDING_DISTANCE] * 0.5
     za, zb = state[SLIDE_A], state[SLIDE_B]
     leverage = p[PULLEY_RADIUS] * p[JOINT_RADIUS]
-    up = leverage * (elastic + sliding_a * (1.0 - za) + sliding_b * (1.0 + zb))
-    down = leverage * (elastic + sliding_a * (1.0 + za) + sliding_b * (1.0 - zb))
+    up = leverage * (elastic + sliding_a * max(0.0, 1.0 - za) + sliding_b * max(0.0, 1.0 + zb))
+    down = leverage * (elastic + sliding_a * max(0.0, 1.0 + za) + sliding_b * max(0.0, 1.0 - zb))
     return positive, negative, up, down

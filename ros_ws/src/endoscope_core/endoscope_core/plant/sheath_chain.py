@@ -14,12 +14,16 @@ from endoscope_core.effects.distributed_friction import (
     LENGTHS,
     NODES,
     OFFSET,
+    SHARE,
     SLIDE,
     STEP,
     STRETCH,
+    WIRE_A,
+    WIRE_B,
 )
 from endoscope_core.effects.slots import PRESLIDING_DISTANCE, WIRE_STIFFNESS
-from endoscope_core.plant.transmission import wire_tension
+from endoscope_core.effects.wire_creep import CREEP_A, CREEP_B
+from endoscope_core.plant.transmission import half_exponent, wire_tension
 
 LEAST_STIFFNESS = 1e-3
 """Share of its stiffness that a slack spring keeps in the linearisation: it must be solvable."""
@@ -36,9 +40,9 @@ def spring_tension(
 
 
 @compiled
-def eliminate(
+def _eliminate(
     state: Array, chain: int, p: Array, on: Flags, pretension: float, common: float, phi: float,
-    motor_step: float,
+    ceiling: float, motor_step: float,
 ) -> tuple[float, float]:
     """Tension in N at the joint after a substep if the joint stood still, and its slope in N/m.
 
@@ -48,20 +52,22 @@ def eliminate(
         First state of this wire's chain.
     phi : float
         Capstan exponent of the whole chain.
+    ceiling : float
+        What the nodes' pre-sliding states approach.
     motor_step : float
         By how much the motor pulls the wire in this substep, m.
     """
-    share = 0.5 * phi / NODES
     offset, gain = motor_step, 0.0
     before, slope_before = spring_tension(state, chain, p, on, pretension, common, 0)
     for i in range(NODES):
         after, slope_after = spring_tension(state, chain, p, on, pretension, common, i + 1)
         slide = state[chain + SLIDE + i]
-        released = math.exp(-share * slide)
+        exponent, share = half_exponent(p, on, phi / NODES, slide, 0.0)
+        released = math.exp(-exponent)
         pulled = 1.0 / released
         way = 1.0 if state[chain + STEP + i] > 0.0 else -1.0
         grip = share * (before * released + after * pulled)
-        grip *= (1.0 - slide * way) / p[PRESLIDING_DISTANCE]
+        grip *= max(0.0, 1.0 - slide * way / ceiling) / p[PRESLIDING_DISTANCE]
         towards = slope_before * released
         away = slope_after * pulled
         pivot = towards * (1.0 - gain) + away + grip
@@ -74,7 +80,10 @@ def eliminate(
 
 
 @compiled
-def follow(state: Array, chain: int, p: Array, motor_step: float, joint_step: float) -> None:
+def _follow(
+    state: Array, chain: int, p: Array, ceiling: float, shake: float, motor_step: float,
+    joint_step: float,
+) -> None:
     """Move the nodes, once the joint has let out `joint_step` m of wire towards the motor."""
     step = joint_step
     for i in range(NODES - 1, -1, -1):
@@ -82,6 +91,42 @@ def follow(state: Array, chain: int, p: Array, motor_step: float, joint_step: fl
         step = state[chain + OFFSET + i] + state[chain + GAIN + i] * beyond
         state[chain + STRETCH + i + 1] += step - beyond
         slide = chain + SLIDE + i
-        state[slide] = dahl.slid(state[slide], step / p[PRESLIDING_DISTANCE])
+        state[slide] = dahl.slid(state[slide], step / p[PRESLIDING_DISTANCE], ceiling, shake)
         state[chain + STEP + i] = step
     state[chain + STRETCH] += motor_step - step
+
+
+@compiled
+def distal_tensions(
+    state: Array, p: Array, on: Flags, pretension: float, shift: float, phi: float,
+    ceiling: float, wire_step: float,
+) -> tuple[float, float, float, float]:
+    """Tensions in N of both wires at the joint in a substep, and their slopes in N/m.
+
+    Parameters
+    ----------
+    shift : float
+        Stretch in m of the positive wire that neither motor nor joint causes.
+    phi : float
+        Capstan exponent of the whole sheath.
+    ceiling : float
+        What the pre-sliding states approach.
+    wire_step : float
+        By how much the motor pulls the positive wire in this substep, m.
+    """
+    phi *= p[SHARE]
+    ta, ka = _eliminate(
+        state, WIRE_A, p, on, pretension, shift - state[CREEP_A], phi, ceiling, wire_step)
+    tb, kb = _eliminate(
+        state, WIRE_B, p, on, pretension, -shift - state[CREEP_B], phi, ceiling, -wire_step)
+    # The chain is solved for the end of the substep, the joint for its middle.
+    return ta, tb, 2.0 * ka, 2.0 * kb
+
+
+@compiled
+def follow(
+    state: Array, p: Array, ceiling: float, shake: float, wire_step: float, joint_step: float,
+) -> None:
+    """Move the nodes of both wires, once the joint has let out `joint_step` m of the positive."""
+    _follow(state, WIRE_A, p, ceiling, shake, wire_step, joint_step)
+    _follow(state, WIRE_B, p, ceiling, shake, -wire_step, -joint_step)

@@ -26,7 +26,9 @@ from endoscope_core.plant.packing import pack, rest_state
 from endoscope_core.plant.parameters import PlantDescription
 
 TICK = 1.0e-3
-SUBSTEPS = 10
+SUBSTEPS = 5
+LARGEST_COMMAND = 1.0e6
+BEYOND = f'{LARGEST_COMMAND:g} rad'
 
 Array = NDArray[np.float64]
 
@@ -138,13 +140,14 @@ class PlantSimulator:
         Raises
         ------
         ValueError
-            If the command has another shape or is not finite; the plant stays as it was.
+            If the command has another shape, is not finite or beyond `LARGEST_COMMAND`; the plant
+            stays as it was.
         """
         command = np.asarray(shaft_command, dtype=float)
         if command.shape != self._gear.shape:
             raise ValueError(f'a command for {self.joints} has shape {command.shape}')
-        if not np.isfinite(command).all():
-            raise ValueError(f'the command {command} is not finite')
+        if not (np.abs(command) <= LARGEST_COMMAND).all():
+            raise ValueError(f'the command {command} is not finite or beyond {BEYOND}')
         self._inputs[:, IN_COMMAND] = command / self._gear
         for _ in range(n_ticks):
             if len(self.joints) == 2:
@@ -198,8 +201,8 @@ def simulate(
     gear = _gears(plant)
     if command.ndim != 2 or command.shape[1] != len(gear) or not len(command):
         raise ValueError(f'a command for {len(gear)} joints has shape {command.shape}')
-    if not np.isfinite(command).all():
-        raise ValueError('the command is not finite')
+    if not (np.abs(command) <= LARGEST_COMMAND).all():
+        raise ValueError(f'the command is not finite or beyond {BEYOND}')
     parameters, on = pack(plant)
     motor = None if start_shaft is None else np.asarray(start_shaft, dtype=float) / gear
     states, histories = rest_state(parameters, motor)
