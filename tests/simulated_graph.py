@@ -19,6 +19,7 @@ from std_srvs.srv import Trigger
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.joint_stream import JointSample, JointSubscription
+from endoscope_nodes.matching import all_matched
 from endoscope_nodes.names import (
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
@@ -85,7 +86,11 @@ class SimulatedGraph:
             self.diagnostics[status.name].append(status)
 
     def listen(self, topic: str, names=JOINTS) -> list[JointSample]:
-        """Collect all samples of a topic from now on."""
+        """Collect all samples of a topic from now on.
+
+        Ask before the topic speaks where each sample counts: who joins a running stream may miss
+        its next message.
+        """
         samples: list[JointSample] = []
         JointSubscription(self.probe, topic, names, samples.append, LOCK_STEP)
         self.connect()
@@ -99,15 +104,7 @@ class SimulatedGraph:
 
     def connect(self) -> None:
         """Wait until all publishers and subscriptions have found each other."""
-        self.wait(
-            lambda: (
-                self.runtime.connected()
-                and all(
-                    p.get_subscription_count() >= self.probe.count_subscribers(p.topic_name)
-                    for p in self.probe.publishers
-                )
-            )
-        )
+        self.wait(lambda: all_matched([*self.runtime.nodes, self.probe]))
 
     def wait(self, condition) -> None:
         """Serve the nodes in real time until something has come true."""
@@ -126,6 +123,8 @@ class SimulatedGraph:
         future = self.conductor.advance(seconds)
         assert self.runtime.spin_until(future, PATIENCE_S), 'simulated time stands still'
         future.result()
+        # The tick is over for the nodes that time waits for; the others may have mail left.
+        self.wait(lambda: True)
 
     def command(self, text: str) -> str:
         """Give a state command; the state after it."""

@@ -1,30 +1,14 @@
 """Calibration through the whole graph, and what makes it abort."""
 
-import math
-
 import numpy as np
 import pytest
 from simulated_graph import SimulatedGraph
-
-from endoscope_core.dataset import configuration_of_size, random_rig
-from endoscope_core.plant import save_plant
-
-NODES_WITH_A_PLANT = ('motor_driver', 'load_cells', 'em_tracker')
-
-
-def plant_of_size(tmp_path, size_deg, seed):
-    """A rig that no data set holds, in a tube of known backlash size."""
-    configuration = configuration_of_size(
-        random_rig(np.random.default_rng(seed)), math.radians(size_deg)
-    )
-    path = tmp_path / 'plant.yaml'
-    save_plant(configuration.plant, path)
-    return {node: {'plant_file': str(path)} for node in NODES_WITH_A_PLANT}
+from tubes import tube_of_size
 
 
 @pytest.mark.parametrize(('size_deg', 'seed'), [(50, 901), (80, 902)])
 def test_finds_the_class_of_a_known_tube(tmp_path, size_deg, seed):
-    with SimulatedGraph(overrides=plant_of_size(tmp_path, size_deg, seed)) as graph:
+    with SimulatedGraph(overrides=tube_of_size(tmp_path, size_deg, seed)) as graph:
         graph.enable()
         values = graph.calibrate()
         assert float(values['class_deg']) == size_deg

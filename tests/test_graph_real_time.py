@@ -27,10 +27,10 @@ class ForeignConsole(Node):
         self.state = ''
         self.commands = self.create_publisher(JointState, NAMESPACE + 'slave/servo_jp', qos)
         self.orders = self.create_publisher(String, NAMESPACE + 'slave/state_command', qos)
+        self.create_subscription(String, NAMESPACE + 'slave/operating_state', self._on_state, qos)
         self.create_subscription(
-            String, NAMESPACE + 'slave/operating_state', self._on_state, qos)
-        self.create_subscription(
-            JointState, NAMESPACE + 'motor/measured_js', self.measured.append, qos)
+            JointState, NAMESPACE + 'motor/measured_js', self.measured.append, qos
+        )
         self._begun = None
         self.done = Future()
         self.create_timer(0.005, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -55,8 +55,12 @@ class ForeignConsole(Node):
 
 def test_a_foreign_console_moves_the_slave():
     factories = [f for f in (*SLAVE_NODES, *CONTROL_NODES) if f.__name__ != 'ConsoleNode']
-    with Runtime(['--ros-args', '--log-level', 'fatal'], Context(), 228,
-                 {'compensator': {'mode': 'none'}, 'controller': {'active': False}}) as runtime:
+    with Runtime(
+        ['--ros-args', '--log-level', 'fatal'],
+        Context(),
+        228,
+        {'compensator': {'mode': 'none'}, 'controller': {'active': False}},
+    ) as runtime:
         for factory in factories:
             runtime.add(factory)
         console = ForeignConsole(runtime.context)
@@ -67,8 +71,7 @@ def test_a_foreign_console_moves_the_slave():
             assert list(console.measured[0].name) == ['motor_x', 'motor_y']
             assert reach[:, 0].max() > 0.5 * 0.4
             assert reach[:, 1].min() < -0.5 * 0.4
-            stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec
-                      for m in console.measured]
+            stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in console.measured]
             assert np.diff(stamps).min() > 0
         finally:
             runtime.executor.remove_node(console)

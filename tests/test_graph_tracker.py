@@ -10,13 +10,15 @@ def weight(graph):
 
 def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
     with SimulatedGraph() as graph:
+        drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
+        corrections = graph.listen('controller/correction_js')
         graph.enable()
         graph.calibrate()
         graph.set('console', source='motion', motion='non_periodic')
         graph.advance(4.0)
         assert weight(graph) == 1.0
-        drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
-        corrections = graph.listen('controller/correction_js')
+        drives.clear()
+        corrections.clear()
         graph.set('em_tracker', in_volume=False)
         graph.advance(2.0)
         assert weight(graph) == 0.0
@@ -36,12 +38,13 @@ def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
 
 def test_a_dead_tracker_node_leaves_the_feed_forward_going():
     with SimulatedGraph() as graph:
+        drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         graph.enable()
         graph.calibrate()
         graph.set('console', source='motion')
         graph.advance(3.0)
         graph.kill('em_tracker')
-        drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
+        drives.clear()
         graph.advance(2.0)
         assert len(drives) == 2000
         assert weight(graph) == 0.0

@@ -150,6 +150,10 @@ class RecorderNode(EndoscopeNode):
             self.get_logger().error(str(report))
         return report
 
+    def extra_readers(self) -> list[tuple[str, int]]:
+        """Topics that are read past the executor, and how many publishers each has found."""
+        return [(source.name, source.count_publishers()) for source in self._sources]
+
     def close(self) -> None:
         """Finish a recording that is being made."""
         if self._session is not None:

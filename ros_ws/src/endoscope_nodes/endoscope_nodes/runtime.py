@@ -22,6 +22,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.matching import all_matched
 from endoscope_nodes.parameters import (
     ParameterError,
     check_overrides,
@@ -170,15 +171,8 @@ class Runtime:
         check_overrides(list(self.nodes))
 
     def connected(self) -> bool:
-        """Whether every publisher of this process has found every subscription of this process."""
-        here = {(node.get_name(), node.get_namespace()) for node in self.nodes}
-        for node in self.nodes:
-            for publisher in node.publishers:
-                readers = node.get_subscriptions_info_by_topic(publisher.topic_name)
-                local = sum((r.node_name, r.node_namespace) in here for r in readers)
-                if publisher.get_subscription_count() < local:
-                    return False
-        return True
+        """Whether the nodes of this process have found each other's topics."""
+        return all_matched(self.nodes)
 
     def stop(self) -> None:
         """Let :meth:`spin` return; may be called from any thread, before or while it spins."""
