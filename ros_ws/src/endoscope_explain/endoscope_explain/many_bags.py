@@ -68,7 +68,8 @@ def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = Non
     for note in inputs.audit.recording.notes:
         if progress is not None:
             progress(f'note: {note}')
-    case = explain_case(inputs, explain_recording, jobs=jobs, progress=progress)
+    case = explain_case(
+        inputs, explain_recording, jobs=jobs, progress=progress, extras=not sources.quick)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         write_report(case, folder)

@@ -41,6 +41,8 @@ class Sources:
         A second recording of the same rig to judge on.
     without : collection of str
         Topics that may be missing.
+    quick : bool
+        Whether to leave out the black boxes and the next experiment.
     """
 
     bag: Path
@@ -48,6 +50,7 @@ class Sources:
     baseline: Path | None = None
     validate: Path | None = None
     without: Collection[str] = ()
+    quick: bool = False
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
                         choices=['motor/measured_js'], help='a topic that may be missing')
     parser.add_argument('--jobs', type=_positive, default=2, metavar='N',
                         help='processes side by side (default 2)')
+    parser.add_argument('--quick', action='store_true',
+                        help='leave out the black boxes and the next experiment')
     parser.add_argument('--dask', metavar='ADDRESS',
                         help='explain several bags on the Dask cluster whose scheduler is there')
 
@@ -37,7 +39,8 @@ def run(args: argparse.Namespace) -> int:
 
     plant = load_plant(args.plant)
     sources = [
-        Sources(bag, plant, args.baseline, args.validate, tuple(args.without))
+        Sources(bag, plant, args.baseline, args.validate, tuple(args.without),
+                args.quick)
         for bag in args.bags
     ]
     explain_bags(sources, args.out, jobs=args.jobs, dask_address=args.dask)

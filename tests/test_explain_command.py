@@ -1,0 +1,147 @@
+"""`endoscope explain` from bags to reports: what it writes, and what it refuses."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from distributed import LocalCluster
+from short_bags import PLANT, one_joint, write_short_bag
+
+from endoscope_bringup import cli
+from endoscope_core.plant import EffectSpec, load_plant, save_plant
+
+
+@pytest.fixture(scope='module')
+def rig(tmp_path_factory):
+    """A folder with a plant file, a sound bag and one of a rig with an end stop."""
+    folder = tmp_path_factory.mktemp('rig')
+    save_plant(PLANT, folder / 'plant.yaml')
+    write_short_bag(folder / 'sound')
+    stop = one_joint(EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.4}))
+    write_short_bag(folder / 'stopped.mcap', stop, seed=2)
+    return folder
+
+
+def explain(rig, out, *arguments):
+    return cli.main([
+        'explain', *map(str, arguments), '--plant', str(rig / 'plant.yaml'), '--out', str(out)])
+
+
+def test_a_stop_is_named_shown_and_exported(rig, tmp_path, capsys):
+    out = tmp_path / 'out'
+    assert explain(rig, out, rig / 'stopped.mcap', '--validate', rig / 'stopped.mcap') == 0
+    assert 'joint_stop on bend_x' in capsys.readouterr().out
+    report = json.loads((out / 'report.json').read_text())
+    assert report['verdict'] == 'missing_physics'
+    (effect,) = report['effects']
+    assert effect['id'] == 'joint_stop'
+    angle = effect['parameters']['angle_rad']
+    assert angle['value'] == pytest.approx(0.4, rel=0.05)
+    wire = 'wires/measured_js:wire_x_pos'
+    for fit in (report['fit'], report['fit']['validation']):
+        assert fit['augmented'][wire]['rmse_over_noise'] < 1.15
+        assert fit['gaussian_process'][wire]['rmse'] > fit['augmented'][wire]['rmse']
+    (place,) = report['where']
+    assert place['stage'] == 'joint'
+    assert [e.id for e in load_plant(out / 'plant.yaml').effects] == ['joint_stop']
+    assert '<h1>The simulation leaves out physics</h1>' in (out / 'report.html').read_text()
+
+
+def test_the_exported_plant_is_what_simulate_runs(rig, tmp_path):
+    out = tmp_path / 'out'
+    assert explain(rig, out, rig / 'sound', '--quick') == 0
+    assert cli.main([
+        'simulate', '--plant', str(out / 'plant.yaml'), '--commands', str(rig / 'sound'), '--out',
+        str(tmp_path / 'answer')]) == 0
+    assert (tmp_path / 'answer' / 'metadata.yaml').is_file()
+
+
+def summary(out):
+    with (out / 'summary.csv').open(newline='') as file:
+        return {row['bag']: row['verdict'] for row in csv.DictReader(file)}
+
+
+def test_many_bags_have_one_report_each_and_one_table(rig, tmp_path, capsys):
+    write_short_bag(tmp_path / 'other' / 'sound', seed=5)
+    bags = (rig / 'sound', tmp_path / 'other' / 'sound')
+    assert explain(rig, tmp_path / 'out', *bags, '--quick', '--jobs', '2') == 0
+    assert summary(tmp_path / 'out') == {'sound': 'consistent', 'sound_2': 'consistent'}
+    for name in ('sound', 'sound_2'):
+        assert (tmp_path / 'out' / name / 'report.html').is_file()
+    assert '2/2' in capsys.readouterr().out
+
+
+def test_a_dask_cluster_does_the_same(rig, tmp_path):
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        assert explain(
+            rig, tmp_path / 'out', rig / 'sound', rig / 'stopped.mcap', '--quick', '--dask',
+            cluster.scheduler_address) == 0
+    assert summary(tmp_path / 'out') == {'sound': 'consistent', 'stopped': 'missing_physics'}
+
+
+def refused(capsys, rig, out, *arguments):
+    assert explain(rig, out, *arguments) == 2
+    output = capsys.readouterr()
+    assert output.err.count('\n') == 1
+    assert not out.exists()
+    return output.err
+
+
+@pytest.mark.parametrize('topic', [
+    'motor/servo_jp', 'motor/measured_js', 'wires/measured_js', 'slave/measured_js'])
+def test_a_lacking_topic_is_named(rig, tmp_path, capsys, topic):
+    bag = write_short_bag(tmp_path / 'bag', leave_out=topic)
+    assert topic in refused(capsys, rig, tmp_path / 'out', bag)
+
+
+@pytest.mark.parametrize('value', [np.nan, np.inf])
+def test_a_reading_that_is_not_finite_is_named(rig, tmp_path, capsys, value):
+    bag = write_short_bag(tmp_path / 'bag', spoil=value)
+    message = refused(capsys, rig, tmp_path / 'out', bag)
+    assert 'slave/measured_js' in message
+    assert 'bend_x' in message
+
+
+def test_a_cut_bag_is_refused(rig, tmp_path, capsys):
+    cut = tmp_path / 'cut.mcap'
+    whole = (rig / 'stopped.mcap').read_bytes()
+    cut.write_bytes(whole[:len(whole) // 2])
+    assert 'cut.mcap' in refused(capsys, rig, tmp_path / 'out', cut)
+
+
+def test_an_empty_file_is_refused(rig, tmp_path, capsys):
+    empty = tmp_path / 'empty.mcap'
+    empty.write_bytes(b'')
+    assert 'empty.mcap' in refused(capsys, rig, tmp_path / 'out', empty)
+
+
+def test_a_wrong_key_of_the_plant_is_named_with_the_nearest(rig, tmp_path, capsys):
+    plant = tmp_path / 'plant.yaml'
+    plant.write_text('joints: {bend_x: {pretention: 5.0}}\n')
+    out = tmp_path / 'out'
+    assert cli.main([
+        'explain', str(rig / 'sound'), '--plant', str(plant), '--out', str(out)]) == 2
+    message = capsys.readouterr().err
+    assert 'pretention' in message
+    assert 'pretension' in message
+    assert not out.exists()
+
+
+def test_one_bad_bag_among_good_ones_is_refused_before_any_work(rig, tmp_path, capsys):
+    bad = write_short_bag(tmp_path / 'bad', leave_out='wires/measured_js')
+    message = refused(capsys, rig, tmp_path / 'out', rig / 'sound', bad)
+    assert 'bad' in message
+
+
+def test_a_folder_that_holds_something_is_left_alone(rig, tmp_path, capsys):
+    (tmp_path / 'kept.txt').write_text('mine')
+    assert explain(rig, tmp_path, rig / 'sound') == 2
+    assert 'not empty' in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ['kept.txt']
+
+
+def test_a_cluster_that_is_not_there_is_named(rig, tmp_path, capsys):
+    message = refused(
+        capsys, rig, tmp_path / 'out', rig / 'sound', '--dask', 'tcp://127.0.0.1:9')
+    assert 'tcp://127.0.0.1:9' in message
