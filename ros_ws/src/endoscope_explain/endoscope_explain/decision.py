@@ -2,7 +2,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from endoscope_explain.compose import Composition
+from endoscope_explain.score import PARAMETER_PRICE
 from endoscope_explain.search import JointSearch
 from endoscope_explain.whiteness import is_noise
 
@@ -10,10 +13,12 @@ NAMED = 20.0
 """Fall of the score that a first effect must bring; noise alone brings a few."""
 ADDED = 30.0
 """Fall of the score that a further effect must bring."""
-ADDED_SHARE = 0.2
+ADDED_SHARE = 0.25
 """Share of the fall so far that a further effect must bring: less is an error of form."""
-EXPLAINED = 0.5
+EXPLAINED = 0.68
 """Share of the misfit's logarithm that the catalogue must explain to be called adequate."""
+BARELY = 0.25
+"""Share below which a name would mislead: the physics is another one, and none is named."""
 NEARLY_NOISE = 100.0
 """Score above noise alone at which an error of form needs no further explanation."""
 RIVAL = 25.0
@@ -59,25 +64,39 @@ def decide(search: JointSearch) -> Decision:
                 break
             chosen = better
     above = nominal.score - nominal.floor()
+    if chosen.effects and not is_noise(chosen.fit) and (
+            nominal.score - chosen.score < BARELY * above):
+        chosen = nominal
     left = chosen.score - chosen.floor()
     explained = 1.0 if above <= 0.0 or is_noise(chosen.fit) else 1.0 - left / above
     adequate = is_noise(chosen.fit) or left < NEARLY_NOISE or (
         bool(chosen.effects) and explained >= EXPLAINED)
     margins, gaps, alternatives = {}, {}, {}
     tried = search.tried()
+    measure = _likelihood if is_noise(chosen.fit) else _score
+    best = measure(chosen)
     for effect_id in chosen.effects:
         rest = frozenset(chosen.effects) - {effect_id}
-        without = [c.score for c in tried if frozenset(c.effects) == rest]
-        margins[effect_id] = min(without, default=nominal.score) - chosen.score
+        without = [measure(c) for c in tried if frozenset(c.effects) == rest]
+        margins[effect_id] = min(without, default=measure(nominal)) - best
         rivals = sorted(
-            (c.score - chosen.score, next(iter(frozenset(c.effects) - rest)))
+            (measure(c) - best, next(iter(frozenset(c.effects) - rest)))
             for c in tried
             if len(c.effects) == len(chosen.effects) and rest < frozenset(c.effects)
             and effect_id not in c.effects)
-        gaps[effect_id] = rivals[0][0] if rivals else margins[effect_id]
-        reach = max(RIVAL, RIVAL_SHARE * margins[effect_id])
+        gaps[effect_id] = min(rivals[0][0] if rivals else np.inf, margins[effect_id])
+        reach = RIVAL if measure is _likelihood else max(RIVAL, RIVAL_SHARE * margins[effect_id])
         alternatives[effect_id] = tuple(name for gap, name in rivals if gap < reach)
     return Decision(chosen, adequate, explained, alternatives, margins, gaps)
+
+
+def _score(composition: Composition) -> float:
+    return composition.score
+
+
+def _likelihood(composition: Composition) -> float:
+    """Half deviance under the known noise: right where nothing but noise is left."""
+    return composition.fit.cost + PARAMETER_PRICE * len(composition.fit.theta)
 
 
 def _better(
@@ -85,7 +104,11 @@ def _better(
 ) -> Composition | None:
     so_far = nominal.score - chosen.score
     needed = max(ADDED, ADDED_SHARE * so_far) if chosen.effects else NAMED
-    for candidate in level:
-        if candidate.score < chosen.score - needed:
+    alike = [c for c in level if is_noise(c.fit)]
+    candidates = sorted(alike, key=_likelihood) if alike else level
+    for candidate in candidates:
+        if candidate.score < chosen.score - needed or (
+                not chosen.effects and alike
+                and _likelihood(candidate) < _likelihood(chosen) - needed):
             return candidate
     return None

@@ -25,6 +25,7 @@ from endoscope_explain.free_parameters import BAND
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.intervals import effect_estimates, nominal_estimates
+from endoscope_explain.latent import unknown_term
 from endoscope_explain.observation import JointObservation, observe
 from endoscope_explain.probability import probability
 from endoscope_explain.recording import Recording
@@ -39,6 +40,7 @@ LEAST_DURATION_S = 2.0
 LEAST_MOTION_RAD = 0.02
 SAME_RIG = 0.03
 """Relative tolerance of a nominal parameter from one recording of a rig to the next."""
+SIBLINGS = 3
 CHANGED = 0.04
 """Relative difference of a nominal parameter that is worth a verdict."""
 NOMINAL_UNITS = {
@@ -95,6 +97,12 @@ def explain_recording(
         tell(f'searching what {observation.joint} lacks')
         searches.append(search(pair, jobs))
         decisions.append(decide(searches[-1]))
+    unknown = None
+    worst = _worst(decisions)
+    if worst is not None:
+        tell(f'looking for physics outside the catalogue on {observations[worst].joint}')
+        unknown = unknown_term(
+            decisions[worst].chosen.fit, jobs, _siblings(searches[worst]))
     tell('judging on held-out blocks')
     effects = _named(observations, decisions)
     verdict = _verdict(effects, decisions, plant)
@@ -109,7 +117,7 @@ def explain_recording(
         _plant_of(plant, [d.chosen.fit for d in decisions], [d.chosen.effects for d in decisions]),
         _ladder(anchors, searches, decisions),
         _candidates(observations, searches),
-        None,
+        unknown,
         all(d.adequate for d in decisions),
         {f'explained_{o.joint}': d.explained
          for o, d in zip(observations, decisions, strict=True)},
@@ -133,6 +141,17 @@ def _healthy(
         seen.append(observation)
         packed[observation.joint] = base, flags
     return tuple(seen), packed
+
+
+def _worst(decisions: list[Decision]) -> int | None:
+    """Index of the joint that is explained least, of those that are not."""
+    unexplained = [i for i, d in enumerate(decisions) if not d.adequate]
+    return max(unexplained, key=lambda i: decisions[i].chosen.score, default=None)
+
+
+def _siblings(tried: JointSearch) -> tuple[str, ...]:
+    """Effects that alone came nearest."""
+    return tuple(c.effects[0] for c in tried.levels[0][:SIBLINGS]) if tried.levels else ()
 
 
 def _is_enough(observations: tuple[JointObservation, ...]) -> bool:
@@ -167,7 +186,8 @@ def _named(
         shared = CATALOGUE[effect.id].stage == Stage.RECORDING
         once.setdefault((effect.id, '' if shared else effect.joint), effect)
     seen: set[str] = set()
-    first, again = [], []
+    first: list[NamedEffect] = []
+    again: list[NamedEffect] = []
     for effect in once.values():
         (again if effect.id in seen else first).append(effect)
         seen.add(effect.id)

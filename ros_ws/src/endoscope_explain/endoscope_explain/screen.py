@@ -31,7 +31,7 @@ class Promise:
     gain : float
         Predicted fall of the half deviance.
     ratio : float
-        Best multiple of the effect as simulated; 0 where that is out of its bounds.
+        Best multiple of the effect at this start.
     """
 
     effect_id: str
@@ -84,6 +84,19 @@ def promises(anchor: Fit, effect_ids: Iterable[str]) -> list[Promise]:
             moved -= span @ (span.T @ moved)
             size = float(moved @ moved)
             ratio = -float(moved @ left) / size if size > 1e-6 else 0.0
-            found.append(Promise(
-                effect_id, start, 0.5 * ratio * ratio * size if ratio > 0.0 else 0.0, ratio))
+            if ratio < 0.0:
+                start, ratio = _mirrored(effect_id, start), -ratio
+            gain = 0.5 * ratio * ratio * size if start else 0.0
+            found.append(Promise(effect_id, start, gain, ratio))
     return sorted(found, key=lambda p: -p.gain)
+
+
+def _mirrored(effect_id: str, start: dict[str, float]) -> dict[str, float]:
+    """Return the start on the other side of no effect at all; empty where there is none."""
+    mirrored, changed = dict(start), False
+    for parameter in CATALOGUE[effect_id].parameters:
+        other = 2.0 * parameter.off - start[parameter.name]
+        if parameter.low < parameter.off and parameter.low <= other <= parameter.high:
+            mirrored[parameter.name] = other
+            changed = changed or other != start[parameter.name]
+    return mirrored if changed else {}

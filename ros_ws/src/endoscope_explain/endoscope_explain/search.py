@@ -66,14 +66,14 @@ def all_anchors(
         return tuple((f.theta, f.residuals, f.jacobian, f.cost) for f in fits)
 
     anchors = []
-    for observation, (refitted, described) in zip(
+    for observation, found in zip(
             observations, parallel_map(numbers, range(len(observations)), jobs), strict=True):
         model = nominal_model(observation, *packed[observation.joint], band)
-        anchors.append((Fit(model, *refitted), Fit(model, *described)))
+        anchors.append((Fit(model, *found[0]), Fit(model, *found[1])))
     angles = []
-    for observation, (refitted, _) in zip(observations, anchors, strict=True):
-        parameters, _ = refitted.model.packed(refitted.theta)
-        angles.append(simulate_joint(observation, parameters, refitted.model.flags)[:, OUT_JOINT])
+    for observation, (fitted, _) in zip(observations, anchors, strict=True):
+        parameters, _ = fitted.model.packed(fitted.theta)
+        angles.append(simulate_joint(observation, parameters, fitted.model.flags)[:, OUT_JOINT])
     couple(observations, tuple(angles))
     return anchors
 

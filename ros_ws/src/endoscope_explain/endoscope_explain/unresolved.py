@@ -13,7 +13,9 @@ Array = NDArray[np.float64]
 WINDOW = 250
 """Raw samples over which the scatter is estimated."""
 SIGNIFICANT = 1.3
-"""Scatter, in units of the known noise, from which on it is taken for motion."""
+"""Scatter, in units of the noise, from which on it is taken for motion."""
+QUIET = 0.1
+"""Share of the recording in which nothing slips; a sensor worse than described is no motion."""
 
 
 def fast_scatter(values: Array, white: float) -> Array:
@@ -41,4 +43,5 @@ def fast_scatter(values: Array, white: float) -> Array:
     kernel = np.ones(WINDOW) / WINDOW
     local = np.convolve(np.pad(squares, WINDOW // 2, mode='edge'), kernel, mode='same')
     local = local[WINDOW // 2:WINDOW // 2 + len(values)]
-    return np.where(local > (SIGNIFICANT * white)**2, np.sqrt(np.maximum(local, white**2)), 0.0)
+    quiet = max(white**2, float(np.quantile(local, QUIET)))
+    return np.where(local > SIGNIFICANT**2 * quiet, np.sqrt(local), 0.0)

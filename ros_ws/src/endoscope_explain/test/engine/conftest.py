@@ -1,0 +1,50 @@
+"""Recordings of our own simulated rig, for tests of the engine."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from endoscope_core.plant import PlantDescription, SensorModel, simulate
+from endoscope_core.plant.parameters import JointParameters
+from endoscope_explain.recording import Recording, Series
+from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
+
+
+def short_motion(duration: float = 12.0) -> np.ndarray:
+    """Joint-equivalent command (N,): sinusoid, steps with holds, chirp."""
+    t = np.arange(int(duration * 1000)) * 1e-3
+    sinusoid = 1.2 * np.sin(2.0 * t)
+    steps = 0.5 * np.sign(np.sin(2.5 * (t - 5.0)))
+    chirp = 0.7 * np.sin(1.5 * (t - 9.0) ** 2)
+    return np.where(t < 5.0, sinusoid, np.where(t < 9.0, steps, chirp))
+
+
+def record(plant: PlantDescription, command: np.ndarray, seed: int = 1) -> Recording:
+    """What the sensors of a one-joint rig read under a joint-equivalent command (N,)."""
+    joint = plant.joint_names()[0]
+    shaft = command[:, None] * plant.joints[joint].gear
+    answer = simulate(plant, shaft)
+    sensors = SensorModel(plant.sensors, seed)
+    slow = slice(None, None, 25)
+    return Recording(
+        'simulated', 0.0, (joint,),
+        Series.of(COMMAND, answer.time, shaft),
+        Series.of(WIRES, answer.time, sensors.tension(answer.tension)),
+        Series.of(BENDING, answer.time[slow], sensors.bending(answer.bending[slow])),
+        Series.of(MOTOR, answer.time, sensors.shaft_position(answer.shaft_position)),
+        Series.of(MOTOR, answer.time, sensors.shaft_velocity(answer.shaft_velocity)),
+        Series.of(MOTOR, answer.time, sensors.shaft_effort(answer.shaft_effort)),
+    )
+
+
+def rig(*effects, **changed: float) -> PlantDescription:
+    """A rig with one joint, with effects and other parameters than nominal."""
+    return PlantDescription(
+        joints={'bend_x': JointParameters(**changed)}, effects=tuple(effects))
+
+
+@pytest.fixture(scope='session')
+def one_joint():
+    """Makes rigs of one joint, motions and recordings of them."""
+    return SimpleNamespace(rig=rig, record=record, motion=short_motion)
