@@ -68,7 +68,7 @@ class DirectorNode(EndoscopeNode):
         """Publish a state command: `enable`, `disable`, `pause`, `resume`, `home`."""
         self._state_commands.publish(String(data=command))
 
-    def set_parameters(self, node: str, **values: Any) -> Future:
+    def request_parameters(self, node: str, **values: Any) -> Future:
         """Ask a node to take parameter values; see `check_parameters_taken`."""
         request = SetParameters.Request(parameters=[
             Parameter(name, value=value).to_parameter_msg() for name, value in values.items()])

@@ -1,42 +1,16 @@
 """The plots of the demonstration's report, each a string of SVG."""
 
-import io
-from collections.abc import Sequence
-
 import matplotlib
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from endoscope_bringup.demo.procedure import MOTIONS, Mode
 from endoscope_bringup.demo.results import CalibrationOutcome, DemoResults
+from endoscope_explain.report.figures.style import INK, STYLE, svg, thinned
 
-INK = '#1f2933'
-GRID = '#d9dee4'
 MODE_COLOUR = {Mode.NONE: '#c2571a', Mode.FEED_FORWARD: '#2f6fb7', Mode.ADAPTIVE: '#1a8a66'}
 WIRE_COLOUR = ('#2f6fb7', '#7fb0e0', '#c2571a', '#e8a877')
 MOTION_TITLE = {'periodic': '60 sin t', 'non_periodic': '30 sin t + 30 sin √3 t'}
-MOST_POINTS = 900
-
-STYLE = {
-    'font.size': 9.0,
-    'font.family': 'sans-serif',
-    'axes.edgecolor': '#9aa5b1',
-    'axes.labelcolor': INK,
-    'axes.titlesize': 9.5,
-    'axes.titleweight': 'bold',
-    'axes.spines.top': False,
-    'axes.spines.right': False,
-    'axes.grid': True,
-    'grid.color': GRID,
-    'grid.linewidth': 0.6,
-    'xtick.color': INK,
-    'ytick.color': INK,
-    'legend.frameon': False,
-    'svg.fonttype': 'none',
-    'svg.hashsalt': 'endoscope',
-}
 
 
 def loops_figure(results: DemoResults, tube: str) -> str:
@@ -60,7 +34,7 @@ def loops_figure(results: DemoResults, tube: str) -> str:
             axis.set_xlabel('desired angle (deg)')
         for row in axes:
             row[0].set_ylabel('actual angle (deg)')
-        return _svg(figure)
+        return svg(figure)
 
 
 def tracking_figure(results: DemoResults, tube: str, motion: str) -> str:
@@ -69,20 +43,20 @@ def tracking_figure(results: DemoResults, tube: str, motion: str) -> str:
         figure = Figure(figsize=(9.6, 4.4), layout='constrained')
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         runs = [results.run(tube, motion, mode) for mode in Mode]
-        above.plot(*_thinned(runs[0].time, runs[0].desired_deg), color=INK, linewidth=1.6,
+        above.plot(*thinned(runs[0].time, runs[0].desired_deg), color=INK, linewidth=1.6,
                    linestyle='--', label='desired')
         for run in runs:
             colour = MODE_COLOUR[run.mode]
-            above.plot(*_thinned(run.time, run.actual_deg), color=colour, linewidth=1.2,
+            above.plot(*thinned(run.time, run.actual_deg), color=colour, linewidth=1.2,
                        label=str(run.mode))
-            below.plot(*_thinned(run.time, run.actual_deg - run.desired_deg), color=colour,
+            below.plot(*thinned(run.time, run.actual_deg - run.desired_deg), color=colour,
                        linewidth=1.0)
         above.set_title(MOTION_TITLE[motion])
         above.set_ylabel('bending angle (deg)')
         above.legend(ncols=4, loc='lower left', fontsize=8)
         below.set_ylabel('error (deg)')
         below.set_xlabel('time (s)')
-        return _svg(figure)
+        return svg(figure)
 
 
 def calibration_figure(calibration: CalibrationOutcome) -> str:
@@ -96,14 +70,14 @@ def calibration_figure(calibration: CalibrationOutcome) -> str:
         loop.set_xlabel('desired (deg)')
         loop.set_ylabel('actual (deg)')
         for column, (wire, colour) in enumerate(zip(calibration.wires, WIRE_COLOUR, strict=False)):
-            tension.plot(*_thinned(calibration.time, calibration.tension[:, column]),
+            tension.plot(*thinned(calibration.time, calibration.tension[:, column]),
                          color=colour, linewidth=1.0, label=wire)
         tension.set_title('wire tension')
         tension.set_xlabel('time (s)')
         tension.set_ylabel('tension (N)')
         tension.legend(ncols=2, fontsize=7)
         _probability_bars(bars, calibration)
-        return _svg(figure)
+        return svg(figure)
 
 
 def _probability_bars(axis: Axes, calibration: CalibrationOutcome) -> None:
@@ -117,19 +91,3 @@ def _probability_bars(axis: Axes, calibration: CalibrationOutcome) -> None:
     axis.set_title(f'class {calibration.class_deg:.0f}°')
     axis.set_ylabel('probability')
     axis.grid(visible=False, axis='x')
-
-
-def _thinned(
-    time: NDArray[np.float64], values: NDArray[np.float64]
-) -> Sequence[NDArray[np.float64]]:
-    step = max(1, len(time) // MOST_POINTS)
-    return time[::step], values[::step]
-
-
-def _svg(figure: Figure) -> str:
-    stream = io.StringIO()
-    figure.savefig(stream, format='svg', metadata={'Date': None})
-    text = stream.getvalue()
-    return text[text.index('<svg'):]
-
-

@@ -105,7 +105,7 @@ class _GraphSession:
         self._recorder = self._runtime.add(RecorderNode)
         self._director = self._runtime.add(DirectorNode)
         self._conductor = None if real_time else self._runtime.add(ConductorNode)
-        self._runtime.check_parameters()
+        self._runtime.prepare()
 
     def __enter__(self) -> '_GraphSession':
         return self
@@ -135,7 +135,7 @@ class _GraphSession:
 
     def _set(self, node: str, **values: Any) -> None:
         answer = self._answer_of(
-            self._director.set_parameters(node, **values), f'the parameters of {node}')
+            self._director.request_parameters(node, **values), f'the parameters of {node}')
         check_parameters_taken(node, answer)
 
     def start(self) -> None:

@@ -1,6 +1,7 @@
 """One look for all plots of the report."""
 
 import io
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -30,7 +31,7 @@ RUNG_TITLE = {
 }
 MOST_POINTS = 1200
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     'font.size': 9.0,
     'font.family': 'sans-serif',
     'axes.edgecolor': '#9aa5b1',
