@@ -1,13 +1,10 @@
 """Turns desired bending into motor commands that make up for the hysteresis."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
 
 from endoscope_core.control import (
-    MODES,
     BoucWenFeedforward,
     FeedforwardLaw,
     FeedforwardSettings,
@@ -21,6 +18,7 @@ from endoscope_core.identification.class_parameters import (
 from endoscope_core.safety import CommandGate, CommandLimits, Refusal
 from endoscope_nodes.calibration_result import class_of
 from endoscope_nodes.command_report import CommandReport
+from endoscope_nodes.compensator_parameters import CompensatorParameters
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report, status
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import (
@@ -40,7 +38,6 @@ from endoscope_nodes.names import (
     MOTORS,
     SLAVE_COMMAND,
 )
-from endoscope_nodes.parameters import parameter
 from endoscope_nodes.qos import COMMAND, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.state_watch import StateWatch
@@ -50,52 +47,6 @@ CALIBRATION = 'calibration'
 NOBODY = 'nobody'
 
 _NOTHING = np.zeros(len(JOINTS))
-
-
-@dataclass(frozen=True)
-class CompensatorParameters:
-    """Parameters of the compensator."""
-
-    mode: str = parameter(
-        'bouc_wen',
-        'feed-forward model in force once its parameters are known',
-        choices=MODES,
-        dynamic=True,
-    )
-    parameter_sets: str = parameter(
-        '',
-        'file with a parameter set for each class, as `endoscope identify` writes it; empty '
-        'for the one that comes with the project',
-    )
-    lead: float = parameter(
-        0.06,
-        "time by which the desired angle is foreseen: the servo's own lag",
-        unit='s',
-        low=0.0,
-        high=0.5,
-    )
-    gear: float = parameter(0.5, 'shaft angle for one radian at the joint', low=0.01, high=100.0)
-    joint_limit: float = parameter(
-        1.75, 'largest desired bending obeyed, either way', unit='rad', low=0.1, high=3.1
-    )
-    drive_limit: float = parameter(
-        3.0,
-        'largest joint-equivalent motor angle put out, either way',
-        unit='rad',
-        low=0.1,
-        high=10.0,
-    )
-    max_speed: float = parameter(30.0, 'largest speed between two commands', unit='rad/s', low=0.0)
-    command_timeout: float = parameter(
-        0.1, 'a command or correction older than this is not obeyed', unit='s', low=0.001, high=1.0
-    )
-    calibration_timeout: float = parameter(
-        0.05,
-        'silence after which calibration no longer goes before the console',
-        unit='s',
-        low=0.001,
-        high=1.0,
-    )
 
 
 class CompensatorNode(EndoscopeNode):
@@ -114,6 +65,8 @@ class CompensatorNode(EndoscopeNode):
         self.calibration_gate = CommandGate(self._limits(p.calibration_timeout))
         self._feedforward = BoucWenFeedforward(len(JOINTS), FeedforwardSettings(lead=p.lead))
         self._passing = BoucWenFeedforward(len(JOINTS))
+        # Loads what is compiled now: the first command must not wait for it.
+        BoucWenFeedforward(len(JOINTS)).step(_NOTHING, _NOTHING, 1e-3)
         self._sets, self._trouble = self._load_sets(p.parameter_sets)
         self._class_deg: int | None = None
         self._source = NOBODY

@@ -27,6 +27,8 @@ from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.state_watch import StateWatch
 from endoscope_nodes.stream_watch import StreamWatch
 
+_NOTHING = np.zeros(len(JOINTS))
+
 
 @dataclass(frozen=True)
 class ControllerParameters:
@@ -71,6 +73,8 @@ class ControllerNode(EndoscopeNode):
         self.controller = AdaptiveBacklashController(
             len(JOINTS), stale_after=p.tracker_timeout, fade_time=p.fade_time
         )
+        # Loads what is compiled now: the first command must not wait for it.
+        AdaptiveBacklashController(len(JOINTS)).step(0.0, _NOTHING, _NOTHING)
         reach = (p.joint_limit,) * len(JOINTS)
         self._gate = CommandGate(
             CommandLimits(

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rclpy.clock import ClockType, ROSClock
+from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.node import Node
 from rclpy.time import Time
 
@@ -54,14 +54,13 @@ class EndoscopeNode(Node):
         """Declare the parameters of the dataclass ``kind``; see :func:`declare_parameters`."""
         return declare_parameters(self, kind, on_change, check)
 
-    def get_clock(self) -> ROSClock:
+    def get_clock(self) -> Clock:
         """Return the node's clock, which in simulated time shows that of the ticker."""
         clock = super().get_clock()
         ticker = getattr(self, 'ticker', None)
-        if ticker is not None and ticker.simulated:
-            clock.set_ros_time_override(
-                Time(nanoseconds=ticker.now_ns(), clock_type=ClockType.ROS_TIME)
-            )
+        if ticker is not None and ticker.simulated and isinstance(clock, ROSClock):
+            now = Time(nanoseconds=ticker.now_ns(), clock_type=ClockType.ROS_TIME)
+            clock.set_ros_time_override(now)
         return clock
 
     def close(self) -> None:

@@ -160,8 +160,27 @@ class Runtime:
             raise RuntimeError('no node has been added yet')
         return self._ticker
 
+    def prepare(self) -> None:
+        """Check the parameters and make ready for a long life; call it before the nodes are served.
+
+        Raises
+        ------
+        ParameterError
+            See :meth:`check_parameters`.
+        """
+        self.check_parameters()
+        # A collection that walks over all that was imported would cost many ticks.
+        gc.collect()
+        gc.freeze()
+
     def check_parameters(self) -> None:
-        """Refuse parameter overrides that no node knows; see :func:`check_overrides`."""
+        """Refuse overrides that no node knows.
+
+        Raises
+        ------
+        ParameterError
+            A parameter override, or a node with overrides, that nobody knows.
+        """
         names = [node.get_name() for node in self.nodes]
         for name in self._overrides:
             if name not in names:
@@ -181,9 +200,6 @@ class Runtime:
 
     def spin(self) -> None:
         """Serve all nodes until :meth:`stop` is called or the context is shut down."""
-        # A collection that walks over all that was imported would cost many ticks.
-        gc.collect()
-        gc.freeze()
         try:
             self.spin_until(self._stop, FOREVER_S)
         except ExternalShutdownException:
@@ -261,7 +277,7 @@ def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -
     try:
         with Runtime(args) as runtime, StopSignals(runtime.stop):
             compose(runtime)
-            runtime.check_parameters()
+            runtime.prepare()
             runtime.spin()
     except (
         ParameterError,

@@ -21,7 +21,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='tracking error left on unseen tubes',
         description='Calibrates, classifies and tracks on random rigs in random tubes, and prints '
         'the error as a share of the uncompensated one. Exits 1 if a limit is missed on '
-        '60 sin(t).')
+        '60 sin(t).',
+    )
     parser.add_argument('--tubes', type=int, default=10, metavar='N', help='number of tubes (10)')
     parser.add_argument('--seed', type=int, default=1, help='chooses the tubes (1)')
 
@@ -49,8 +50,10 @@ def run(args: argparse.Namespace) -> int:
     near = sum(trial.nearest_class for trial in trials)
     print(f'class within 5 deg of the size: {near} of {len(trials)}')
     print(f'inference: {_inference_time(classifier) * 1e3:.2f} ms on one thread')
-    worst = [max(getattr(trial, kind)['periodic'] for trial in trials)
-             for kind in ('feedforward', 'feedback')]
+    worst = [
+        max(getattr(trial, kind)['periodic'] for trial in trials)
+        for kind in ('feedforward', 'feedback')
+    ]
     return 0 if worst[0] <= FEEDFORWARD_LIMIT and worst[1] <= FEEDBACK_LIMIT else 1
 
 
@@ -71,8 +74,10 @@ def _summary(signal: str, trials: 'Sequence[UnseenTubeTrial]') -> str:
     parts = []
     for label, kind in (('feed-forward', 'feedforward'), ('with feedback', 'feedback')):
         shares = 100.0 * np.array([getattr(trial, kind)[signal] for trial in trials])
-        parts.append(f'{label} {np.mean(shares):.1f} +- {np.std(shares):.1f} % '
-                     f'(worst {np.max(shares):.1f} %)')
+        parts.append(
+            f'{label} {np.mean(shares):.1f} +- {np.std(shares):.1f} % '
+            f'(worst {np.max(shares):.1f} %)'
+        )
     return f'{signal}: {", ".join(parts)} of the uncompensated RMSE'
 
 

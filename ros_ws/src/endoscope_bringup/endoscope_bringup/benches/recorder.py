@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from endoscope_bringup.benches.process_cpu import cpu_seconds
+
 TARGET_RATE = 20_000
 TARGET_CPU_SHARE = 0.5
 _TOPICS = 20
@@ -109,12 +111,12 @@ def run_recorder_bench(rate: int, seconds: float) -> RecorderFigure:
             )
             try:
                 sender.wait_for_readers()
-                cpu_before, began = _cpu_seconds(recorder.pid), time.monotonic()
+                cpu_before, began = cpu_seconds(recorder.pid), time.monotonic()
                 sent = sender.send(rate, seconds)
                 # One second more, so that the recorder pays for all that it has queued.
                 elapsed = time.monotonic() - began
                 time.sleep(1.0)
-                cpu = _cpu_seconds(recorder.pid) - cpu_before
+                cpu = cpu_seconds(recorder.pid) - cpu_before
             finally:
                 recorder.terminate()
                 _, errors = recorder.communicate(timeout=30)
@@ -173,8 +175,3 @@ class _Sender:
     def __exit__(self, *_: object) -> None:
         self._node.destroy_node()
         self._context.shutdown()
-
-
-def _cpu_seconds(pid: int) -> float:
-    fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')

@@ -1,0 +1,192 @@
+"""Measures all nodes of the graph composed in one process, in real time and in lock-step."""
+
+import os
+import tempfile
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.task import Future
+from std_msgs.msg import String
+
+from endoscope_core.safety import OperatingState
+from endoscope_nodes.conductor_node import ConductorNode
+from endoscope_nodes.graph import ALL_NODES
+from endoscope_nodes.names import STATE_COMMAND
+from endoscope_nodes.qos import EVENT
+from endoscope_nodes.runtime import Runtime
+
+TARGET_TICKS = 0.99
+TARGET_LATENCY_P99_MS = 1.0
+TARGET_CORES = 1.0
+TARGET_LOCK_STEP = 2.0
+_SETTLING_S = 2.0
+_SIMULATED = ('--ros-args', '-p', 'use_sim_time:=true')
+_PLAYING = {'source': 'motion', 'motion': 'periodic'}
+
+
+@dataclass(frozen=True)
+class ComposedFigure:
+    """All nodes in one process, in real time.
+
+    Attributes
+    ----------
+    seconds
+        Length of the measurement.
+    ticks
+        Share of the 1 kHz ticks that took place.
+    latency_p50_ms, latency_p99_ms
+        From the instant at which the console's tick was due to the motor driver's obeying it.
+    cores
+        CPU time of the process per second.
+    recorded, lost
+        Messages in the bag, and messages that publishers sent and the recorder did not get.
+    state
+        Operating state at the end, with the cause of a fault.
+    load
+        Load average of the machine at the end.
+    """
+
+    seconds: float
+    ticks: float
+    latency_p50_ms: float
+    latency_p99_ms: float
+    cores: float
+    recorded: int
+    lost: int
+    state: str
+    load: float
+
+    @property
+    def reached(self) -> bool:
+        """Whether every target is met."""
+        return (
+            self.ticks >= TARGET_TICKS
+            and self.latency_p99_ms < TARGET_LATENCY_P99_MS
+            and self.cores < TARGET_CORES
+            and self.lost == 0
+            and self.state == OperatingState.ENABLED
+        )
+
+    def __str__(self) -> str:
+        return (
+            f'one process, 1 kHz, {self.seconds:.0f} s: {100 * self.ticks:.2f} % of ticks, '
+            f'command to motor {self.latency_p50_ms:.2f} ms (p99 {self.latency_p99_ms:.2f}), '
+            f'{self.cores:.2f} cores, {self.recorded} messages recorded, {self.lost} lost, '
+            f'{self.state} at the end, load average {self.load:.1f}'
+        )
+
+
+def run_graph_bench(seconds: float) -> ComposedFigure:
+    """Measure all nodes, recorder included, composed in this process in real time.
+
+    Parameters
+    ----------
+    seconds
+        Length of the measurement, after some seconds of settling.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        bag = str(Path(folder) / 'bag')
+        graph = _Composition(ALL_NODES, {'recorder': {'bag': bag}, 'console': _PLAYING})
+        try:
+            graph.enable()
+            graph.serve(_SETTLING_S)
+            driver, ticker = graph.node('motor_driver'), graph.runtime.ticker
+            driver.latency_ns = deque()
+            ticks, missed, cpu = ticker.ticks, ticker.missed, time.process_time()
+            began = time.monotonic()
+            graph.serve(seconds)
+            elapsed, cpu = time.monotonic() - began, time.process_time() - cpu
+            ticks, missed = ticker.ticks - ticks, ticker.missed - missed
+            latency = sorted(driver.latency_ns)
+            machine = graph.node('supervisor').machine
+            state = f'{machine.state} {machine.cause}'.strip()
+            report = graph.node('recorder').stop()
+        finally:
+            graph.close()
+    return ComposedFigure(
+        seconds=elapsed,
+        ticks=ticks / (ticks + missed),
+        latency_p50_ms=latency[len(latency) // 2] * 1e-6,
+        latency_p99_ms=latency[len(latency) * 99 // 100] * 1e-6,
+        cores=cpu / elapsed,
+        recorded=report.message_count,
+        lost=report.lost_count,
+        state=state,
+        load=os.getloadavg()[0],
+    )
+
+
+def run_lock_step_bench(seconds: float) -> float:
+    """Simulated seconds per real second of the whole graph in lock-step, recorder included."""
+    with tempfile.TemporaryDirectory() as folder:
+        bag = str(Path(folder) / 'bag')
+        overrides = {'recorder': {'bag': bag}, 'console': _PLAYING}
+        graph = _Composition((*ALL_NODES, ConductorNode), overrides, _SIMULATED)
+        try:
+            graph.advance(0.5)
+            graph.enable()
+            graph.advance(0.5)
+            began = time.monotonic()
+            graph.advance(seconds)
+            return seconds / (time.monotonic() - began)
+        finally:
+            graph.close()
+
+
+class _Composition:
+    """Nodes in this process with a context and a domain of their own."""
+
+    _PATIENCE_S = 60.0
+
+    def __init__(
+        self,
+        factories: Sequence[Any],
+        overrides: Mapping[str, Mapping[str, object]],
+        args: Sequence[str] = (),
+    ) -> None:
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.runtime = Runtime(args, Context(), 100 + os.getpid() % 130, overrides)
+        for factory in factories:
+            self.runtime.add(factory)
+        self.runtime.prepare()
+        self._first = self.runtime.nodes[0]
+        self._commands = self._first.create_publisher(String, STATE_COMMAND, EVENT)
+        deadline = time.monotonic() + self._PATIENCE_S
+        while not self.runtime.connected():
+            if time.monotonic() > deadline:
+                raise RuntimeError('the nodes do not find each other')
+            time.sleep(0.01)
+
+    def node(self, name: str) -> Any:
+        return next(n for n in self.runtime.nodes if n.get_name() == name)
+
+    def enable(self) -> None:
+        machine = self.node('supervisor').machine
+        deadline = time.monotonic() + self._PATIENCE_S
+        while machine.state is not OperatingState.ENABLED:
+            if time.monotonic() > deadline:
+                raise RuntimeError(f'the slave is not enabled: {machine.present_causes}')
+            self.serve(0.1)
+            self._commands.publish(String(data='enable'))
+            self.serve(0.1)
+
+    def serve(self, seconds: float) -> None:
+        future = Future()
+        timer = self._first.create_timer(
+            seconds, lambda: future.done() or future.set_result(None), clock=self._steady
+        )
+        self.runtime.spin_until(future, seconds + self._PATIENCE_S)
+        self._first.destroy_timer(timer)
+
+    def advance(self, seconds: float) -> None:
+        future = self.node('conductor').advance(seconds)
+        self.runtime.spin_until(future, 10.0 * seconds + self._PATIENCE_S)
+
+    def close(self) -> None:
+        self.runtime.close()
