@@ -6,5 +6,6 @@ all of them.
 """
 
 COMMANDS: tuple[str, ...] = (
-    'demo', 'simulate', 'explain', 'convert', 'record', 'replay', 'bag', 'dataset', 'train', 'identify', 'bench',
+    'demo', 'simulate', 'explain', 'convert', 'record', 'replay', 'bag', 'dataset', 'train',
+    'identify', 'effects', 'bench',
 )

@@ -43,6 +43,7 @@ def through_gap(
 
     Parameters
     ----------
+    parameters : array (parameters,)
     offset : float
         Of the wire end from the tip before this step, rad.
     pull : float

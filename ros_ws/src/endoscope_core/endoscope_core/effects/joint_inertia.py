@@ -28,6 +28,7 @@ def speeds(
 
     Parameters
     ----------
+    parameters : array (parameters,)
     speed : float
         At the start, rad/s.
     settled_speed : float

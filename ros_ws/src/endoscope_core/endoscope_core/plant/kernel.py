@@ -101,9 +101,9 @@ def advance_tick(
 
     Parameters
     ----------
-    state : array (states,), history : array (2, HISTORY)
+    state, history : array (states,), array (2, HISTORY)
         Changed in place.
-    p : array (parameters,), on : array (flags,) of bool
+    p, on : array (parameters,), array (flags,) of bool
         Parameters and effects in force.
     u : float
         Command in rad, joint-equivalent.
@@ -246,9 +246,9 @@ def run_joints(
 
     Parameters
     ----------
-    states : array (J, states), histories : array (J, 2, HISTORY)
+    states, histories : array (J, states), array (J, 2, HISTORY)
         Changed in place.
-    p : array (J, parameters), on : array (J, flags)
+    p, on : array (J, parameters), array (J, flags) of bool
     inputs : array (J, N, INPUTS)
         Changed where `coupled`.
     coupled : bool

@@ -75,7 +75,9 @@ def plant_from_mapping(content: Any) -> PlantDescription:
     """
     sections = _section(content, 'the plant')
     _check_keys(sections, ('joints', 'sensors', 'effects'), 'the plant')
-    joints_given = _section(sections.get('joints', dict.fromkeys(JOINT_NAMES)), 'joints')
+    joints_given = dict.fromkeys(JOINT_NAMES)
+    if sections.get('joints') is not None:
+        joints_given = _section(sections['joints'], 'joints')
     _check_keys(joints_given, JOINT_NAMES, 'joints')
     if not joints_given:
         raise ValueError('joints is empty: name bend_x, bend_y or both')

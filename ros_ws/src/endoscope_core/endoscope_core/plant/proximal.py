@@ -39,12 +39,15 @@ def proximal_tensions(
 
     Parameters
     ----------
+    state, p, on : array (states,), array (parameters,), array (flags,) of bool
+    pretension : float
+        N.
     phi : float
         Capstan exponent of the whole sheath.
     speed : float
         Sliding speed in m/s.
-    stretch : float
-        Of the whole positive wire in m, `shift` of it spread along a chain.
+    stretch, shift : float
+        Stretch of the whole positive wire in m, and what of it neither motor nor joint causes.
 
     Returns
     -------

@@ -105,6 +105,9 @@ def distal_tensions(
 
     Parameters
     ----------
+    state, p, on : array (states,), array (parameters,), array (flags,) of bool
+    pretension : float
+        N.
     shift : float
         Stretch in m of the positive wire that neither motor nor joint causes.
     phi : float

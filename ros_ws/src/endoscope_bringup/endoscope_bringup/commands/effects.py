@@ -1,0 +1,50 @@
+"""`endoscope effects`: the physics that a plant.yaml can add to the nominal plant."""
+
+import argparse
+import math
+import textwrap
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from endoscope_core.effects import EffectDefinition, EffectParameter
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `effects`."""
+    parser = subparsers.add_parser(
+        'effects', help='list the physics that a plant.yaml can add to the nominal plant',
+        description='Lists the catalogue, or tells equation, source and parameters of an effect.')
+    parser.add_argument('ids', nargs='*', metavar='ID', help='effects to tell all about')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the catalogue, or the effects asked for; return 0."""
+    from endoscope_core.effects import CATALOGUE, UnknownEffectError, describe
+    from endoscope_core.errors import EndoscopeError
+
+    try:
+        chosen = [describe(effect_id) for effect_id in args.ids]
+    except UnknownEffectError as error:
+        raise EndoscopeError(str(error)) from error
+    if chosen:
+        print('\n\n'.join(_told(definition) for definition in chosen))
+        return 0
+    for definition in CATALOGUE.values():
+        print(f'{definition.id:22} {definition.stage:13} {definition.physics}')
+    return 0
+
+
+def _told(definition: 'EffectDefinition') -> str:
+    lines = [f'{definition.id} ({definition.stage})']
+    for text in (definition.physics, definition.equation, definition.source):
+        lines += textwrap.wrap(text, 96, initial_indent='  ', subsequent_indent='    ')
+    return '\n'.join([*lines, *(_parameter(p) for p in definition.parameters)])
+
+
+def _parameter(parameter: 'EffectParameter') -> str:
+    if parameter.choices:
+        allowed = 'one of ' + ', '.join(f'{choice:g}' for choice in parameter.choices)
+    else:
+        allowed = f'{parameter.low:g} to {parameter.high:g} {parameter.unit}'
+    off = '' if math.isnan(parameter.off) else f', off at {parameter.off:g}'
+    return f'  {parameter.name:18} {allowed}, typical {parameter.typical:g}{off}'

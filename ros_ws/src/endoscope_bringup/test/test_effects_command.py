@@ -1,0 +1,27 @@
+"""`endoscope effects`."""
+
+from endoscope_bringup.cli import main
+from endoscope_core.effects import CATALOGUE
+
+
+def test_lists_every_effect(capsys):
+    assert main(['effects']) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(CATALOGUE)
+
+
+def test_tells_equation_source_and_parameters(capsys):
+    assert main(['effects', 'joint_stop', 'load_cell_gain']) == 0
+    told = capsys.readouterr().out
+    definition = CATALOGUE['joint_stop']
+    assert definition.equation in told
+    assert definition.source in told
+    assert '0.05 to 2.5 rad, typical 0.6, off at 2.5' in told
+    assert 'one of 0, 1' in told
+
+
+def test_an_unknown_effect_is_one_line_and_exit_2(capsys):
+    assert main(['effects', 'joint_stp']) == 2
+    err = capsys.readouterr().err
+    assert 'joint_stop' in err
+    assert err.count('\n') == 1

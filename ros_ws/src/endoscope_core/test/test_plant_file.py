@@ -1,0 +1,99 @@
+"""plant.yaml: what is written is read back, and what is wrong is named."""
+
+from dataclasses import replace
+
+import pytest
+
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.plant import (
+    EffectSpec,
+    JointParameters,
+    PlantDescription,
+    PlantFileError,
+    SensorParameters,
+    load_plant,
+    save_plant,
+)
+
+
+def written(tmp_path, text):
+    path = tmp_path / 'plant.yaml'
+    path.write_text(text, encoding='utf-8')
+    return path
+
+
+def test_a_plant_with_every_effect_survives_the_round_trip(tmp_path):
+    plant = PlantDescription(
+        joints={'bend_x': JointParameters(capstan_exponent=1.3), 'bend_y': JointParameters()},
+        sensors=SensorParameters(tracker_rate=60.0),
+        effects=tuple(
+            EffectSpec(definition.id, 'bend_y', {p.name: p.typical for p in definition.parameters})
+            for definition in CATALOGUE.values()))
+    save_plant(plant, tmp_path / 'plant.yaml')
+    assert load_plant(tmp_path / 'plant.yaml') == plant
+    assert [path.name for path in tmp_path.iterdir()] == ['plant.yaml']
+
+
+@pytest.mark.parametrize('text', ['', 'joints: {bend_x: {}, bend_y: {}}\neffects: []\n', 'joints:'])
+def test_what_is_missing_is_nominal(tmp_path, text):
+    plant = load_plant(written(tmp_path, text))
+    assert plant.sensors == SensorParameters()
+    assert all(joint == JointParameters() for joint in plant.joints.values())
+    assert plant.effects == ()
+
+
+def test_joints_come_in_one_order_and_one_may_be_alone(tmp_path):
+    both = load_plant(written(tmp_path, 'joints: {bend_y: {pretension: 6}, bend_x: }'))
+    assert both.joint_names() == ('bend_x', 'bend_y')
+    assert both.joints['bend_y'] == replace(JointParameters(), pretension=6.0)
+    assert load_plant(written(tmp_path, 'joints: {bend_y: }')).joint_names() == ('bend_y',)
+
+
+def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
+    plant = load_plant(written(tmp_path, 'joints: {bend_x: {presliding_distance: 2e-4}}'))
+    assert plant.joints['bend_x'].presliding_distance == 2e-4
+
+
+@pytest.mark.parametrize(('text', 'message'), [
+    ('joins: {}', 'unknown key joins in the plant: did you mean joints'),
+    ('joints: {bend_z: {}}', 'unknown key bend_z in joints: did you mean bend_'),
+    ('joints: {}', 'joints is empty'),
+    ('joints: {bend_x: {capstan_exponant: 1}}', 'did you mean capstan_exponent'),
+    ('joints: {bend_x: {xyz: 1}}', 'unknown key xyz in joints.bend_x: valid are pretension'),
+    ('joints: {bend_x: {pretension: five}}', "joints.bend_x.pretension is 'five': give a number"),
+    ('joints: {bend_x: {pretension: true}}', 'give a number'),
+    ('joints: {bend_x: {wire_stiffness: -1}}', 'wire_stiffness is -1.0: it must be positive'),
+    ('joints: {bend_x: {wire_stiffness: .nan}}', 'give a finite number'),
+    ('joints: [bend_x]', 'joints must be a mapping'),
+    ('sensors: {tracker_nois: 1}', 'did you mean tracker_noise'),
+    ('sensors: {tracker_rate: 0}', 'tracker_rate is 0.0: it must be positive'),
+    ('effects: {}\njoint: 1', 'unknown key joint in the plant: did you mean joints'),
+    ('effects: gravity', 'effects must be a list'),
+    ('effects: [{joint: bend_x}]', r'effects\[0\] has no id'),
+    ('effects: [{id: gravity}]', r'effects\[0\] has no joint'),
+    ('effects: [{id: gravty, joint: bend_x}]', 'unknown effect gravty: did you mean gravity'),
+    ('effects: [{id: gravity, joint: bend_x, parameter: {}}]', 'did you mean parameters'),
+    ('effects: [{id: gravity, joint: bend_x, parameters: {moment: 1}}]', 'did you mean moment_nm'),
+    ('effects: [{id: gravity, joint: bend_x, parameters: {moment_nm: 9}}]',
+     'gravity: moment_nm is 9, it must be between 0 and 0.1 N m'),
+    ('joints: {bend_x: }\neffects: [{id: gravity, joint: bend_y}]', 'joint bend_y'),
+    ('a: [', 'is not YAML'),
+])
+def test_what_is_wrong_is_named_in_one_line(tmp_path, text, message):
+    path = written(tmp_path, text)
+    with pytest.raises(PlantFileError, match=message) as caught:
+        load_plant(path)
+    assert str(path) in str(caught.value)
+    assert '\n' not in str(caught.value)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(PlantFileError, match=r'cannot read plant file .*none\.yaml'):
+        load_plant(tmp_path / 'none.yaml')
+
+
+def test_a_file_that_is_not_text_is_refused(tmp_path):
+    path = tmp_path / 'plant.yaml'
+    path.write_bytes(b'\xff\xfe\x00\x80')
+    with pytest.raises(PlantFileError, match='is not YAML'):
+        load_plant(path)
