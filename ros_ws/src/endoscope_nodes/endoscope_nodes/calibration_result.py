@@ -1,23 +1,31 @@
 """The message ``calibration/result``: how it is written, and how it is read."""
 
 import math
+from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
 
-from endoscope_core.classifier.inference import ClassificationResult
 from endoscope_nodes.diagnostics import ERROR, OK, status
+
+if TYPE_CHECKING:
+    # Those who only read results need no torch.
+    from endoscope_core.classifier.inference import ClassificationResult
 
 NAME = 'calibration: hysteresis class'
 
 
 def successful_result(
-    stamp_ns: int, verdict: ClassificationResult, backlash: float | None, duration: float
+    stamp_ns: int, verdict: 'ClassificationResult', backlash: float | None, duration: float
 ) -> DiagnosticArray:
     """Say which class was found.
 
     Parameters
     ----------
+    stamp_ns
+        Of the message, in ns.
+    verdict
+        What the classifier said.
     backlash
         Size in rad as the tracker measured it; None where it could not.
     duration
