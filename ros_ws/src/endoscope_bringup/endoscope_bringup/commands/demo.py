@@ -1,44 +1,57 @@
 """`endoscope demo`: the papers' whole procedure on the simulated slave, recorded, with report."""
 
 import argparse
+import time
+from functools import partial
 from pathlib import Path
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `demo`."""
     parser = subparsers.add_parser(
-        'demo', help='the whole procedure on the simulated slave, recorded, with a report',
+        'demo',
+        help='the whole procedure on the simulated slave, recorded, with a report',
         description='Enables the simulated slave, calibrates it, classifies its wire tensions, and '
         "tracks the first paper's signals uncompensated, with feed-forward and with feedback; "
-        'writes bags and report.html.')
-    parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder for bags and report, empty or not yet there; '
-                        'default bags/demo-DATE-TIME')
+        'writes bags and report.html.',
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        metavar='DIR',
+        help='folder for bags and report, empty or not yet there; default bags/demo-DATE-TIME',
+    )
     parser.add_argument('--seed', type=int, default=1, help='of the noise; default %(default)s')
-    parser.add_argument('--tube', choices=('descending', 'transverse', 'both'), default='both',
-                        help="which of the first paper's two colon shapes; default %(default)s")
-    parser.add_argument('--real-time', action='store_true',
-                        help='run by the wall clock instead of in lock-step on /clock')
+    parser.add_argument(
+        '--tube',
+        choices=('descending', 'transverse', 'both'),
+        default='both',
+        help="which of the first paper's two colon shapes; default %(default)s",
+    )
+    parser.add_argument(
+        '--real-time',
+        action='store_true',
+        help='run by the wall clock instead of in lock-step on /clock',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the demonstration and return 0."""
-    import time
-
     from endoscope_bringup.demo.procedure import TUBES
     from endoscope_bringup.demo.run_demo import REPORT, figures_table, run_demo
     from endoscope_core.atomic_output import atomic_directory
 
     out = args.out or Path(time.strftime('bags/demo-%Y%m%d-%H%M%S'))
     tubes = [tube for tube in TUBES if args.tube == 'both' or tube.name.startswith(args.tube)]
-    began = time.monotonic()
-
-    def progress(what: str) -> None:
-        print(f'[{time.monotonic() - began:6.1f} s] {what}', flush=True)
-
+    progress = partial(_print_progress, time.monotonic())
     with atomic_directory(out) as folder:
         results = run_demo(
-            folder, tubes=tubes, seed=args.seed, real_time=args.real_time, progress=progress)
+            folder, tubes=tubes, seed=args.seed, real_time=args.real_time, progress=progress
+        )
     print(figures_table(results))
     print(f'recordings and report: {out / REPORT}')
     return 0
+
+
+def _print_progress(began: float, what: str) -> None:
+    print(f'[{time.monotonic() - began:6.1f} s] {what}', flush=True)

@@ -58,7 +58,9 @@ def analyse(
     return DemoResults(
         tuple(_calibration(recordings[facts.tube], facts) for facts in calibrations),
         tuple(_run(recordings[segment.tube], segment) for segment in segments),
-        dict(sorted(messages.items())), lost)
+        dict(sorted(messages.items())),
+        lost,
+    )
 
 
 def _run(recording: Recording, segment: Segment) -> TrackingRun:
@@ -73,9 +75,15 @@ def _run(recording: Recording, segment: Segment) -> TrackingRun:
         sizes.append(abs(width_at_mid_height(*pair)))
     shown = JOINTS.index(SHOWN_JOINT)
     return TrackingRun(
-        segment.tube, segment.motion, segment.mode, time,
-        np.degrees(desired[:, shown]), np.degrees(actual[:, shown]),
-        float(np.mean(errors)), float(np.mean(sizes)))
+        segment.tube,
+        segment.motion,
+        segment.mode,
+        time,
+        np.degrees(desired[:, shown]),
+        np.degrees(actual[:, shown]),
+        float(np.mean(errors)),
+        float(np.mean(sizes)),
+    )
 
 
 def _calibration(recording: Recording, facts: CalibrationFacts) -> CalibrationOutcome:
@@ -88,9 +96,17 @@ def _calibration(recording: Recording, facts: CalibrationFacts) -> CalibrationOu
     desired = np.degrees(signal(time[shown])[0])
     loop = np.degrees(actual[shown, JOINTS.index(SHOWN_JOINT)])
     return CalibrationOutcome(
-        facts.tube, wire_time[recorded], wires.require('effort')[recorded], wires.names,
-        desired, loop, width_at_mid_height(desired, loop),
-        facts.class_deg, facts.probabilities, facts.duration)
+        facts.tube,
+        wire_time[recorded],
+        wires.require('effort')[recorded],
+        wires.names,
+        desired,
+        loop,
+        width_at_mid_height(desired, loop),
+        facts.class_deg,
+        facts.probabilities,
+        facts.duration,
+    )
 
 
 def _tracked(recording: Recording, start: float, end: float) -> tuple[Array, Array]:
@@ -103,5 +119,6 @@ def _tracked(recording: Recording, start: float, end: float) -> tuple[Array, Arr
 def _desired(recording: Recording, times: Array) -> Array:
     series = recording.joint_state('slave/servo_jp').select(JOINTS)
     stamps, position = series.seconds(0), series.require('position')
-    return np.column_stack([
-        np.interp(times, stamps, position[:, joint]) for joint in range(len(JOINTS))])
+    return np.column_stack(
+        [np.interp(times, stamps, position[:, joint]) for joint in range(len(JOINTS))]
+    )

@@ -54,15 +54,18 @@ class DirectorNode(EndoscopeNode):
         self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
         self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
         self.create_subscription(
-            JointState, CALIBRATION_COMMAND, self._on_calibration, COMMAND, raw=True)
+            JointState, CALIBRATION_COMMAND, self._on_calibration, COMMAND, raw=True
+        )
         self._calibrate = self.create_client(Trigger, CALIBRATION_RUN)
         self._setters: dict[str, Client] = {
-            name: self.create_client(SetParameters, f'{name}/set_parameters') for name in DIRECTED}
+            name: self.create_client(SetParameters, f'{name}/set_parameters') for name in DIRECTED
+        }
 
     def ready(self) -> bool:
         """Whether all services that the procedure needs are there."""
         return all(
-            client.service_is_ready() for client in (self._calibrate, *self._setters.values()))
+            client.service_is_ready() for client in (self._calibrate, *self._setters.values())
+        )
 
     def command_state(self, command: str) -> None:
         """Publish a state command: `enable`, `disable`, `pause`, `resume`, `home`."""
@@ -70,8 +73,11 @@ class DirectorNode(EndoscopeNode):
 
     def request_parameters(self, node: str, **values: Any) -> Future:
         """Ask a node to take parameter values; see `check_parameters_taken`."""
-        request = SetParameters.Request(parameters=[
-            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()])
+        request = SetParameters.Request(
+            parameters=[
+                Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
+            ]
+        )
         return self._setters[node].call_async(request)
 
     def request_calibration(self) -> Future:

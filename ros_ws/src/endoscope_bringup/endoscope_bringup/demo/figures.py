@@ -25,8 +25,14 @@ def loops_figure(results: DemoResults, tube: str) -> str:
                 axis.plot([-95, 95], [-95, 95], color='#9aa5b1', linewidth=0.8, linestyle=':')
                 axis.plot(run.desired_deg, run.actual_deg, color=MODE_COLOUR[mode], linewidth=1.2)
                 axis.set_title(f'{MOTION_TITLE[motion]} · {mode}')
-                axis.text(0.03, 0.96, f'RMSE {run.rmse_deg:.1f}°\nbacklash {run.backlash_deg:.1f}°',
-                          transform=axis.transAxes, va='top', color=INK)
+                axis.text(
+                    0.03,
+                    0.96,
+                    f'RMSE {run.rmse_deg:.1f}°\nbacklash {run.backlash_deg:.1f}°',
+                    transform=axis.transAxes,
+                    va='top',
+                    color=INK,
+                )
                 axis.set_aspect('equal')
                 axis.set_xlim(-95, 95)
                 axis.set_ylim(-95, 95)
@@ -43,14 +49,21 @@ def tracking_figure(results: DemoResults, tube: str, motion: str) -> str:
         figure = Figure(figsize=(9.6, 4.4), layout='constrained')
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         runs = [results.run(tube, motion, mode) for mode in Mode]
-        above.plot(*thinned(runs[0].time, runs[0].desired_deg), color=INK, linewidth=1.6,
-                   linestyle='--', label='desired')
+        above.plot(
+            *thinned(runs[0].time, runs[0].desired_deg),
+            color=INK,
+            linewidth=1.6,
+            linestyle='--',
+            label='desired',
+        )
         for run in runs:
             colour = MODE_COLOUR[run.mode]
-            above.plot(*thinned(run.time, run.actual_deg), color=colour, linewidth=1.2,
-                       label=str(run.mode))
-            below.plot(*thinned(run.time, run.actual_deg - run.desired_deg), color=colour,
-                       linewidth=1.0)
+            above.plot(
+                *thinned(run.time, run.actual_deg), color=colour, linewidth=1.2, label=str(run.mode)
+            )
+            below.plot(
+                *thinned(run.time, run.actual_deg - run.desired_deg), color=colour, linewidth=1.0
+            )
         above.set_title(MOTION_TITLE[motion])
         above.set_ylabel('bending angle (deg)')
         above.legend(ncols=4, loc='lower left', fontsize=8)
@@ -64,14 +77,22 @@ def calibration_figure(calibration: CalibrationOutcome) -> str:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 2.9), layout='constrained')
         loop, tension, bars = figure.subplots(1, 3, width_ratios=(2, 4, 3))
-        loop.plot(calibration.loop_desired_deg, calibration.loop_actual_deg,
-                  color=MODE_COLOUR[Mode.NONE], linewidth=1.2)
+        loop.plot(
+            calibration.loop_desired_deg,
+            calibration.loop_actual_deg,
+            color=MODE_COLOUR[Mode.NONE],
+            linewidth=1.2,
+        )
         loop.set_title(f'loop, {calibration.backlash_deg:.0f}° wide')
         loop.set_xlabel('desired (deg)')
         loop.set_ylabel('actual (deg)')
         for column, (wire, colour) in enumerate(zip(calibration.wires, WIRE_COLOUR, strict=False)):
-            tension.plot(*thinned(calibration.time, calibration.tension[:, column]),
-                         color=colour, linewidth=1.0, label=wire)
+            tension.plot(
+                *thinned(calibration.time, calibration.tension[:, column]),
+                color=colour,
+                linewidth=1.0,
+                label=wire,
+            )
         tension.set_title('wire tension')
         tension.set_xlabel('time (s)')
         tension.set_ylabel('tension (N)')
@@ -83,8 +104,9 @@ def calibration_figure(calibration: CalibrationOutcome) -> str:
 def _probability_bars(axis: Axes, calibration: CalibrationOutcome) -> None:
     classes = sorted(calibration.probabilities)
     values = [calibration.probabilities[c] for c in classes]
-    chosen = [MODE_COLOUR[Mode.FEED_FORWARD] if c == calibration.class_deg else '#c3ccd5'
-              for c in classes]
+    chosen = [
+        MODE_COLOUR[Mode.FEED_FORWARD] if c == calibration.class_deg else '#c3ccd5' for c in classes
+    ]
     bars = axis.bar([f'{c}°' for c in classes], values, color=chosen)
     axis.bar_label(bars, labels=[f'{v:.2f}' if v >= 0.005 else '' for v in values], fontsize=7)
     axis.set_ylim(0, 1.1)

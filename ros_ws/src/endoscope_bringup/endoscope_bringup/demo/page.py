@@ -51,12 +51,30 @@ def table_rows(results: DemoResults) -> list[TableRow]:
         for motion in MOTIONS:
             none, forward, adaptive = (results.run(tube, motion, mode) for mode in Mode)
             paper = TABLE_5[tube, motion]
-            rows.append(TableRow(
-                tube, MOTION_TITLE[motion], 'RMSE', paper[0], paper[1],
-                none.rmse_deg, forward.rmse_deg, adaptive.rmse_deg))
-            rows.append(TableRow(
-                tube, MOTION_TITLE[motion], 'backlash size', paper[2], paper[3],
-                none.backlash_deg, forward.backlash_deg, adaptive.backlash_deg))
+            rows.append(
+                TableRow(
+                    tube,
+                    MOTION_TITLE[motion],
+                    'RMSE',
+                    paper[0],
+                    paper[1],
+                    none.rmse_deg,
+                    forward.rmse_deg,
+                    adaptive.rmse_deg,
+                )
+            )
+            rows.append(
+                TableRow(
+                    tube,
+                    MOTION_TITLE[motion],
+                    'backlash size',
+                    paper[2],
+                    paper[3],
+                    none.backlash_deg,
+                    forward.backlash_deg,
+                    adaptive.backlash_deg,
+                )
+            )
     return rows
 
 
@@ -76,7 +94,11 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
     """
     environment = Environment(
         loader=PackageLoader('endoscope_bringup', 'demo/templates'),
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     rows = table_rows(results)
     rmse = [row for row in rows if row.figure == 'RMSE']
     tubes = [
@@ -89,7 +111,12 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
         for calibration in results.calibrations
     ]
     return environment.get_template('report.html.j2').render(
-        tubes=tubes, rows=rows, facts=facts, messages=results.messages, lost=results.lost,
+        tubes=tubes,
+        rows=rows,
+        facts=facts,
+        messages=results.messages,
+        lost=results.lost,
         worst_forward=max(row.feed_forward_left for row in rmse),
         worst_adaptive=max(row.adaptive_left for row in rmse),
-        worst_paper=max(row.paper_left for row in rmse))
+        worst_paper=max(row.paper_left for row in rmse),
+    )

@@ -47,7 +47,7 @@ class TubeRecording:
 
 
 def run_tube(
-    tube: Tube, folder: Path, *, seed: int, real_time: bool, progress: Progress
+    tube: Tube, folder: Path, *, domain: int, seed: int, real_time: bool, progress: Progress
 ) -> TubeRecording:
     """Enable, calibrate, and track every motion in every mode on one simulated tube.
 
@@ -56,6 +56,8 @@ def run_tube(
     tube : Tube
     folder : Path
         Gets the bag, and the plant file of the slave.
+    domain : int
+        ROS domain of the graph.
     seed : int
         Of the sensors' noise.
     real_time : bool
@@ -74,16 +76,19 @@ def run_tube(
     """
     name = tube.name.replace(' ', '_')
     plant = PlantDescription()
-    joints = {joint: replace(p, capstan_exponent=tube.capstan_exponent)
-              for joint, p in plant.joints.items()}
+    joints = {
+        joint: replace(p, capstan_exponent=tube.capstan_exponent)
+        for joint, p in plant.joints.items()
+    }
     plant_file = folder / f'{name}.plant.yaml'
     save_plant(replace(plant, joints=joints), plant_file)
     bag = folder / name
-    with _GraphSession(plant_file, bag, seed, real_time) as session:
+    with _GraphSession(plant_file, bag, domain, seed, real_time) as session:
         session.start()
         calibration = session.calibrate(tube, progress)
         segments = tuple(
-            session.track(tube, motion, mode, progress) for motion in MOTIONS for mode in Mode)
+            session.track(tube, motion, mode, progress) for motion in MOTIONS for mode in Mode
+        )
         lost = session.stop()
     return TubeRecording(bag, segments, calibration, lost)
 
@@ -91,15 +96,22 @@ def run_tube(
 class _GraphSession:
     """The node graph in this process, and an operator at its topics."""
 
-    def __init__(self, plant_file: Path, bag: Path, seed: int, real_time: bool) -> None:
+    def __init__(
+        self, plant_file: Path, bag: Path, domain: int, seed: int, real_time: bool
+    ) -> None:
         arguments = ['--ros-args', '-p', f'use_sim_time:={str(not real_time).lower()}']
         slave = {'plant_file': str(plant_file), 'seed': seed}
-        self._runtime = Runtime(arguments, context=Context(), overrides={
-            'motor_driver': slave,
-            'load_cells': slave,
-            'em_tracker': slave,
-            'recorder': {'bag': str(bag)},
-        })
+        self._runtime = Runtime(
+            arguments,
+            context=Context(),
+            domain_id=domain,
+            overrides={
+                'motor_driver': slave,
+                'load_cells': slave,
+                'em_tracker': slave,
+                'recorder': {'bag': str(bag)},
+            },
+        )
         for factory in (*SLAVE_NODES, *CONTROL_NODES):
             self._runtime.add(factory)
         self._recorder = self._runtime.add(RecorderNode)
@@ -135,7 +147,8 @@ class _GraphSession:
 
     def _set(self, node: str, **values: Any) -> None:
         answer = self._answer_of(
-            self._director.request_parameters(node, **values), f'the parameters of {node}')
+            self._director.request_parameters(node, **values), f'the parameters of {node}'
+        )
         check_parameters_taken(node, answer)
 
     def start(self) -> None:
@@ -156,20 +169,26 @@ class _GraphSession:
         if not answer.success:
             raise GraphRefusedError(f'calibration/run: {answer.message}')
         self._wait_until(
-            lambda: self._director.calibration_result is not None, 'calibration/result')
+            lambda: self._director.calibration_result is not None, 'calibration/result'
+        )
         assert self._director.calibration_result is not None
         values = values_of(self._director.calibration_result)
         facts = CalibrationFacts(
             tube.name,
             self._director.last_calibration_ns * 1e-9 - calibration_sinusoid().duration,
             float(values['class_deg']),
-            {round(float(key.removeprefix('probability_').removesuffix('_deg'))): float(value)
-             for key, value in values.items()
-             if key.startswith('probability_') and key.endswith('_deg')},
-            float(values['duration']))
-        progress(f'{tube.name}: class {facts.class_deg:.0f} deg with probability '
-                 f'{facts.probabilities[round(facts.class_deg)]:.2f}, '
-                 f'{facts.duration:.1f} s after the request')
+            {
+                round(float(key.removeprefix('probability_').removesuffix('_deg'))): float(value)
+                for key, value in values.items()
+                if key.startswith('probability_') and key.endswith('_deg')
+            },
+            float(values['duration']),
+        )
+        progress(
+            f'{tube.name}: class {facts.class_deg:.0f} deg with probability '
+            f'{facts.probabilities[round(facts.class_deg)]:.2f}, '
+            f'{facts.duration:.1f} s after the request'
+        )
         return facts
 
     def track(self, tube: Tube, motion: str, mode: Mode, progress: Progress) -> Segment:

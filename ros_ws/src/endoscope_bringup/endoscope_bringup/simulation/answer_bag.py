@@ -49,8 +49,11 @@ class _Times:
 
     def only(self, kept: NDArray[np.bool_]) -> '_Times':
         return replace(
-            self, stamp_ns=self.stamp_ns[kept], log_ns=self.log_ns[kept],
-            publish_ns=self.publish_ns[kept])
+            self,
+            stamp_ns=self.stamp_ns[kept],
+            log_ns=self.log_ns[kept],
+            publish_ns=self.publish_ns[kept],
+        )
 
 
 def write_answer(
@@ -87,26 +90,32 @@ def write_answer(
     driven = replace(
         plant,
         joints={joint: plant.joints[joint] for joint in commands.joints},
-        effects=tuple(spec for spec in plant.effects if spec.joint in commands.joints))
+        effects=tuple(spec for spec in plant.effects if spec.joint in commands.joints),
+    )
     with BagWriter(out) as writer:
         times = {
             suffix: _times(recording, commands, suffix, rate)
             for suffix, rate in (
                 (MOTOR_TOPIC, plant.sensors.load_cell_rate),
                 (WIRES_TOPIC, plant.sensors.load_cell_rate),
-                (BENDING_TOPIC, plant.sensors.tracker_rate))
+                (BENDING_TOPIC, plant.sensors.tracker_rate),
+            )
         }
         faults = recording_faults(driven)
         for suffix, device in zip((MOTOR_TOPIC, WIRES_TOPIC, BENDING_TOPIC), TOPICS, strict=True):
             since = (times[suffix].stamp_ns - commands.stamp_ns[0]) * NANOSECONDS
             times[suffix] = times[suffix].only(faults.keeps(device, since))
         stamps = AnswerStamps(
-            *(times[s].stamp_ns for s in (MOTOR_TOPIC, WIRES_TOPIC, BENDING_TOPIC)))
+            *(times[s].stamp_ns for s in (MOTOR_TOPIC, WIRES_TOPIC, BENDING_TOPIC))
+        )
         answer = _answer_as_stamped(driven, commands, stamps, _recorded_shaft(recording, commands))
         if noise_seed is not None:
             answer = _noisy(answer, SensorModel(plant.sensors, noise_seed))
-        streams = [_copied(recording, suffix) for suffix in (SHAFT_TOPIC, ANGLE_TOPIC)
-                   if recording.has(suffix)]
+        streams = [
+            _copied(recording, suffix)
+            for suffix in (SHAFT_TOPIC, ANGLE_TOPIC)
+            if recording.has(suffix)
+        ]
         streams += _encoded(answer, times, commands.joints)
         writer.write_streams(streams)
         return writer.message_count
@@ -134,23 +143,26 @@ def _answer_as_stamped(
     the command of that stamp has already moved. The shafts, whose encoders are the finest clock,
     tell which habit a recording has.
     """
+
     def answer(read_delay: float, at: AnswerStamps) -> Answer:
-        return answer_commands(
-            plant, commands.stamp_ns, commands.shaft, at, read_delay=read_delay)
+        return answer_commands(plant, commands.stamp_ns, commands.shaft, at, read_delay=read_delay)
 
     if recorded is None:
         return answer(0.0, stamps)
     position = recorded.require('position')
     misfits = [
-        float(np.nanmean((answer(delay, replace(stamps, motor=recorded.stamp_ns)).shaft_position
-                          - position) ** 2))
-        for delay in READ_DELAYS]
+        float(
+            np.nanmean(
+                (answer(delay, replace(stamps, motor=recorded.stamp_ns)).shaft_position - position)
+                ** 2
+            )
+        )
+        for delay in READ_DELAYS
+    ]
     return answer(READ_DELAYS[int(np.argmin(misfits))], stamps)
 
 
-def _times(
-    recording: Recording, commands: BagCommands, suffix: str, rate: float
-) -> _Times:
+def _times(recording: Recording, commands: BagCommands, suffix: str, rate: float) -> _Times:
     if recording.has(suffix):
         series = recording.joint_state(suffix, order='recorded', finite=())
         return _Times(series.topic, series.stamp_ns, series.log_ns, series.publish_ns)
@@ -174,10 +186,12 @@ def _copied(recording: Recording, suffix: str) -> MessageStream:
     topic = recording.find(suffix)
     messages = list(recording.messages([topic]))
     return MessageStream(
-        topic, recording.topics[topic].type,
+        topic,
+        recording.topics[topic].type,
         [message.data for message in messages],
         np.array([message.log_ns for message in messages], dtype=np.int64),
-        np.array([message.publish_ns for message in messages], dtype=np.int64))
+        np.array([message.publish_ns for message in messages], dtype=np.int64),
+    )
 
 
 def _encoded(
@@ -188,15 +202,22 @@ def _encoded(
     tension = answer.tension.reshape(len(answer.tension), -1)
     payloads: dict[str, Callable[[Stamps], list[bytes]]] = {
         MOTOR_TOPIC: lambda stamps: encode_joint_states(
-            motors, stamps, position=answer.shaft_position, velocity=answer.shaft_velocity,
-            effort=answer.shaft_effort),
+            motors,
+            stamps,
+            position=answer.shaft_position,
+            velocity=answer.shaft_velocity,
+            effort=answer.shaft_effort,
+        ),
         WIRES_TOPIC: lambda stamps: encode_joint_states(wires, stamps, effort=tension),
-        BENDING_TOPIC: lambda stamps: encode_joint_states(
-            joints, stamps, position=answer.bending),
+        BENDING_TOPIC: lambda stamps: encode_joint_states(joints, stamps, position=answer.bending),
     }
     return [
         MessageStream(
-            times[suffix].topic, JOINT_STATE, encode(times[suffix].stamp_ns),
-            times[suffix].log_ns, times[suffix].publish_ns)
+            times[suffix].topic,
+            JOINT_STATE,
+            encode(times[suffix].stamp_ns),
+            times[suffix].log_ns,
+            times[suffix].publish_ns,
+        )
         for suffix, encode in payloads.items()
     ]

@@ -78,15 +78,16 @@ def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommand
     else:
         found = ', '.join(sorted(recording.topics)) or 'none'
         raise NoCommandsError(
-            f'{recording.path}: lacks topic {SHAFT_TOPIC} or {ANGLE_TOPIC}; it has {found}')
+            f'{recording.path}: lacks topic {SHAFT_TOPIC} or {ANGLE_TOPIC}; it has {found}'
+        )
     joints = tuple(joint for joint, name in names.items() if name in series.names)
     if not joints:
         raise NoCommandsError(
             f'{recording.path}: {series.topic} commands {", ".join(series.names) or "nothing"}, '
-            f'the plant has {", ".join(names.values())}')
+            f'the plant has {", ".join(names.values())}'
+        )
     chosen = series.select([names[joint] for joint in joints])
-    return BagCommands(
-        series.topic, joints, chosen.stamp_ns, _shaft_angles(chosen, joints, plant))
+    return BagCommands(series.topic, joints, chosen.stamp_ns, _shaft_angles(chosen, joints, plant))
 
 
 def _shaft_angles(
