@@ -25,8 +25,12 @@ def one_joint(*effects: EffectSpec) -> PlantDescription:
 
 
 def write_short_bag(
-    path: Path, plant: PlantDescription = PLANT, duration: float = 4.0, seed: int = 1,
-    leave_out: str = '', spoil: float | None = None,
+    path: Path,
+    plant: PlantDescription = PLANT,
+    duration: float = 4.0,
+    seed: int = 1,
+    leave_out: str = '',
+    spoil: float | None = None,
 ) -> Path:
     """Write a recording of a sweep and some steps.
 
@@ -45,8 +49,9 @@ def write_short_bag(
         Written in place of one reading of the tracker.
     """
     time = np.arange(0.0, duration, 1e-3)
-    angle = np.where(time < 0.7 * duration, 0.9 * np.sin(2.2 * time), 0.4 * np.sign(
-        np.sin(6.0 * time)))
+    angle = np.where(
+        time < 0.7 * duration, 0.9 * np.sin(2.2 * time), 0.4 * np.sign(np.sin(6.0 * time))
+    )
     command = angle[:, None] * plant.joints['bend_x'].gear
     truth, sensors = simulate(plant, command), SensorModel(plant.sensors, seed)
     bending = sensors.bending(truth.bending[::25])
@@ -55,18 +60,30 @@ def write_short_bag(
     stamps = (time * 1e9).round().astype(np.int64) + 1_700_000_000_000_000_000
     quantities = {
         'motor/servo_jp': (['motor_x'], stamps, {'position': command}),
-        'motor/measured_js': (['motor_x'], stamps, {
-            'position': sensors.shaft_position(truth.shaft_position),
-            'velocity': sensors.shaft_velocity(truth.shaft_velocity),
-            'effort': sensors.shaft_effort(truth.shaft_effort)}),
-        'wires/measured_js': (['wire_x_pos', 'wire_x_neg'], stamps, {
-            'effort': sensors.tension(truth.tension)[:, 0]}),
+        'motor/measured_js': (
+            ['motor_x'],
+            stamps,
+            {
+                'position': sensors.shaft_position(truth.shaft_position),
+                'velocity': sensors.shaft_velocity(truth.shaft_velocity),
+                'effort': sensors.shaft_effort(truth.shaft_effort),
+            },
+        ),
+        'wires/measured_js': (
+            ['wire_x_pos', 'wire_x_neg'],
+            stamps,
+            {'effort': sensors.tension(truth.tension)[:, 0]},
+        ),
         'slave/measured_js': (['bend_x'], stamps[::25], {'position': bending}),
     }
     with BagWriter(path) as bag:
-        bag.write_streams([
-            MessageStream(
-                f'/rig/{topic}', JOINT_STATE, encode_joint_states(names, at, **values), at)
-            for topic, (names, at, values) in quantities.items() if topic != leave_out
-        ])
+        bag.write_streams(
+            [
+                MessageStream(
+                    f'/rig/{topic}', JOINT_STATE, encode_joint_states(names, at, **values), at
+                )
+                for topic, (names, at, values) in quantities.items()
+                if topic != leave_out
+            ]
+        )
     return path

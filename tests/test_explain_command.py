@@ -24,8 +24,9 @@ def rig(tmp_path_factory):
 
 
 def explain(rig, out, *arguments):
-    return cli.main([
-        'explain', *map(str, arguments), '--plant', str(rig / 'plant.yaml'), '--out', str(out)])
+    return cli.main(
+        ['explain', *map(str, arguments), '--plant', str(rig / 'plant.yaml'), '--out', str(out)]
+    )
 
 
 def test_a_stop_is_named_shown_and_exported(rig, tmp_path, capsys):
@@ -51,9 +52,20 @@ def test_a_stop_is_named_shown_and_exported(rig, tmp_path, capsys):
 def test_the_exported_plant_is_what_simulate_runs(rig, tmp_path):
     out = tmp_path / 'out'
     assert explain(rig, out, rig / 'sound', '--quick') == 0
-    assert cli.main([
-        'simulate', '--plant', str(out / 'plant.yaml'), '--commands', str(rig / 'sound'), '--out',
-        str(tmp_path / 'answer')]) == 0
+    assert (
+        cli.main(
+            [
+                'simulate',
+                '--plant',
+                str(out / 'plant.yaml'),
+                '--commands',
+                str(rig / 'sound'),
+                '--out',
+                str(tmp_path / 'answer'),
+            ]
+        )
+        == 0
+    )
     assert (tmp_path / 'answer' / 'metadata.yaml').is_file()
 
 
@@ -74,9 +86,18 @@ def test_many_bags_have_one_report_each_and_one_table(rig, tmp_path, capsys):
 
 def test_a_dask_cluster_does_the_same(rig, tmp_path):
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        assert explain(
-            rig, tmp_path / 'out', rig / 'sound', rig / 'stopped.mcap', '--quick', '--dask',
-            cluster.scheduler_address) == 0
+        assert (
+            explain(
+                rig,
+                tmp_path / 'out',
+                rig / 'sound',
+                rig / 'stopped.mcap',
+                '--quick',
+                '--dask',
+                cluster.scheduler_address,
+            )
+            == 0
+        )
     assert summary(tmp_path / 'out') == {'sound': 'consistent', 'stopped': 'missing_physics'}
 
 
@@ -88,8 +109,9 @@ def refused(capsys, rig, out, *arguments):
     return output.err
 
 
-@pytest.mark.parametrize('topic', [
-    'motor/servo_jp', 'motor/measured_js', 'wires/measured_js', 'slave/measured_js'])
+@pytest.mark.parametrize(
+    'topic', ['motor/servo_jp', 'motor/measured_js', 'wires/measured_js', 'slave/measured_js']
+)
 def test_a_lacking_topic_is_named(rig, tmp_path, capsys, topic):
     bag = write_short_bag(tmp_path / 'bag', leave_out=topic)
     assert topic in refused(capsys, rig, tmp_path / 'out', bag)
@@ -106,7 +128,7 @@ def test_a_reading_that_is_not_finite_is_named(rig, tmp_path, capsys, value):
 def test_a_cut_bag_is_refused(rig, tmp_path, capsys):
     cut = tmp_path / 'cut.mcap'
     whole = (rig / 'stopped.mcap').read_bytes()
-    cut.write_bytes(whole[:len(whole) // 2])
+    cut.write_bytes(whole[: len(whole) // 2])
     assert 'cut.mcap' in refused(capsys, rig, tmp_path / 'out', cut)
 
 
@@ -120,8 +142,7 @@ def test_a_wrong_key_of_the_plant_is_named_with_the_nearest(rig, tmp_path, capsy
     plant = tmp_path / 'plant.yaml'
     plant.write_text('joints: {bend_x: {pretention: 5.0}}\n')
     out = tmp_path / 'out'
-    assert cli.main([
-        'explain', str(rig / 'sound'), '--plant', str(plant), '--out', str(out)]) == 2
+    assert cli.main(['explain', str(rig / 'sound'), '--plant', str(plant), '--out', str(out)]) == 2
     message = capsys.readouterr().err
     assert 'pretention' in message
     assert 'pretension' in message
@@ -142,6 +163,5 @@ def test_a_folder_that_holds_something_is_left_alone(rig, tmp_path, capsys):
 
 
 def test_a_cluster_that_is_not_there_is_named(rig, tmp_path, capsys):
-    message = refused(
-        capsys, rig, tmp_path / 'out', rig / 'sound', '--dask', 'tcp://127.0.0.1:9')
+    message = refused(capsys, rig, tmp_path / 'out', rig / 'sound', '--dask', 'tcp://127.0.0.1:9')
     assert 'tcp://127.0.0.1:9' in message

@@ -24,9 +24,18 @@ from endoscope_bags.errors import BagError
 
 QUANTITIES = ('position', 'velocity', 'effort')
 UNITS = {
-    's': 1.0, 'ms': 1e-3, 'us': 1e-6,
-    'rad': 1.0, 'deg': math.pi / 180.0, 'rad/s': 1.0, 'deg/s': math.pi / 180.0,
-    'N': 1.0, 'mN': 1e-3, 'N m': 1.0, 'mN m': 1e-3, '-': 1.0,
+    's': 1.0,
+    'ms': 1e-3,
+    'us': 1e-6,
+    'rad': 1.0,
+    'deg': math.pi / 180.0,
+    'rad/s': 1.0,
+    'deg/s': math.pi / 180.0,
+    'N': 1.0,
+    'mN': 1e-3,
+    'N m': 1.0,
+    'mN m': 1e-3,
+    '-': 1.0,
 }
 """SI value of one of each unit."""
 
@@ -107,8 +116,11 @@ def load_table_mapping(path: str | Path) -> TableMapping:
 
 
 def _mapping(content: Any) -> TableMapping:
-    given = _section(content, 'the mapping', (
-        'time', 'topics', 'delimiter', 'header_lines', 'namespace', 'start_s', 'drop_repeats'))
+    given = _section(
+        content,
+        'the mapping',
+        ('time', 'topics', 'delimiter', 'header_lines', 'namespace', 'start_s', 'drop_repeats'),
+    )
     for key in ('time', 'topics'):
         if key not in given:
             raise ValueError(f'{key} is missing')
@@ -120,11 +132,14 @@ def _mapping(content: Any) -> TableMapping:
         raise ValueError('topics is empty')
     delimiter = str(given.get('delimiter', ','))
     return TableMapping(
-        _column(given['time'], 'time'), topics,
+        _column(given['time'], 'time'),
+        topics,
         None if delimiter == 'whitespace' else delimiter,
         int(_number(given.get('header_lines', 0), 'header_lines')),
         str(given.get('namespace', '/endoscope')).rstrip('/'),
-        _number(given.get('start_s', 0.0), 'start_s'), bool(given.get('drop_repeats', True)))
+        _number(given.get('start_s', 0.0), 'start_s'),
+        bool(given.get('drop_repeats', True)),
+    )
 
 
 def _topic(topic: str, content: Any) -> dict[str, dict[str, Column]]:
@@ -134,7 +149,8 @@ def _topic(topic: str, content: Any) -> dict[str, dict[str, Column]]:
         quantity: {
             name: _column(column, f'{where}.{quantity}.{name}')
             for name, column in _section(columns, f'{where}.{quantity}').items()
-        } for quantity, columns in quantities.items()
+        }
+        for quantity, columns in quantities.items()
     }
     names = {tuple(columns) for columns in read.values()}
     if len(names) != 1 or not next(iter(names)):
@@ -155,9 +171,7 @@ def _column(content: Any, where: str) -> Column:
     return Column(number, UNITS[unit] * scale, UNITS[unit] * offset)
 
 
-def _section(
-    value: Any, where: str, valid: tuple[str, ...] | None = None
-) -> Mapping[str, Any]:
+def _section(value: Any, where: str, valid: tuple[str, ...] | None = None) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
         raise ValueError(f'{where} must be a mapping of names to values, not {value!r}')
     for key in value:

@@ -80,9 +80,20 @@ def convert_table(table: str | Path, mapping: TableMapping, out: str | Path) -> 
         }
         for quantity, array in values.items():
             _check_finite(table, topic, quantity, array)
-        streams.append(MessageStream(
-            f'{mapping.namespace}/{topic}', JOINT_STATE,
-            encode_joint_states(names, stamps, **values), stamps))
+        streams.append(
+            MessageStream(
+                f'{mapping.namespace}/{topic}',
+                JOINT_STATE,
+                encode_joint_states(
+                    names,
+                    stamps,
+                    position=values.get('position'),
+                    velocity=values.get('velocity'),
+                    effort=values.get('effort'),
+                ),
+                stamps,
+            )
+        )
     with BagWriter(out) as bag:
         bag.write_streams(streams)
     return Converted(rows, rows - len(time), len(time) * len(streams))
@@ -95,13 +106,14 @@ def _read(table: Path, mapping: TableMapping) -> Array:
         raise TableError(f'{table} cannot be read: {error}') from error
     needed = max(c.number for c in _columns(mapping))
     rows = []
-    for number, line in enumerate(lines[mapping.header_lines:], mapping.header_lines + 1):
+    for number, line in enumerate(lines[mapping.header_lines :], mapping.header_lines + 1):
         if not line.strip():
             continue
         cells = line.split(mapping.delimiter)
         if len(cells) < needed:
             raise TableError(
-                f'{table}: line {number} has {len(cells)} columns, {needed} are needed')
+                f'{table}: line {number} has {len(cells)} columns, {needed} are needed'
+            )
         try:
             rows.append([float(cell) for cell in cells[:needed]])
         except ValueError as error:
@@ -112,9 +124,15 @@ def _read(table: Path, mapping: TableMapping) -> Array:
 
 
 def _columns(mapping: TableMapping) -> list[Column]:
-    return [mapping.time, *(
-        column for quantities in mapping.topics.values() for columns in quantities.values()
-        for column in columns.values())]
+    return [
+        mapping.time,
+        *(
+            column
+            for quantities in mapping.topics.values()
+            for columns in quantities.values()
+            for column in columns.values()
+        ),
+    ]
 
 
 def _si(numbers: Array, column: Column) -> Array:
@@ -135,4 +153,5 @@ def _check_finite(table: Path, topic: str, quantity: str, values: Array) -> None
     if bad.any():
         raise NonFiniteError(
             f'{table}: {quantity} of {topic} is not finite in row {int(np.argmax(bad)) + 1} and '
-            f'{int(bad.sum()) - 1} more')
+            f'{int(bad.sum()) - 1} more'
+        )

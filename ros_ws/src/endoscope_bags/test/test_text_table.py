@@ -61,14 +61,17 @@ def test_repeats_are_kept_where_asked(table, tmp_path):
     assert convert_table(table, load_table_mapping(path), tmp_path / 'bag.mcap').repeated == 0
 
 
-@pytest.mark.parametrize(('old', 'new', 'message'), [
-    ('time: {column: 1, unit: s}', '', 'time is missing'),
-    ('unit: deg}', 'unit: degrees}', "unit is 'degrees': valid are"),
-    ('column: 3', 'colum: 3', 'unknown key colum'),
-    ('column: 3', 'column: 0', 'from 1'),
-    ('position: {bend_x: {column: 2', 'angle: {bend_x: {column: 2', 'unknown key angle'),
-    ('start_s: 100.0', 'start_s: soon', "start_s is 'soon'"),
-])
+@pytest.mark.parametrize(
+    ('old', 'new', 'message'),
+    [
+        ('time: {column: 1, unit: s}', '', 'time is missing'),
+        ('unit: deg}', 'unit: degrees}', "unit is 'degrees': valid are"),
+        ('column: 3', 'colum: 3', 'unknown key colum'),
+        ('column: 3', 'column: 0', 'from 1'),
+        ('position: {bend_x: {column: 2', 'angle: {bend_x: {column: 2', 'unknown key angle'),
+        ('start_s: 100.0', 'start_s: soon', "start_s is 'soon'"),
+    ],
+)
 def test_a_wrong_mapping_is_refused_by_its_key(tmp_path, old, new, message):
     path = tmp_path / 'mapping.yaml'
     path.write_text(MAPPING.replace(old, new, 1))
@@ -76,15 +79,21 @@ def test_a_wrong_mapping_is_refused_by_its_key(tmp_path, old, new, message):
         load_table_mapping(path)
 
 
-@pytest.mark.parametrize(('text', 'error', 'message'), [
-    ('0,1,1,5,5\n1,1,1,5\n', TableError, 'line 2 has 4 columns, 5 are needed'),
-    ('0,1,1,5,5\n1,one,1,5,5\n', TableError, 'line 2 holds something else than numbers'),
-    ('0,1,1,5,5\n', TableError, 'fewer than two rows'),
-    ('1,1,1,5,5\n0,1,1,5,5\n', TableError, 'time runs backwards after 101 s'),
-    ('0,1,1,5,5\n1,1,nan,5,5\n', BagError, 'position of slave/measured_js is not finite in row 2'),
-])
-def test_a_wrong_table_is_refused_and_nothing_is_written(
-        tmp_path, mapping, text, error, message):
+@pytest.mark.parametrize(
+    ('text', 'error', 'message'),
+    [
+        ('0,1,1,5,5\n1,1,1,5\n', TableError, 'line 2 has 4 columns, 5 are needed'),
+        ('0,1,1,5,5\n1,one,1,5,5\n', TableError, 'line 2 holds something else than numbers'),
+        ('0,1,1,5,5\n', TableError, 'fewer than two rows'),
+        ('1,1,1,5,5\n0,1,1,5,5\n', TableError, 'time runs backwards after 101 s'),
+        (
+            '0,1,1,5,5\n1,1,nan,5,5\n',
+            BagError,
+            'position of slave/measured_js is not finite in row 2',
+        ),
+    ],
+)
+def test_a_wrong_table_is_refused_and_nothing_is_written(tmp_path, mapping, text, error, message):
     path = tmp_path / 'table.txt'
     path.write_text(text)
     with pytest.raises(error, match=re.escape(message)):

@@ -38,11 +38,18 @@ def calibration():
 
 def write_bag(folder, streams):
     with BagWriter(folder) as writer:
-        writer.write_streams([
-            MessageStream(topic, JOINT_STATE, encode_joint_states(names, stamps, position=values),
-                          stamps + 7, stamps + 5)
-            for topic, names, stamps, values in streams
-        ])
+        writer.write_streams(
+            [
+                MessageStream(
+                    topic,
+                    JOINT_STATE,
+                    encode_joint_states(names, stamps, position=values),
+                    stamps + 7,
+                    stamps + 5,
+                )
+                for topic, names, stamps, values in streams
+            ]
+        )
     return folder
 
 
@@ -88,9 +95,13 @@ def test_identifying_a_bag_finds_the_width_of_its_loop(calibration, tmp_path, dr
         'motor/servo_jp': 0.5 * angle[:, :1],
         'slave/servo_jp': angle[:, :1],
     }[driver]
-    bag = write_bag(tmp_path / 'bag', [
-        (f'/rig/{driver}', names, stamps, values),
-        ('/rig/slave/measured_js', ['bend_x'], stamps[::25], bending)])
+    bag = write_bag(
+        tmp_path / 'bag',
+        [
+            (f'/rig/{driver}', names, stamps, values),
+            ('/rig/slave/measured_js', ['bend_x'], stamps[::25], bending),
+        ],
+    )
     assert main(['identify', str(bag), '--model', 'bouc_wen']) == 0
     found = json.loads(capsys.readouterr().out)['joints']
     assert list(found) == ['bend_x']
@@ -99,27 +110,33 @@ def test_identifying_a_bag_finds_the_width_of_its_loop(calibration, tmp_path, dr
     width = width_at_mid_height(angle[settled, 0], trajectory.bending[settled, 0])
     modelled = bouc_wen_forward(model, Servo().answer(angle[:, 0], 1e-3))
     assert width_at_mid_height(angle[settled, 0], modelled[settled]) == pytest.approx(
-        width, abs=np.deg2rad(2.0))
+        width, abs=np.deg2rad(2.0)
+    )
     assert found['bend_x']['model_rmse'] < np.deg2rad(1.5)
 
 
 def test_a_bag_that_does_not_say_what_the_motors_did_is_refused(calibration, tmp_path, capsys):
     stamps, _, trajectory = calibration
-    bag = write_bag(tmp_path / 'bag', [
-        ('/rig/slave/measured_js', ['bend_x'], stamps[::25], trajectory.bending[::25, :1])])
+    bag = write_bag(
+        tmp_path / 'bag',
+        [('/rig/slave/measured_js', ['bend_x'], stamps[::25], trajectory.bending[::25, :1])],
+    )
     assert main(['identify', str(bag), '--model', 'bouc_wen']) == 2
     error = capsys.readouterr().err
     assert 'motor/measured_js' in error
     assert error.count('\n') == 1
 
 
-@pytest.mark.parametrize('command', [
-    ['identify', 'nowhere', '--model', 'bouc_wen'],
-    ['identify', 'nowhere', '--model', 'unheard_of'],
-    ['identify', 'nowhere'],
-    ['train', '--data', 'nowhere', '--out', 'x.pt'],
-    ['dataset', '--out', 'x', '--per-class', '0'],
-])
+@pytest.mark.parametrize(
+    'command',
+    [
+        ['identify', 'nowhere', '--model', 'bouc_wen'],
+        ['identify', 'nowhere', '--model', 'unheard_of'],
+        ['identify', 'nowhere'],
+        ['train', '--data', 'nowhere', '--out', 'x.pt'],
+        ['dataset', '--out', 'x', '--per-class', '0'],
+    ],
+)
 def test_wrong_usage_is_one_line_and_exit_2(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     try:

@@ -13,13 +13,15 @@ from endoscope_core.plant import PlantDescription, SensorModel, save_plant, simu
 
 TICKS = 1200
 STAMPS = 1_700_000_000_000_000_000 + np.arange(TICKS) * 1_000_000
-SHAFT = np.column_stack([
-    0.3 * np.sin(0.004 * np.arange(TICKS)), 0.2 * np.sin(0.003 * np.arange(TICKS))])
+SHAFT = np.column_stack(
+    [0.3 * np.sin(0.004 * np.arange(TICKS)), 0.2 * np.sin(0.003 * np.arange(TICKS))]
+)
 
 
 def stream(topic: str, names: list[str], stamps: np.ndarray, **values: np.ndarray) -> MessageStream:
     return MessageStream(
-        topic, JOINT_STATE, encode_joint_states(names, stamps, **values), stamps + 7, stamps + 5)
+        topic, JOINT_STATE, encode_joint_states(names, stamps, **values), stamps + 7, stamps + 5
+    )
 
 
 @pytest.fixture
@@ -32,26 +34,37 @@ def plant_file(tmp_path: Path) -> Path:
 def recorded(tmp_path: Path) -> Path:
     tracked = STAMPS[::25]
     with BagWriter(tmp_path / 'recorded') as writer:
-        writer.write_streams([
-            stream('/other/motor/servo_jp', ['motor_y', 'motor_x'], STAMPS,
-                   position=SHAFT[:, ::-1]),
-            stream('/other/slave/measured_js', ['bend_x', 'bend_y'], tracked,
-                   position=np.zeros((len(tracked), 2))),
-        ])
+        writer.write_streams(
+            [
+                stream(
+                    '/other/motor/servo_jp', ['motor_y', 'motor_x'], STAMPS, position=SHAFT[:, ::-1]
+                ),
+                stream(
+                    '/other/slave/measured_js',
+                    ['bend_x', 'bend_y'],
+                    tracked,
+                    position=np.zeros((len(tracked), 2)),
+                ),
+            ]
+        )
     return tmp_path / 'recorded'
 
 
 def run(plant: Path, commands: Path, out: Path, *more: str) -> int:
-    return main(['simulate', '--plant', str(plant), '--commands', str(commands),
-                 '--out', str(out), *more])
+    return main(
+        ['simulate', '--plant', str(plant), '--commands', str(commands), '--out', str(out), *more]
+    )
 
 
 def test_the_answer_has_the_topics_and_stamps_of_the_recording(recorded, plant_file, tmp_path):
     assert run(plant_file, recorded, tmp_path / 'answer') == 0
     answer = open_bag(tmp_path / 'answer')
     assert set(answer.topics) == {
-        '/other/motor/servo_jp', '/other/slave/measured_js', '/other/motor/measured_js',
-        '/other/wires/measured_js'}
+        '/other/motor/servo_jp',
+        '/other/slave/measured_js',
+        '/other/motor/measured_js',
+        '/other/wires/measured_js',
+    }
     bending = answer.joint_state('slave/measured_js')
     np.testing.assert_array_equal(bending.stamp_ns, STAMPS[::25])
     np.testing.assert_array_equal(bending.log_ns, STAMPS[::25] + 7)
@@ -64,8 +77,9 @@ def test_the_answer_has_the_topics_and_stamps_of_the_recording(recorded, plant_f
 
 def test_desired_angles_times_the_gear_stand_in_for_shaft_commands(plant_file, tmp_path):
     with BagWriter(tmp_path / 'angles.mcap') as writer:
-        writer.write_streams([
-            stream('slave/servo_jp', ['bend_x'], STAMPS, position=SHAFT[:, :1] / 0.5)])
+        writer.write_streams(
+            [stream('slave/servo_jp', ['bend_x'], STAMPS, position=SHAFT[:, :1] / 0.5)]
+        )
     assert run(plant_file, tmp_path / 'angles.mcap', tmp_path / 'answer.mcap') == 0
     answer = open_bag(tmp_path / 'answer.mcap')
     assert answer.joint_state('wires/measured_js').names == ('wire_x_pos', 'wire_x_neg')
@@ -84,14 +98,15 @@ def test_noise_is_reproducible_and_as_large_as_the_sensors_say(recorded, plant_f
     assert SensorModel(PlantDescription().sensors, 3).tension(clean).shape == clean.shape
 
 
-@pytest.mark.parametrize(('text', 'named'), [
-    ('joints: {bend_x: {pretensoin: 5}}', 'pretension'),
-    ('effects: [{id: stribek_friction, joint: bend_x}]', 'stribeck_friction'),
-    ('joints: {bend_z: {}}', 'bend_'),
-])
-def test_a_wrong_plant_key_is_one_line_and_leaves_nothing(
-    recorded, tmp_path, capsys, text, named
-):
+@pytest.mark.parametrize(
+    ('text', 'named'),
+    [
+        ('joints: {bend_x: {pretensoin: 5}}', 'pretension'),
+        ('effects: [{id: stribek_friction, joint: bend_x}]', 'stribeck_friction'),
+        ('joints: {bend_z: {}}', 'bend_'),
+    ],
+)
+def test_a_wrong_plant_key_is_one_line_and_leaves_nothing(recorded, tmp_path, capsys, text, named):
     (tmp_path / 'wrong.yaml').write_text(text)
     assert run(tmp_path / 'wrong.yaml', recorded, tmp_path / 'answer') == 2
     message = capsys.readouterr().err
@@ -102,8 +117,9 @@ def test_a_wrong_plant_key_is_one_line_and_leaves_nothing(
 
 def test_a_bag_without_commands_is_refused_and_leaves_nothing(plant_file, tmp_path, capsys):
     with BagWriter(tmp_path / 'mute') as writer:
-        writer.write_streams([
-            stream('/x/wires/measured_js', ['wire_x_pos'], STAMPS, effort=np.ones((TICKS, 1)))])
+        writer.write_streams(
+            [stream('/x/wires/measured_js', ['wire_x_pos'], STAMPS, effort=np.ones((TICKS, 1)))]
+        )
     assert run(plant_file, tmp_path / 'mute', tmp_path / 'answer') == 2
     assert 'motor/servo_jp' in capsys.readouterr().err
     assert sorted(p.name for p in tmp_path.iterdir()) == ['mute', 'plant.yaml']
@@ -113,8 +129,9 @@ def test_a_command_that_is_not_a_number_is_refused(plant_file, tmp_path, capsys)
     shaft = SHAFT.copy()
     shaft[700, 0] = np.nan
     with BagWriter(tmp_path / 'broken') as writer:
-        writer.write_streams([
-            stream('motor/servo_jp', ['motor_x', 'motor_y'], STAMPS, position=shaft)])
+        writer.write_streams(
+            [stream('motor/servo_jp', ['motor_x', 'motor_y'], STAMPS, position=shaft)]
+        )
     assert run(plant_file, tmp_path / 'broken', tmp_path / 'answer') == 2
     assert 'nan' in capsys.readouterr().err
     assert not (tmp_path / 'answer').exists()
@@ -125,13 +142,18 @@ def test_the_answer_is_stamped_as_the_recording_stamps_its_readings(plant_file, 
     truth = simulate(PlantDescription(), SHAFT)
     shaft = SensorModel(PlantDescription().sensors, 1).shaft_position(truth.shaft_position)
     with BagWriter(tmp_path / 'recorded') as writer:
-        writer.write_streams([
-            stream('motor/servo_jp', ['motor_x', 'motor_y'], STAMPS, position=SHAFT),
-            stream('motor/measured_js', ['motor_x', 'motor_y'], STAMPS[:TICKS - late],
-                   position=shaft[late:]),
-        ])
+        writer.write_streams(
+            [
+                stream('motor/servo_jp', ['motor_x', 'motor_y'], STAMPS, position=SHAFT),
+                stream(
+                    'motor/measured_js',
+                    ['motor_x', 'motor_y'],
+                    STAMPS[: TICKS - late],
+                    position=shaft[late:],
+                ),
+            ]
+        )
     assert run(plant_file, tmp_path / 'recorded', tmp_path / 'answer') == 0
     bending = open_bag(tmp_path / 'answer').joint_state('slave/measured_js')
     rows = np.arange(0, TICKS - 1, 25)
-    np.testing.assert_allclose(
-        bending.position[:len(rows)], truth.bending[rows + late], atol=1e-9)
+    np.testing.assert_allclose(bending.position[: len(rows)], truth.bending[rows + late], atol=1e-9)

@@ -11,8 +11,7 @@ from endoscope_core.compiled_cache import njit
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_OPTIONS: dict[str, Any] = {
-    'cache': True, 'error_model': 'numpy', 'nogil': True, '_nrt': False}
+_OPTIONS: dict[str, Any] = {'cache': True, 'error_model': 'numpy', 'nogil': True, '_nrt': False}
 compiled: Callable[[Callable[..., Any]], Callable[..., Any]] = njit(**_OPTIONS)
 """Decorator for physics on arrays that the caller made.
 

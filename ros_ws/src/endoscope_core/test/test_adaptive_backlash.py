@@ -50,8 +50,9 @@ def drive(controller, rig, ticks, first=0, tracker=True, amplitude=1.0):
     for k in range(first, first + ticks):
         angle, speed = amplitude * math.sin(k * TICK), amplitude * math.cos(k * TICK)
         measurement = rig.measure(k)
-        correction = controller.step(
-            k * TICK, [angle], [speed], measurement if tracker else None)[0]
+        correction = controller.step(k * TICK, [angle], [speed], measurement if tracker else None)[
+            0
+        ]
         rig.advance(angle + correction)
         errors.append(rig.joint - angle)
         corrections.append(correction)
@@ -119,7 +120,8 @@ def test_late_measurements_are_compared_with_what_was_desired_then():
         angle = math.sin(k * TICK)
         stamp = (k - 100) * TICK
         measurement = (
-            TrackerMeasurement(stamp, [math.sin(stamp)]) if k % PERIOD == 0 and k > 200 else None)
+            TrackerMeasurement(stamp, [math.sin(stamp)]) if k % PERIOD == 0 and k > 200 else None
+        )
         controller.step(k * TICK, [angle], [math.cos(k * TICK)], measurement)
     assert abs(controller.estimates[0].backlash) < 1e-6
     assert abs(controller.estimates[0].gain) < 1e-6
@@ -140,13 +142,16 @@ def test_the_correction_is_bounded_whatever_the_tracker_says(samples):
     assert 0.0 <= estimate.bound <= settings_.loop_gain * settings_.boundary_layer
 
 
-@pytest.mark.parametrize('measurement', [
-    TrackerMeasurement(0.5, [math.nan]),
-    TrackerMeasurement(0.5, [0.0, 0.0]),
-    TrackerMeasurement(0.3, [0.0]),
-    TrackerMeasurement(9.0, [0.0]),
-    TrackerMeasurement(math.nan, [0.0]),
-])
+@pytest.mark.parametrize(
+    'measurement',
+    [
+        TrackerMeasurement(0.5, [math.nan]),
+        TrackerMeasurement(0.5, [0.0, 0.0]),
+        TrackerMeasurement(0.3, [0.0]),
+        TrackerMeasurement(9.0, [0.0]),
+        TrackerMeasurement(math.nan, [0.0]),
+    ],
+)
 def test_an_unusable_measurement_is_counted_and_ignored(measurement):
     controller = AdaptiveBacklashController(1)
     controller.activate()
@@ -157,9 +162,15 @@ def test_an_unusable_measurement_is_counted_and_ignored(measurement):
     assert controller.estimates == before
 
 
-@pytest.mark.parametrize('inputs', [
-    (0.1, [0.0], [0.0]), (math.nan, [0.0], [0.0]), (0.3, [math.inf], [0.0]), (0.3, [0.0], []),
-])
+@pytest.mark.parametrize(
+    'inputs',
+    [
+        (0.1, [0.0], [0.0]),
+        (math.nan, [0.0], [0.0]),
+        (0.3, [math.inf], [0.0]),
+        (0.3, [0.0], []),
+    ],
+)
 def test_bad_input_is_refused(inputs):
     controller = AdaptiveBacklashController(1)
     controller.step(0.2, [0.0], [0.0])
@@ -176,24 +187,37 @@ def test_settings_that_close_an_algebraic_loop_are_refused():
 
 
 @given(
-    st.floats(0.5, 1.5), st.floats(-0.3, 0.3), st.floats(-0.5, 0.5), st.floats(0.0, 0.03),
-    st.integers(0, 2**31))
+    st.floats(0.5, 1.5),
+    st.floats(-0.3, 0.3),
+    st.floats(-0.5, 0.5),
+    st.floats(0.0, 0.03),
+    st.integers(0, 2**31),
+)
 def test_the_lyapunov_function_does_not_rise(gain, true_gain, true_backlash, rest, seed):
     """The argument of the docstring, on the map that it is made for, to first order in dt."""
     c = AdaptiveBacklashSettings(
-        leakage=0.0, bound_leakage=0.0, error_limit=10.0, integral_limit=10.0, gain_limit=10.0,
-        backlash_limit=10.0)
+        leakage=0.0,
+        bound_leakage=0.0,
+        error_limit=10.0,
+        integral_limit=10.0,
+        gain_limit=10.0,
+        backlash_limit=10.0,
+    )
     generator = np.random.default_rng(seed)
     dt = 1e-5
     state = AdaptationState(
-        gain=generator.uniform(-0.3, 0.3), backlash=generator.uniform(-0.5, 0.5),
+        gain=generator.uniform(-0.3, 0.3),
+        backlash=generator.uniform(-0.5, 0.5),
         bound=generator.uniform(0.0, 0.9) * c.loop_gain * c.boundary_layer,
-        integral=generator.uniform(-0.02, 0.02))
+        integral=generator.uniform(-0.02, 0.02),
+    )
 
     def value(s):
-        squares = ((s.gain - true_gain) ** 2 / c.gain_rate
-                   + (s.backlash - true_backlash) ** 2 / c.backlash_rate
-                   + (s.bound - rest) ** 2 / c.bound_rate)
+        squares = (
+            (s.gain - true_gain) ** 2 / c.gain_rate
+            + (s.backlash - true_backlash) ** 2 / c.backlash_rate
+            + (s.bound - rest) ** 2 / c.bound_rate
+        )
         return 0.5 * gain * squares + 0.5 * s.integral**2 / c.integral_weight
 
     for _ in range(20):
@@ -206,7 +230,8 @@ def test_the_lyapunov_function_does_not_rise(gain, true_gain, true_backlash, res
             now = AdaptationState(bound=state.bound, surface=surface)
             error = gain * (mismatch + robust_term(c, now)) + eta
         assert learnt_term(state, theta, s) - true_gain * theta - true_backlash * s == (
-            pytest.approx(mismatch))
+            pytest.approx(mismatch)
+        )
         after = adapt(c, state, error, theta, s, dt)
         allowed = 0.2785 * c.boundary_layer * gain * state.bound - error**2
         assert value(after) - value(state) <= dt * allowed + 1e-7 * dt + 50.0 * dt**2

@@ -17,8 +17,12 @@ from endoscope_core.hysteresis.bouc_wen import GREATEST_INVERSE_SLOPE
 SAFE = BoucWenParameters.from_shape(alpha=0.92, lag=0.6, travel=0.4, rho=0.4, n=2.2)
 
 shapes = st.tuples(
-    st.floats(0.3, 2.0), st.floats(0.01, 1.5), st.floats(0.3, 1.5), st.floats(-0.95, 1.0),
-    st.one_of(st.just(1.0), st.floats(1.0, 5.0)))
+    st.floats(0.3, 2.0),
+    st.floats(0.01, 1.5),
+    st.floats(0.3, 1.5),
+    st.floats(-0.95, 1.0),
+    st.one_of(st.just(1.0), st.floats(1.0, 5.0)),
+)
 parameter_sets = shapes.map(lambda shape: BoucWenParameters.from_shape(*shape))
 moves = st.floats(-1e6, 1e6) | st.floats(-1.0, 1.0) | st.floats(-1e-9, 1e-9)
 
@@ -54,8 +58,11 @@ def test_solution_is_that_of_equation_4(n, rho):
 
     def equation_4(t, h):
         speed = 1.4 * math.cos(t)
-        return (p.A * speed - p.B * abs(speed) * np.abs(h) ** (p.n - 1.0) * h
-                - p.C * speed * np.abs(h) ** p.n)
+        return (
+            p.A * speed
+            - p.B * abs(speed) * np.abs(h) ** (p.n - 1.0) * h
+            - p.C * speed * np.abs(h) ** p.n
+        )
 
     time = np.arange(0.0, 8.0, 1e-3)
     reference = solve_ivp(equation_4, (0.0, 8.0), [0.0], t_eval=time, rtol=1e-9, atol=1e-11).y[0]
@@ -85,23 +92,27 @@ def test_saturated_loop_is_as_wide_as_the_lag_says():
 @given(parameter_sets)
 def test_shape_comes_back(parameters):
     again = BoucWenParameters.from_shape(
-        parameters.alpha, parameters.lag, parameters.travel, parameters.rho, parameters.n)
+        parameters.alpha, parameters.lag, parameters.travel, parameters.rho, parameters.n
+    )
     assert again.to_dict() == pytest.approx(parameters.to_dict(), rel=1e-6, abs=1e-9)
     assert BoucWenParameters.from_dict(parameters.to_dict()) == parameters
 
 
-@pytest.mark.parametrize(('changes', 'complaint'), [
-    ({'alpha': 0.0}, 'alpha'),
-    ({'alpha': -1.0}, 'alpha'),
-    ({'beta': 0.1}, 'beta'),
-    ({'A': 0.0}, 'A = 0'),
-    ({'B': 0.0}, 'B = 0'),
-    ({'C': -1e9}, r'B \+ C'),
-    ({'n': 0.5}, 'n = 0.5'),
-    ({'n': math.nan}, 'n is nan'),
-    ({'beta': -6.0}, '120 deg'),
-    ({'beta': -60.0, 'B': 1e4}, 'too steep'),
-])
+@pytest.mark.parametrize(
+    ('changes', 'complaint'),
+    [
+        ({'alpha': 0.0}, 'alpha'),
+        ({'alpha': -1.0}, 'alpha'),
+        ({'beta': 0.1}, 'beta'),
+        ({'A': 0.0}, 'A = 0'),
+        ({'B': 0.0}, 'B = 0'),
+        ({'C': -1e9}, r'B \+ C'),
+        ({'n': 0.5}, 'n = 0.5'),
+        ({'n': math.nan}, 'n is nan'),
+        ({'beta': -6.0}, '120 deg'),
+        ({'beta': -60.0, 'B': 1e4}, 'too steep'),
+    ],
+)
 def test_unsafe_parameters_are_refused(changes, complaint):
     with pytest.raises(ValueError, match=complaint):
         BoucWenParameters(**{**SAFE.to_dict(), **changes})
@@ -109,10 +120,12 @@ def test_unsafe_parameters_are_refused(changes, complaint):
 
 def test_slope_limit_is_what_the_inverse_reaches():
     steep = BoucWenParameters.from_shape(
-        1.0, 0.5, 0.5 / (0.999 * GREATEST_INVERSE_SLOPE - 1.0), -0.9, 2.0)
+        1.0, 0.5, 0.5 / (0.999 * GREATEST_INVERSE_SLOPE - 1.0), -0.9, 2.0
+    )
     theta = np.concatenate([np.linspace(0.0, 1.0, 20001), np.linspace(1.0, 0.0, 20001)])
-    slope = np.diff(bouc_wen_inverse(steep, theta)) / np.where(np.diff(theta) == 0, 1,
-                                                               np.diff(theta))
+    slope = np.diff(bouc_wen_inverse(steep, theta)) / np.where(
+        np.diff(theta) == 0, 1, np.diff(theta)
+    )
     assert np.max(slope) == pytest.approx(steep.inverse_slope, rel=0.01)
 
 

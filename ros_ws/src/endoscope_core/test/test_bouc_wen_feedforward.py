@@ -12,9 +12,14 @@ TICK = 1e-3
 SMALL = BoucWenParameters.from_shape(alpha=0.9, lag=0.3, travel=0.02, rho=-0.9, n=2.0)
 LARGE = BoucWenParameters.from_shape(alpha=0.95, lag=0.8, travel=0.04, rho=-0.9, n=3.0)
 NONE = FeedforwardLaw()
-laws = st.sampled_from([
-    NONE, FeedforwardLaw('bouc_wen', (SMALL, LARGE)), FeedforwardLaw('bouc_wen', (LARGE, SMALL)),
-    FeedforwardLaw('none', (SMALL, SMALL))])
+laws = st.sampled_from(
+    [
+        NONE,
+        FeedforwardLaw('bouc_wen', (SMALL, LARGE)),
+        FeedforwardLaw('bouc_wen', (LARGE, SMALL)),
+        FeedforwardLaw('none', (SMALL, SMALL)),
+    ]
+)
 
 
 def desired_at(time):
@@ -26,9 +31,9 @@ def velocity_at(time):
 
 
 def run(feedforward, start, end):
-    return np.array([
-        feedforward.step(desired_at(t), velocity_at(t), TICK)
-        for t in np.arange(start, end, TICK)])
+    return np.array(
+        [feedforward.step(desired_at(t), velocity_at(t), TICK) for t in np.arange(start, end, TICK)]
+    )
 
 
 def test_without_a_model_the_desired_angle_passes():
@@ -78,7 +83,8 @@ def test_it_goes_on_from_a_command_that_someone_else_sent():
     run(feedforward, 0.0, 1.0)
     feedforward.rebase([-0.5, 0.5])
     np.testing.assert_allclose(
-        feedforward.step(desired_at(1.0), velocity_at(1.0), TICK), [-0.5, 0.5], atol=0.05)
+        feedforward.step(desired_at(1.0), velocity_at(1.0), TICK), [-0.5, 0.5], atol=0.05
+    )
 
 
 @given(st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5)), min_size=2, max_size=40))
@@ -91,13 +97,16 @@ def test_command_and_its_speed_are_bounded_whatever_is_desired(desired):
     assert np.all(np.abs(np.diff(commands, axis=0)) <= limit + 1e-12)
 
 
-@pytest.mark.parametrize('inputs', [
-    ([math.nan, 0.0], [0.0, 0.0], TICK),
-    ([0.0], [0.0, 0.0], TICK),
-    ([0.0, 0.0], [0.0, math.inf], TICK),
-    ([0.0, 0.0], [0.0, 0.0], 0.0),
-    ([0.0, 0.0], [0.0, 0.0], math.nan),
-])
+@pytest.mark.parametrize(
+    'inputs',
+    [
+        ([math.nan, 0.0], [0.0, 0.0], TICK),
+        ([0.0], [0.0, 0.0], TICK),
+        ([0.0, 0.0], [0.0, math.inf], TICK),
+        ([0.0, 0.0], [0.0, 0.0], 0.0),
+        ([0.0, 0.0], [0.0, 0.0], math.nan),
+    ],
+)
 def test_bad_input_is_refused_and_changes_nothing(inputs):
     feedforward = BoucWenFeedforward(2)
     feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))

@@ -62,7 +62,8 @@ def test_the_recorded_loop_has_the_size_of_its_class(small):
     settled = time >= calibration_sinusoid().steady[0]
     for row, actual in enumerate(small.actual_angle.astype(float)):
         widths = [
-            width_at_mid_height(small.desired_angle[settled], actual[settled, j]) for j in (0, 1)]
+            width_at_mid_height(small.desired_angle[settled], actual[settled, j]) for j in (0, 1)
+        ]
         assert np.rad2deg(np.mean(widths)) == pytest.approx(small.class_deg[row], abs=2.5)
 
 

@@ -24,14 +24,17 @@ def test_columns_may_come_in_another_order(tmp_path):
     assert read_command_file(path).angle.tolist() == [[2, 1], [4, 3]]
 
 
-@pytest.mark.parametrize(('text', 'message'), [
-    ('time,bend_x\n0,0\n1,0\n', 'no column bend_y'),
-    ('time,bend_x,bend_y\n0,0,0\n', 'fewer than two rows'),
-    ('time,bend_x,bend_y\n0,0,0\n1,x,0\n', 'line 3 holds something else'),
-    ('time,bend_x,bend_y\n0,0,0\n1,0\n', 'line 3 holds something else'),
-    ('time,bend_x,bend_y\n0,0,0\n1,nan,0\n', 'line 3 holds a value that is not finite'),
-    ('time,bend_x,bend_y\n0,0,0\n2,0,0\n1,0,0\n', 'time does not increase at line 4'),
-])
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('time,bend_x\n0,0\n1,0\n', 'no column bend_y'),
+        ('time,bend_x,bend_y\n0,0,0\n', 'fewer than two rows'),
+        ('time,bend_x,bend_y\n0,0,0\n1,x,0\n', 'line 3 holds something else'),
+        ('time,bend_x,bend_y\n0,0,0\n1,0\n', 'line 3 holds something else'),
+        ('time,bend_x,bend_y\n0,0,0\n1,nan,0\n', 'line 3 holds a value that is not finite'),
+        ('time,bend_x,bend_y\n0,0,0\n2,0,0\n1,0,0\n', 'time does not increase at line 4'),
+    ],
+)
 def test_an_unusable_file_is_refused_with_its_line(tmp_path, text, message):
     path = tmp_path / 'motion.csv'
     path.write_text(text)

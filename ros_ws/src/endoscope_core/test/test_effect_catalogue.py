@@ -11,26 +11,52 @@ from endoscope_core.plant import EffectSpec, PlantDescription, simulate
 from endoscope_core.plant.packing import effect_values, pack
 
 COMPARABLE = {
-    'transport_delay': ('delay_s',), 'actuator_lag': ('time_constant_s',),
-    'rate_limit': ('limit_rad_per_s',), 'torque_limit': (), 'gear_backlash': ('gap_rad',),
-    'cogging': (), 'wire_slack': (), 'pretension_loss': ('rate_n_per_s',),
-    'stribeck_friction': (), 'viscous_friction': (), 'wire_stiffening': (), 'wire_creep': (),
-    'configuration_change': ('time_s',), 'friction_asymmetry': (), 'friction_run_in': (),
-    'distributed_friction': (), 'presliding_shape': (), 'joint_backlash': ('gap_rad',),
-    'joint_stop': ('angle_rad',), 'contact': ('angle_rad',), 'gravity': (),
-    'external_load': ('moment_nm', 'time_s'), 'joint_inertia': (), 'cross_coupling': (),
-    'breathing': ('frequency_hz',), 'tracker_bias': ('bias_rad',), 'tracker_distortion': (),
-    'tracker_delay': ('delay_s',), 'tracker_drift': ('rate_rad_per_s',), 'tracker_outliers': (),
-    'load_cell_drift': ('rate_n_per_s',), 'load_cell_gain': ('gain',),
-    'load_cell_crosstalk': (), 'load_cell_saturation': ('limit_n',), 'clock_skew': ('skew',),
+    'transport_delay': ('delay_s',),
+    'actuator_lag': ('time_constant_s',),
+    'rate_limit': ('limit_rad_per_s',),
+    'torque_limit': (),
+    'gear_backlash': ('gap_rad',),
+    'cogging': (),
+    'wire_slack': (),
+    'pretension_loss': ('rate_n_per_s',),
+    'stribeck_friction': (),
+    'viscous_friction': (),
+    'wire_stiffening': (),
+    'wire_creep': (),
+    'configuration_change': ('time_s',),
+    'friction_asymmetry': (),
+    'friction_run_in': (),
+    'distributed_friction': (),
+    'presliding_shape': (),
+    'joint_backlash': ('gap_rad',),
+    'joint_stop': ('angle_rad',),
+    'contact': ('angle_rad',),
+    'gravity': (),
+    'external_load': ('moment_nm', 'time_s'),
+    'joint_inertia': (),
+    'cross_coupling': (),
+    'breathing': ('frequency_hz',),
+    'tracker_bias': ('bias_rad',),
+    'tracker_distortion': (),
+    'tracker_delay': ('delay_s',),
+    'tracker_drift': ('rate_rad_per_s',),
+    'tracker_outliers': (),
+    'load_cell_drift': ('rate_n_per_s',),
+    'load_cell_gain': ('gain',),
+    'load_cell_crosstalk': (),
+    'load_cell_saturation': ('limit_n',),
+    'clock_skew': ('skew',),
     'recording_gap': ('time_s',),
 }
 OF_THE_RECORDING = ('tracker_outliers', 'clock_skew', 'recording_gap')
 IN_THE_PLANT = [effect_id for effect_id in COMPARABLE if effect_id not in OF_THE_RECORDING]
 TIME = 1e-3 * np.arange(2500)
-COMMAND = 0.5 * np.column_stack([
-    np.deg2rad(85.0) * np.sin(3.0 * TIME), np.deg2rad(60.0) * np.sin(2.0 * TIME + 1.0)
-    - np.deg2rad(60.0) * np.sin(1.0)])
+COMMAND = 0.5 * np.column_stack(
+    [
+        np.deg2rad(85.0) * np.sin(3.0 * TIME),
+        np.deg2rad(60.0) * np.sin(2.0 * TIME + 1.0) - np.deg2rad(60.0) * np.sin(1.0),
+    ]
+)
 CHANNELS = ('shaft_position', 'shaft_velocity', 'shaft_effort', 'tension', 'bending')
 # Beginning within the 2.5 s that are simulated here.
 EARLY = {'configuration_change': {'time_s': 1.0}, 'external_load': {'time_s': 1.0}}
@@ -48,7 +74,8 @@ def with_effect(effect_id, parameters=None, joint='bend_x'):
 
 def changed_channels(trajectory, reference, joint):
     return {
-        name for name in CHANNELS
+        name
+        for name in CHANNELS
         if np.abs(getattr(trajectory, name)[:, joint] - getattr(reference, name)[:, joint]).max()
         > 1e-9
     }
@@ -104,14 +131,17 @@ def test_vanishes_at_its_off_value(effect_id, nominal):
     trajectory = with_effect(effect_id, off)
     for name in CHANNELS:
         np.testing.assert_allclose(
-            getattr(trajectory, name), getattr(nominal, name), rtol=0.0, atol=1e-9)
+            getattr(trajectory, name), getattr(nominal, name), rtol=0.0, atol=1e-9
+        )
 
 
 @pytest.mark.parametrize('effect_id', IN_THE_PLANT)
 def test_changes_what_lies_downstream_and_nothing_else(effect_id, nominal):
     physics = {'shaft_effort', 'tension', 'bending'}
     expected = {
-        Stage.ACTUATOR: {*CHANNELS}, Stage.TRANSMISSION: physics, Stage.JOINT: physics,
+        Stage.ACTUATOR: {*CHANNELS},
+        Stage.TRANSMISSION: physics,
+        Stage.JOINT: physics,
     }.get(CATALOGUE[effect_id].stage)
     if effect_id in ('gear_backlash', 'cogging'):
         expected = physics  # they act behind the encoder
@@ -135,15 +165,28 @@ def slopes(effect_id, parameter, step):
     sign = 1.0 if parameter.typical + step * unit <= parameter.high else -1.0
     here, there = (
         with_effect(effect_id, {parameter.name: parameter.typical + shift})
-        for shift in (0.0, sign * step * unit))
-    return np.concatenate([
-        ((there.tension - here.tension)[:, 0] / 0.02).ravel(),
-        (there.bending - here.bending)[:, 0] / 0.00436]) / step
+        for shift in (0.0, sign * step * unit)
+    )
+    return (
+        np.concatenate(
+            [
+                ((there.tension - here.tension)[:, 0] / 0.02).ravel(),
+                (there.bending - here.bending)[:, 0] / 0.00436,
+            ]
+        )
+        / step
+    )
 
 
-@pytest.mark.parametrize(('effect_id', 'name'), [
-    (effect_id, p.name) for effect_id in IN_THE_PLANT for p in CATALOGUE[effect_id].parameters
-    if not p.choices and p.name != 'time_s'])
+@pytest.mark.parametrize(
+    ('effect_id', 'name'),
+    [
+        (effect_id, p.name)
+        for effect_id in IN_THE_PLANT
+        for p in CATALOGUE[effect_id].parameters
+        if not p.choices and p.name != 'time_s'
+    ],
+)
 def test_readings_have_a_slope_by_every_parameter(effect_id, name):
     parameter = next(p for p in CATALOGUE[effect_id].parameters if p.name == name)
     coarse, fine = (slopes(effect_id, parameter, step) for step in (1e-3, 1e-4))

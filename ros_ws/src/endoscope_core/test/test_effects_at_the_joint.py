@@ -9,7 +9,8 @@ TICK = 1e-3
 TIME = TICK * np.arange(4000)
 # Neither friction nor wires: the bending section alone answers to moments.
 LOOSE = JointParameters(
-    pretension=0.0, wire_stiffness=1e-3, joint_friction=0.0, capstan_exponent=0.0)
+    pretension=0.0, wire_stiffness=1e-3, joint_friction=0.0, capstan_exponent=0.0
+)
 
 
 def answer(command, *effects, joint=None):
@@ -45,7 +46,7 @@ def test_a_loaded_tip_leaves_the_wires_free_within_the_gap():
     smooth = JointParameters(capstan_exponent=0.0)
     run = answer(SINE, ('joint_backlash', {'gap_rad': 0.2, 'loaded_tip': 1.0}), joint=smooth)
     turn = int(np.argmax(SINE[:2000]))
-    free = np.flatnonzero(np.abs(run.tension[turn:turn + 1000, 0, 0] - 5.0) < 0.01)
+    free = np.flatnonzero(np.abs(run.tension[turn : turn + 1000, 0, 0] - 5.0) < 0.01)
     assert len(free) == free[-1] - free[0] + 1
     lead = (2.0 * run.shaft_position - run.bending)[turn + free, 0]
     assert lead[0] - lead[-1] == pytest.approx(0.2, abs=0.005)
@@ -69,14 +70,14 @@ def test_joint_stop_is_a_spring_beyond_its_angle_on_both_sides(stiffness):
 @pytest.mark.parametrize('side', [1.0, -1.0])
 @pytest.mark.parametrize('exponent', [1.0, 1.5])
 def test_contact_is_one_sided_and_compliant(side, exponent):
-    touch = ('contact', {
-        'angle_rad': 0.3, 'stiffness': 0.02, 'exponent': exponent, 'side': side})
+    touch = ('contact', {'angle_rad': 0.3, 'stiffness': 0.02, 'exponent': exponent, 'side': side})
     towards = side * still(touch, ('external_load', {'moment_nm': side * 0.005, 'time_s': 0.0}))
     away = side * still(touch, ('external_load', {'moment_nm': -side * 0.002, 'time_s': 0.0}))
     assert away[-1] == pytest.approx(-0.002 / 0.003, rel=1e-3)
     deep = towards[-1] - 0.3
     assert 0.003 * towards[-1] + 0.02 * deep * (deep / 0.2) ** (exponent - 1.0) == pytest.approx(
-        0.005, rel=1e-3)
+        0.005, rel=1e-3
+    )
 
 
 def test_gravity_bends_until_the_section_holds_it():
@@ -90,20 +91,22 @@ def test_external_load_acts_from_its_time_on():
     np.testing.assert_array_equal(angle[:1500], 0.0)
     tau = 3e-4 / 0.003
     np.testing.assert_allclose(
-        angle[1510:], 0.5 * (1.0 - np.exp(-(TIME[1510:] - 1.5) / tau)), atol=1e-4)
+        angle[1510:], 0.5 * (1.0 - np.exp(-(TIME[1510:] - 1.5) / tau)), atol=1e-4
+    )
 
 
 def test_joint_inertia_rings_at_its_frequency():
     inertia = 1e-4
-    run = still(('joint_inertia', {'inertia_kg_m2': inertia}),
-                ('external_load', {'moment_nm': 0.0015, 'time_s': 0.0}))
+    run = still(
+        ('joint_inertia', {'inertia_kg_m2': inertia}),
+        ('external_load', {'moment_nm': 0.0015, 'time_s': 0.0}),
+    )
     omega = np.sqrt(0.003 / inertia)
     ratio = 3e-4 / (2.0 * np.sqrt(0.003 * inertia))
     damped = omega * np.sqrt(1.0 - ratio**2)
     decay = np.exp(-ratio * omega * TIME)
     sine = ratio / np.sqrt(1.0 - ratio**2) * np.sin(damped * TIME)
-    np.testing.assert_allclose(
-        run, 0.5 * (1.0 - decay * (np.cos(damped * TIME) + sine)), atol=3e-3)
+    np.testing.assert_allclose(run, 0.5 * (1.0 - decay * (np.cos(damped * TIME) + sine)), atol=3e-3)
 
 
 def test_cross_coupling_by_moment_and_by_wire_travel():
@@ -122,7 +125,8 @@ def test_cross_coupling_by_moment_and_by_wire_travel():
     spec = EffectSpec('cross_coupling', 'bend_x', {'moment_per_rad': 0.0, 'wire_per_rad': 0.2})
     run = simulate(PlantDescription(joints=joints, effects=(spec,)), command)
     np.testing.assert_allclose(
-        run.tension[1:, 0, 0], 5.0 + 2000.0 * 0.0025 * 0.2 * run.bending[:-1, 1], atol=1e-2)
+        run.tension[1:, 0, 0], 5.0 + 2000.0 * 0.0025 * 0.2 * run.bending[:-1, 1], atol=1e-2
+    )
 
 
 def test_a_single_joint_has_nothing_to_couple_to():
@@ -141,8 +145,12 @@ def test_breathing_moves_the_joint_at_its_frequency():
 
 
 def test_breathing_with_its_second_harmonic_is_lujans_fourth_power():
-    given = {'moment_nm': 0.5, 'frequency_hz': 0.5, 'phase_rad': np.pi / 2,
-             'second_harmonic': -0.25}
+    given = {
+        'moment_nm': 0.5,
+        'frequency_hz': 0.5,
+        'phase_rad': np.pi / 2,
+        'second_harmonic': -0.25,
+    }
     stiff = JointParameters(joint_stiffness=50.0, capstan_exponent=0.0, joint_friction=0.0)
     with pytest.raises(ValueError, match='moment_nm'):
         still(('breathing', given), joint=stiff)

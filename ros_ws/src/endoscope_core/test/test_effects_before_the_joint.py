@@ -28,13 +28,16 @@ def test_transport_delay_shifts_the_whole_answer(ticks):
     late = answer(SINE, ('transport_delay', {'delay_s': ticks * TICK}))
     prompt = answer(SINE)
     np.testing.assert_allclose(
-        late.shaft_position[ticks:], prompt.shaft_position[:-ticks], atol=1e-9)
+        late.shaft_position[ticks:], prompt.shaft_position[:-ticks], atol=1e-9
+    )
     np.testing.assert_allclose(late.tension[ticks:], prompt.tension[:-ticks], atol=1e-5)
 
 
 def test_transport_delay_between_ticks_lies_between():
-    at = [answer(SINE, ('transport_delay', {'delay_s': d})).shaft_position
-          for d in (0.020, 0.0204, 0.021)]
+    at = [
+        answer(SINE, ('transport_delay', {'delay_s': d})).shaft_position
+        for d in (0.020, 0.0204, 0.021)
+    ]
     np.testing.assert_allclose(at[1], 0.6 * at[0] + 0.4 * at[2], atol=5e-6)
 
 
@@ -42,8 +45,10 @@ def test_actuator_lag_is_first_order():
     stiff = JointParameters(motor_bandwidth=2000.0)
     lagged = answer(np.full(1000, 0.3), ('actuator_lag', {'time_constant_s': 0.1}), joint=stiff)
     np.testing.assert_allclose(
-        lagged.shaft_position[50:, 0], 0.3 * (1.0 - np.exp(-(TIME[50:1000] - 0.001) / 0.1)),
-        atol=2e-3)
+        lagged.shaft_position[50:, 0],
+        0.3 * (1.0 - np.exp(-(TIME[50:1000] - 0.001) / 0.1)),
+        atol=2e-3,
+    )
 
 
 def test_rate_limit_is_the_largest_speed():
@@ -67,9 +72,9 @@ def test_gear_backlash_has_the_width_of_its_gap():
     # After a turning point the wires first notice the motor once it has crossed the gap.
     shaft = free.shaft_position[:, 0]
     turn = int(np.argmax(shaft))
-    crossed = turn + int(np.argmin(np.abs(shaft[turn:turn + 1000] - shaft[turn] + 0.1)))
-    assert np.ptp(played.tension[turn + 5:crossed, 0, 0]) < 0.05
-    assert np.ptp(played.tension[crossed:crossed + 100, 0, 0]) > 0.5
+    crossed = turn + int(np.argmin(np.abs(shaft[turn : turn + 1000] - shaft[turn] + 0.1)))
+    assert np.ptp(played.tension[turn + 5 : crossed, 0, 0]) < 0.05
+    assert np.ptp(played.tension[crossed : crossed + 100, 0, 0]) > 0.5
 
 
 def test_cogging_repeats_with_the_shaft_angle():
@@ -87,7 +92,8 @@ def test_cogging_repeats_with_the_shaft_angle():
 
 def test_wire_slack_takes_the_tension_at_rest():
     assert answer(np.zeros(10), ('wire_slack', {'length_m': 1e-3})).tension[:, 0] == pytest.approx(
-        5.0 - 2000.0 * 1e-3)
+        5.0 - 2000.0 * 1e-3
+    )
     slack = answer(step_command(0.05), ('wire_slack', {'length_m': 4e-3}))
     np.testing.assert_array_equal(slack.tension[0, 0], 0.0)
     # 0.05 rad of the shaft wind 0.25 mm: far from the 1.5 mm that are left to take up.
@@ -98,8 +104,11 @@ def test_wire_slack_takes_the_tension_at_rest():
 def test_pretension_loss_is_linear_in_time_and_ends_at_zero():
     left = answer(np.zeros(4000), ('pretension_loss', {'rate_n_per_s': 1.0})).tension[:, 0]
     np.testing.assert_allclose(left, np.repeat((5.0 - TIME)[:, None], 2, axis=1), atol=1e-9)
-    soft = answer(np.zeros(4000), ('pretension_loss', {'rate_n_per_s': 1.0}),
-                  joint=JointParameters(pretension=2.0))
+    soft = answer(
+        np.zeros(4000),
+        ('pretension_loss', {'rate_n_per_s': 1.0}),
+        joint=JointParameters(pretension=2.0),
+    )
     np.testing.assert_array_equal(soft.tension[-1000:], 0.0)
 
 
@@ -119,8 +128,11 @@ def test_stribeck_friction_is_the_curve_at_steady_speed():
     effect = ('stribeck_friction', {'rise': 0.5, 'stribeck_speed': 1e-3, 'shudder': 0.0})
     for speed in (0.1, 0.4, 0.8):
         run = answer(speed * TIME, effect, joint=damped)
-        wire_speed = 0.5 * 0.0025 * (
-            speed / GEAR + (run.bending[2500, 0] - run.bending[2480, 0]) / (20 * TICK))
+        wire_speed = (
+            0.5
+            * 0.0025
+            * (speed / GEAR + (run.bending[2500, 0] - run.bending[2480, 0]) / (20 * TICK))
+        )
         expected = np.exp(0.45 * (1.0 + 0.5 * np.exp(-wire_speed / 1e-3)))
         assert friction_of(run, 2490) == pytest.approx(expected, rel=0.02)
 
@@ -129,19 +141,29 @@ def test_a_shuddering_wire_keeps_less_friction():
     held = step_command(0.4)
     calm, shaken = (
         answer(held, ('stribeck_friction', {'rise': 0.8, 'shudder': shudder}))
-        for shudder in (0.0, 1.0))
+        for shudder in (0.0, 1.0)
+    )
     assert shaken.bending[-1, 0] > calm.bending[-1, 0] + np.deg2rad(3.0)
 
 
-@pytest.mark.parametrize(('given', 'expected'), [
-    ({'coefficient': 300.0, 'load_factor': 0.0}, lambda t, v: 0.5 * 300.0 * v),
-    ({'coefficient': 0.0, 'load_factor': 60.0}, lambda t, v: t * (np.exp(0.5 * 60.0 * v) - 1.0)),
-])
+@pytest.mark.parametrize(
+    ('given', 'expected'),
+    [
+        ({'coefficient': 300.0, 'load_factor': 0.0}, lambda t, v: 0.5 * 300.0 * v),
+        (
+            {'coefficient': 0.0, 'load_factor': 60.0},
+            lambda t, v: t * (np.exp(0.5 * 60.0 * v) - 1.0),
+        ),
+    ],
+)
 def test_viscous_friction_is_proportional_to_speed(given, expected):
     run = answer(0.4 * TIME, ('viscous_friction', given))
     row = 1500
-    speed = 0.5 * 0.0025 * (
-        0.4 / GEAR + (run.bending[row + 10, 0] - run.bending[row - 10, 0]) / (20 * TICK))
+    speed = (
+        0.5
+        * 0.0025
+        * (0.4 / GEAR + (run.bending[row + 10, 0] - run.bending[row - 10, 0]) / (20 * TICK))
+    )
     stretch = 0.0025 * (run.shaft_position[row, 0] / GEAR - run.bending[row, 0])
     dry = (5.0 + 2000.0 * stretch) * np.exp(0.45)
     assert run.tension[row, 0, 0] - dry == pytest.approx(expected(dry, speed), rel=0.02)
@@ -161,8 +183,11 @@ def test_wire_stiffening_is_its_law():
 def test_wire_creep_relaxes_with_its_time_constant():
     blocked = JointParameters(capstan_exponent=0.0, joint_stiffness=1e6)
     ratio, constant = 0.5, 1.0
-    run = answer(step_command(0.2, rise=1), ('wire_creep', {
-        'compliance_ratio': ratio, 'time_constant_s': constant}), joint=blocked)
+    run = answer(
+        step_command(0.2, rise=1),
+        ('wire_creep', {'compliance_ratio': ratio, 'time_constant_s': constant}),
+        joint=blocked,
+    )
     load = run.tension[:, 0, 0] - 5.0
     whole = 2000.0 * 0.0025 * 0.4
     # At a held stretch the solid relaxes to 1 / (1 + ratio), by 1 + ratio faster than it creeps.
@@ -170,7 +195,8 @@ def test_wire_creep_relaxes_with_its_time_constant():
     rate = (1.0 + ratio) / constant
     row = slice(300, None)
     np.testing.assert_allclose(
-        load[row], settled + (whole - settled) * np.exp(-rate * (TIME[row] - 0.035)), rtol=0.01)
+        load[row], settled + (whole - settled) * np.exp(-rate * (TIME[row] - 0.035)), rtol=0.01
+    )
 
 
 def test_configuration_change_multiplies_the_friction_from_its_time_on():
@@ -184,9 +210,11 @@ def test_friction_asymmetry_brakes_a_pulled_wire_more():
     run = answer(0.4 * TIME, ('friction_asymmetry', {'asymmetry': 0.3}))
     stretch = 0.0025 * (run.shaft_position[1500, 0] / GEAR - run.bending[1500, 0])
     assert run.tension[1500, 0, 0] == pytest.approx(
-        (5.0 + 2000.0 * stretch) * np.exp(0.45 * 1.3), rel=1e-3)
+        (5.0 + 2000.0 * stretch) * np.exp(0.45 * 1.3), rel=1e-3
+    )
     assert run.tension[1500, 0, 1] == pytest.approx(
-        (5.0 - 2000.0 * stretch) * np.exp(-0.45 * 0.7), rel=1e-3)
+        (5.0 - 2000.0 * stretch) * np.exp(-0.45 * 0.7), rel=1e-3
+    )
 
 
 def test_friction_run_in_falls_with_the_distance_slid():
@@ -223,13 +251,16 @@ def test_distributed_friction_lets_the_joint_wait_for_the_sliding_front():
 def test_presliding_shape_is_sharper_or_softer_than_dahl(exponent, softer):
     def distance_to_half(*effects):
         run = answer(0.08 * TIME, *effects, joint=JointParameters(joint_stiffness=1e6))
-        friction = np.log(run.tension[:, 0, 0] / (
-            5.0 + 2000.0 * 0.0025 * run.shaft_position[:, 0] / GEAR)) / 0.45
+        friction = (
+            np.log(run.tension[:, 0, 0] / (5.0 + 2000.0 * 0.0025 * run.shaft_position[:, 0] / GEAR))
+            / 0.45
+        )
         wire = 0.5 * 0.0025 * run.shaft_position[:, 0] / GEAR
         return float(np.interp(0.8, friction, wire))
 
-    shaped = distance_to_half(('presliding_shape', {
-        'exponent': exponent, 'memory': 0.0, 'at_joint': 0.0}))
+    shaped = distance_to_half(
+        ('presliding_shape', {'exponent': exponent, 'memory': 0.0, 'at_joint': 0.0})
+    )
     # z' = (1 - z)^n from 0: at z = 0.8, x / xs = (1 - 0.2^(1 - n)) / (1 - n).
     expected = 1e-4 * (1.0 - 0.2 ** (1.0 - exponent)) / (1.0 - exponent)
     assert shaped == pytest.approx(expected, rel=0.02)
@@ -243,8 +274,11 @@ def test_presliding_memory_closes_inner_loops():
     way = 0.02 * np.interp(phase, [0, 1000, 2000, 3000, 4000], [0.0, 1.0, 0.6, 1.0, 1.0])
 
     def miss(memory):
-        run = answer(way, ('presliding_shape', {
-            'exponent': 1.0, 'memory': memory, 'at_joint': 0.0}), joint=blocked)
+        run = answer(
+            way,
+            ('presliding_shape', {'exponent': 1.0, 'memory': memory, 'at_joint': 0.0}),
+            joint=blocked,
+        )
         return abs(run.tension[3500, 0, 0] - np.max(run.tension[1000:1100, 0, 0]))
 
     assert miss(1.0) < 0.3 * miss(0.0)

@@ -38,11 +38,11 @@ def bending_with(effect_id, **parameters):
 def test_tracker_bias_drift_and_distortion_are_their_formulas(true):
     q = true.bending_true[:, 0]
     np.testing.assert_allclose(bending_with('tracker_bias', bias_rad=0.1), q + 0.1)
-    np.testing.assert_allclose(
-        bending_with('tracker_drift', rate_rad_per_s=0.02), q + 0.02 * TIME)
+    np.testing.assert_allclose(bending_with('tracker_drift', rate_rad_per_s=0.02), q + 0.02 * TIME)
     np.testing.assert_allclose(
         bending_with('tracker_distortion', linear=0.1, quadratic=0.2, cubic=-0.3),
-        q + 0.1 * q + 0.2 * q**2 - 0.3 * q**3)
+        q + 0.1 * q + 0.2 * q**2 - 0.3 * q**3,
+    )
 
 
 @pytest.mark.parametrize('delay', [0.0, 0.04, 0.0405, 0.5])
@@ -57,12 +57,15 @@ def test_tracker_delay_leaves_the_true_angle_alone(true):
 
 
 @pytest.mark.parametrize('wire', [0, 1])
-@pytest.mark.parametrize(('effect_id', 'parameters', 'reading'), [
-    ('load_cell_drift', {'rate_n_per_s': 0.3}, lambda own, other: own + 0.3 * TIME),
-    ('load_cell_gain', {'gain': 1.2}, lambda own, other: 1.2 * own),
-    ('load_cell_crosstalk', {'share': 0.15}, lambda own, other: own + 0.15 * other),
-    ('load_cell_saturation', {'limit_n': 6.0}, lambda own, other: np.minimum(own, 6.0)),
-])
+@pytest.mark.parametrize(
+    ('effect_id', 'parameters', 'reading'),
+    [
+        ('load_cell_drift', {'rate_n_per_s': 0.3}, lambda own, other: own + 0.3 * TIME),
+        ('load_cell_gain', {'gain': 1.2}, lambda own, other: 1.2 * own),
+        ('load_cell_crosstalk', {'share': 0.15}, lambda own, other: own + 0.15 * other),
+        ('load_cell_saturation', {'limit_n': 6.0}, lambda own, other: np.minimum(own, 6.0)),
+    ],
+)
 def test_a_load_cell_fault_is_in_its_cell_only(true, wire, effect_id, parameters, reading):
     faulty = simulate(plant_with(effect_id, wire=float(wire), **parameters), COMMAND)
     own, other = true.tension[:, 0, wire], true.tension[:, 0, 1 - wire]
@@ -86,8 +89,10 @@ def test_a_skewed_clock_is_fast_by_its_skew_and_back():
 
 
 def test_the_tracker_has_one_clock():
-    both = tuple(EffectSpec('clock_skew', joint, {'skew': skew}) for joint, skew in (
-        ('bend_x', 1e-3), ('bend_y', 2e-3)))
+    both = tuple(
+        EffectSpec('clock_skew', joint, {'skew': skew})
+        for joint, skew in (('bend_x', 1e-3), ('bend_y', 2e-3))
+    )
     with pytest.raises(ValueError, match='one clock'):
         recording_faults(PlantDescription(effects=both))
 
@@ -95,7 +100,8 @@ def test_the_tracker_has_one_clock():
 @pytest.mark.parametrize('topic', [0, 1, 2])
 def test_a_gap_is_in_its_topic_only(topic):
     faults = recording_faults(
-        plant_with('recording_gap', time_s=1.0, duration_s=0.5, topic=float(topic)))
+        plant_with('recording_gap', time_s=1.0, duration_s=0.5, topic=float(topic))
+    )
     kept = faults.keeps(TOPICS[topic], TIME)
     np.testing.assert_array_equal(kept, (TIME < 1.0) | (TIME >= 1.5))
     for other in set(TOPICS) - {TOPICS[topic]}:
@@ -132,8 +138,8 @@ def test_recorded_stamps_are_answered_by_the_clock_that_made_them(true, skew):
     stamps = np.arange(3000) * 1_000_000
     tracker = stamps[::25]
     answer = answer_commands(
-        plant_with('clock_skew', skew=skew), stamps, COMMAND,
-        AnswerStamps(stamps, stamps, tracker))
+        plant_with('clock_skew', skew=skew), stamps, COMMAND, AnswerStamps(stamps, stamps, tracker)
+    )
     known = tracker * 1e-9 / (1.0 + skew) < TIME[-1]
     expected = np.interp(tracker * 1e-9 / (1.0 + skew), TIME, true.bending[:, 0])
     np.testing.assert_allclose(answer.bending[known, 0], expected[known], atol=1e-6)
@@ -142,8 +148,11 @@ def test_recorded_stamps_are_answered_by_the_clock_that_made_them(true, skew):
 def test_recorded_stamps_are_answered_with_outliers(true):
     stamps = np.arange(3000) * 1_000_000
     answer = answer_commands(
-        plant_with('tracker_outliers', rate=0.2, size_rad=0.3), stamps, COMMAND,
-        AnswerStamps(stamps, stamps, stamps[::25]))
+        plant_with('tracker_outliers', rate=0.2, size_rad=0.3),
+        stamps,
+        COMMAND,
+        AnswerStamps(stamps, stamps, stamps[::25]),
+    )
     off = np.abs(answer.bending[:, 0] - true.bending[::25, 0])
     assert set(np.round(off, 6)) == {0.0, 0.3}
 
@@ -153,6 +162,7 @@ def test_a_plant_file_with_two_clocks_is_refused(tmp_path):
     path.write_text(
         'effects:\n'
         '  - {id: clock_skew, joint: bend_x, parameters: {skew: 0.001}}\n'
-        '  - {id: clock_skew, joint: bend_y, parameters: {skew: 0.002}}\n')
+        '  - {id: clock_skew, joint: bend_y, parameters: {skew: 0.002}}\n'
+    )
     with pytest.raises(PlantFileError, match='one clock'):
         load_plant(path)

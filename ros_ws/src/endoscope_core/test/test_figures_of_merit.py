@@ -46,12 +46,15 @@ def test_width_stands_quantised_angles_that_sit_on_the_middle():
     assert width_at_mid_height(desired[SETTLED], actual[SETTLED]) == pytest.approx(0.8, abs=0.06)
 
 
-@pytest.mark.parametrize(('desired', 'actual', 'complaint'), [
-    ([0.0, 1.0], [0.0, 1.0, 2.0], 'equally long'),
-    ([0.0, 1.0, 2.0], [0.0, np.nan, 2.0], 'not finite'),
-    ([0.0, 1.0, 2.0], [1.0, 1.0, 1.0], 'does not move'),
-    ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], 'no whole loop'),
-])
+@pytest.mark.parametrize(
+    ('desired', 'actual', 'complaint'),
+    [
+        ([0.0, 1.0], [0.0, 1.0, 2.0], 'equally long'),
+        ([0.0, 1.0, 2.0], [0.0, np.nan, 2.0], 'not finite'),
+        ([0.0, 1.0, 2.0], [1.0, 1.0, 1.0], 'does not move'),
+        ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], 'no whole loop'),
+    ],
+)
 def test_what_is_no_loop_is_refused(desired, actual, complaint):
     with pytest.raises(ValueError, match=complaint):
         width_at_mid_height(desired, actual)
@@ -61,11 +64,14 @@ def test_rmse():
     assert tracking_rmse([0.0, 0.0], [3.0, -4.0]) == pytest.approx(np.sqrt(12.5))
 
 
-@pytest.mark.parametrize(('desired', 'actual', 'complaint'), [
-    ([0.0], [0.0, 1.0], 'must be equal'),
-    ([], [], 'no samples'),
-    ([0.0], [np.inf], 'not finite'),
-])
+@pytest.mark.parametrize(
+    ('desired', 'actual', 'complaint'),
+    [
+        ([0.0], [0.0, 1.0], 'must be equal'),
+        ([], [], 'no samples'),
+        ([0.0], [np.inf], 'not finite'),
+    ],
+)
 def test_rmse_refuses(desired, actual, complaint):
     with pytest.raises(ValueError, match=complaint):
         tracking_rmse(desired, actual)

@@ -37,8 +37,9 @@ def test_it_finds_the_parameters_that_made_a_recording():
 
 
 def test_noise_offset_and_an_unknown_start_are_borne():
-    many = [recording(0.005, k, offset=0.05 * k, h0=0.4 * TRUE.h_max, rested=False)
-            for k in range(3)]
+    many = [
+        recording(0.005, k, offset=0.05 * k, h0=0.4 * TRUE.h_max, rested=False) for k in range(3)
+    ]
     fit = fit_model(many)
     assert fit.rmse == pytest.approx(0.005, rel=0.1)
     assert fit.parameters.lag == pytest.approx(TRUE.lag, rel=0.02)
@@ -70,13 +71,16 @@ def test_the_servo_settles_on_its_command_and_lags_by_its_damping():
     np.testing.assert_allclose(still, 0.3)
 
 
-@pytest.mark.parametrize(('recordings', 'complaint'), [
-    ([], 'no recording'),
-    ([Recording(DRIVER[:50], DRIVER[:50])], 'at least 100'),
-    ([Recording(DRIVER, np.full(TIME.size, np.nan))], 'finite'),
-    ([Recording(DRIVER, np.zeros(TIME.size))], 'less than 1 deg'),
-    ([Recording(DRIVER, DRIVER[:-1])], 'differ in length'),
-])
+@pytest.mark.parametrize(
+    ('recordings', 'complaint'),
+    [
+        ([], 'no recording'),
+        ([Recording(DRIVER[:50], DRIVER[:50])], 'at least 100'),
+        ([Recording(DRIVER, np.full(TIME.size, np.nan))], 'finite'),
+        ([Recording(DRIVER, np.zeros(TIME.size))], 'less than 1 deg'),
+        ([Recording(DRIVER, DRIVER[:-1])], 'differ in length'),
+    ],
+)
 def test_a_recording_without_hysteresis_is_refused(recordings, complaint):
     with pytest.raises(IdentificationError, match=complaint):
         fit_model(recordings)
@@ -95,10 +99,16 @@ def test_a_class_without_parameters_is_refused():
         parameters_for_class(load_class_parameters(), 55)
 
 
-@pytest.mark.parametrize('content', [
-    'no json', '[]', '{}', '{"classes": {"40": {"feedforward": {"alpha": 1.0}}}}',
-    json.dumps({'classes': {'40': {'feedforward': {**TRUE.to_dict(), 'alpha': -1.0}}}}),
-])
+@pytest.mark.parametrize(
+    'content',
+    [
+        'no json',
+        '[]',
+        '{}',
+        '{"classes": {"40": {"feedforward": {"alpha": 1.0}}}}',
+        json.dumps({'classes': {'40': {'feedforward': {**TRUE.to_dict(), 'alpha': -1.0}}}}),
+    ],
+)
 def test_a_file_without_safe_parameters_is_refused(tmp_path, content):
     path = tmp_path / 'classes.json'
     path.write_text(content)

@@ -17,10 +17,12 @@ from endoscope_core.plant import (
 )
 
 TIME = 1e-3 * np.arange(8000)
-SMOOTH = np.column_stack([
-    np.deg2rad(90.0) * np.sin(TIME),
-    np.deg2rad(40.0) * np.sin(0.5 * TIME**2) * np.cos(TIME),
-])
+SMOOTH = np.column_stack(
+    [
+        np.deg2rad(90.0) * np.sin(TIME),
+        np.deg2rad(40.0) * np.sin(0.5 * TIME**2) * np.cos(TIME),
+    ]
+)
 EVERY_EFFECT = tuple(EffectSpec(effect_id, 'bend_x') for effect_id in CATALOGUE)
 
 
@@ -63,10 +65,15 @@ def compared(joint, steps, substeps):
 
 
 @pytest.mark.parametrize('substeps', [3, 10])
-@pytest.mark.parametrize('changed', [
-    {}, {'capstan_exponent': 2.1}, {'capstan_exponent': 0.3},
-    {'wire_stiffness': 2500.0, 'joint_damping': 2e-4, 'motor_damping_ratio': 1.2},
-])
+@pytest.mark.parametrize(
+    'changed',
+    [
+        {},
+        {'capstan_exponent': 2.1},
+        {'capstan_exponent': 0.3},
+        {'wire_stiffness': 2500.0, 'joint_damping': 2e-4, 'motor_damping_ratio': 1.2},
+    ],
+)
 def test_agrees_with_explicit_steps_of_10_us_to_a_tenth_of_the_sensors_noise(changed, substeps):
     tension, angle = compared(replace(JointParameters(), **changed), 100, substeps)
     assert tension[0] < 0.002 * (1 if substeps == 10 else 4)
@@ -102,8 +109,14 @@ def test_tick_by_tick_is_exactly_the_batch(effects):
     for n in range(len(command)):
         sample = simulator.sample
         assert sample.time == pytest.approx(batch.time[n])
-        for name in ('shaft_position', 'shaft_velocity', 'shaft_effort', 'tension', 'bending',
-                     'bending_true'):
+        for name in (
+            'shaft_position',
+            'shaft_velocity',
+            'shaft_effort',
+            'tension',
+            'bending',
+            'bending_true',
+        ):
             np.testing.assert_array_equal(getattr(sample, name), getattr(batch, name)[n])
         simulator.advance(command[n])
 

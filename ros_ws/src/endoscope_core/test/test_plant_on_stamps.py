@@ -13,7 +13,8 @@ def test_commands_on_the_ticks_give_what_the_simulator_gives():
     stamps = START_NS + np.arange(1500) * 1_000_000
     command = np.column_stack([0.4 * np.sin(0.003 * np.arange(1500)), np.zeros(1500)])
     answer = answer_commands(
-        PlantDescription(), stamps, command, AnswerStamps(stamps, stamps, stamps[::25]))
+        PlantDescription(), stamps, command, AnswerStamps(stamps, stamps, stamps[::25])
+    )
     straight = simulate(PlantDescription(), command)
     np.testing.assert_allclose(answer.shaft_position, straight.shaft_position, atol=1e-9)
     np.testing.assert_allclose(answer.tension, straight.tension, atol=1e-9)
@@ -35,7 +36,8 @@ def test_answers_between_ticks_lie_between_the_neighbouring_ticks():
     command = np.column_stack([np.linspace(0, 0.3, 300), np.zeros(300)])
     between = stamps[100:102] + 500_000
     answer = answer_commands(
-        PlantDescription(), stamps, command, AnswerStamps(stamps, stamps, between))
+        PlantDescription(), stamps, command, AnswerStamps(stamps, stamps, between)
+    )
     whole = simulate(PlantDescription(), command).bending
     np.testing.assert_allclose(answer.bending, 0.5 * (whole[100:102] + whole[101:103]), atol=1e-12)
 

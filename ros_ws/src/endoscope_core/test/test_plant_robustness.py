@@ -17,24 +17,32 @@ def value_of(parameter):
         return st.sampled_from(parameter.choices)
     return st.one_of(
         st.sampled_from((parameter.low, parameter.high, parameter.typical)),
-        st.floats(parameter.low, parameter.high))
+        st.floats(parameter.low, parameter.high),
+    )
 
 
 def effect_of(definition):
-    return st.fixed_dictionaries(
-        {p.name: value_of(p) for p in definition.parameters}
-    ).map(lambda parameters: EffectSpec(definition.id, 'bend_x', parameters))
+    return st.fixed_dictionaries({p.name: value_of(p) for p in definition.parameters}).map(
+        lambda parameters: EffectSpec(definition.id, 'bend_x', parameters)
+    )
 
 
 effects = st.lists(
-    st.sampled_from(tuple(CATALOGUE.values())), max_size=6, unique_by=lambda d: d.id,
+    st.sampled_from(tuple(CATALOGUE.values())),
+    max_size=6,
+    unique_by=lambda d: d.id,
 ).flatmap(lambda chosen: st.tuples(*map(effect_of, chosen)))
-joints = st.builds(JointParameters, **{
-    f.name: st.floats(0.3, 3.0).map(lambda factor, name=f.name: factor * getattr(NOMINAL, name))
-    for f in fields(JointParameters)
-})
+joints = st.builds(
+    JointParameters,
+    **{
+        f.name: st.floats(0.3, 3.0).map(lambda factor, name=f.name: factor * getattr(NOMINAL, name))
+        for f in fields(JointParameters)
+    },
+)
 commands = st.lists(
-    st.floats(-1.0, 1.0) | st.floats(-1e6, 1e6), min_size=1, max_size=12,
+    st.floats(-1.0, 1.0) | st.floats(-1e6, 1e6),
+    min_size=1,
+    max_size=12,
 ).map(lambda levels: np.repeat(np.array(levels)[:, None], 25, axis=0))
 
 

@@ -12,11 +12,14 @@ SENSORS = SensorParameters()
 MANY = np.full(200_000, 3.0)
 
 
-@pytest.mark.parametrize(('name', 'rms', 'step'), [
-    ('tension', SENSORS.load_cell_noise, SENSORS.load_cell_resolution),
-    ('bending', SENSORS.tracker_noise, 0.0),
-    ('shaft_effort', SENSORS.effort_noise, SENSORS.effort_resolution),
-])
+@pytest.mark.parametrize(
+    ('name', 'rms', 'step'),
+    [
+        ('tension', SENSORS.load_cell_noise, SENSORS.load_cell_resolution),
+        ('bending', SENSORS.tracker_noise, 0.0),
+        ('shaft_effort', SENSORS.effort_noise, SENSORS.effort_resolution),
+    ],
+)
 def test_noise_has_its_rms_and_readings_their_steps(name, rms, step):
     readings = getattr(SensorModel(SENSORS, 1), name)(MANY)
     mean_step = step / math.sqrt(12.0)
@@ -34,7 +37,8 @@ def test_the_encoder_and_its_velocity_come_in_steps_without_noise():
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
     assert np.abs(angle - np.linspace(-1.0, 1.0, 50)).max() <= math.pi / 4096
     np.testing.assert_allclose(
-        model.shaft_velocity([0.011, 0.013, -0.03]), [0.0, 0.02397, -0.02397])
+        model.shaft_velocity([0.011, 0.013, -0.03]), [0.0, 0.02397, -0.02397]
+    )
 
 
 def test_a_seed_repeats_and_another_does_not():

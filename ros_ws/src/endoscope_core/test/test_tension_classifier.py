@@ -46,10 +46,15 @@ def easy():
     noise = generator.normal(0.0, 0.02, (classes.size, 9000, 4))
     tension = (5.0 + 0.05 * classes[:, None, None] * wave + noise).astype(np.float32)
     return CalibrationDataset(
-        tension=tension, desired_angle=np.sin(time), desired_velocity=np.cos(time),
-        actual_angle=np.zeros((classes.size, 9000, 2), np.float32), class_deg=classes,
-        backlash_size=np.deg2rad(classes), configuration=np.arange(classes.size) // 2,
-        manifest={'seed': 0, 'per_class': 4})
+        tension=tension,
+        desired_angle=np.sin(time),
+        desired_velocity=np.cos(time),
+        actual_angle=np.zeros((classes.size, 9000, 2), np.float32),
+        class_deg=classes,
+        backlash_size=np.deg2rad(classes),
+        configuration=np.arange(classes.size) // 2,
+        manifest={'seed': 0, 'per_class': 4},
+    )
 
 
 @pytest.mark.parametrize('class_deg', [40, 70, 100])
@@ -70,8 +75,7 @@ def test_table_2_reduces_a_recording_to_one_feature_vector():
     assert network.features(torch.zeros(1, 4, 9000)).shape == (1, 64, 1)
 
 
-@pytest.mark.parametrize('tension', [
-    np.zeros((8999, 4)), np.zeros((9000, 2)), np.zeros((4, 9000))])
+@pytest.mark.parametrize('tension', [np.zeros((8999, 4)), np.zeros((9000, 2)), np.zeros((4, 9000))])
 def test_another_shape_is_refused(classifier, tension):
     with pytest.raises(ClassifierError, match='have shape'):
         classifier.classify(tension)

@@ -18,9 +18,7 @@ Array = NDArray[np.float64]
 SAME_COMMAND_RAD = 1e-6
 
 
-def against_baseline(
-    observation: JointObservation, healthy: Fit
-) -> tuple[JointObservation, Array]:
+def against_baseline(observation: JointObservation, healthy: Fit) -> tuple[JointObservation, Array]:
     """A joint's observation as seen against the same joint in health.
 
     Parameters
@@ -56,17 +54,20 @@ def _same_commands(one: JointObservation, other: JointObservation) -> bool:
     return bool(
         abs(one.inputs.shape[1] - other.inputs.shape[1]) <= 2
         and np.max(np.abs(one.inputs[0, :length, 0] - other.inputs[0, :length, 0]))
-        < SAME_COMMAND_RAD)
+        < SAME_COMMAND_RAD
+    )
 
 
-def _corrected(
-    channel: Channel, before: Channel, residual: Array, repeated: bool
-) -> Channel:
+def _corrected(channel: Channel, before: Channel, residual: Array, repeated: bool) -> Channel:
     size = float(np.mean(residual**2))
     same_stamps = len(channel.time) == len(before.time) and np.allclose(
-        channel.time, before.time, atol=1e-4)
+        channel.time, before.time, atol=1e-4
+    )
     if repeated and same_stamps and size > 1.1:
         # The residual is simulated minus measured.
-        return replace(channel, value=channel.value + residual * before.noise,
-                       noise=np.hypot(channel.noise, before.noise))
+        return replace(
+            channel,
+            value=channel.value + residual * before.noise,
+            noise=np.hypot(channel.noise, before.noise),
+        )
     return replace(channel, noise=channel.noise * np.sqrt(max(size, 1.0)))

@@ -92,9 +92,7 @@ def improved_plant(explanation: Explanation, audit: AuditReport) -> PlantDescrip
     return replace(plant, effects=plant.effects + tuple(added))
 
 
-def changed_parameters(
-    estimates: Mapping[str, NominalEstimate]
-) -> dict[str, NominalEstimate]:
+def changed_parameters(estimates: Mapping[str, NominalEstimate]) -> dict[str, NominalEstimate]:
     """Return the parameters whose intervals exclude their described values, largest change first.
 
     Parameters
@@ -106,16 +104,28 @@ def changed_parameters(
     dict of str to NominalEstimate
     """
     changed = {
-        name: e for name, e in estimates.items()
-        if e.nominal > 0.0 and e.value > 0.0 and not e.low <= e.nominal <= e.high
+        name: e
+        for name, e in estimates.items()
+        if e.nominal > 0.0
+        and e.value > 0.0
+        and not e.low <= e.nominal <= e.high
         and abs(math.log(e.value / e.nominal)) > CHANGED
     }
-    return dict(sorted(
-        changed.items(), key=lambda item: -abs(math.log(item[1].value / item[1].nominal))))
+    return dict(
+        sorted(changed.items(), key=lambda item: -abs(math.log(item[1].value / item[1].nominal)))
+    )
 
 
 def _effect_of(finding: Finding) -> NamedEffect:
     equation, source = AUDITED_EFFECTS[finding.id]
     return NamedEffect(
-        finding.id, finding.joint, finding.stage, finding.probability, equation, source,
-        finding.parameters, (), finding.evidence)
+        finding.id,
+        finding.joint,
+        finding.stage,
+        finding.probability,
+        equation,
+        source,
+        finding.parameters,
+        (),
+        finding.evidence,
+    )

@@ -52,11 +52,16 @@ def residuals(
 
     `lead` in ticks and `skew` of the tracker's clock are as in `Channel.predicted`.
     """
-    return np.concatenate([
-        (channel.predicted(outputs, lead, skew if channel.quantity == 'bending' else 0.0)
-         - channel.value) / channel.noise
-        for channel in observation.channels
-    ])
+    return np.concatenate(
+        [
+            (
+                channel.predicted(outputs, lead, skew if channel.quantity == 'bending' else 0.0)
+                - channel.value
+            )
+            / channel.noise
+            for channel in observation.channels
+        ]
+    )
 
 
 def packed_joint(plant: PlantDescription, joint: str) -> tuple[Array, Flags]:

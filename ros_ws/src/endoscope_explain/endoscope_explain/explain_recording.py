@@ -44,10 +44,18 @@ SIBLINGS = 3
 CHANGED = 0.04
 """Relative difference of a nominal parameter that is worth a verdict."""
 NOMINAL_UNITS = {
-    'pretension': 'N', 'wire_stiffness': 'N/m', 'joint_radius': 'm', 'pulley_radius': 'm',
-    'capstan_exponent': '-', 'presliding_distance': 'm', 'joint_stiffness': 'N m/rad',
-    'joint_damping': 'N m s/rad', 'joint_friction': 'N m', 'joint_presliding': 'rad',
-    'motor_bandwidth': 'rad/s', 'motor_damping_ratio': '-',
+    'pretension': 'N',
+    'wire_stiffness': 'N/m',
+    'joint_radius': 'm',
+    'pulley_radius': 'm',
+    'capstan_exponent': '-',
+    'presliding_distance': 'm',
+    'joint_stiffness': 'N m/rad',
+    'joint_damping': 'N m s/rad',
+    'joint_friction': 'N m',
+    'joint_presliding': 'rad',
+    'motor_bandwidth': 'rad/s',
+    'motor_damping_ratio': '-',
 }
 
 
@@ -83,8 +91,15 @@ def explain_recording(
     observations = with_held_noise(observe(recording, plant))
     if not _is_enough(observations):
         return Explanation(
-            Verdict.INSUFFICIENT_DATA, (), {}, plant, plant, plant, {},
-            runtime_s=time.monotonic() - begun)
+            Verdict.INSUFFICIENT_DATA,
+            (),
+            {},
+            plant,
+            plant,
+            plant,
+            {},
+            runtime_s=time.monotonic() - begun,
+        )
     tell('refitting the nominal plant')
     packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
     band = BAND
@@ -101,17 +116,17 @@ def explain_recording(
     worst = _worst(decisions)
     if worst is not None:
         tell(f'looking for physics outside the catalogue on {observations[worst].joint}')
-        unknown = unknown_term(
-            decisions[worst].chosen.fit, jobs, _siblings(searches[worst]))
+        unknown = unknown_term(decisions[worst].chosen.fit, jobs, _siblings(searches[worst]))
     tell('judging on held-out blocks')
     effects = _named(observations, decisions)
     verdict = _verdict(effects, decisions, plant)
     return Explanation(
         verdict,
         effects,
-        {o.joint: nominal_estimates(
-            d.chosen.fit, packed_joint(plant, o.joint)[0], NOMINAL_UNITS)
-         for o, d in zip(observations, decisions, strict=True)},
+        {
+            o.joint: nominal_estimates(d.chosen.fit, packed_joint(plant, o.joint)[0], NOMINAL_UNITS)
+            for o, d in zip(observations, decisions, strict=True)
+        },
         plant,
         _plant_of(plant, [s.nominal.fit for s in searches], [() for _ in searches]),
         _plant_of(plant, [d.chosen.fit for d in decisions], [d.chosen.effects for d in decisions]),
@@ -119,21 +134,24 @@ def explain_recording(
         _candidates(observations, searches),
         unknown,
         all(d.adequate for d in decisions),
-        {f'explained_{o.joint}': d.explained
-         for o, d in zip(observations, decisions, strict=True)},
+        {f'explained_{o.joint}': d.explained for o, d in zip(observations, decisions, strict=True)},
         baseline is not None,
         time.monotonic() - begun,
     )
 
 
 def _healthy(
-    observations: tuple[JointObservation, ...], baseline: Recording, plant: PlantDescription,
+    observations: tuple[JointObservation, ...],
+    baseline: Recording,
+    plant: PlantDescription,
     jobs: int,
 ) -> tuple[tuple[JointObservation, ...], dict[str, tuple[Array, Flags]]]:
     before = with_held_noise(observe(baseline, plant))
     packed = {o.joint: packed_joint(plant, o.joint) for o in before}
-    fits = {o.joint: refitted
-            for o, (refitted, _) in zip(before, all_anchors(before, packed, jobs), strict=True)}
+    fits = {
+        o.joint: refitted
+        for o, (refitted, _) in zip(before, all_anchors(before, packed, jobs), strict=True)
+    }
     seen = []
     for observation in observations:
         flags = packed[observation.joint][1]
@@ -156,8 +174,11 @@ def _siblings(tried: JointSearch) -> tuple[str, ...]:
 
 def _is_enough(observations: tuple[JointObservation, ...]) -> bool:
     return any(
-        o.channels and o.inputs.shape[1] * 1e-3 >= LEAST_DURATION_S
-        and np.ptp(o.inputs[0, :, 0]) >= LEAST_MOTION_RAD for o in observations)
+        o.channels
+        and o.inputs.shape[1] * 1e-3 >= LEAST_DURATION_S
+        and np.ptp(o.inputs[0, :, 0]) >= LEAST_MOTION_RAD
+        for o in observations
+    )
 
 
 def _named(
@@ -168,16 +189,32 @@ def _named(
         for effect_id in decision.chosen.effects:
             definition = CATALOGUE[effect_id]
             rivals = decision.alternatives[effect_id]
-            effects.append(NamedEffect(
-                effect_id, observation.joint, str(definition.stage),
-                probability(decision.gaps[effect_id], decision.margins[effect_id],
-                            decision.adequate, len(rivals)),
-                definition.equation, definition.source,
-                effect_estimates(decision.chosen.fit, definition.first_parameter,
-                                 {p.name: p.unit for p in definition.parameters}),
-                rivals,
-                {'margin': decision.margins[effect_id], 'gap': decision.gaps[effect_id],
-                 'explained': decision.explained}))
+            effects.append(
+                NamedEffect(
+                    effect_id,
+                    observation.joint,
+                    str(definition.stage),
+                    probability(
+                        decision.gaps[effect_id],
+                        decision.margins[effect_id],
+                        decision.adequate,
+                        len(rivals),
+                    ),
+                    definition.equation,
+                    definition.source,
+                    effect_estimates(
+                        decision.chosen.fit,
+                        definition.first_parameter,
+                        {p.name: p.unit for p in definition.parameters},
+                    ),
+                    rivals,
+                    {
+                        'margin': decision.margins[effect_id],
+                        'gap': decision.gaps[effect_id],
+                        'explained': decision.explained,
+                    },
+                )
+            )
     ordered = sorted(effects, key=lambda e: (-e.probability, -e.evidence['margin']))
     # A clock belongs to a device, not to a joint; a tracker's fault shows on both. Each id comes
     # once before any comes again.
@@ -206,8 +243,11 @@ def _verdict(
         return Verdict.SENSOR_FAULT
     if Stage.RECORDING in stages:
         return Verdict.RECORDING_FAULT
-    changed = any(_has_changed(e) for d in decisions for e in nominal_estimates(
-        d.chosen.fit, d.chosen.fit.model.base, NOMINAL_UNITS).values())
+    changed = any(
+        _has_changed(e)
+        for d in decisions
+        for e in nominal_estimates(d.chosen.fit, d.chosen.fit.model.base, NOMINAL_UNITS).values()
+    )
     return Verdict.PARAMETERS_DIFFER if changed else Verdict.CONSISTENT
 
 
@@ -224,13 +264,19 @@ def _plant_of(
         joint = f.model.observation.joint
         packed, _ = f.model.packed(f.theta)
         names = [item.name for item in fields(JointParameters)]
-        joints[joint] = JointParameters(**{
-            name: float(value) for name, value in zip(names, packed, strict=False)})
+        joints[joint] = JointParameters(
+            **{name: float(value) for name, value in zip(names, packed, strict=False)}
+        )
         for effect_id in added:
             definition = CATALOGUE[effect_id]
             first = definition.first_parameter
-            specs.append(EffectSpec(effect_id, joint, {
-                p.name: float(packed[first + i]) for i, p in enumerate(definition.parameters)}))
+            specs.append(
+                EffectSpec(
+                    effect_id,
+                    joint,
+                    {p.name: float(packed[first + i]) for i, p in enumerate(definition.parameters)},
+                )
+            )
     return replace(plant, joints=joints, effects=tuple(specs))
 
 
@@ -244,8 +290,10 @@ def _ladder(
         rungs['nominal'] |= on_samples(observation, described.residuals, judged)
         rungs['refitted'] |= held_out_fit(tried.nominal.fit)
         rungs['augmented'] |= (
-            held_out_fit(decision.chosen.fit) if decision.chosen.effects
-            else {s.signal: rungs['refitted'][s.signal] for s in observation.channels})
+            held_out_fit(decision.chosen.fit)
+            if decision.chosen.effects
+            else {s.signal: rungs['refitted'][s.signal] for s in observation.channels}
+        )
     return rungs
 
 
@@ -255,7 +303,11 @@ def _candidates(
     found = []
     for observation, tried in zip(observations, searches, strict=True):
         for c in tried.tried():
-            found.append(Candidate(
-                tuple((effect_id, observation.joint) for effect_id in c.effects),
-                c.score, misfit(c.fit).total / observation.size))
+            found.append(
+                Candidate(
+                    tuple((effect_id, observation.joint) for effect_id in c.effects),
+                    c.score,
+                    misfit(c.fit).total / observation.size,
+                )
+            )
     return tuple(sorted(found, key=lambda c: c.score))

@@ -83,9 +83,18 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
         if centre <= 0.0:
             continue
         reach = 1.0 + band * 4.0 / 3.0
-        free.append(FreeParameter(
-            index, key, True, 1.0, centre / reach, centre * reach,
-            math.log(centre), BAND_SPREAD * band / BAND))
+        free.append(
+            FreeParameter(
+                index,
+                key,
+                True,
+                1.0,
+                centre / reach,
+                centre * reach,
+                math.log(centre),
+                BAND_SPREAD * band / BAND,
+            )
+        )
     mean, spread = LEAD_PRIOR
     free.append(FreeParameter(LEAD, 'reading_lead', False, 1.0, 0.0, 1.0, mean, spread))
     return tuple(free)
@@ -103,7 +112,8 @@ def with_free_reference(
     name, reach = SCALED[effect_id]
     return tuple(
         replace(item, low=item.low / reach, high=item.high * reach) if item.name == name else item
-        for item in free)
+        for item in free
+    )
 
 
 def effect_parameters(effect_id: str) -> tuple[FreeParameter, ...]:
@@ -111,12 +121,12 @@ def effect_parameters(effect_id: str) -> tuple[FreeParameter, ...]:
     definition = CATALOGUE[effect_id]
     return tuple(
         _of_effect(definition.first_parameter + i, parameter)
-        for i, parameter in enumerate(definition.parameters) if not parameter.choices
+        for i, parameter in enumerate(definition.parameters)
+        if not parameter.choices
     )
 
 
 def _of_effect(index: int, parameter: EffectParameter) -> FreeParameter:
     positive = parameter.low > 0.0 and not math.isfinite(parameter.off)
     unit = abs(parameter.typical) or 0.1 * (parameter.high - parameter.low)
-    return FreeParameter(
-        index, parameter.name, positive, unit, parameter.low, parameter.high)
+    return FreeParameter(index, parameter.name, positive, unit, parameter.low, parameter.high)

@@ -34,13 +34,17 @@ def with_held_noise(observations: tuple[JointObservation, ...]) -> tuple[JointOb
     for quantity, found in squares.items():
         pooled = np.concatenate(found)
         if len(pooled) >= LEAST_SAMPLES:
-            factors[quantity] = float(np.clip(
-                np.sqrt(np.mean(pooled)), 1.0, LARGEST_FACTOR))
+            factors[quantity] = float(np.clip(np.sqrt(np.mean(pooled)), 1.0, LARGEST_FACTOR))
     return tuple(
-        replace(observation, channels=tuple(
-            replace(c, noise=c.noise * factors.get(c.quantity, 1.0))
-            for c in observation.channels))
-        for observation in observations)
+        replace(
+            observation,
+            channels=tuple(
+                replace(c, noise=c.noise * factors.get(c.quantity, 1.0))
+                for c in observation.channels
+            ),
+        )
+        for observation in observations
+    )
 
 
 def held(observation: JointObservation) -> Mask:
@@ -59,10 +63,11 @@ def _squares(channel: Channel, still: Mask) -> Array:
     at_rest = still[channel.tick[channel.first]]
     whole = at_rest[:-3] & at_rest[3:]
     regular = np.diff(channel.time)
-    even = (np.ptp(np.stack([regular[:-2], regular[1:-1], regular[2:]]), axis=0)
-            < 0.5 * np.median(regular))
+    even = np.ptp(np.stack([regular[:-2], regular[1:-1], regular[2:]]), axis=0) < 0.5 * np.median(
+        regular
+    )
     scaled = channel.value / channel.noise
     use = whole & even
     # The mean of the largest squares would be of slips and outliers, not of noise.
-    squares = (np.diff(scaled, 3)**2 / 20.0)[use]
+    squares = (np.diff(scaled, 3) ** 2 / 20.0)[use]
     return squares[squares < 25.0]

@@ -34,8 +34,13 @@ def held_out_fit(final: Fit) -> dict[str, ChannelFit]:
     judged, used = held_out_masks(final.model.observation)
     if not judged.any():
         return on_samples(final.model.observation, final.residuals, np.ones_like(judged))
-    again = fit(final.model, final.theta, weight=used.astype(float), iterations=REFIT_STEPS,
-                known_jacobian=final.jacobian)
+    again = fit(
+        final.model,
+        final.theta,
+        weight=used.astype(float),
+        iterations=REFIT_STEPS,
+        known_jacobian=final.jacobian,
+    )
     return on_samples(final.model.observation, again.residuals, judged)
 
 
@@ -49,5 +54,6 @@ def on_samples(
         use = use if use.any() else np.ones_like(use)
         error = residuals[part][use] * channel.noise[use]
         result[channel.signal] = ChannelFit(
-            float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(channel.noise[use]**2))))
+            float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(channel.noise[use] ** 2)))
+        )
     return result

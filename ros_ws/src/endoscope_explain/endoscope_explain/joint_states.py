@@ -50,9 +50,7 @@ class JointStates:
         return self.values[name]
 
 
-def joint_states(
-    observation: JointObservation, parameters: Array, outputs: Array
-) -> JointStates:
+def joint_states(observation: JointObservation, parameters: Array, outputs: Array) -> JointStates:
     """States along a simulation.
 
     Parameters
@@ -66,20 +64,22 @@ def joint_states(
     dq: Array = np.asarray(np.gradient(q, TICK), dtype=float)
     dm = outputs[:, OUT_MOTOR_SPEED]
     tension = 0.5 * (outputs[:, OUT_TENSION_A] + outputs[:, OUT_TENSION_B])
-    return JointStates({
-        't': np.asarray(TICK * np.arange(len(q)), dtype=float),
-        'q': q,
-        'dq': dq,
-        'm': outputs[:, OUT_MOTOR],
-        'dm': dm,
-        'v': 0.5 * parameters[JOINT_RADIUS] * (dm + dq),
-        'T': tension,
-        'tau': outputs[:, OUT_EFFORT],
-        'q_other': observation.inputs[0, :, IN_OTHER_JOINT],
-        'dwell': _dwell(dq),
-        'lag_q': _above_lag(q),
-        'lag_T': _above_lag(tension),
-    })
+    return JointStates(
+        {
+            't': np.asarray(TICK * np.arange(len(q)), dtype=float),
+            'q': q,
+            'dq': dq,
+            'm': outputs[:, OUT_MOTOR],
+            'dm': dm,
+            'v': 0.5 * parameters[JOINT_RADIUS] * (dm + dq),
+            'T': tension,
+            'tau': outputs[:, OUT_EFFORT],
+            'q_other': observation.inputs[0, :, IN_OTHER_JOINT],
+            'dwell': _dwell(dq),
+            'lag_q': _above_lag(q),
+            'lag_T': _above_lag(tension),
+        }
+    )
 
 
 def _above_lag(values: Array) -> Array:
@@ -97,7 +97,7 @@ def _dwell(speed: Array) -> Array:
     rest_from = 0
     for begin, end in zip(begins, ends, strict=True):
         rest = TICK * (begin - rest_from)
-        travelled = np.cumsum(np.abs(speed[begin:end + 1])) * TICK
-        result[begin:end + 1] = np.log1p(rest / 0.1) * np.exp(-travelled / FADING_RAD)
+        travelled = np.cumsum(np.abs(speed[begin : end + 1])) * TICK
+        result[begin : end + 1] = np.log1p(rest / 0.1) * np.exp(-travelled / FADING_RAD)
         rest_from = int(end) + 1
     return result

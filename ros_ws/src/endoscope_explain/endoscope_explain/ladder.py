@@ -44,7 +44,8 @@ def ladders(
     """
     plants = {name: getattr(explanation, name) for name in PHYSICS}
     held_out: dict[str, Mapping[str, ChannelFit]] = {
-        name: dict(explanation.fit.get(name, {})) for name in PHYSICS}
+        name: dict(explanation.fit.get(name, {})) for name in PHYSICS
+    }
     second: dict[str, Mapping[str, ChannelFit]] = {}
     if not held_out['nominal']:
         return held_out, second
@@ -55,11 +56,15 @@ def ladders(
         recorded = view(recording, plants)
         begin = recorded.begin
         held_out |= black_box_rungs(
-            recording, recorded, lambda t: trained_on(t - begin),
-            {'held out': (recording, recorded, lambda t: judged(t - begin))})['held out']
+            recording,
+            recorded,
+            lambda t: trained_on(t - begin),
+            {'held out': (recording, recorded, lambda t: judged(t - begin))},
+        )['held out']
         if validation is not None and seen is not None:
             second |= black_box_rungs(
-                recording, recorded, _all, {'second': (validation, seen, _all)})['second']
+                recording, recorded, _all, {'second': (validation, seen, _all)}
+            )['second']
     return held_out, second
 
 

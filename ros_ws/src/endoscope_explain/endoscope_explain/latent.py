@@ -83,17 +83,29 @@ def unknown_term(fit: Fit, jobs: int, siblings: tuple[str, ...]) -> UnknownTerm 
     before, after = float(np.sum(fit.residuals**2)), float(np.sum(law.residuals**2))
     above = before - fit.model.observation.size
     used = sorted({name for name in STATE_NAMES for t in law.terms if name in _names(t)})
-    spread = 1.645 / np.sqrt(np.maximum(law.curvature, 1e-300)) * np.sqrt(
-        max(after / fit.model.observation.size, 1.0))
+    spread = (
+        1.645
+        / np.sqrt(np.maximum(law.curvature, 1e-300))
+        * np.sqrt(max(after / fit.model.observation.size, 1.0))
+    )
     return UnknownTerm(
-        fit.model.observation.joint, node, NODES[node],
-        ' + '.join(f'{c:.4g}*{t.expression}'
-                   for c, t in zip(law.coefficients, law.terms, strict=True)).replace('+ -', '- '),
+        fit.model.observation.joint,
+        node,
+        NODES[node],
+        ' + '.join(
+            f'{c:.4g}*{t.expression}' for c, t in zip(law.coefficients, law.terms, strict=True)
+        ).replace('+ -', '- '),
         {name: STATE_NAMES[name] for name in used},
-        tuple(Estimate(float(c), float(c - s), float(c + s), NODES[node])
-              for c, s in zip(law.coefficients, spread, strict=True)),
+        tuple(
+            Estimate(float(c), float(c - s), float(c + s), NODES[node])
+            for c, s in zip(law.coefficients, spread, strict=True)
+        ),
         float(np.clip((before - after) / max(above, 1.0), 0.0, 1.0)),
-        np.asarray(1e-3 * np.arange(len(law.push)), dtype=float), law.push, law.push, siblings)
+        np.asarray(1e-3 * np.arange(len(law.push)), dtype=float),
+        law.push,
+        law.push,
+        siblings,
+    )
 
 
 def pursue(fit: Fit, jobs: int) -> tuple[Term, ...]:
@@ -113,10 +125,14 @@ def pursue(fit: Fit, jobs: int) -> tuple[Term, ...]:
     left = fit.residuals - span @ (span.T @ fit.residuals)
     chosen: list[int] = []
     while len(chosen) < LARGEST_LAW:
-        gains = np.array([
-            _gain(a, left) if i not in chosen and (
-                not chosen or terms[i].node == terms[chosen[0]].node) else 0.0
-            for i, a in enumerate(answers)])
+        gains = np.array(
+            [
+                _gain(a, left)
+                if i not in chosen and (not chosen or terms[i].node == terms[chosen[0]].node)
+                else 0.0
+                for i, a in enumerate(answers)
+            ]
+        )
         best = int(np.argmax(gains))
         if gains[best] < WORTH_ADDING * float(left @ left):
             break
@@ -142,17 +158,18 @@ def refit(fit: Fit, terms: tuple[Term, ...]) -> Law | None:
     curvature = np.ones(len(terms))
     for _ in range(REFIT_STEPS):
         parameters, lead = fit.model.packed(theta)
-        answers = np.stack([
-            _answer(fit, parameters, lead, outputs, t, states, (terms, c)) for t in terms], axis=1)
+        answers = np.stack(
+            [_answer(fit, parameters, lead, outputs, t, states, (terms, c)) for t in terms], axis=1
+        )
         full = np.hstack([fit.jacobian, answers])
         weight = np.concatenate([fit.model.prior_weight(), np.zeros(len(terms))])
         normal = full.T @ full + np.diag(weight**2)
         gradient = full.T @ current
-        gradient[:len(theta)] += fit.model.prior_weight() * fit.model.prior(theta)
-        curvature = 1.0 / np.diag(np.linalg.pinv(normal))[len(theta):]
+        gradient[: len(theta)] += fit.model.prior_weight() * fit.model.prior(theta)
+        curvature = 1.0 / np.diag(np.linalg.pinv(normal))[len(theta) :]
         step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), -gradient)
-        new_theta = np.clip(theta + step[:len(theta)], low, high)
-        new_c = c + step[len(theta):]
+        new_theta = np.clip(theta + step[: len(theta)], low, high)
+        new_c = c + step[len(theta) :]
         new_parameters, new_lead = fit.model.packed(new_theta)
         new_outputs = _simulate(fit, new_parameters, terms, new_c, states)
         new_states = joint_states(observation, new_parameters, new_outputs)
@@ -189,24 +206,30 @@ def _simulate(
 
 
 def _answer(
-    fit: Fit, parameters: Array, lead: float, outputs: Array, term: Term, states: JointStates,
+    fit: Fit,
+    parameters: Array,
+    lead: float,
+    outputs: Array,
+    term: Term,
+    states: JointStates,
     law: tuple[tuple[Term, ...], Array] | None = None,
 ) -> Array:
     """Change of the residual (size,) for one unit of a term's coefficient."""
-    size = float(np.sqrt(np.mean(term.along(states)**2)))
+    size = float(np.sqrt(np.mean(term.along(states) ** 2)))
     if size < 1e-12:
         return np.zeros(fit.model.observation.size)
     probe = PROBE[term.node] / size
     terms, coefficients = law if law is not None else ((), np.empty(0))
     moved = _simulate(
-        fit, parameters, (term, *terms), np.concatenate([[probe], coefficients]), states)
+        fit, parameters, (term, *terms), np.concatenate([[probe], coefficients]), states
+    )
     observation = fit.model.observation
     return (residuals(observation, moved, lead) - residuals(observation, outputs, lead)) / probe
 
 
 def _gain(answer: Array, left: Array) -> float:
     size = float(answer @ answer)
-    return float(answer @ left)**2 / size if size > 1e-12 else 0.0
+    return float(answer @ left) ** 2 / size if size > 1e-12 else 0.0
 
 
 def _names(term: Term) -> set[str]:

@@ -69,7 +69,8 @@ def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = Non
         if progress is not None:
             progress(f'note: {note}')
     case = explain_case(
-        inputs, explain_recording, jobs=jobs, progress=progress, extras=not sources.quick)
+        inputs, explain_recording, jobs=jobs, progress=progress, extras=not sources.quick
+    )
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         write_report(case, folder)
@@ -154,18 +155,30 @@ def summary_table(reports: Mapping[str, Reported]) -> str:
     """Return one CSV line for each bag: verdict, effects, largest misfit before and after."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator='\n')
-    writer.writerow([
-        'bag', 'verdict', 'effects', 'probabilities', 'nominal_rmse_over_noise',
-        'augmented_rmse_over_noise', 'runtime_s'])
+    writer.writerow(
+        [
+            'bag',
+            'verdict',
+            'effects',
+            'probabilities',
+            'nominal_rmse_over_noise',
+            'augmented_rmse_over_noise',
+            'runtime_s',
+        ]
+    )
     for name, reported in reports.items():
         content = json.loads(reported.files[REPORT_JSON])
         effects = content['effects']
-        writer.writerow([
-            name, content['verdict'],
-            ' '.join(f'{e["id"]}@{e["joint"]}' for e in effects),
-            ' '.join(f'{e["probability"]:.3f}' for e in effects),
-            *(f'{_worst(content["fit"][rung]):.2f}' for rung in ('nominal', 'augmented')),
-            f'{content["runtime_s"]:.1f}'])
+        writer.writerow(
+            [
+                name,
+                content['verdict'],
+                ' '.join(f'{e["id"]}@{e["joint"]}' for e in effects),
+                ' '.join(f'{e["probability"]:.3f}' for e in effects),
+                *(f'{_worst(content["fit"][rung]):.2f}' for rung in ('nominal', 'augmented')),
+                f'{content["runtime_s"]:.1f}',
+            ]
+        )
     return text.getvalue()
 
 
@@ -196,7 +209,6 @@ def _on_dask(sources: Sequence[Sources], address: str) -> Iterator[tuple[int, Re
         raise ClusterError(f'no Dask scheduler at {address}: {error}') from error
     with client:
         # A report is a pure function of its sources, but nothing is gained by keeping results.
-        futures = {
-            client.submit(explain_one, one, pure=False): i for i, one in enumerate(sources)}
+        futures = {client.submit(explain_one, one, pure=False): i for i, one in enumerate(sources)}
         for future in dask_completed(futures):
             yield futures[future], future.result()

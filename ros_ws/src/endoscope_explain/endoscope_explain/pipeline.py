@@ -102,15 +102,21 @@ def read_inputs(sources: Sources) -> Inputs:
         if other.joints != raw.joints:
             raise JointsDifferError(
                 f'{path}: has {", ".join(other.joints)}, but {sources.bag} has '
-                f'{", ".join(raw.joints)}')
+                f'{", ".join(raw.joints)}'
+            )
         return audit_recording(other, plant).recording
 
     return Inputs(
-        plant, audit_recording(raw, plant), second(sources.baseline), second(sources.validate))
+        plant, audit_recording(raw, plant), second(sources.baseline), second(sources.validate)
+    )
 
 
 def explain_case(
-    inputs: Inputs, engine: Engine, *, jobs: int = 2, progress: Progress | None = None,
+    inputs: Inputs,
+    engine: Engine,
+    *,
+    jobs: int = 2,
+    progress: Progress | None = None,
     extras: bool = True,
 ) -> ExplainedCase:
     """Explain a recording.
@@ -137,22 +143,29 @@ def explain_case(
     for finding in audit.findings:
         tell(f'audit: {finding.text}; {finding.remedy}')
     explanation = engine(
-        audit.recording, inputs.plant, baseline=inputs.baseline, jobs=jobs, progress=progress)
+        audit.recording, inputs.plant, baseline=inputs.baseline, jobs=jobs, progress=progress
+    )
     tell('locating')
     plant = improved_plant(explanation, audit)
     case = ExplainedCase(
-        audit.recording, audit, explanation, combined_verdict(explanation, audit),
-        combined_effects(explanation, audit), (), plant, {},
+        audit.recording,
+        audit,
+        explanation,
+        combined_verdict(explanation, audit),
+        combined_effects(explanation, audit),
+        (),
+        plant,
+        {},
         validation_name='' if inputs.validation is None else inputs.validation.name,
-        baseline_name='' if inputs.baseline is None else inputs.baseline.name)
+        baseline_name='' if inputs.baseline is None else inputs.baseline.name,
+    )
     case = replace(case, places=_places(case))
     if extras:
         # Before the black boxes, whose libraries start threads: a fork is not safe after that.
         case = replace(case, next_experiment=_next(case, jobs, tell))
     tell('judging beside black boxes' if extras else 'judging')
     held_out, second = ladders(audit.recording, explanation, inputs.validation, extras)
-    return replace(
-        case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
+    return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
 
 
 def _next(case: ExplainedCase, jobs: int, tell: Progress) -> NextExperiment | None:
@@ -171,8 +184,10 @@ def _places(case: ExplainedCase) -> tuple[Place, ...]:
     explanation = case.explanation
     audited = {(f.id, f.joint) for f in case.audit.faults()}
     places = locate_effects(
-        case.recording, explanation.augmented,
-        [e for e in case.effects if (e.id, e.joint) not in audited])
+        case.recording,
+        explanation.augmented,
+        [e for e in case.effects if (e.id, e.joint) not in audited],
+    )
     places += locate_findings(case.audit)
     if case.verdict is Verdict.UNKNOWN_PHYSICS:
         places = locate_unknown(case.recording, explanation) + places

@@ -79,9 +79,7 @@ class RecordedView:
         return tuple(s for s in self.signals.values() if s.joint == joint)
 
 
-def simulate_rig(
-    observations: tuple[JointObservation, ...], plant: PlantDescription
-) -> Array:
+def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescription) -> Array:
     """Simulate all joints of a recording side by side.
 
     Parameters
@@ -101,13 +99,12 @@ def simulate_rig(
     states, histories = rest_state(parameters, np.array([o.start for o in observations]))
     out = np.empty((len(observations), inputs.shape[1], OUTPUTS))
     run_joints(
-        states, histories, parameters, flags, inputs, len(observations) > 1, TICK, SUBSTEPS, out)
+        states, histories, parameters, flags, inputs, len(observations) > 1, TICK, SUBSTEPS, out
+    )
     return out
 
 
-def reading_lead(
-    observations: tuple[JointObservation, ...], outputs: Array
-) -> float:
+def reading_lead(observations: tuple[JointObservation, ...], outputs: Array) -> float:
     """Estimate by how much of a tick readings are younger than their stamps.
 
     From the motor's angle, which moves fast and is read without noise; 0 where it was not
@@ -150,11 +147,20 @@ def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> Record
     for j, observation in enumerate(observations):
         for channel in observation.channels:
             signals[channel.signal] = SignalView(
-                channel.signal, observation.joint, channel.quantity, channel.unit,
-                channel.time + begin, channel.value, channel.noise,
-                {name: channel.predicted(
-                    out[j], lead, skews[name] if channel.quantity == 'bending' else 0.0)
-                 for name, out in simulated.items()})
+                channel.signal,
+                observation.joint,
+                channel.quantity,
+                channel.unit,
+                channel.time + begin,
+                channel.value,
+                channel.noise,
+                {
+                    name: channel.predicted(
+                        out[j], lead, skews[name] if channel.quantity == 'bending' else 0.0
+                    )
+                    for name, out in simulated.items()
+                },
+            )
     by_joint = {o.joint: outputs[j] for j, o in enumerate(observations)}
     return RecordedView(observations, signals, by_joint, begin)
 
@@ -164,6 +170,7 @@ def rung(recorded: RecordedView, name: str) -> dict[str, ChannelFit]:
     return {
         signal: ChannelFit(
             float(np.sqrt(np.mean((v.measured - v.predicted[name]) ** 2))),
-            float(np.sqrt(np.mean(v.noise**2))))
+            float(np.sqrt(np.mean(v.noise**2))),
+        )
         for signal, v in recorded.signals.items()
     }

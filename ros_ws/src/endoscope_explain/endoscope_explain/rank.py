@@ -58,14 +58,15 @@ def look(
     Look
     """
     model = with_effect(anchors[0].model, promise.effect_id, promise.start)
-    added = model.free[len(anchors[0].theta):]
+    added = model.free[len(anchors[0].theta) :]
     own = np.array([item.coordinate(float(model.base[item.index])) for item in added])
     begun = []
     for anchor in anchors:
         theta = np.concatenate([anchor.theta, own])
         begun.append((theta, model.residuals(theta), anchor))
     theta, residuals, anchor = min(
-        begun, key=lambda b: float(np.sum(b[1]**2) + np.sum(model.prior(b[0])**2)))
+        begun, key=lambda b: float(np.sum(b[1] ** 2) + np.sum(model.prior(b[0]) ** 2))
+    )
     columns = list(range(len(anchor.theta), len(theta)))
     derivative = np.hstack([anchor.jacobian, jacobian(model, theta, residuals, columns)])
     theta, cost = _quasi_newton(model, theta, residuals, derivative, steps)
@@ -79,7 +80,7 @@ def _quasi_newton(
     weight = model.prior_weight()
 
     def cost_of(values: Array, at: Array) -> float:
-        return 0.5 * float(values @ values + np.sum(model.prior(at)**2))
+        return 0.5 * float(values @ values + np.sum(model.prior(at) ** 2))
 
     cost = cost_of(residuals, theta)
     damping = 1e-3

@@ -40,8 +40,9 @@ class Misfit:
 
 def misfit(fit: Fit) -> Misfit:
     """Misfit of a fitted joint, channel by channel."""
-    channels = np.array([
-        float(np.mean(fit.residuals[part]**2)) for part in fit.model.observation.slices()])
+    channels = np.array(
+        [float(np.mean(fit.residuals[part] ** 2)) for part in fit.model.observation.slices()]
+    )
     return Misfit(channels, float(np.sum(fit.residuals**2)))
 
 
@@ -60,5 +61,5 @@ def score(fit: Fit, weights: Array | None = None) -> float:
     """
     size = np.maximum(misfit(fit).channels, 1.0)
     weights = np.full(len(size), EFFECTIVE_SAMPLES) if weights is None else weights
-    prior = 0.5 * float(np.sum(fit.model.prior(fit.theta)**2))
+    prior = 0.5 * float(np.sum(fit.model.prior(fit.theta) ** 2))
     return float(0.5 * weights @ np.log(size)) + prior + PARAMETER_PRICE * len(fit.theta)

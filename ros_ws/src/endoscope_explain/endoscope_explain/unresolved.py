@@ -38,10 +38,10 @@ def fast_scatter(values: Array, white: float) -> Array:
     """
     if len(values) < WINDOW:
         return np.zeros(len(values))
-    squares = np.concatenate([np.zeros(3), np.diff(values, 3)**2 / 20.0])
+    squares = np.concatenate([np.zeros(3), np.diff(values, 3) ** 2 / 20.0])
     # The median within the window would hide slips, the mean hears each of them.
     kernel = np.ones(WINDOW) / WINDOW
     local = np.convolve(np.pad(squares, WINDOW // 2, mode='edge'), kernel, mode='same')
-    local = local[WINDOW // 2:WINDOW // 2 + len(values)]
+    local = local[WINDOW // 2 : WINDOW // 2 + len(values)]
     quiet = max(white**2, float(np.quantile(local, QUIET)))
     return np.where(local > SIGNIFICANT**2 * quiet, np.sqrt(local), 0.0)

@@ -39,7 +39,9 @@ def make_recording(
     sensors = SensorModel(plant.sensors, seed)
     tracker = slice(None, None, TRACKER_EVERY)
     return Recording(
-        'synthetic', 0.0, joints,
+        'synthetic',
+        0.0,
+        joints,
         Series.of('motor/servo_jp', time, command),
         Series.of('wires/measured_js', time, sensors.tension(truth.tension)),
         Series.of('slave/measured_js', time[tracker], sensors.bending(truth.bending[tracker])),
@@ -70,19 +72,31 @@ def stribeck_case(stribeck_recording):
     plant = PlantDescription()
     audit = audit_recording(stribeck_recording, plant)
     augmented = dataclasses.replace(plant, effects=(EXPLAINED,))
-    recorded = view(audit.recording, {
-        'nominal': plant, 'refitted': plant, 'augmented': augmented})
+    recorded = view(audit.recording, {'nominal': plant, 'refitted': plant, 'augmented': augmented})
     definition = CATALOGUE[EXPLAINED.id]
     effect = NamedEffect(
-        EXPLAINED.id, EXPLAINED.joint, str(definition.stage), 0.97, definition.equation,
+        EXPLAINED.id,
+        EXPLAINED.joint,
+        str(definition.stage),
+        0.97,
+        definition.equation,
         definition.source,
         {name: Estimate(v, 0.9 * v, 1.1 * v, '-') for name, v in EXPLAINED.parameters.items()},
-        ('viscous_friction',), {'margin': 120.0})
-    parameters = {joint: {
-        'capstan_exponent': NominalEstimate(0.9, 0.88, 0.92, '-', 0.9, True)
-    } for joint in plant.joints}
+        ('viscous_friction',),
+        {'margin': 120.0},
+    )
+    parameters = {
+        joint: {'capstan_exponent': NominalEstimate(0.9, 0.88, 0.92, '-', 0.9, True)}
+        for joint in plant.joints
+    }
     explanation = Explanation(
-        Verdict.MISSING_PHYSICS, (effect,), parameters, plant, plant, augmented,
-        {name: rung(recorded, name) for name in ('nominal', 'refitted', 'augmented')})
+        Verdict.MISSING_PHYSICS,
+        (effect,),
+        parameters,
+        plant,
+        plant,
+        augmented,
+        {name: rung(recorded, name) for name in ('nominal', 'refitted', 'augmented')},
+    )
     inputs = Inputs(plant, audit, None, None)
     return explain_case(inputs, lambda *_, **__: explanation, extras=False)

@@ -91,8 +91,9 @@ def test_a_clock_that_is_set_back_is_a_fault(sound):
 def test_a_frozen_cell_is_found_and_not_judged(sound):
     values = sound.tension.values.copy()
     values[3000:3400, 0, 1] = values[3000, 0, 1]
-    report = audit_recording(sound.with_series({
-        'tension': changed(sound.tension, values=values)}), PLANT)
+    report = audit_recording(
+        sound.with_series({'tension': changed(sound.tension, values=values)}), PLANT
+    )
     (finding,) = report.findings
     assert (finding.id, finding.signals) == ('held_samples', ('wires/measured_js:wire_x_neg',))
     assert not report.recording.tension.valid[3001:3400, 0, 1].any()
@@ -107,8 +108,9 @@ def test_a_coarse_tracker_that_stands_still_with_the_rig_is_no_fault(sound):
 def test_clipping_is_named_with_wire_and_limit(sound):
     values = np.minimum(sound.tension.values, np.array([np.inf, 9.0])[None, None, :])
     values[:, 1] = sound.tension.values[:, 1]
-    report = audit_recording(sound.with_series({
-        'tension': changed(sound.tension, values=values)}), PLANT)
+    report = audit_recording(
+        sound.with_series({'tension': changed(sound.tension, values=values)}), PLANT
+    )
     (finding,) = report.findings
     assert (finding.id, finding.joint) == ('load_cell_saturation', 'bend_x')
     assert finding.parameters['limit_n'].value == pytest.approx(9.0)
@@ -122,8 +124,9 @@ def test_isolated_wrong_tracker_samples_are_found(sound, size, share):
     values = sound.bending.values.copy()
     wrong = rng.choice(np.arange(10, len(values) - 10), int(share * len(values)), replace=False)
     values[wrong, 1] += size * rng.choice([-1, 1], len(wrong))
-    report = audit_recording(sound.with_series({
-        'bending': changed(sound.bending, values=values)}), PLANT)
+    report = audit_recording(
+        sound.with_series({'bending': changed(sound.bending, values=values)}), PLANT
+    )
     (finding,) = report.findings
     assert (finding.id, finding.joint) == ('tracker_outliers', 'bend_y')
     masked = ~report.recording.bending.valid[:, 1]

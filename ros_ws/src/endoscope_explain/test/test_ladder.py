@@ -40,7 +40,12 @@ def test_physics_beats_black_boxes_on_a_second_recording(stribeck_case, record):
     wire = 'wires/measured_js:wire_x_pos'
     for ladder in (held_out, validation):
         assert set(ladder) == {
-            'nominal', 'refitted', 'augmented', 'gaussian_process', 'neural_network'}
+            'nominal',
+            'refitted',
+            'augmented',
+            'gaussian_process',
+            'neural_network',
+        }
         assert ladder['augmented'][wire].ratio < 1.5
         assert ladder['gaussian_process'][wire].ratio > ladder['augmented'][wire].ratio
     assert validation['neural_network'][wire].ratio > validation['augmented'][wire].ratio

@@ -57,8 +57,15 @@ def test_the_proposal_names_its_rivals_and_the_best_motion(record):
     plant = with_effect('transport_delay', delay_s=0.03)
     recording = record(plant, duration=6.0)
     effect = NamedEffect(
-        'transport_delay', 'bend_x', str(CATALOGUE['transport_delay'].stage), 0.5, '', '', {},
-        ('actuator_lag',))
+        'transport_delay',
+        'bend_x',
+        str(CATALOGUE['transport_delay'].stage),
+        0.5,
+        '',
+        '',
+        {},
+        ('actuator_lag',),
+    )
     proposed = propose(recording, plant, effect)
     assert proposed.separates == ('transport_delay', 'actuator_lag')
     assert proposed.distances[proposed.waveform] == max(proposed.distances.values())

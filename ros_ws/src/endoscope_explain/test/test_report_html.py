@@ -59,16 +59,37 @@ def test_every_verdict_has_its_sentence(stribeck_case, verdict):
 def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case):
     time = np.linspace(0.0, 10.0, 200)
     term = UnknownTerm(
-        'bend_x', 'moment', 'N m', 'a exp(-((q - b) / c)**2)', {'q': 'bending angle, rad'},
-        (Estimate(0.01, 0.009, 0.011, 'N m'),), 0.9, time, np.sin(time), np.sin(time), ('gravity',))
+        'bend_x',
+        'moment',
+        'N m',
+        'a exp(-((q - b) / c)**2)',
+        {'q': 'bending angle, rad'},
+        (Estimate(0.01, 0.009, 0.011, 'N m'),),
+        0.9,
+        time,
+        np.sin(time),
+        np.sin(time),
+        ('gravity',),
+    )
     experiment = NextExperiment(
-        'It tells gravity from contact.', ('gravity', 'contact'), 'slow ramps', 'bend_x',
-        {'chirp': 1.0, 'slow ramps': 4.0}, tuple(time),
-        tuple((float(v), 0.0) for v in np.sin(time)), ('bend_x', 'bend_y'))
+        'It tells gravity from contact.',
+        ('gravity', 'contact'),
+        'slow ramps',
+        'bend_x',
+        {'chirp': 1.0, 'slow ramps': 4.0},
+        tuple(time),
+        tuple((float(v), 0.0) for v in np.sin(time)),
+        ('bend_x', 'bend_y'),
+    )
     explanation = dataclasses.replace(stribeck_case.explanation, unknown=term)
-    page = html_page(dataclasses.replace(
-        stribeck_case, explanation=explanation, verdict=Verdict.UNKNOWN_PHYSICS,
-        next_experiment=experiment))
+    page = html_page(
+        dataclasses.replace(
+            stribeck_case,
+            explanation=explanation,
+            verdict=Verdict.UNKNOWN_PHYSICS,
+            next_experiment=experiment,
+        )
+    )
     assert 'a exp(-((q - b) / c)**2)' in page
     assert 'It tells gravity from contact.' in page
     assert page.index('slow ramps') < page.index('>chirp<')

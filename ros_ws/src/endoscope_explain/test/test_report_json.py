@@ -18,7 +18,14 @@ from endoscope_explain.report.writing import write_report
 NUMBER = (int, float)
 STAGES = {'actuator', 'transmission', 'joint', 'sensing', 'recording'}
 KEYS = {
-    'schema', 'verdict', 'where', 'effects', 'parameters', 'fit', 'symbolic', 'next_experiment',
+    'schema',
+    'verdict',
+    'where',
+    'effects',
+    'parameters',
+    'fit',
+    'symbolic',
+    'next_experiment',
     'runtime_s',
 }
 
@@ -38,8 +45,16 @@ def check_report(report):
         assert 0 <= low <= high
     for effect in report['effects']:
         assert set(effect) == {
-            'id', 'joint', 'stage', 'probability', 'equation', 'source', 'parameters',
-            'alternatives', 'evidence'}
+            'id',
+            'joint',
+            'stage',
+            'probability',
+            'equation',
+            'source',
+            'parameters',
+            'alternatives',
+            'evidence',
+        }
         assert effect['stage'] in STAGES
         assert 0 <= effect['probability'] <= 1
         assert effect['equation']
@@ -102,12 +117,24 @@ def test_a_number_that_is_not_finite_is_refused(stribeck_case):
 
 def test_unknown_physics_carries_its_formula(stribeck_case):
     term = UnknownTerm(
-        'bend_x', 'moment', 'N m', 'a exp(-((q - b) / c)**2)', {'q': 'angle, rad'},
-        (Estimate(0.01, 0.009, 0.011, 'N m'),), 0.9, None, None, None, ('gravity',))
+        'bend_x',
+        'moment',
+        'N m',
+        'a exp(-((q - b) / c)**2)',
+        {'q': 'angle, rad'},
+        (Estimate(0.01, 0.009, 0.011, 'N m'),),
+        0.9,
+        None,
+        None,
+        None,
+        ('gravity',),
+    )
     explanation = dataclasses.replace(
-        stribeck_case.explanation, verdict=Verdict.UNKNOWN_PHYSICS, unknown=term)
+        stribeck_case.explanation, verdict=Verdict.UNKNOWN_PHYSICS, unknown=term
+    )
     case = dataclasses.replace(
-        stribeck_case, explanation=explanation, verdict=Verdict.UNKNOWN_PHYSICS)
+        stribeck_case, explanation=explanation, verdict=Verdict.UNKNOWN_PHYSICS
+    )
     report = report_mapping(case)
     check_report(report)
     assert report['symbolic']['expression'] == term.expression
@@ -116,9 +143,15 @@ def test_unknown_physics_carries_its_formula(stribeck_case):
 
 def test_the_written_plant_holds_the_effect_and_the_motion_is_beside_it(stribeck_case, tmp_path):
     experiment = NextExperiment(
-        'two rivals', ('viscous_friction', 'stribeck_friction'), 'slow ramps', 'bend_x',
-        {'slow ramps': 4.0}, (0.0, 0.5, 1.0), ((0.0, 0.0), (0.2, 0.0), (0.0, 0.0)),
-        ('bend_x', 'bend_y'))
+        'two rivals',
+        ('viscous_friction', 'stribeck_friction'),
+        'slow ramps',
+        'bend_x',
+        {'slow ramps': 4.0},
+        (0.0, 0.5, 1.0),
+        ((0.0, 0.0), (0.2, 0.0), (0.0, 0.0)),
+        ('bend_x', 'bend_y'),
+    )
     write_report(dataclasses.replace(stribeck_case, next_experiment=experiment), tmp_path)
     report = json.loads((tmp_path / 'report.json').read_text())
     check_report(report)
@@ -128,17 +161,28 @@ def test_the_written_plant_holds_the_effect_and_the_motion_is_beside_it(stribeck
 
 def finding(effect_id, stage):
     return Finding(
-        effect_id, Severity.FAULT, 'bend_x', stage, ('slave/measured_js',), ((1.0, 2.0),), 'text',
-        'remedy', parameters={'time_s': Estimate(1.0, 0.9, 1.1, 's')})
+        effect_id,
+        Severity.FAULT,
+        'bend_x',
+        stage,
+        ('slave/measured_js',),
+        ((1.0, 2.0),),
+        'text',
+        'remedy',
+        parameters={'time_s': Estimate(1.0, 0.9, 1.1, 's')},
+    )
 
 
-@pytest.mark.parametrize(('findings', 'effects', 'verdict'), [
-    ([('recording_gap', 'recording')], True, 'missing_physics'),
-    ([('recording_gap', 'recording')], False, 'recording_fault'),
-    ([('tracker_outliers', 'sensing')], False, 'sensor_fault'),
-    ([('held_samples', 'recording')], False, 'recording_fault'),
-    ([], False, 'consistent'),
-])
+@pytest.mark.parametrize(
+    ('findings', 'effects', 'verdict'),
+    [
+        ([('recording_gap', 'recording')], True, 'missing_physics'),
+        ([('recording_gap', 'recording')], False, 'recording_fault'),
+        ([('tracker_outliers', 'sensing')], False, 'sensor_fault'),
+        ([('held_samples', 'recording')], False, 'recording_fault'),
+        ([], False, 'consistent'),
+    ],
+)
 def test_the_audits_faults_enter_the_verdict(stribeck_case, findings, effects, verdict):
     explanation = stribeck_case.explanation
     if not effects:
@@ -147,4 +191,5 @@ def test_the_audits_faults_enter_the_verdict(stribeck_case, findings, effects, v
     assert combined_verdict(explanation, audit) == verdict
     named = {e.id for e in combined_effects(explanation, audit)}
     assert named == ({'stribeck_friction'} if effects else set()) | (
-        {f for f, _ in findings} & set(AUDITED_EFFECTS))
+        {f for f, _ in findings} & set(AUDITED_EFFECTS)
+    )

@@ -6,6 +6,16 @@ all of them.
 """
 
 COMMANDS: tuple[str, ...] = (
-    'demo', 'simulate', 'explain', 'convert', 'record', 'replay', 'bag', 'dataset', 'train',
-    'identify', 'effects', 'bench',
+    'demo',
+    'simulate',
+    'explain',
+    'convert',
+    'record',
+    'replay',
+    'bag',
+    'dataset',
+    'train',
+    'identify',
+    'effects',
+    'bench',
 )

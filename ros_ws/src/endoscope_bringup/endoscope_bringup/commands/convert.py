@@ -7,14 +7,26 @@ from pathlib import Path
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `convert`."""
     parser = subparsers.add_parser(
-        'convert', help='turn a text table of measurements into a bag',
+        'convert',
+        help='turn a text table of measurements into a bag',
         description='Writes the columns of TABLE, described by a mapping file, as topics of a bag. '
-        'Rows whose time is that of the row before are dropped.')
+        'Rows whose time is that of the row before are dropped.',
+    )
     parser.add_argument('table', type=Path, metavar='TABLE', help='text, one row a sample')
-    parser.add_argument('--mapping', type=Path, required=True, metavar='M.yaml',
-                        help='which column is which topic, quantity, joint and unit')
-    parser.add_argument('--out', type=Path, required=True, metavar='BAG',
-                        help='where to write: a bare file if it ends in .mcap, else a folder')
+    parser.add_argument(
+        '--mapping',
+        type=Path,
+        required=True,
+        metavar='M.yaml',
+        help='which column is which topic, quantity, joint and unit',
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        required=True,
+        metavar='BAG',
+        help='where to write: a bare file if it ends in .mcap, else a folder',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -23,6 +35,8 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_bags.text_table import convert_table
 
     done = convert_table(args.table, load_table_mapping(args.mapping), args.out)
-    print(f'{args.out}: {done.messages} messages of {done.rows} rows, '
-          f'{done.repeated} repeated rows dropped')
+    print(
+        f'{args.out}: {done.messages} messages of {done.rows} rows, '
+        f'{done.repeated} repeated rows dropped'
+    )
     return 0

@@ -10,12 +10,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'dataset',
         help='simulate calibration recordings of known backlash size',
         description='Writes recordings.npz and manifest.json to DIR: calibrations of random rigs '
-        'in random tubes, seven classes of backlash size from 40 to 100 deg.')
-    parser.add_argument('--out', type=Path, required=True, metavar='DIR',
-                        help='new or empty folder')
+        'in random tubes, seven classes of backlash size from 40 to 100 deg.',
+    )
+    parser.add_argument(
+        '--out', type=Path, required=True, metavar='DIR', help='new or empty folder'
+    )
     parser.add_argument('--seed', type=int, default=7, help='the same seed, the same data set (7)')
-    parser.add_argument('--per-class', type=int, default=30, metavar='N',
-                        help='recordings of each class (30)')
+    parser.add_argument(
+        '--per-class', type=int, default=30, metavar='N', help='recordings of each class (30)'
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -26,8 +29,9 @@ def run(args: argparse.Namespace) -> int:
     require_free_directory(args.out)
     dataset = make_dataset(args.seed, args.per_class, _print_progress)
     save_dataset(dataset, args.out)
-    print(f'{args.out}: {len(dataset.class_deg)} recordings, '
-          f'manifest SHA-256 {dataset.manifest_hash}')
+    print(
+        f'{args.out}: {len(dataset.class_deg)} recordings, manifest SHA-256 {dataset.manifest_hash}'
+    )
     return 0
 
 

@@ -12,8 +12,10 @@ if TYPE_CHECKING:
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `effects`."""
     parser = subparsers.add_parser(
-        'effects', help='list the physics that a plant.yaml can add to the nominal plant',
-        description='Lists the catalogue, or tells equation, source and parameters of an effect.')
+        'effects',
+        help='list the physics that a plant.yaml can add to the nominal plant',
+        description='Lists the catalogue, or tells equation, source and parameters of an effect.',
+    )
     parser.add_argument('ids', nargs='*', metavar='ID', help='effects to tell all about')
 
 

@@ -7,28 +7,54 @@ from pathlib import Path
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `explain`."""
     parser = subparsers.add_parser(
-        'explain', help='say where a recording and its simulation differ, and what was left out',
+        'explain',
+        help='say where a recording and its simulation differ, and what was left out',
         description='Explains what the simulation P.yaml leaves out of each recording BAG. Writes '
         'report.json, report.html and the improved plant.yaml to DIR; with several bags to '
-        'one folder each in DIR, and a summary table.')
-    parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
-                        help='rosbag2 folder or .mcap')
-    parser.add_argument('--plant', type=Path, required=True, metavar='P.yaml',
-                        help='the simulation that is to be compared')
-    parser.add_argument('--out', type=Path, required=True, metavar='DIR',
-                        help='a new or empty folder')
-    parser.add_argument('--baseline', type=Path, metavar='BAG0',
-                        help='the same rig when it was well: only what is new is explained')
-    parser.add_argument('--validate', type=Path, metavar='BAG2',
-                        help='a second recording of the same rig to judge the fit on')
-    parser.add_argument('--without', action='append', default=[], metavar='TOPIC',
-                        choices=['motor/measured_js'], help='a topic that may be missing')
-    parser.add_argument('--jobs', type=_positive, default=2, metavar='N',
-                        help='processes side by side (default 2)')
-    parser.add_argument('--quick', action='store_true',
-                        help='leave out the black boxes and the next experiment')
-    parser.add_argument('--dask', metavar='ADDRESS',
-                        help='explain several bags on the Dask cluster whose scheduler is there')
+        'one folder each in DIR, and a summary table.',
+    )
+    parser.add_argument('bags', nargs='+', type=Path, metavar='BAG', help='rosbag2 folder or .mcap')
+    parser.add_argument(
+        '--plant',
+        type=Path,
+        required=True,
+        metavar='P.yaml',
+        help='the simulation that is to be compared',
+    )
+    parser.add_argument(
+        '--out', type=Path, required=True, metavar='DIR', help='a new or empty folder'
+    )
+    parser.add_argument(
+        '--baseline',
+        type=Path,
+        metavar='BAG0',
+        help='the same rig when it was well: only what is new is explained',
+    )
+    parser.add_argument(
+        '--validate',
+        type=Path,
+        metavar='BAG2',
+        help='a second recording of the same rig to judge the fit on',
+    )
+    parser.add_argument(
+        '--without',
+        action='append',
+        default=[],
+        metavar='TOPIC',
+        choices=['motor/measured_js'],
+        help='a topic that may be missing',
+    )
+    parser.add_argument(
+        '--jobs', type=_positive, default=2, metavar='N', help='processes side by side (default 2)'
+    )
+    parser.add_argument(
+        '--quick', action='store_true', help='leave out the black boxes and the next experiment'
+    )
+    parser.add_argument(
+        '--dask',
+        metavar='ADDRESS',
+        help='explain several bags on the Dask cluster whose scheduler is there',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -39,8 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
     plant = load_plant(args.plant)
     sources = [
-        Sources(bag, plant, args.baseline, args.validate, tuple(args.without),
-                args.quick)
+        Sources(bag, plant, args.baseline, args.validate, tuple(args.without), args.quick)
         for bag in args.bags
     ]
     explain_bags(sources, args.out, jobs=args.jobs, dask_address=args.dask)

@@ -13,16 +13,30 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'identify',
         help='fit a hysteresis model to a recording',
         description='Fits a hysteresis model to each joint of a bag, or to each class of a data '
-        'set, and the feed-forward that goes with it. Prints JSON, or writes it to FILE.')
-    parser.add_argument('source', type=Path, metavar='BAG|DATASET',
-                        help='rosbag2 folder, .mcap, or data set of `endoscope dataset`')
+        'set, and the feed-forward that goes with it. Prints JSON, or writes it to FILE.',
+    )
+    parser.add_argument(
+        'source',
+        type=Path,
+        metavar='BAG|DATASET',
+        help='rosbag2 folder, .mcap, or data set of `endoscope dataset`',
+    )
     parser.add_argument('--model', choices=MODELS, required=True, help='the model')
     parser.add_argument('--out', type=Path, metavar='FILE', help='JSON file to write')
     parser.add_argument('--seed', type=int, default=0, help='of the search (0)')
-    parser.add_argument('--gear', type=float, default=0.5,
-                        help='motor shaft angle for one radian at the joint (0.5)')
-    parser.add_argument('--per-class', type=int, default=30, metavar='N',
-                        help='of a data set, use at most N recordings of each class (30)')
+    parser.add_argument(
+        '--gear',
+        type=float,
+        default=0.5,
+        help='motor shaft angle for one radian at the joint (0.5)',
+    )
+    parser.add_argument(
+        '--per-class',
+        type=int,
+        default=30,
+        metavar='N',
+        help='of a data set, use at most N recordings of each class (30)',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -51,9 +65,11 @@ def _of_dataset(args: argparse.Namespace) -> dict[str, object]:
     lead = FeedforwardSettings().lead
     found = identify_classes(dataset, lead, args.seed, args.per_class, _report)
     made = dataset.manifest
-    command = (f'endoscope dataset --seed {made["seed"]} --per-class {made["per_class"]} '
-               f'--out DATA && endoscope identify DATA --model {args.model} --seed {args.seed} '
-               f'--per-class {args.per_class}')
+    command = (
+        f'endoscope dataset --seed {made["seed"]} --per-class {made["per_class"]} '
+        f'--out DATA && endoscope identify DATA --model {args.model} --seed {args.seed} '
+        f'--per-class {args.per_class}'
+    )
     return class_parameter_sets(found, command, dataset.manifest_hash, lead)
 
 

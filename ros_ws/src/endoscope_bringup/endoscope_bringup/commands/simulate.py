@@ -7,17 +7,34 @@ from pathlib import Path
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `simulate`."""
     parser = subparsers.add_parser(
-        'simulate', help="write the plant's answer to the commands of a bag",
+        'simulate',
+        help="write the plant's answer to the commands of a bag",
         description="Writes the plant's answer to the commands of BAG: the same topics at the same "
-        'stamps, without noise unless --noise is given.')
-    parser.add_argument('--plant', type=Path, required=True, metavar='P.yaml',
-                        help='the plant, with its effects')
-    parser.add_argument('--commands', type=Path, required=True, metavar='BAG',
-                        help='rosbag2 folder or .mcap with motor/servo_jp or slave/servo_jp')
-    parser.add_argument('--out', type=Path, required=True, metavar='BAG2',
-                        help='where to write: a bare file if it ends in .mcap, else a folder')
-    parser.add_argument('--noise', type=int, metavar='SEED',
-                        help="add the sensors' noise and resolution, reproducibly")
+        'stamps, without noise unless --noise is given.',
+    )
+    parser.add_argument(
+        '--plant', type=Path, required=True, metavar='P.yaml', help='the plant, with its effects'
+    )
+    parser.add_argument(
+        '--commands',
+        type=Path,
+        required=True,
+        metavar='BAG',
+        help='rosbag2 folder or .mcap with motor/servo_jp or slave/servo_jp',
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        required=True,
+        metavar='BAG2',
+        help='where to write: a bare file if it ends in .mcap, else a folder',
+    )
+    parser.add_argument(
+        '--noise',
+        type=int,
+        metavar='SEED',
+        help="add the sensors' noise and resolution, reproducibly",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

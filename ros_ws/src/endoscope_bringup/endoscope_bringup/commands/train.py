@@ -10,14 +10,22 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'train',
         help='train the tension classifier',
         description='Cross-validates the 1D-CNN with held-out tube configurations, trains it on '
-        'all of DIR, and writes FILE and a JSON file of the same name that says how.')
-    parser.add_argument('--data', type=Path, required=True, metavar='DIR',
-                        help='data set of `endoscope dataset`')
-    parser.add_argument('--out', type=Path, required=True, metavar='FILE',
-                        help='weights to write, by custom with suffix .pt')
+        'all of DIR, and writes FILE and a JSON file of the same name that says how.',
+    )
+    parser.add_argument(
+        '--data', type=Path, required=True, metavar='DIR', help='data set of `endoscope dataset`'
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        required=True,
+        metavar='FILE',
+        help='weights to write, by custom with suffix .pt',
+    )
     parser.add_argument('--seed', type=int, default=0, help='of weights, batches and folds (0)')
-    parser.add_argument('--folds', type=int, default=5, metavar='K',
-                        help='of the cross-validation (5)')
+    parser.add_argument(
+        '--folds', type=int, default=5, metavar='K', help='of the cross-validation (5)'
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -32,9 +40,11 @@ def run(args: argparse.Namespace) -> int:
     validation = cross_validate(dataset, args.seed, args.folds, _print_line)
     network = train_network(dataset.tension, dataset.class_deg, args.seed)
     made = dataset.manifest
-    command = (f'endoscope dataset --seed {made["seed"]} --per-class {made["per_class"]} '
-               f'--out DATA && endoscope train --seed {args.seed} --folds {args.folds} '
-               f'--data DATA --out {out.name}')
+    command = (
+        f'endoscope dataset --seed {made["seed"]} --per-class {made["per_class"]} '
+        f'--out DATA && endoscope train --seed {args.seed} --folds {args.folds} '
+        f'--data DATA --out {out.name}'
+    )
     save_classifier(out, network, dataset, validation, command, args.seed)
     print(f'{out}: {100.0 * validation.mean_accuracy:.2f} % right on held-out tube configurations')
     return 0

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from datetime import UTC, datetime
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -101,12 +102,12 @@ def _run_tubes(
     By the wall clock they run one after the other: graphs that share two cores would be late.
     """
     here = int(os.environ.get('ROS_DOMAIN_ID', '0'))
-    settings = {'seed': seed, 'real_time': real_time, 'progress': progress}
+    procedure = partial(run_tube, folder=folder, seed=seed, real_time=real_time, progress=progress)
     if real_time or len(tubes) == 1:
-        return [run_tube(tube, folder, domain=here, **settings) for tube in tubes]
+        return [procedure(tube, domain=here) for tube in tubes]
     with ProcessPoolExecutor(len(tubes), mp_context=get_context('spawn')) as pool:
         runs = [
-            pool.submit(run_tube, tube, folder, domain=(here + n) % DOMAINS, **settings)
+            pool.submit(procedure, tube, domain=(here + n) % DOMAINS)
             for n, tube in enumerate(tubes)
         ]
         return [run.result() for run in runs]

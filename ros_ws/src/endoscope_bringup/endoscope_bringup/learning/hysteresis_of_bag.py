@@ -65,23 +65,30 @@ def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecord
         angle = driven[1] / scale
         found[joint] = HysteresisRecording(
             np.interp(grid, driven[0], angle) if measured else _servo(driven[0], angle, grid),
-            np.interp(grid, *bent), rested=False)
+            np.interp(grid, *bent),
+            rested=False,
+        )
     if not found:
         raise NoHysteresisError(
             f'{bag.path}: {motor.topic} ({", ".join(motor.names)}) and {bending.topic} '
-            f'({", ".join(bending.names)}) have no joint in common for a second')
+            f'({", ".join(bending.names)}) have no joint in common for a second'
+        )
     return found
 
 
 def _motor(bag: Recording, gear: float) -> tuple[JointStateSeries, float, bool]:
     """Best account of the motors, what its angles are to be divided by, whether it is measured."""
     for topic, scale, measured in (
-            (MOTOR, gear, True), (MOTOR_COMMAND, gear, False), (DESIRED, 1.0, False)):
+        (MOTOR, gear, True),
+        (MOTOR_COMMAND, gear, False),
+        (DESIRED, 1.0, False),
+    ):
         if bag.has(topic):
             return bag.joint_state(topic, finite=('position',)), scale, measured
     raise NoHysteresisError(
         f'{bag.path}: lacks {MOTOR}, {MOTOR_COMMAND} and {DESIRED}: it does not say what the '
-        'motors did')
+        'motors did'
+    )
 
 
 def _angle_over_time(series: JointStateSeries, joint: str, origin_ns: int) -> tuple[Array, Array]:

@@ -79,7 +79,8 @@ class TensionClassifier:
         for path in (weights, sidecar):
             if not path.is_file():
                 raise ClassifierError(
-                    f'{path} is missing: make classifier weights with `endoscope train`')
+                    f'{path} is missing: make classifier weights with `endoscope train`'
+                )
         try:
             description: dict[str, Any] = json.loads(sidecar.read_text(encoding='utf-8'))
             classes = tuple(int(c) for c in description['classes_deg'])
@@ -88,7 +89,8 @@ class TensionClassifier:
             network.load_state_dict(state)
         except UnpicklingError as error:
             raise ClassifierError(
-                f'{weights} holds no classifier weights: it is no PyTorch file') from error
+                f'{weights} holds no classifier weights: it is no PyTorch file'
+            ) from error
         except (OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
             reason = str(error).splitlines()[0]
             raise ClassifierError(f'{weights} holds no classifier weights: {reason}') from error
@@ -117,7 +119,8 @@ class TensionClassifier:
         if array.shape != (CALIBRATION_SAMPLES, WIRES):
             raise ClassifierError(
                 f'tensions of a calibration have shape ({CALIBRATION_SAMPLES}, {WIRES}), '
-                f'not {array.shape}')
+                f'not {array.shape}'
+            )
         if not np.all(np.isfinite(array)):
             raise ClassifierError('the tensions hold values that are not finite')
         with torch.inference_mode():

@@ -52,7 +52,9 @@ def as_input(tension: NDArray[np.float32]) -> Tensor:
 
 
 def train_network(
-    tension: NDArray[np.float32], class_deg: NDArray[np.int64], seed: int,
+    tension: NDArray[np.float32],
+    class_deg: NDArray[np.int64],
+    seed: int,
     settings: TrainingSettings | None = None,
 ) -> TensionCnn:
     """Train a network; the same seed on the same machine gives the same weights.
@@ -102,7 +104,10 @@ def predict(network: TensionCnn, tension: NDArray[np.float32]) -> NDArray[np.flo
 
 
 def cross_validate(
-    dataset: CalibrationDataset, seed: int, folds: int = 5, progress: Progress | None = None,
+    dataset: CalibrationDataset,
+    seed: int,
+    folds: int = 5,
+    progress: Progress | None = None,
     settings: TrainingSettings | None = None,
 ) -> CrossValidation:
     """Stratified k-fold cross-validation that keeps each tube configuration on one side.
@@ -118,7 +123,8 @@ def cross_validate(
     split = splitter.split(dataset.tension, dataset.class_deg, dataset.configuration)
     for k, (train, test) in enumerate(split):
         network = train_network(
-            dataset.tension[train], dataset.class_deg[train], seed + k, settings)
+            dataset.tension[train], dataset.class_deg[train], seed + k, settings
+        )
         named = np.argmax(predict(network, dataset.tension[test]), axis=1)
         true = np.searchsorted(CLASSES_DEG, dataset.class_deg[test])
         np.add.at(confusion, (true, named), 1)

@@ -31,8 +31,12 @@ def weights_path(path: str | Path) -> Path:
 
 
 def save_classifier(
-    path: str | Path, network: TensionCnn, dataset: CalibrationDataset,
-    validation: CrossValidation, command: str, seed: int,
+    path: str | Path,
+    network: TensionCnn,
+    dataset: CalibrationDataset,
+    validation: CrossValidation,
+    command: str,
+    seed: int,
 ) -> None:
     """Write ``path`` (state dict) and the JSON file of the same name beside it.
 

@@ -148,12 +148,15 @@ def feedforward_step(
     moved = foreseen - state.foreseen
     if parameters is None:
         hysteresis = bouc_wen_normalised_step(
-            state.hysteresis, moved, settings.resting_travel, 0.0, 1.0)
+            state.hysteresis, moved, settings.resting_travel, 0.0, 1.0
+        )
     else:
         hysteresis = bouc_wen_normalised_step(
-            state.hysteresis, moved, parameters.travel, parameters.rho, parameters.n)
+            state.hysteresis, moved, parameters.travel, parameters.rho, parameters.n
+        )
     worked_off = _limit(
-        state.offset * min(1.0, dt / settings.offset_time), settings.offset_rate * dt)
+        state.offset * min(1.0, dt / settings.offset_time), settings.offset_rate * dt
+    )
     offset = state.offset - worked_off
     wanted = compensated_angle(parameters if active else None, foreseen, hysteresis, desired)
     step = _limit(wanted + offset - state.command, settings.speed_limit * dt)
@@ -203,7 +206,8 @@ class BoucWenFeedforward:
         """
         if law.parameters and len(law.parameters) != self._joints:
             raise ValueError(
-                f'parameters for {len(law.parameters)} joints given, {self._joints} wanted')
+                f'parameters for {len(law.parameters)} joints given, {self._joints} wanted'
+            )
         self.law = law
         if self._states:
             self.rebase([state.command for state in self._states])
@@ -256,7 +260,8 @@ class BoucWenFeedforward:
         self._states = [
             feedforward_step(self._parameters(j), active, self.settings, state, angle, speed, dt)
             for j, (state, angle, speed) in enumerate(
-                zip(self._states, angles, speeds, strict=True))
+                zip(self._states, angles, speeds, strict=True)
+            )
         ]
         return np.array([state.command for state in self._states])
 

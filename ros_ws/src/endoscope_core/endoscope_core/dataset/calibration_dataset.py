@@ -90,7 +90,8 @@ def make_dataset(
     """
     if per_class < 1 or seed < 0:
         raise DatasetError(
-            f'per_class = {per_class} must be positive and seed = {seed} not negative')
+            f'per_class = {per_class} must be positive and seed = {seed} not negative'
+        )
     total = per_class * len(CLASSES_DEG)
     configurations: list[TubeConfiguration] = []
     recordings = []
@@ -128,7 +129,8 @@ def make_dataset(
                 'backlash_size': configuration.backlash_size,
                 'capstan_exponent': configuration.exponent,
                 'joints': {
-                    name: asdict(joint) for name, joint in configuration.plant.joints.items()},
+                    name: asdict(joint) for name, joint in configuration.plant.joints.items()
+                },
             }
             for k, configuration in enumerate(configurations)
         ],
@@ -168,7 +170,8 @@ def load_dataset(folder: str | Path) -> CalibrationDataset:
     for name in (MANIFEST_FILE, ARRAYS_FILE):
         if not (folder / name).is_file():
             raise DatasetError(
-                f'{folder} is no data set: it has no {name}; make one with `endoscope dataset`')
+                f'{folder} is no data set: it has no {name}; make one with `endoscope dataset`'
+            )
     try:
         manifest = json.loads((folder / MANIFEST_FILE).read_text(encoding='utf-8'))
         with np.load(folder / ARRAYS_FILE, allow_pickle=False) as stored:

@@ -65,8 +65,12 @@ def random_rig(generator: np.random.Generator) -> PlantDescription:
     joints = {}
     for name in JOINTS:
         changes = {
-            key: getattr(nominal, key) * (1.0 + spread * (
-                (1.0 - JOINT_SHARE) * common[key] + JOINT_SHARE * generator.uniform(-1.0, 1.0)))
+            key: getattr(nominal, key)
+            * (
+                1.0
+                + spread
+                * ((1.0 - JOINT_SHARE) * common[key] + JOINT_SHARE * generator.uniform(-1.0, 1.0))
+            )
             for key, spread in RELATIVE_SPREAD.items()
         }
         changes['pulley_radius'] = changes['joint_radius'] / nominal.gear

@@ -42,6 +42,7 @@ from endoscope_core.effects import (
     clock_skew,
     recording_gap,
 )
+
 # isort: on
 from endoscope_core.effects.definition import (
     CATALOGUE,

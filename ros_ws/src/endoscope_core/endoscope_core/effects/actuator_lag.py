@@ -13,8 +13,9 @@ DEFINITION = define(
     equation="u_f' = (u - u_f) / time_constant_s",
     source='Ogata, Modern Control Engineering, 5th ed. 2010, sec. 5-2',
     parameters=(
-        EffectParameter('time_constant_s', 's', 0.0, 1.0, 0.03, off=0.0, starts=(0.01, 0.06),
-                        comparable=True),
+        EffectParameter(
+            'time_constant_s', 's', 0.0, 1.0, 0.03, off=0.0, starts=(0.01, 0.06), comparable=True
+        ),
     ),
 )
 ON = DEFINITION.flag

@@ -10,12 +10,19 @@ DEFINITION = define(
     Stage.JOINT,
     physics='A periodic moment with a frequency of its own: the patient breathes.',
     equation='tau = moment_nm (sin a + second_harmonic cos 2a), '
-             'a = 2 pi frequency_hz t + phase_rad',
+    'a = 2 pi frequency_hz t + phase_rad',
     source='Lujan et al., Med. Phys. 26(5), 1999 (second_harmonic 0 for n = 1, +-0.25 for n = 2)',
     parameters=(
         EffectParameter('moment_nm', 'N m', 0.0, 0.1, 0.004, off=0.0, starts=(0.003,)),
-        EffectParameter('frequency_hz', 'Hz', 0.02, 5.0, 0.25,
-                        starts=(0.15, 0.2, 0.25, 0.3, 0.4, 0.6), comparable=True),
+        EffectParameter(
+            'frequency_hz',
+            'Hz',
+            0.02,
+            5.0,
+            0.25,
+            starts=(0.15, 0.2, 0.25, 0.3, 0.4, 0.6),
+            comparable=True,
+        ),
         EffectParameter('phase_rad', 'rad', -7.0, 7.0, 0.0, starts=(0.0, 1.6, 3.1, -1.6)),
         EffectParameter('second_harmonic', '-', -0.5, 0.5, 0.0),
     ),

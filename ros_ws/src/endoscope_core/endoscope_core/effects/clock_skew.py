@@ -9,7 +9,8 @@ DEFINITION = define(
     equation='stamp = start + (1 + skew) (t - start)',
     source='Moon, Skelly, Towsley, IEEE INFOCOM 1999',
     parameters=(
-        EffectParameter('skew', '-', -0.05, 0.05, 1e-3, off=0.0, starts=(-5e-4, 5e-4),
-                        comparable=True),
+        EffectParameter(
+            'skew', '-', -0.05, 0.05, 1e-3, off=0.0, starts=(-5e-4, 5e-4), comparable=True
+        ),
     ),
 )

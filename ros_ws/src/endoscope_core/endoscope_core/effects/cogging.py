@@ -11,13 +11,19 @@ DEFINITION = define(
     Stage.ACTUATOR,
     physics='Ripple between encoder and pulley that repeats with the shaft angle.',
     equation='pulley = shaft + amplitude_rad (sin(cycles_per_turn shaft + phase_rad) '
-             '- sin(phase_rad))',
+    '- sin(phase_rad))',
     source='Transmission error of gears: Munro, Proc. IMechE C 203, 1989; cogging: Proca et al., '
-           'IEEE Trans. Magn. 39(3), 2003',
+    'IEEE Trans. Magn. 39(3), 2003',
     parameters=(
         EffectParameter('amplitude_rad', 'rad', 0.0, 0.3, 0.03, off=0.0, starts=(0.02,)),
-        EffectParameter('cycles_per_turn', '-', 1.0, 64.0, 12.0,
-                        starts=(4.0, 7.0, 10.0, 13.0, 16.0, 20.0, 24.0, 30.0)),
+        EffectParameter(
+            'cycles_per_turn',
+            '-',
+            1.0,
+            64.0,
+            12.0,
+            starts=(4.0, 7.0, 10.0, 13.0, 16.0, 20.0, 24.0, 30.0),
+        ),
         EffectParameter('phase_rad', 'rad', -7.0, 7.0, 0.0, starts=(-1.6, 0.0, 1.6, 3.1)),
     ),
 )

@@ -11,8 +11,15 @@ DEFINITION = define(
     equation='phi(t) = phi for t < time_s, factor phi after',
     source='phi = mu Theta, Euler-Eytelwein: Kaneko et al., IEEE ICRA 1991',
     parameters=(
-        EffectParameter('time_s', 's', 0.0, 3600.0, 15.0,
-                        starts=(3.0, 8.0, 15.0, 22.0, 30.0, 40.0), comparable=True),
+        EffectParameter(
+            'time_s',
+            's',
+            0.0,
+            3600.0,
+            15.0,
+            starts=(3.0, 8.0, 15.0, 22.0, 30.0, 40.0),
+            comparable=True,
+        ),
         EffectParameter('factor', '-', 0.1, 8.0, 1.6, off=1.0, starts=(0.7, 1.4)),
     ),
 )

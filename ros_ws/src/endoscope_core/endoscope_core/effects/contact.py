@@ -10,8 +10,9 @@ DEFINITION = define(
     equation='tau = -side stiffness d (d / 0.2 rad)^(exponent - 1), d = side q - angle_rad > 0',
     source='Hunt, Crossley, J. Appl. Mech. 42, 1975, without damping',
     parameters=(
-        EffectParameter('angle_rad', 'rad', 0.0, 2.5, 0.5, off=2.5, starts=(0.25, 0.5, 0.8),
-                        comparable=True),
+        EffectParameter(
+            'angle_rad', 'rad', 0.0, 2.5, 0.5, off=2.5, starts=(0.25, 0.5, 0.8), comparable=True
+        ),
         EffectParameter('stiffness', 'N m/rad', 0.0, 1.0, 0.02, off=0.0, starts=(0.015,)),
         EffectParameter('exponent', '-', 1.0, 2.5, 1.0),
         EffectParameter('side', '-', -1.0, 1.0, 1.0, choices=(1.0, -1.0)),

@@ -7,15 +7,15 @@ DEFINITION = define(
     'cross_coupling',
     Stage.JOINT,
     physics='The other bending joint moves this one: through the elastic section, or because its '
-            "bending changes the length of this joint's wires.",
+    "bending changes the length of this joint's wires.",
     equation='tau = moment_per_rad q_other; stretch = r (m - q + wire_per_rad q_other)',
     source='Tsai, Robot Analysis, Wiley 1999, ch. 7 (tendon routing); Camarillo et al., IEEE '
-           'Trans. Robot. 24(6), 2008 (elastic coupling)',
+    'Trans. Robot. 24(6), 2008 (elastic coupling)',
     parameters=(
-        EffectParameter('moment_per_rad', 'N m/rad', -0.05, 0.05, 0.005, off=0.0,
-                        starts=(0.003, 0.0)),
-        EffectParameter('wire_per_rad', '-', -1.0, 1.0, 0.0, off=0.0,
-                        starts=(0.0, 0.05)),
+        EffectParameter(
+            'moment_per_rad', 'N m/rad', -0.05, 0.05, 0.005, off=0.0, starts=(0.003, 0.0)
+        ),
+        EffectParameter('wire_per_rad', '-', -1.0, 1.0, 0.0, off=0.0, starts=(0.0, 0.05)),
     ),
 )
 ON = DEFINITION.flag

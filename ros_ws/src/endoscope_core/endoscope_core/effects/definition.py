@@ -120,8 +120,14 @@ def define(
     if effect_id in CATALOGUE:
         raise ValueError(f'effect {effect_id} is defined twice')
     definition = EffectDefinition(
-        effect_id, stage, physics, equation, source, parameters,
-        flag=SLOTS.flag(), first_parameter=SLOTS.parameter_block(len(parameters)),
+        effect_id,
+        stage,
+        physics,
+        equation,
+        source,
+        parameters,
+        flag=SLOTS.flag(),
+        first_parameter=SLOTS.parameter_block(len(parameters)),
     )
     CATALOGUE[effect_id] = definition
     return definition

@@ -9,14 +9,12 @@ DEFINITION = define(
     'distributed_friction',
     Stage.TRANSMISSION,
     physics='Friction acts all along the sheath: motion reaches the joint only after the sliding '
-            'front has travelled through it.',
+    'front has travelled through it.',
     equation='8 nodes along each wire, T_i exp(-phi_i z_i / 2) = T_(i+1) exp(phi_i z_i / 2), '
-             'phi_i = share phi / 8, each with its own Dahl z_i; springs between them',
+    'phi_i = share phi / 8, each with its own Dahl z_i; springs between them',
     source='Kaneko et al., IEEE ICRA 1991; Palli, Borghesan, Melchiorri, IEEE Trans. Robot. '
-           '28(2), 2012 (lumped chain)',
-    parameters=(
-        EffectParameter('share', '-', 0.0, 1.0, 1.0, off=0.0, starts=(0.7,)),
-    ),
+    '28(2), 2012 (lumped chain)',
+    parameters=(EffectParameter('share', '-', 0.0, 1.0, 1.0, off=0.0, starts=(0.7,)),),
 )
 ON = DEFINITION.flag
 SHARE = DEFINITION.first_parameter

@@ -11,10 +11,18 @@ DEFINITION = define(
     equation='tau = moment_nm for t >= time_s',
     source='Step disturbance: De Luca, Mattone, IEEE ICRA 2005',
     parameters=(
-        EffectParameter('moment_nm', 'N m', -0.1, 0.1, 0.005, off=0.0, starts=(0.003,),
-                        comparable=True),
-        EffectParameter('time_s', 's', 0.0, 3600.0, 15.0,
-                        starts=(3.0, 8.0, 15.0, 22.0, 30.0, 40.0), comparable=True),
+        EffectParameter(
+            'moment_nm', 'N m', -0.1, 0.1, 0.005, off=0.0, starts=(0.003,), comparable=True
+        ),
+        EffectParameter(
+            'time_s',
+            's',
+            0.0,
+            3600.0,
+            15.0,
+            starts=(3.0, 8.0, 15.0, 22.0, 30.0, 40.0),
+            comparable=True,
+        ),
     ),
 )
 ON = DEFINITION.flag

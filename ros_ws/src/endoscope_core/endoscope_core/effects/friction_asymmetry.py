@@ -9,10 +9,8 @@ DEFINITION = define(
     physics='A wire is braked more when it is pulled than when it is released, or less.',
     equation='phi (1 + asymmetry) while pulled (z > 0), phi (1 - asymmetry) while released',
     source='Direction-dependent Coulomb friction: Armstrong-Helouvry, Control of Machines with '
-           'Friction, 1991, ch. 2',
-    parameters=(
-        EffectParameter('asymmetry', '-', -0.95, 0.95, 0.3, off=0.0, starts=(-0.2, 0.2)),
-    ),
+    'Friction, 1991, ch. 2',
+    parameters=(EffectParameter('asymmetry', '-', -0.95, 0.95, 0.3, off=0.0, starts=(-0.2, 0.2)),),
 )
 ON = DEFINITION.flag
 ASYMMETRY = DEFINITION.first_parameter

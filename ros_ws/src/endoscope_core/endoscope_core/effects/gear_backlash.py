@@ -11,10 +11,11 @@ DEFINITION = define(
     physics='Play between encoder and pulley; the measured shaft is before it.',
     equation='pulley = play(shaft, gap_rad): moves only once the shaft has crossed the gap',
     source='Tao, Kokotovic, Adaptive Control of Systems with Actuator and Sensor '
-           'Nonlinearities, Wiley 1996, ch. 2',
+    'Nonlinearities, Wiley 1996, ch. 2',
     parameters=(
-        EffectParameter('gap_rad', 'rad', 0.0, 1.0, 0.1, off=0.0, starts=(0.05, 0.15),
-                        comparable=True),
+        EffectParameter(
+            'gap_rad', 'rad', 0.0, 1.0, 0.1, off=0.0, starts=(0.05, 0.15), comparable=True
+        ),
     ),
 )
 ON = DEFINITION.flag

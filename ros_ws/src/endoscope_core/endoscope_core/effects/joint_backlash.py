@@ -10,11 +10,12 @@ DEFINITION = define(
     Stage.JOINT,
     physics='Play between the end of the wires and the tip.',
     equation='tip = play(q, gap_rad); with loaded_tip, stiffness and friction act on the tip and '
-             'the wire end is free within the gap',
+    'the wire end is free within the gap',
     source='Nordin, Gutman, Automatica 38(10), 2002: hysteresis and dead-zone models of backlash',
     parameters=(
-        EffectParameter('gap_rad', 'rad', 0.0, 1.5, 0.12, off=0.0, starts=(0.08, 0.2),
-                        comparable=True),
+        EffectParameter(
+            'gap_rad', 'rad', 0.0, 1.5, 0.12, off=0.0, starts=(0.08, 0.2), comparable=True
+        ),
         EffectParameter('loaded_tip', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
 )

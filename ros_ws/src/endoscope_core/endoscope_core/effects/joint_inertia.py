@@ -12,8 +12,7 @@ DEFINITION = define(
     equation="inertia_kg_m2 q'' + c q' = r (Ta_distal - Tb_distal) - K q - tau_f zj",
     source='Spong, Hutchinson, Vidyasagar, Robot Modeling and Control, 2006, sec. 7.3',
     parameters=(
-        EffectParameter('inertia_kg_m2', 'kg m^2', 0.0, 2e-3, 5e-5, off=0.0,
-                        starts=(5e-6, 5e-5)),
+        EffectParameter('inertia_kg_m2', 'kg m^2', 0.0, 2e-3, 5e-5, off=0.0, starts=(5e-6, 5e-5)),
     ),
 )
 ON = DEFINITION.flag
@@ -22,7 +21,11 @@ INERTIA = DEFINITION.first_parameter
 
 @compiled
 def speeds(
-    parameters: Array, speed: float, settled_speed: float, resistance: float, duration: float,
+    parameters: Array,
+    speed: float,
+    settled_speed: float,
+    resistance: float,
+    duration: float,
 ) -> tuple[float, float]:
     """Mean speed over a step and speed at its end, with inertia.
 

@@ -10,8 +10,9 @@ DEFINITION = define(
     equation='tau = -stiffness (|q| - angle_rad) sgn q where |q| > angle_rad',
     source='Kelvin-Voigt unilateral constraint: Gilardi, Sharf, Mech. Mach. Theory 37, 2002',
     parameters=(
-        EffectParameter('angle_rad', 'rad', 0.05, 2.5, 0.6, off=2.5, starts=(0.4, 0.6, 0.8),
-                        comparable=True),
+        EffectParameter(
+            'angle_rad', 'rad', 0.05, 2.5, 0.6, off=2.5, starts=(0.4, 0.6, 0.8), comparable=True
+        ),
         EffectParameter('stiffness', 'N m/rad', 0.005, 2.0, 0.2, starts=(0.1,)),
     ),
 )

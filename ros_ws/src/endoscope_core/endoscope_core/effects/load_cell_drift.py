@@ -10,8 +10,9 @@ DEFINITION = define(
     equation='reading of cell `wire` = T + rate_n_per_s t',
     source='VDI/VDE 2638, characteristics of force transducers (zero drift)',
     parameters=(
-        EffectParameter('rate_n_per_s', 'N/s', -1.0, 1.0, 0.05, off=0.0, starts=(0.02,),
-                        comparable=True),
+        EffectParameter(
+            'rate_n_per_s', 'N/s', -1.0, 1.0, 0.05, off=0.0, starts=(0.02,), comparable=True
+        ),
         EffectParameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
 )

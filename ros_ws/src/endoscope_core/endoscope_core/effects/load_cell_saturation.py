@@ -10,8 +10,9 @@ DEFINITION = define(
     equation='reading of cell `wire` = min(T, limit_n)',
     source='VDI/VDE 2638, characteristics of force transducers (overload)',
     parameters=(
-        EffectParameter('limit_n', 'N', 0.1, 500.0, 10.0, off=500.0, starts=(6.0, 10.0),
-                        comparable=True),
+        EffectParameter(
+            'limit_n', 'N', 0.1, 500.0, 10.0, off=500.0, starts=(6.0, 10.0), comparable=True
+        ),
         EffectParameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
 )

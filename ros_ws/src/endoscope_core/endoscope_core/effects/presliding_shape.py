@@ -13,11 +13,11 @@ DEFINITION = define(
     'presliding_shape',
     Stage.TRANSMISSION,
     physics='Friction builds up with displacement sharper or softer than exponentially, or with '
-            'memory of inner loops.',
-    equation="z = (1 - memory) d + memory mean_j clip(x / (xs g_j)); "
-             "d' = (v / xs) |1 - d sgn v|^exponent",
+    'memory of inner loops.',
+    equation='z = (1 - memory) d + memory mean_j clip(x / (xs g_j)); '
+    "d' = (v / xs) |1 - d sgn v|^exponent",
     source='Dahl, AIAA J. 14(12), 1976 (exponent); Al-Bender, Lampaert, Swevers, IEEE Trans. '
-           'Autom. Control 50(11), 2005 (generalised Maxwell-slip)',
+    'Autom. Control 50(11), 2005 (generalised Maxwell-slip)',
     parameters=(
         EffectParameter('exponent', '-', 0.1, 4.0, 1.8, off=1.0, starts=(0.5, 2.0)),
         EffectParameter('memory', '-', 0.0, 1.0, 0.0, off=0.0, starts=(0.1, 0.7)),
@@ -80,7 +80,7 @@ def slid(state: Array, parameters: Array, place: int, ratio: float) -> float:
 @compiled
 def _rest_after(rest: float, size: float, excess: float) -> float:
     """Exact solution of rest' = -rest^(1 + excess) after a displacement of `size`."""
-    rate = size * rest ** excess
+    rate = size * rest**excess
     argument = excess * rate
     if argument <= -1.0:
         return 0.0

@@ -10,8 +10,9 @@ DEFINITION = define(
     equation='T0(t) = max(0, T0 - rate_n_per_s t)',
     source='Relaxation of tendon pretension: Palli et al., IEEE/ASME Trans. Mechatron. 17(6), 2012',
     parameters=(
-        EffectParameter('rate_n_per_s', 'N/s', -1.0, 1.0, 0.04, off=0.0, starts=(0.03,),
-                        comparable=True),
+        EffectParameter(
+            'rate_n_per_s', 'N/s', -1.0, 1.0, 0.04, off=0.0, starts=(0.03,), comparable=True
+        ),
     ),
 )
 ON = DEFINITION.flag

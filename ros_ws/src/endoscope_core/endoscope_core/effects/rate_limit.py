@@ -10,10 +10,18 @@ DEFINITION = define(
     physics="The servo's speed saturates.",
     equation="m'' = 2 zeta wm (sat(wm (u - m) / (2 zeta), limit / gear) - m')",
     source='Position loop around a saturated speed loop: Ellis, Control System Design Guide, '
-           '4th ed. 2012, ch. 17',
+    '4th ed. 2012, ch. 17',
     parameters=(
-        EffectParameter('limit_rad_per_s', 'rad/s', 0.02, 200.0, 0.6, off=200.0,
-                        starts=(0.3, 0.7, 1.5), comparable=True),
+        EffectParameter(
+            'limit_rad_per_s',
+            'rad/s',
+            0.02,
+            200.0,
+            0.6,
+            off=200.0,
+            starts=(0.3, 0.7, 1.5),
+            comparable=True,
+        ),
     ),
 )
 ON = DEFINITION.flag
@@ -22,7 +30,10 @@ LIMIT = DEFINITION.first_parameter
 
 @compiled
 def limited_error(
-    parameters: Array, error: float, speed_from_error: float, speed_kept: float,
+    parameters: Array,
+    error: float,
+    speed_from_error: float,
+    speed_kept: float,
 ) -> float:
     """Servo's error in rad, joint-equivalent, cut where its speed would settle above the limit.
 

@@ -11,11 +11,11 @@ DEFINITION = define(
     'stribeck_friction',
     Stage.TRANSMISSION,
     physics='Sheath friction is higher at low sliding speed; where it falls so steeply that the '
-            'wire cannot slide smoothly, the wire shudders.',
+    'wire cannot slide smoothly, the wire shudders.',
     equation="z' = (v - s z / g) / xs, g = 1 + rise exp(-s_g / stribeck_speed); s, s_g: mean "
-             'speeds of a wire that shudders at the speed of neutral stability, else |v|',
+    'speeds of a wire that shudders at the speed of neutral stability, else |v|',
     source='LuGre: Canudas de Wit et al., IEEE Trans. Autom. Control 40(3), 1995; averaged over '
-           'fast shudder as in Iannelli et al., Automatica 42(4), 2006',
+    'fast shudder as in Iannelli et al., Automatica 42(4), 2006',
     parameters=(
         EffectParameter('rise', '-', 0.0, 3.0, 0.5, off=0.0, starts=(0.4,)),
         EffectParameter('stribeck_speed', 'm/s', 1e-5, 2e-2, 1e-3, starts=(3e-4, 2e-3)),

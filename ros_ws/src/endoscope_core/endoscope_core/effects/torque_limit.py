@@ -11,8 +11,9 @@ DEFINITION = define(
     equation='|pulley_radius (Ta_proximal - Tb_proximal)| <= limit_nm; the motor yields there',
     source='Ideal torque source with saturation: Siciliano et al., Robotics, 2009, sec. 5.2',
     parameters=(
-        EffectParameter('limit_nm', 'N m', 1e-3, 10.0, 0.055, off=10.0,
-                        starts=(0.03, 0.045, 0.055)),
+        EffectParameter(
+            'limit_nm', 'N m', 1e-3, 10.0, 0.055, off=10.0, starts=(0.03, 0.045, 0.055)
+        ),
     ),
 )
 ON = DEFINITION.flag
@@ -20,9 +21,7 @@ LIMIT = DEFINITION.first_parameter
 
 
 @compiled
-def yielding(
-    parameters: Array, step: float, loads: tuple[float, float, float, float]
-) -> float:
+def yielding(parameters: Array, step: float, loads: tuple[float, float, float, float]) -> float:
     """Step of the motor in rad, joint-equivalent, cut where its load reaches the limit.
 
     `loads` are the tensions of both wires in N before the step, and the slope of their torque in

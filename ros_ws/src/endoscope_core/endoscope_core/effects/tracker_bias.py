@@ -10,8 +10,9 @@ DEFINITION = define(
     equation='reading = q + bias_rad',
     source='Franz et al., IEEE Trans. Med. Imaging 33(8), 2014 (static error)',
     parameters=(
-        EffectParameter('bias_rad', 'rad', -1.0, 1.0, 0.05, off=0.0, starts=(0.02,),
-                        comparable=True),
+        EffectParameter(
+            'bias_rad', 'rad', -1.0, 1.0, 0.05, off=0.0, starts=(0.02,), comparable=True
+        ),
     ),
 )
 ON = DEFINITION.flag

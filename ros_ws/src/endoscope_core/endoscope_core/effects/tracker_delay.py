@@ -11,8 +11,9 @@ DEFINITION = define(
     equation='reading(t) = q(t - delay_s)',
     source='Franz et al., IEEE Trans. Med. Imaging 33(8), 2014 (latency)',
     parameters=(
-        EffectParameter('delay_s', 's', 0.0, 0.5, 0.04, off=0.0, starts=(0.02, 0.06),
-                        comparable=True),
+        EffectParameter(
+            'delay_s', 's', 0.0, 0.5, 0.04, off=0.0, starts=(0.02, 0.06), comparable=True
+        ),
     ),
 )
 ON = DEFINITION.flag

@@ -7,7 +7,7 @@ DEFINITION = define(
     'tracker_distortion',
     Stage.SENSING,
     physics="Metal nearby distorts the field: the tracker's angle is a nonlinear function of the "
-            'true one.',
+    'true one.',
     equation='reading = q + linear q + quadratic q^2 + cubic q^3',
     source='Kindratenko, Virtual Reality 5, 2000 (polynomial distortion models)',
     parameters=(

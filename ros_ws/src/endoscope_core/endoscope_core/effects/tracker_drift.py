@@ -10,8 +10,9 @@ DEFINITION = define(
     equation='reading = q + rate_rad_per_s t',
     source='Franz et al., IEEE Trans. Med. Imaging 33(8), 2014 (drift)',
     parameters=(
-        EffectParameter('rate_rad_per_s', 'rad/s', -0.1, 0.1, 0.003, off=0.0, starts=(0.001,),
-                        comparable=True),
+        EffectParameter(
+            'rate_rad_per_s', 'rad/s', -0.1, 0.1, 0.003, off=0.0, starts=(0.001,), comparable=True
+        ),
     ),
 )
 ON = DEFINITION.flag

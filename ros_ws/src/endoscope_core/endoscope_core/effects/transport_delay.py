@@ -11,8 +11,9 @@ DEFINITION = define(
     equation='u_servo(t) = u(t - delay_s)',
     source='Normey-Rico, Camacho, Control of Dead-time Processes, Springer 2007, ch. 2',
     parameters=(
-        EffectParameter('delay_s', 's', 0.0, 0.5, 0.02, off=0.0, starts=(0.005, 0.03),
-                        comparable=True),
+        EffectParameter(
+            'delay_s', 's', 0.0, 0.5, 0.02, off=0.0, starts=(0.005, 0.03), comparable=True
+        ),
     ),
 )
 ON = DEFINITION.flag
@@ -21,7 +22,12 @@ DELAY = DEFINITION.first_parameter
 
 @compiled
 def delayed_command(
-    state: Array, parameters: Array, history: Array, fraction: float, width: float, tick: float,
+    state: Array,
+    parameters: Array,
+    history: Array,
+    fraction: float,
+    width: float,
+    tick: float,
 ) -> float:
     """Mean of the delayed, held command over one substep.
 

@@ -9,7 +9,7 @@ DEFINITION = define(
     physics='The sheath brakes the wires in proportion to their sliding speed.',
     equation='T_proximal,distal = T exp(+-(phi z + load_factor v) / 2) +- coefficient v / 2',
     source='Olsson et al., Eur. J. Control 4(3), 1998, eq. 2 (film); Do et al., '
-           'Mechatronics 24, 2014 (friction coefficient growing with speed)',
+    'Mechatronics 24, 2014 (friction coefficient growing with speed)',
     parameters=(
         EffectParameter('coefficient', 'N s/m', 0.0, 5000.0, 200.0, off=0.0, starts=(100.0,)),
         EffectParameter('load_factor', 's/m', 0.0, 500.0, 0.0, off=0.0, starts=(1.0,)),

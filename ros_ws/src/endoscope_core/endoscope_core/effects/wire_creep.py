@@ -12,7 +12,7 @@ DEFINITION = define(
     physics='Wire and sheath are viscoelastic: the stretch goes on under load.',
     equation="T = T0 + k (s - c); time_constant_s c' = compliance_ratio (T - T0) / k - c",
     source='Standard linear solid (Kelvin-Voigt element in series): Findley, Lai, Onaran, '
-           'Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976, ch. 5',
+    'Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976, ch. 5',
     parameters=(
         EffectParameter('compliance_ratio', '-', 0.0, 5.0, 0.3, off=0.0, starts=(0.2,)),
         EffectParameter('time_constant_s', 's', 0.02, 60.0, 2.0, starts=(0.3, 1.5, 8.0)),

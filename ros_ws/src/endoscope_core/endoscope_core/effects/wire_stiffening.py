@@ -31,8 +31,12 @@ def linear_equivalent(parameters: Array, stretch: float) -> tuple[float, float]:
     exponent = rate * stretch
     if exponent > LARGEST_EXPONENT:
         slope = math.exp(LARGEST_EXPONENT)
-        return (math.expm1(LARGEST_EXPONENT) / rate + slope * (stretch - LARGEST_EXPONENT / rate)
-                + cubic * stretch, slope + 3.0 * cubic)
+        return (
+            math.expm1(LARGEST_EXPONENT) / rate
+            + slope * (stretch - LARGEST_EXPONENT / rate)
+            + cubic * stretch,
+            slope + 3.0 * cubic,
+        )
     if abs(exponent) < 1e-6:
         return stretch * (1.0 + 0.5 * exponent + cubic), 1.0 + exponent + 3.0 * cubic
     grown = math.expm1(exponent)

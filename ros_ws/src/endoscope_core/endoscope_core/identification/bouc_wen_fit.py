@@ -113,10 +113,12 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0) -> ModelFit:
     bounds = [(np.log(SHORTEST_TRAVEL), np.log(LONGEST_TRAVEL)), RHO_BOUNDS, EXPONENT_BOUNDS]
     bounds += [(-1.0, 1.0)] * len(starts)
     found = differential_evolution(
-        cost, bounds, rng=np.random.default_rng(seed), popsize=8, maxiter=60, tol=1e-5)
+        cost, bounds, rng=np.random.default_rng(seed), popsize=8, maxiter=60, tol=1e-5
+    )
     alpha, lag, mean_square = _linear_part(recordings, states(found.x))
     parameters = BoucWenParameters.from_shape(
-        alpha, lag, float(np.exp(found.x[0])), float(found.x[1]), float(found.x[2]))
+        alpha, lag, float(np.exp(found.x[0])), float(found.x[1]), float(found.x[2])
+    )
     return ModelFit(parameters, float(np.sqrt(mean_square)), int(found.nfev))
 
 
@@ -151,10 +153,12 @@ def _check(recordings: Sequence[Recording]) -> None:
             if len(values) < 100 or not np.all(np.isfinite(values)):
                 raise IdentificationError(
                     f'recording {k}: the {name} angle has {len(values)} samples, of which all must '
-                    'be finite and at least 100 there')
+                    'be finite and at least 100 there'
+                )
             if np.ptp(values) < _SMALLEST_MOTION:
                 raise IdentificationError(
                     f'recording {k}: the {name} angle moves by less than 1 deg, which shows no '
-                    'hysteresis; record a calibration or commissioning motion')
+                    'hysteresis; record a calibration or commissioning motion'
+                )
         if len(recording.driver) != len(recording.actual):
             raise IdentificationError(f'recording {k}: motor and bending differ in length')

@@ -35,7 +35,10 @@ class ClassIdentification:
 
 
 def identify_classes(
-    dataset: CalibrationDataset, lead: float, seed: int = 0, recordings_per_class: int = 30,
+    dataset: CalibrationDataset,
+    lead: float,
+    seed: int = 0,
+    recordings_per_class: int = 30,
     progress: Callable[[str], None] | None = None,
 ) -> list[ClassIdentification]:
     """Model and feed-forward of every class, from all its recordings and both joints at once.
@@ -60,15 +63,18 @@ def identify_classes(
         actual = dataset.actual_angle[chosen, ::_SAMPLE_STEP].astype(float)
         recordings = [
             Recording(motor, actual[k, :, j])
-            for k in range(len(chosen)) for j in range(actual.shape[2])
+            for k in range(len(chosen))
+            for j in range(actual.shape[2])
         ]
         model = fit_model(recordings, seed)
         feedforward = fit_feedforward(model.parameters, servo, lead, seed)
         found.append(ClassIdentification(class_deg, model, feedforward))
         if progress is not None:
             left = 100.0 * feedforward.rmse / feedforward.uncompensated_rmse
-            progress(f'class {class_deg}: model {np.rad2deg(model.rmse):.2f} deg rms, '
-                     f'feed-forward leaves {left:.0f} % on it')
+            progress(
+                f'class {class_deg}: model {np.rad2deg(model.rmse):.2f} deg rms, '
+                f'feed-forward leaves {left:.0f} % on it'
+            )
     return found
 
 
@@ -111,7 +117,8 @@ def load_class_parameters(path: str | Path | None = None) -> dict[int, BoucWenPa
     path = Path(path)
     if not path.is_file():
         raise ClassParameterError(
-            f'{path} is missing: make parameter sets with `endoscope identify`')
+            f'{path} is missing: make parameter sets with `endoscope identify`'
+        )
     try:
         content: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
         return {

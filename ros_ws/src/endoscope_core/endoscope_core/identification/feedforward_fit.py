@@ -79,10 +79,17 @@ def fit_feedforward(
     reach = min(2.5 * model.lag + 0.2, GREATEST_LAG)
     bounds = [(0.7 * model.alpha, 1.4 * model.alpha), (0.01, reach), (1.0, 4.0)]
     found = differential_evolution(
-        lambda x: error(_candidate(x)), bounds, rng=np.random.default_rng(seed), popsize=6,
-        maxiter=30, tol=1e-4, polish=False)
+        lambda x: error(_candidate(x)),
+        bounds,
+        rng=np.random.default_rng(seed),
+        popsize=6,
+        maxiter=30,
+        tol=1e-4,
+        polish=False,
+    )
     return FeedforwardFit(
-        _candidate(found.x), float(np.sqrt(found.fun)), float(np.sqrt(error(None))))
+        _candidate(found.x), float(np.sqrt(found.fun)), float(np.sqrt(error(None)))
+    )
 
 
 def _candidate(x: Array) -> BoucWenParameters:

@@ -14,7 +14,9 @@ from endoscope_core.effects import (
 
 @compiled
 def servo_transition(
-    bandwidth: float, damping_ratio: float, step: float,
+    bandwidth: float,
+    damping_ratio: float,
+    step: float,
 ) -> tuple[float, float, float, float]:
     """Exact transition of the servo over `step` s: rows of the matrix on (m - u, m')."""
     sigma = damping_ratio * bandwidth
@@ -28,13 +30,23 @@ def servo_transition(
         c, s = math.cosh(w * step), math.sinh(w * step) / w
     else:
         c, s = 1.0, step
-    return (decay * (c + sigma * s), decay * s,
-            -decay * bandwidth * bandwidth * s, decay * (c - sigma * s))
+    return (
+        decay * (c + sigma * s),
+        decay * s,
+        -decay * bandwidth * bandwidth * s,
+        decay * (c - sigma * s),
+    )
 
 
 @compiled
 def servo_command(
-    state: Array, history: Array, p: Array, on: Flags, u: float, fraction: float, width: float,
+    state: Array,
+    history: Array,
+    p: Array,
+    on: Flags,
+    u: float,
+    fraction: float,
+    width: float,
     tick: float,
 ) -> float:
     """Mean command that reaches the servo in a substep from `fraction`, `width` ticks long."""
@@ -48,7 +60,11 @@ def servo_command(
 
 @compiled
 def servo_step(
-    p: Array, on: Flags, transition: tuple[float, float, float, float], m: float, dm: float,
+    p: Array,
+    on: Flags,
+    transition: tuple[float, float, float, float],
+    m: float,
+    dm: float,
     command: float,
 ) -> tuple[float, float]:
     """Motor angle and speed after a substep with `command` held."""

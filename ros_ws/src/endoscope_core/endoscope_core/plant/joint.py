@@ -15,7 +15,12 @@ from endoscope_core.plant.inputs import IN_OTHER_JOINT, IN_PUSH_MOMENT
 
 @compiled
 def load(
-    p: Array, on: Flags, x: Array, q: float, time: float, tick: float,
+    p: Array,
+    on: Flags,
+    x: Array,
+    q: float,
+    time: float,
+    tick: float,
 ) -> tuple[float, float]:
     """Moment in N m of all but wires, friction and damping, and minus its slope by the angle."""
     moment = x[IN_PUSH_MOMENT] - p[JOINT_STIFFNESS] * q

@@ -85,16 +85,36 @@ from endoscope_core.plant.transmission import (
 )
 
 __all__ = [
-    'INPUTS', 'IN_COMMAND', 'IN_MOTOR', 'IN_OTHER_JOINT', 'IN_PUSH_COMMAND', 'IN_PUSH_MOMENT',
-    'IN_PUSH_STRETCH', 'OUTPUTS', 'OUT_BENDING', 'OUT_EFFORT', 'OUT_JOINT', 'OUT_MOTOR',
-    'OUT_MOTOR_SPEED', 'OUT_TENSION_A', 'OUT_TENSION_B', 'advance_tick', 'read_sensors',
+    'INPUTS',
+    'IN_COMMAND',
+    'IN_MOTOR',
+    'IN_OTHER_JOINT',
+    'IN_PUSH_COMMAND',
+    'IN_PUSH_MOMENT',
+    'IN_PUSH_STRETCH',
+    'OUTPUTS',
+    'OUT_BENDING',
+    'OUT_EFFORT',
+    'OUT_JOINT',
+    'OUT_MOTOR',
+    'OUT_MOTOR_SPEED',
+    'OUT_TENSION_A',
+    'OUT_TENSION_B',
+    'advance_tick',
+    'read_sensors',
     'run_joints',
 ]
 
 
 @compiled
 def advance_tick(
-    state: Array, history: Array, p: Array, on: Flags, u: float, x: Array, tick: float,
+    state: Array,
+    history: Array,
+    p: Array,
+    on: Flags,
+    u: float,
+    x: Array,
+    tick: float,
     substeps: int,
 ) -> None:
     """Advance one joint by one tick with the input row `x` and command `u` in force.
@@ -161,7 +181,8 @@ def advance_tick(
         stretch = r * (0.5 * (pulley + pulley_new) - wire_end) + shift
         if chained:
             ta, tb, ka, kb = sheath_chain.distal_tensions(
-                state, p, on, pretension, shift, phi, ceiling, wire_step)
+                state, p, on, pretension, shift, phi, ceiling, wire_step
+            )
             phi *= 1.0 - p[distributed_friction.SHARE]
         else:
             ca, cb = state[wire_creep.CREEP_A], state[wire_creep.CREEP_B]
@@ -189,7 +210,8 @@ def advance_tick(
         offset = 0.0
         if loaded_tip:
             offset, pull, touching = joint_backlash.through_gap(
-                p, wire_end - q, pull, pull_slope + drag / dt)
+                p, wire_end - q, pull, pull_slope + drag / dt
+            )
             pull_slope *= touching
             drag *= touching
 
@@ -233,14 +255,22 @@ def advance_tick(
     end = state[TICKS] * tick
     phi = friction_exponent(state, p, on, end, tick)
     loads = proximal_tensions(
-        state, p, on, pretension_now(p, on, end), phi, v, r * (pulley - wire_end) + shift, shift)
+        state, p, on, pretension_now(p, on, end), phi, v, r * (pulley - wire_end) + shift, shift
+    )
     state[TENSION_A], state[TENSION_B] = loads[0], loads[1]
 
 
 @compiled
 def run_joints(
-    states: Array, histories: Array, p: Array, on: Flags, inputs: Array, coupled: bool,
-    tick: float, substeps: int, out: Array,
+    states: Array,
+    histories: Array,
+    p: Array,
+    on: Flags,
+    inputs: Array,
+    coupled: bool,
+    tick: float,
+    substeps: int,
+    out: Array,
 ) -> None:
     """Run all joints side by side over a whole input.
 

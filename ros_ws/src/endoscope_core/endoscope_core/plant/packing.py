@@ -26,16 +26,20 @@ def effect_values(spec: EffectSpec) -> NDArray[np.float64]:
     for name in spec.parameters:
         if name not in names:
             raise UnknownEffectError(
-                f'effect {spec.id} has no parameter {name}: {nearest(name, names)}')
-    values = np.array([
-        float(spec.parameters.get(parameter.name, parameter.typical))
-        for parameter in definition.parameters
-    ])
+                f'effect {spec.id} has no parameter {name}: {nearest(name, names)}'
+            )
+    values = np.array(
+        [
+            float(spec.parameters.get(parameter.name, parameter.typical))
+            for parameter in definition.parameters
+        ]
+    )
     for parameter, value in zip(definition.parameters, values, strict=True):
         if not math.isfinite(value) or not parameter.low <= value <= parameter.high:
             raise ValueError(
                 f'effect {spec.id}: {parameter.name} is {value:g}, it must be between '
-                f'{parameter.low:g} and {parameter.high:g} {parameter.unit}')
+                f'{parameter.low:g} and {parameter.high:g} {parameter.unit}'
+            )
     return values
 
 
@@ -61,14 +65,15 @@ def pack(plant: PlantDescription) -> tuple[NDArray[np.float64], NDArray[np.bool_
     flags = np.zeros((len(names), SLOTS.flags), dtype=np.bool_)
     for row, joint in zip(parameters, plant.joints.values(), strict=True):
         nominal = astuple(joint)
-        row[:len(nominal)] = nominal
+        row[: len(nominal)] = nominal
         for definition in CATALOGUE.values():
             for i, parameter in enumerate(definition.parameters):
                 row[definition.first_parameter + i] = parameter.typical
     for spec in plant.effects:
         if spec.joint not in names:
             raise UnknownEffectError(
-                f'effect {spec.id} is on joint {spec.joint}: {nearest(spec.joint, names)}')
+                f'effect {spec.id} is on joint {spec.joint}: {nearest(spec.joint, names)}'
+            )
         j = names.index(spec.joint)
         values = effect_values(spec)
         definition = CATALOGUE[spec.id]
@@ -76,7 +81,7 @@ def pack(plant: PlantDescription) -> tuple[NDArray[np.float64], NDArray[np.bool_
             raise ValueError(f'effect {spec.id} is given twice on joint {spec.joint}')
         flags[j, definition.flag] = True
         first = definition.first_parameter
-        parameters[j, first:first + len(values)] = values
+        parameters[j, first : first + len(values)] = values
     return parameters, flags
 
 

@@ -6,7 +6,13 @@ from endoscope_core.effects import dahl, presliding_shape
 
 @compiled
 def steepness(
-    state: Array, p: Array, on: Flags, place: int, slide: float, speed: float, ceiling: float,
+    state: Array,
+    p: Array,
+    on: Flags,
+    place: int,
+    slide: float,
+    speed: float,
+    ceiling: float,
     shudder: float,
 ) -> float:
     """Growth of a friction state by displacement in pre-sliding distances, in a speed's way."""
@@ -20,7 +26,13 @@ def steepness(
 
 @compiled
 def slid(
-    state: Array, p: Array, on: Flags, place: int, slide: float, ratio: float, ceiling: float,
+    state: Array,
+    p: Array,
+    on: Flags,
+    place: int,
+    slide: float,
+    ratio: float,
+    ceiling: float,
     shake: float,
 ) -> float:
     """Friction state after sliding `ratio` pre-sliding distances (signed), towards +-`ceiling`."""

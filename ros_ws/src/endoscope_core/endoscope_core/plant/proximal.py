@@ -32,8 +32,14 @@ def stretch_shift(p: Array, on: Flags, x: Array) -> float:
 
 @compiled
 def proximal_tensions(
-    state: Array, p: Array, on: Flags, pretension: float, phi: float, speed: float,
-    stretch: float, shift: float,
+    state: Array,
+    p: Array,
+    on: Flags,
+    pretension: float,
+    phi: float,
+    speed: float,
+    stretch: float,
+    shift: float,
 ) -> tuple[float, float, float, float]:
     """Tensions in N at the motor, and the slopes of their torque by the motor's angle.
 
@@ -59,9 +65,11 @@ def proximal_tensions(
     ca, cb = state[wire_creep.CREEP_A], state[wire_creep.CREEP_B]
     if is_distributed(p, on):
         ta, ka = spring_tension(
-            state, distributed_friction.WIRE_A, p, on, pretension, shift - ca, 0)
+            state, distributed_friction.WIRE_A, p, on, pretension, shift - ca, 0
+        )
         tb, kb = spring_tension(
-            state, distributed_friction.WIRE_B, p, on, pretension, -shift - cb, 0)
+            state, distributed_friction.WIRE_B, p, on, pretension, -shift - cb, 0
+        )
         phi *= 1.0 - p[distributed_friction.SHARE]
     else:
         ta, ka = wire_tension(p, on, pretension, stretch - ca)

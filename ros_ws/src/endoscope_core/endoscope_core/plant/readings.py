@@ -57,7 +57,12 @@ def is_cell(p: Array, choice: int, cell: int) -> bool:
 
 @compiled
 def load_cell_reading(
-    p: Array, on: Flags, cell: int, tension: float, neighbour: float, time: float,
+    p: Array,
+    on: Flags,
+    cell: int,
+    tension: float,
+    neighbour: float,
+    time: float,
 ) -> float:
     """Tension in N as a load cell reads it, with `neighbour` N on the other one of the pair."""
     if on[load_cell_crosstalk.ON] and is_cell(p, load_cell_crosstalk.WIRE, cell):
@@ -73,7 +78,12 @@ def load_cell_reading(
 
 @compiled
 def read_sensors(
-    state: Array, history: Array, p: Array, on: Flags, tick: float, out: Array,
+    state: Array,
+    history: Array,
+    p: Array,
+    on: Flags,
+    tick: float,
+    out: Array,
 ) -> None:
     """Write what the noise-free sensors read now into `out` (OUTPUTS,); once a tick."""
     history[ANGLE_HISTORY, int(state[TICKS]) % HISTORY] = state[TIP]

@@ -130,8 +130,9 @@ def recording_faults(plant: PlantDescription) -> RecordingFaults:
     """
     skews = {float(effect_values(spec)[0]) for spec in _specs(plant, clock_skew.DEFINITION)}
     if len(skews) > 1:
-        raise ValueError('effect clock_skew is given twice with different skew: the tracker has '
-                         'one clock')
+        raise ValueError(
+            'effect clock_skew is given twice with different skew: the tracker has one clock'
+        )
     gaps = []
     for spec in _specs(plant, recording_gap.DEFINITION):
         begin, duration, topic = effect_values(spec).tolist()

@@ -31,18 +31,32 @@ LEAST_STIFFNESS = 1e-3
 
 @compiled
 def spring_tension(
-    state: Array, chain: int, p: Array, on: Flags, pretension: float, common: float, i: int,
+    state: Array,
+    chain: int,
+    p: Array,
+    on: Flags,
+    pretension: float,
+    common: float,
+    i: int,
 ) -> tuple[float, float]:
     """Tension and slope of spring `i`; `common` is stretch in m spread over the whole wire."""
     tension, slope = wire_tension(
-        p, on, pretension, state[chain + STRETCH + i] / LENGTHS[i] + common)
+        p, on, pretension, state[chain + STRETCH + i] / LENGTHS[i] + common
+    )
     return tension, max(slope, LEAST_STIFFNESS * p[WIRE_STIFFNESS]) / LENGTHS[i]
 
 
 @compiled
 def _eliminate(
-    state: Array, chain: int, p: Array, on: Flags, pretension: float, common: float, phi: float,
-    ceiling: float, motor_step: float,
+    state: Array,
+    chain: int,
+    p: Array,
+    on: Flags,
+    pretension: float,
+    common: float,
+    phi: float,
+    ceiling: float,
+    motor_step: float,
 ) -> tuple[float, float]:
     """Tension in N at the joint after a substep if the joint stood still, and its slope in N/m.
 
@@ -81,7 +95,12 @@ def _eliminate(
 
 @compiled
 def _follow(
-    state: Array, chain: int, p: Array, ceiling: float, shake: float, motor_step: float,
+    state: Array,
+    chain: int,
+    p: Array,
+    ceiling: float,
+    shake: float,
+    motor_step: float,
     joint_step: float,
 ) -> None:
     """Move the nodes, once the joint has let out `joint_step` m of wire towards the motor."""
@@ -98,8 +117,14 @@ def _follow(
 
 @compiled
 def distal_tensions(
-    state: Array, p: Array, on: Flags, pretension: float, shift: float, phi: float,
-    ceiling: float, wire_step: float,
+    state: Array,
+    p: Array,
+    on: Flags,
+    pretension: float,
+    shift: float,
+    phi: float,
+    ceiling: float,
+    wire_step: float,
 ) -> tuple[float, float, float, float]:
     """Tensions in N of both wires at the joint in a substep, and their slopes in N/m.
 
@@ -119,16 +144,23 @@ def distal_tensions(
     """
     phi *= p[SHARE]
     ta, ka = _eliminate(
-        state, WIRE_A, p, on, pretension, shift - state[CREEP_A], phi, ceiling, wire_step)
+        state, WIRE_A, p, on, pretension, shift - state[CREEP_A], phi, ceiling, wire_step
+    )
     tb, kb = _eliminate(
-        state, WIRE_B, p, on, pretension, -shift - state[CREEP_B], phi, ceiling, -wire_step)
+        state, WIRE_B, p, on, pretension, -shift - state[CREEP_B], phi, ceiling, -wire_step
+    )
     # The chain is solved for the end of the substep, the joint for its middle.
     return ta, tb, 2.0 * ka, 2.0 * kb
 
 
 @compiled
 def follow(
-    state: Array, p: Array, ceiling: float, shake: float, wire_step: float, joint_step: float,
+    state: Array,
+    p: Array,
+    ceiling: float,
+    shake: float,
+    wire_step: float,
+    joint_step: float,
 ) -> None:
     """Move the nodes of both wires, once the joint has let out `joint_step` m of the positive."""
     _follow(state, WIRE_A, p, ceiling, shake, wire_step, joint_step)

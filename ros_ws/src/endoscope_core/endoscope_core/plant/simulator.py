@@ -118,7 +118,7 @@ class PlantSimulator:
             self._gear * out[:, OUT_MOTOR],
             self._gear * out[:, OUT_MOTOR_SPEED],
             out[:, OUT_EFFORT].copy(),
-            out[:, OUT_TENSION_A:OUT_TENSION_B + 1].copy(),
+            out[:, OUT_TENSION_A : OUT_TENSION_B + 1].copy(),
             out[:, OUT_BENDING].copy(),
             out[:, OUT_JOINT].copy(),
         )
@@ -154,8 +154,15 @@ class PlantSimulator:
                 self._inputs[:, IN_OTHER_JOINT] = self._outputs[::-1, OUT_JOINT]
             for j, x in enumerate(self._inputs):
                 advance_tick(
-                    self._states[j], self._histories[j], self._parameters[j], self._on[j],
-                    x[IN_COMMAND], x, self.tick, self._substeps)
+                    self._states[j],
+                    self._histories[j],
+                    self._parameters[j],
+                    self._on[j],
+                    x[IN_COMMAND],
+                    x,
+                    self.tick,
+                    self._substeps,
+                )
             self._ticks += 1
             self._read()
         return self.sample
@@ -163,8 +170,13 @@ class PlantSimulator:
     def _read(self) -> None:
         for j, out in enumerate(self._outputs):
             read_sensors(
-                self._states[j], self._histories[j], self._parameters[j], self._on[j],
-                self.tick, out)
+                self._states[j],
+                self._histories[j],
+                self._parameters[j],
+                self._on[j],
+                self.tick,
+                out,
+            )
 
 
 def simulate(
@@ -217,7 +229,7 @@ def simulate(
         by_time[:, :, OUT_MOTOR] * gear,
         by_time[:, :, OUT_MOTOR_SPEED] * gear,
         by_time[:, :, OUT_EFFORT],
-        by_time[:, :, OUT_TENSION_A:OUT_TENSION_B + 1],
+        by_time[:, :, OUT_TENSION_A : OUT_TENSION_B + 1],
         by_time[:, :, OUT_BENDING],
         by_time[:, :, OUT_JOINT],
     )

@@ -62,7 +62,11 @@ def friction_exponent(state: Array, p: Array, on: Flags, time: float, tick: floa
 
 @compiled
 def half_exponent(
-    p: Array, on: Flags, phi: float, slide: float, speed: float,
+    p: Array,
+    on: Flags,
+    phi: float,
+    slide: float,
+    speed: float,
 ) -> tuple[float, float]:
     """Exponent of the friction at one end of a wire, and its slope by the pre-sliding state.
 

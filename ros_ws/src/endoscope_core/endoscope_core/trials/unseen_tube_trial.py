@@ -51,7 +51,10 @@ class UnseenTubeTrial:
 
 
 def run_unseen_tube_trial(
-    seed: int, number: int, signals: Sequence[Signal], classifier: TensionClassifier,
+    seed: int,
+    number: int,
+    signals: Sequence[Signal],
+    classifier: TensionClassifier,
     sets: Mapping[int, BoucWenParameters],
 ) -> UnseenTubeTrial:
     """Calibrate, classify, choose parameters and track, on a random rig in a random tube.

@@ -129,15 +129,25 @@ def _audited_tension(
             at_limit = np.zeros(len(values), bool)
             if pile is not None:
                 at_limit, limit = pile
-                findings.append(saturation_finding(
-                    joint, signal, series.time, at_limit, limit, sensors.load_cell_resolution,
-                    wire))
+                findings.append(
+                    saturation_finding(
+                        joint,
+                        signal,
+                        series.time,
+                        at_limit,
+                        limit,
+                        sensors.load_cell_resolution,
+                        wire,
+                    )
+                )
             repeated, _ = held(
-                values, sensors.load_cell_noise, sensors.load_cell_resolution, interval)
+                values, sensors.load_cell_noise, sensors.load_cell_resolution, interval
+            )
             repeated &= ~at_limit
             if repeated.any():
-                findings.append(held_finding(
-                    joint, signal, series.topic, series.time, repeated, interval))
+                findings.append(
+                    held_finding(joint, signal, series.topic, series.time, repeated, interval)
+                )
             wrong[:, j, wire] = at_limit | repeated
     return series.without(wrong)
 
@@ -155,10 +165,12 @@ def _audited_bending(
         values = series.values[:, j]
         repeated, _ = held(values, plant.sensors.tracker_noise, 0.0, interval)
         if repeated.any():
-            findings.append(held_finding(
-                joint, signal, series.topic, series.time, repeated, interval))
+            findings.append(
+                held_finding(joint, signal, series.topic, series.time, repeated, interval)
+            )
         travel = motor_travel(
-            series.time, motor.time, motor.values[:, j] / plant.joints[joint].gear, 3.0 * interval)
+            series.time, motor.time, motor.values[:, j] / plant.joints[joint].gear, 3.0 * interval
+        )
         spikes = find_outliers(values, plant.sensors.tracker_noise, travel)
         wrong[:, j] = repeated
         isolated[:, j] = spikes

@@ -28,9 +28,7 @@ def chance_of_repeat(noise: float, resolution: float) -> float:
     return min(1.0, resolution / (2.0 * noise * math.sqrt(math.pi)))
 
 
-def held(
-    values: Array, noise: float, resolution: float, interval: float
-) -> tuple[Mask, int]:
+def held(values: Array, noise: float, resolution: float, interval: float) -> tuple[Mask, int]:
     """Find samples that repeat the one before for longer than chance allows.
 
     Parameters
@@ -63,7 +61,7 @@ def held(
     repeated = np.zeros(len(values), bool)
     for start, length in zip(starts, lengths, strict=True):
         if length >= bound:
-            repeated[start + 1:start + length] = True
+            repeated[start + 1 : start + length] = True
     return repeated, period
 
 
@@ -77,7 +75,12 @@ def held_finding(
     longest = max(b - a for a, b in spans)
     severity = Severity.FAULT if longest > max(0.05, 4 * interval) else Severity.NOTE
     return Finding(
-        'held_samples', severity, joint, 'recording', (signal,), spans,
+        'held_samples',
+        severity,
+        joint,
+        'recording',
+        (signal,),
+        spans,
         f'{signal} stands still for up to {longest:.3f} s (first from {spans[0][0]:.3f} s), which '
         'its noise does not allow: the source repeated an old sample',
         'repeated samples are not judged',

@@ -89,9 +89,7 @@ def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
     return wrong
 
 
-def motor_travel(
-    tracker_time: Array, motor_time: Array, motor_angle: Array, reach: float
-) -> Array:
+def motor_travel(tracker_time: Array, motor_time: Array, motor_angle: Array, reach: float) -> Array:
     """Return the range of the motor's angle within `reach` s of each tracker sample.
 
     Parameters
@@ -147,7 +145,11 @@ def outlier_finding(joints: Sequence[str], series: Series, wrong: Mask) -> Findi
     befallen = [name for j, name in enumerate(joints) if wrong[:, j].any()]
     signals = tuple(signal_name('bending', name) for name in befallen)
     return Finding(
-        'tracker_outliers', Severity.FAULT, joints[worst], 'sensing', signals,
+        'tracker_outliers',
+        Severity.FAULT,
+        joints[worst],
+        'sensing',
+        signals,
         tuple((float(t), float(t)) for t in series.time[wrong.any(axis=1)]),
         f'{count} of {n} samples of {" and ".join(signals)} are isolated and wrong, by '
         f'{np.degrees(typical):.1f} deg rms',
@@ -163,8 +165,7 @@ def outlier_finding(joints: Sequence[str], series: Series, wrong: Mask) -> Findi
 def _quiet_noise(values: Array) -> float:
     # The interpolation error of a cubic through the four neighbours is noise times sqrt(1 + 34/36)
     # where the signal is smooth; the median ignores what is not.
-    inner = values[2:-2] - (
-        4.0 * (values[1:-3] + values[3:-1]) - (values[:-4] + values[4:])) / 6.0
+    inner = values[2:-2] - (4.0 * (values[1:-3] + values[3:-1]) - (values[:-4] + values[4:])) / 6.0
     return float(np.median(np.abs(inner)) / 0.6745 / np.sqrt(1.0 + 34.0 / 36.0))
 
 
@@ -172,7 +173,7 @@ def _roughness_nearby(heights: Array, reach: int = 6) -> Array:
     """Return the second largest |spike| within `reach` samples of every sample."""
     size = np.abs(heights)
     padded = np.pad(size, reach)
-    around = np.stack([
-        padded[reach + k:reach + k + len(size)] for k in range(-reach, reach + 1) if abs(k) > 1
-    ])
+    around = np.stack(
+        [padded[reach + k : reach + k + len(size)] for k in range(-reach, reach + 1) if abs(k) > 1]
+    )
     return np.partition(around, -2, axis=0)[-2]

@@ -32,10 +32,12 @@ def delay_slope(series: Series) -> tuple[float, float] | None:
     # Against a drift the quickest delivery is the window's last or first: it is taken out first.
     for _ in range(3):
         flat = delay - slope * series.time
-        quickest = np.array([
-            np.flatnonzero(window == w)[np.argmin(flat[window == w])]
-            for w in np.unique(window)[:-1]
-        ])
+        quickest = np.array(
+            [
+                np.flatnonzero(window == w)[np.argmin(flat[window == w])]
+                for w in np.unique(window)[:-1]
+            ]
+        )
         time = series.time[quickest] - series.time[quickest].mean()
         slope = float(time @ delay[quickest] / (time @ time))
         rest = delay[quickest] - delay[quickest].mean() - slope * time
@@ -88,7 +90,12 @@ def skew_finding(topic: str, joint: str, skew: Estimate, duration: float) -> Fin
     """Describe the `clock_skew` of the device behind one topic."""
     way = 'fast' if skew.value > 0 else 'slow'
     return Finding(
-        'clock_skew', Severity.FAULT, joint, 'recording', (topic,), ((0.0, duration),),
+        'clock_skew',
+        Severity.FAULT,
+        joint,
+        'recording',
+        (topic,),
+        ((0.0, duration),),
         f'the clock behind {topic} runs {way} by {abs(skew.value) * 1e3:.3f} ms in a second',
         'its stamps were put on the common clock',
         parameters={'skew': skew},

@@ -41,7 +41,12 @@ def clipped(values: Array, noise: float, resolution: float) -> tuple[Mask, float
 
 
 def saturation_finding(
-    joint: str, signal: str, time: Array, at_limit: Mask, limit: float, resolution: float,
+    joint: str,
+    signal: str,
+    time: Array,
+    at_limit: Mask,
+    limit: float,
+    resolution: float,
     wire: int,
 ) -> Finding:
     """Describe the `load_cell_saturation` of one wire (0: positive, 1: negative)."""
@@ -55,7 +60,12 @@ def saturation_finding(
         else:
             spans.append((begin, end))
     return Finding(
-        'load_cell_saturation', Severity.FAULT, joint, 'sensing', (signal,), tuple(spans),
+        'load_cell_saturation',
+        Severity.FAULT,
+        joint,
+        'sensing',
+        (signal,),
+        tuple(spans),
         f'{signal} clips at {limit:.3f} N in {int(at_limit.sum())} samples',
         'clipped samples are not judged',
         parameters={

@@ -34,27 +34,39 @@ def order_stamps(series: Series, joint: str) -> tuple[Series, list[Finding]]:
         # Neighbours that changed places are harmless; a clock that was set back is not.
         severity = Severity.FAULT if worst > 0.1 else Severity.NOTE
         first = float(series.time[1:][backward][0])
-        findings.append(Finding(
-            'unordered_stamps', severity, joint, 'recording', (series.topic,),
-            ((first, first + worst),),
-            f'{int(backward.sum())} stamps of {series.topic} run backwards, by {worst:.3f} s at '
-            f'most (first at {first:.3f} s)',
-            'sorted by stamp',
-            evidence={'count': float(backward.sum()), 'worst_s': worst},
-        ))
+        findings.append(
+            Finding(
+                'unordered_stamps',
+                severity,
+                joint,
+                'recording',
+                (series.topic,),
+                ((first, first + worst),),
+                f'{int(backward.sum())} stamps of {series.topic} run backwards, by {worst:.3f} s at '
+                f'most (first at {first:.3f} s)',
+                'sorted by stamp',
+                evidence={'count': float(backward.sum()), 'worst_s': worst},
+            )
+        )
     order = np.argsort(series.time, kind='stable')
     time = series.time[order]
     fresh = np.r_[True, np.diff(time) > 0]
     repeats = int((~fresh).sum())
     if repeats:
         at = float(time[~fresh][0])
-        findings.append(Finding(
-            'repeated_stamps', Severity.NOTE, joint, 'recording', (series.topic,),
-            ((at, float(time[~fresh][-1])),),
-            f'{repeats} stamps of {series.topic} occur more than once (first at {at:.3f} s)',
-            'the first of each was kept',
-            evidence={'count': float(repeats)},
-        ))
+        findings.append(
+            Finding(
+                'repeated_stamps',
+                Severity.NOTE,
+                joint,
+                'recording',
+                (series.topic,),
+                ((at, float(time[~fresh][-1])),),
+                f'{repeats} stamps of {series.topic} occur more than once (first at {at:.3f} s)',
+                'the first of each was kept',
+                evidence={'count': float(repeats)},
+            )
+        )
     return series.taken(order[fresh]), findings
 
 
@@ -123,13 +135,20 @@ def gap_findings(
     onset = Estimate(begin + 0.5 * usual, begin, begin + usual, 's')
     missing = {t: sum(b - a - intervals[t] for a, b in g) for t, g in gaps_by_topic.items() if g}
     counts = ', '.join(f'{t} ({missing[t]:.3f} s in {len(gaps_by_topic[t])})' for t in topics)
-    return [Finding(
-        'recording_gap', Severity.FAULT, joint, 'recording', topics,
-        tuple(sorted({(a, b) for _, a, b, _ in every})),
-        f'samples are missing: {counts}; the longest gap lasts {length:.3f} s from {begin:.3f} s',
-        'nothing is judged where samples are missing',
-        parameters={'time_s': onset,
-                    'duration_s': Estimate(length - usual, max(length - 2 * usual, 0.0), length,
-                                           's')},
-        evidence={'gaps': float(len(every)), 'missing_s': float(sum(missing.values()))},
-    )]
+    return [
+        Finding(
+            'recording_gap',
+            Severity.FAULT,
+            joint,
+            'recording',
+            topics,
+            tuple(sorted({(a, b) for _, a, b, _ in every})),
+            f'samples are missing: {counts}; the longest gap lasts {length:.3f} s from {begin:.3f} s',
+            'nothing is judged where samples are missing',
+            parameters={
+                'time_s': onset,
+                'duration_s': Estimate(length - usual, max(length - 2 * usual, 0.0), length, 's'),
+            },
+            evidence={'gaps': float(len(every)), 'missing_s': float(sum(missing.values()))},
+        )
+    ]

@@ -49,7 +49,8 @@ class GaussianProcess:
         x, y = self._scaling.scaled(features, outputs)
         few, many = (
             np.linspace(0, len(x) - 1, min(count, len(x))).astype(int)
-            for count in (TUNING_POINTS, GAUSSIAN_PROCESS_POINTS))
+            for count in (TUNING_POINTS, GAUSSIAN_PROCESS_POINTS)
+        )
         kernel = RBF(np.full(x.shape[1], 3.0), (0.1, 1e3)) + WhiteKernel(0.1, (1e-3, 2.0))
         tuning = GaussianProcessRegressor(kernel, optimizer=_few_steps)
         # Matrices this small are slower on several threads than on one.
@@ -82,15 +83,19 @@ class NeuralNetwork:
         from torch import nn
 
         self._scaling = _Scaling(features, outputs)
-        x, y = (torch.tensor(a, dtype=torch.float32)
-                for a in self._scaling.scaled(features, outputs))
+        x, y = (
+            torch.tensor(a, dtype=torch.float32) for a in self._scaling.scaled(features, outputs)
+        )
         # A generator of its own: nobody else's random numbers are touched.
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self._network = nn.Sequential(
-                nn.Linear(x.shape[1], NETWORK_WIDTH), nn.Tanh(),
-                nn.Linear(NETWORK_WIDTH, NETWORK_WIDTH), nn.Tanh(),
-                nn.Linear(NETWORK_WIDTH, y.shape[1]))
+                nn.Linear(x.shape[1], NETWORK_WIDTH),
+                nn.Tanh(),
+                nn.Linear(NETWORK_WIDTH, NETWORK_WIDTH),
+                nn.Tanh(),
+                nn.Linear(NETWORK_WIDTH, y.shape[1]),
+            )
         with _one_thread():
             self._train(x, y)
 
@@ -147,5 +152,6 @@ def _few_steps(objective: object, start: Array, bounds: Array) -> tuple[Array, f
     from scipy.optimize import minimize
 
     found = minimize(
-        objective, start, jac=True, bounds=bounds, method='L-BFGS-B', options={'maxiter': 10})
+        objective, start, jac=True, bounds=bounds, method='L-BFGS-B', options={'maxiter': 10}
+    )
     return found.x, found.fun

@@ -38,7 +38,11 @@ class ResidualModel:
     """
 
     def __init__(
-        self, kind: str, recording: Recording, recorded: RecordedView, joint: str,
+        self,
+        kind: str,
+        recording: Recording,
+        recorded: RecordedView,
+        joint: str,
         use: Callable[[Array], Mask],
     ) -> None:
         self._joint = joint
@@ -87,7 +91,8 @@ def black_box_rungs(
         By name of what was judged on, black box and signal.
     """
     rungs: dict[str, dict[str, dict[str, ChannelFit]]] = {
-        name: {kind: {} for kind in KINDS} for name in judged}
+        name: {kind: {} for kind in KINDS} for name in judged
+    }
     for joint in recorded.joints:
         for kind in KINDS:
             model = ResidualModel(kind, recording, recorded, joint, use)
@@ -100,7 +105,8 @@ def black_box_rungs(
                     left = (one.measured - one.predicted[BASE])[chosen] - correction
                     rungs[name][kind][one.signal] = ChannelFit(
                         float(np.sqrt(np.mean(left**2))),
-                        float(np.sqrt(np.mean(one.noise[chosen] ** 2))))
+                        float(np.sqrt(np.mean(one.noise[chosen] ** 2))),
+                    )
     return rungs
 
 

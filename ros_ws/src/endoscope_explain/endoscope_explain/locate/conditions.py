@@ -113,7 +113,7 @@ def drive(recording: Recording, j: int, gear: float, end: float) -> Array:
         window.
     """
     count = int(np.ceil(end / WINDOW_S))
-    grid = (np.arange(count * int(WINDOW_S / GRID_S)) + 0.5) * GRID_S
+    grid = (np.arange(count * int(WINDOW_S / GRID_S), dtype=np.float64) + 0.5) * GRID_S
     motor = _motor(recording, j, gear, grid)
     bending = np.interp(grid, recording.bending.time, recording.bending.values[:, j])
     every = np.abs(np.c_[motor, _speed(motor), bending]).reshape(count, -1, 3)

@@ -57,22 +57,26 @@ def locate_effects(
     """
     located = []
     for effect in effects:
-        rest = tuple(
-            e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
+        rest = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
         if len(rest) == len(plant.effects):
             continue
         recorded = view(recording, {'without': replace(plant, effects=rest), 'with': plant})
         found = excess_between(list(recorded.signals.values()), 'without', 'with')
         time = effect.parameters.get('time_s')
-        located.append(place(
-            recording, plant, found, effect.stage, effect.joint,
-            None if time is None else time.value))
+        located.append(
+            place(
+                recording,
+                plant,
+                found,
+                effect.stage,
+                effect.joint,
+                None if time is None else time.value,
+            )
+        )
     return located
 
 
-def locate_unknown(
-    recording: Recording, explanation: Explanation
-) -> list[Place]:
+def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place]:
     """Say where a mismatch shows that no effect of the catalogue explains."""
     term = explanation.unknown
     recorded = view(recording, {'refitted': explanation.refitted})
@@ -84,17 +88,14 @@ def locate_unknown(
 
 def locate_parameters(recording: Recording, explanation: Explanation) -> list[Place]:
     """Say where parameters that changed show, stage by stage."""
-    recorded = view(
-        recording, {'nominal': explanation.nominal, 'refitted': explanation.refitted})
+    recorded = view(recording, {'nominal': explanation.nominal, 'refitted': explanation.refitted})
     found = excess_between(list(recorded.signals.values()), 'nominal', 'refitted')
     stages: Mapping[tuple[str, str], float] = {
         (STAGE_OF_PARAMETER[name], joint): 0.0
         for joint, estimates in explanation.parameters.items()
         for name in changed_parameters(estimates)
     }
-    return [
-        place(recording, explanation.refitted, found, stage, joint) for stage, joint in stages
-    ]
+    return [place(recording, explanation.refitted, found, stage, joint) for stage, joint in stages]
 
 
 def locate_findings(audit: AuditReport) -> list[Place]:
@@ -103,8 +104,12 @@ def locate_findings(audit: AuditReport) -> list[Place]:
 
 
 def place(
-    recording: Recording, plant: PlantDescription, found: Sequence[SignalExcess], stage: str,
-    joint: str, began: float | None = None,
+    recording: Recording,
+    plant: PlantDescription,
+    found: Sequence[SignalExcess],
+    stage: str,
+    joint: str,
+    began: float | None = None,
 ) -> Place:
     """Describe one trace in signals, time, state and frequency.
 
@@ -135,11 +140,23 @@ def place(
         rest = '' if regime == 'throughout' or regime.startswith('after') else f', {regime}'
         regime = f'from {began:.1f} s on{rest}'
     return Place(
-        stage, joint, tuple(by_signal) or (telling[0].view.signal,),
-        intervals(telling, end), regime, band_hz(telling[0]), by_signal, began)
+        stage,
+        joint,
+        tuple(by_signal) or (telling[0].view.signal,),
+        intervals(telling, end),
+        regime,
+        band_hz(telling[0]),
+        by_signal,
+        began,
+    )
 
 
 def _place_of(finding: Finding) -> Place:
     return Place(
-        finding.stage, finding.joint, finding.signals, finding.intervals[:12], finding.text,
-        (0.0, 0.0))
+        finding.stage,
+        finding.joint,
+        finding.signals,
+        finding.intervals[:12],
+        finding.text,
+        (0.0, 0.0),
+    )

@@ -61,7 +61,7 @@ def information(energy: Array, active: Mask, within: Mask) -> float:
     """
     total = float(energy[within].sum())
     inside = active & within
-    time_share = inside.sum() / max(within.sum(), 1)
+    time_share = int(inside.sum()) / max(int(within.sum()), 1)
     if total <= 0.0 or not 0.02 < time_share < 0.98:
         return 0.0
     share = float(np.clip(energy[inside].sum() / total, 1e-9, 1 - 1e-9))

@@ -41,8 +41,9 @@ def refit(
         if spec.joint == observation.joint:
             free += effect_parameters(spec.id)
     model = JointModel(observation, base, flags, free)
-    start = np.array([
-        item.coordinate(1.0 if item.index == LEAD else float(base[item.index])) for item in free])
+    start = np.array(
+        [item.coordinate(1.0 if item.index == LEAD else float(base[item.index])) for item in free]
+    )
     return fit(model, start, iterations=iterations)
 
 
@@ -70,8 +71,13 @@ def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescriptio
             continue
         definition = CATALOGUE[spec.id]
         first = definition.first_parameter
-        effects.append(EffectSpec(spec.id, joint, {
-            p.name: float(packed[first + i]) for i, p in enumerate(definition.parameters)}))
+        effects.append(
+            EffectSpec(
+                spec.id,
+                joint,
+                {p.name: float(packed[first + i]) for i, p in enumerate(definition.parameters)},
+            )
+        )
     return PlantDescription(joints, plant.sensors, tuple(effects))
 
 

@@ -32,13 +32,16 @@ def imagine(plant: PlantDescription, waveform: Waveform) -> Recording:
     answer = simulate(plant, desired * gear, substeps=3)
     slow = slice(None, None, max(1, round(1.0 / (plant.sensors.tracker_rate * TICK))))
     return Recording(
-        waveform.name, 0.0, joints,
+        waveform.name,
+        0.0,
+        joints,
         Series.of('motor/servo_jp', time, desired * gear),
         Series.of('wires/measured_js', time, answer.tension),
         Series.of('slave/measured_js', time[slow], answer.bending[slow]),
         Series.of('motor/measured_js', time, answer.shaft_position),
         Series.of('motor/measured_js', time, answer.shaft_velocity),
-        Series.of('motor/measured_js', time, answer.shaft_effort))
+        Series.of('motor/measured_js', time, answer.shaft_effort),
+    )
 
 
 def is_safe(recording: Recording, tension_limit: float, bending_limit: float) -> bool:
@@ -54,4 +57,5 @@ def is_safe(recording: Recording, tension_limit: float, bending_limit: float) ->
     """
     return bool(
         recording.tension.values.max() <= tension_limit
-        and np.abs(recording.bending.values).max() <= bending_limit)
+        and np.abs(recording.bending.values).max() <= bending_limit
+    )

@@ -54,7 +54,7 @@ def propose(
     """
     plants = {effect.id: plant} | {
         rival: fitted
-        for rival in effect.alternatives[:MOST_RIVALS - 1]
+        for rival in effect.alternatives[: MOST_RIVALS - 1]
         if (fitted := rival_plant(recording, plant, effect, rival)) is not None
     }
     if len(plants) < 2:
@@ -64,7 +64,8 @@ def propose(
     def smallest(waveform: Waveform) -> float:
         imagined = {name: imagine(p, waveform) for name, p in plants.items()}
         return min(
-            distance(imagined[a], plants[b], effect.joint) for a, b in permutations(plants, 2))
+            distance(imagined[a], plants[b], effect.joint) for a, b in permutations(plants, 2)
+        )
 
     found = parallel_map(smallest, motions, jobs)
     distances = {m.name: d for m, d in zip(motions, found, strict=True)}
@@ -76,8 +77,14 @@ def propose(
         f'{best.name.capitalize()} of {best.joint} would tell {rivals} apart: there their '
         f'predictions differ by {distances[best.name]:.1f} times the noise at least, after each '
         'has been refitted to the other.',
-        tuple(plants), best.name, best.joint, distances, tuple(map(float, best.time)),
-        tuple((float(row[0]), float(row[1])) for row in columns), JOINTS)
+        tuple(plants),
+        best.name,
+        best.joint,
+        distances,
+        tuple(map(float, best.time)),
+        tuple((float(row[0]), float(row[1])) for row in columns),
+        JOINTS,
+    )
 
 
 def rival_plant(

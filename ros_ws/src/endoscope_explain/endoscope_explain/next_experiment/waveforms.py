@@ -60,9 +60,7 @@ def family(joint: str, others: tuple[str, ...], reach: float) -> list[Waveform]:
         ('rest on either side', rest_on_either_side(a)),
     ]
     found = [_sampled(name, joint, signal) for name, signal in signals]
-    found += [
-        _sampled(f'{other} alone', other, multisine(a, 14.0)) for other in others
-    ]
+    found += [_sampled(f'{other} alone', other, multisine(a, 14.0)) for other in others]
     return found
 
 
@@ -74,8 +72,18 @@ def nested_reversals(reach: float) -> Signal:
     reach : float
         In rad.
     """
-    turns = [reach, -reach, 0.8 * reach, -0.6 * reach, 0.6 * reach, -0.3 * reach, 0.4 * reach, 0.0,
-             0.2 * reach, 0.0]
+    turns = [
+        reach,
+        -reach,
+        0.8 * reach,
+        -0.6 * reach,
+        0.6 * reach,
+        -0.3 * reach,
+        0.4 * reach,
+        0.0,
+        0.2 * reach,
+        0.0,
+    ]
     parts, here = [], 0.0
     for target in turns:
         parts.append(move(here, target, 0.4 + 1.2 * abs(target - here) / max(reach, 1e-9)))
@@ -93,8 +101,12 @@ def fast_and_slow(reach: float) -> Signal:
     """
     parts: list[Signal] = []
     for duration in (3.0, 1.2, 0.5):
-        parts += [move(0.0, reach, 0.5 * duration), move(reach, -reach, duration),
-                  move(-reach, 0.0, 0.5 * duration), hold(0.4)]
+        parts += [
+            move(0.0, reach, 0.5 * duration),
+            move(reach, -reach, duration),
+            move(-reach, 0.0, 0.5 * duration),
+            hold(0.4),
+        ]
     return sequence('fast and slow', parts)
 
 
@@ -106,9 +118,18 @@ def rest_on_either_side(reach: float) -> Signal:
     reach : float
         In rad.
     """
-    return sequence('rest on either side', [
-        hold(3.0), move(0.0, reach, 1.0), hold(5.0, reach), move(reach, -reach, 1.5),
-        hold(5.0, -reach), move(-reach, 0.0, 1.0), hold(1.0)])
+    return sequence(
+        'rest on either side',
+        [
+            hold(3.0),
+            move(0.0, reach, 1.0),
+            hold(5.0, reach),
+            move(reach, -reach, 1.5),
+            hold(5.0, -reach),
+            move(-reach, 0.0, 1.0),
+            hold(1.0),
+        ],
+    )
 
 
 def _sampled(name: str, joint: str, signal: Signal) -> Waveform:

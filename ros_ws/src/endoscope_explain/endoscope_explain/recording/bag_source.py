@@ -108,10 +108,10 @@ def recording_from_bag(
     def series(topic: str, source: JointStateSeries, names: Sequence[str], key: str) -> Series:
         chosen = source.select(names)
         values = chosen.require(key)
-        time = (chosen.stamp_ns - origin_ns) * 1e-9
+        time = np.asarray((chosen.stamp_ns - origin_ns) * 1e-9, dtype=np.float64)
         if key == 'effort' and topic == WIRES:
             values = values.reshape(len(values), len(joints), 2)
-        received = (chosen.log_ns - origin_ns) * 1e-9
+        received = np.asarray((chosen.log_ns - origin_ns) * 1e-9, dtype=np.float64)
         return Series.of(topic, time, np.ascontiguousarray(values), received)
 
     shaft = series(

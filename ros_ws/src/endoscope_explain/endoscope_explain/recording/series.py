@@ -54,8 +54,12 @@ class Series:
     def taken(self, index: NDArray[np.intp] | Mask) -> 'Series':
         """Return the samples of an index array, in its order."""
         return replace(
-            self, time=self.time[index], values=self.values[index], valid=self.valid[index],
-            received=None if self.received is None else self.received[index])
+            self,
+            time=self.time[index],
+            values=self.values[index],
+            valid=self.valid[index],
+            received=None if self.received is None else self.received[index],
+        )
 
     def without(self, wrong: Mask) -> 'Series':
         """Return the same samples, with those that are `wrong` no longer valid."""

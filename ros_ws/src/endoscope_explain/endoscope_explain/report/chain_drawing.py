@@ -32,11 +32,15 @@ def chain_svg(guilty: Mapping[str, Sequence[str]]) -> str:
     width = len(STAGES) * BOX + (len(STAGES) - 1) * GAP + 4
     below = max((len(words) for words in guilty.values()), default=0) * LINE + 10
     parts = [
-        (f'<svg viewBox="0 0 {width} {TOP + HEIGHT + below}" role="img" '
-         'aria-label="chain from command to recording" font-family="system-ui, sans-serif">'),
-        ('<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" '
-         'markerHeight="7" orient="auto"><path d="M0 0 L8 4 L0 8 z" fill="#627180"/></marker>'
-         '</defs>'),
+        (
+            f'<svg viewBox="0 0 {width} {TOP + HEIGHT + below}" role="img" '
+            'aria-label="chain from command to recording" font-family="system-ui, sans-serif">'
+        ),
+        (
+            '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" '
+            'markerHeight="7" orient="auto"><path d="M0 0 L8 4 L0 8 z" fill="#627180"/></marker>'
+            '</defs>'
+        ),
     ]
     for index, stage in enumerate(STAGES):
         x = 2 + index * (BOX + GAP)
@@ -45,7 +49,8 @@ def chain_svg(guilty: Mapping[str, Sequence[str]]) -> str:
             y = TOP + HEIGHT / 2
             parts.append(
                 f'<line x1="{x - GAP + 2}" y1="{y}" x2="{x - 2}" y2="{y}" stroke="#627180" '
-                'stroke-width="1.6" marker-end="url(#tip)"/>')
+                'stroke-width="1.6" marker-end="url(#tip)"/>'
+            )
     return ''.join(parts) + '</svg>'
 
 
@@ -53,20 +58,28 @@ def _box(stage: str, x: float, words: Sequence[str] | None) -> str:
     title, detail = TITLES[stage]
     marked = words is not None
     fill, edge, ink = (
-        ('#b3261e', '#8c1d18', '#ffffff') if marked else ('#f5f7f9', '#c3ccd5', '#1f2933'))
+        ('#b3261e', '#8c1d18', '#ffffff') if marked else ('#f5f7f9', '#c3ccd5', '#1f2933')
+    )
     soft = '#ffe9e6' if marked else '#627180'
     middle = x + BOX / 2
     parts = [
-        (f'<rect x="{x}" y="{TOP}" width="{BOX}" height="{HEIGHT}" rx="8" fill="{fill}" '
-         f'stroke="{edge}" stroke-width="1.4"/>'),
-        (f'<text x="{middle}" y="{TOP + 27}" text-anchor="middle" font-size="15" '
-         f'font-weight="600" fill="{ink}">{escape(title)}</text>'),
-        (f'<text x="{middle}" y="{TOP + 46}" text-anchor="middle" font-size="11.5" '
-         f'fill="{soft}">{escape(detail)}</text>'),
+        (
+            f'<rect x="{x}" y="{TOP}" width="{BOX}" height="{HEIGHT}" rx="8" fill="{fill}" '
+            f'stroke="{edge}" stroke-width="1.4"/>'
+        ),
+        (
+            f'<text x="{middle}" y="{TOP + 27}" text-anchor="middle" font-size="15" '
+            f'font-weight="600" fill="{ink}">{escape(title)}</text>'
+        ),
+        (
+            f'<text x="{middle}" y="{TOP + 46}" text-anchor="middle" font-size="11.5" '
+            f'fill="{soft}">{escape(detail)}</text>'
+        ),
     ]
     for line, text in enumerate(words or ()):
         y = TOP + HEIGHT + (line + 1) * LINE + 2
         parts.append(
             f'<text x="{middle}" y="{y}" text-anchor="middle" font-size="12.5" '
-            f'font-weight="600" fill="#b3261e">{escape(text)}</text>')
+            f'font-weight="600" fill="#b3261e">{escape(text)}</text>'
+        )
     return ''.join(parts)

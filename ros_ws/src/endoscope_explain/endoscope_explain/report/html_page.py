@@ -25,8 +25,11 @@ from endoscope_explain.report.sentences import HEADLINES, verdict_sentence
 Array = NDArray[np.float64]
 
 SHORT_TITLES = {
-    'nominal': 'nominal', 'refitted': 'refitted', 'augmented': 'improved',
-    'gaussian_process': 'Gaussian process', 'neural_network': 'neural network',
+    'nominal': 'nominal',
+    'refitted': 'refitted',
+    'augmented': 'improved',
+    'gaussian_process': 'Gaussian process',
+    'neural_network': 'neural network',
 }
 
 GREEN, BLUE, AMBER, RED, GREY = '#136b4f', '#2f6fb7', '#a15c00', '#b3261e', '#52606d'
@@ -54,9 +57,14 @@ def html_page(case: ExplainedCase) -> str:
         HTML that needs no other file.
     """
     explanation = case.explanation
-    recorded = view(case.recording, {
-        'nominal': explanation.nominal, 'refitted': explanation.refitted,
-        'augmented': explanation.augmented})
+    recorded = view(
+        case.recording,
+        {
+            'nominal': explanation.nominal,
+            'refitted': explanation.refitted,
+            'augmented': explanation.augmented,
+        },
+    )
     joint = _joint_of_interest(case, recorded)
     j = case.recording.joints.index(joint)
     gear = explanation.nominal.joints[joint].gear
@@ -64,27 +72,43 @@ def html_page(case: ExplainedCase) -> str:
     passage = telling_passage(recorded, joint)
     experiment, unknown = case.next_experiment, explanation.unknown
     environment = Environment(
-        loader=PackageLoader('endoscope_explain', 'report/templates'), autoescape=True,
-        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+        loader=PackageLoader('endoscope_explain', 'report/templates'),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     return environment.get_template('report.html.j2').render(
-        name=case.recording.name, headline=HEADLINES[case.verdict], colour=COLOURS[case.verdict],
-        sentence=verdict_sentence(case), chain=chain_svg(_guilty(case)),
+        name=case.recording.name,
+        headline=HEADLINES[case.verdict],
+        colour=COLOURS[case.verdict],
+        sentence=verdict_sentence(case),
+        chain=chain_svg(_guilty(case)),
         places=[_place(place) for place in case.places],
-        effects=[_effect(effect) for effect in case.effects], joint=joint, passage=passage,
-        unknown=unknown, unknown_svg=unknown_figure(unknown) if unknown else '',
+        effects=[_effect(effect) for effect in case.effects],
+        joint=joint,
+        passage=passage,
+        unknown=unknown,
+        unknown_svg=unknown_figure(unknown) if unknown else '',
         timeline_svg=timeline_figure(recorded, command, joint, case.places),
         loops_svg=loops_figure(recorded, command, joint, passage),
         signals_svg=signals_figure(recorded, joint, passage),
         ladder_svg=ladder_figure(case.ladder) if case.ladder['nominal'] else '',
         tables=_tables(case, recorded),
         parameters_svg=parameters_figure(explanation.parameters) if explanation.parameters else '',
-        candidates=_candidates(case), experiment=experiment,
+        candidates=_candidates(case),
+        experiment=experiment,
         experiment_svg=experiment_figure(experiment) if experiment else '',
         distances=_ranked(experiment.distances) if experiment else [],
-        experiment_file=EXPERIMENT_FILE, findings=case.audit.findings,
-        notes=case.recording.notes, duration=f'{case.recording.duration:.1f}',
-        joints=case.recording.joints, runtime_s=case.runtime_s, baseline=case.baseline_name,
-        validation=case.validation_name)
+        experiment_file=EXPERIMENT_FILE,
+        findings=case.audit.findings,
+        notes=case.recording.notes,
+        duration=f'{case.recording.duration:.1f}',
+        joints=case.recording.joints,
+        runtime_s=case.runtime_s,
+        baseline=case.baseline_name,
+        validation=case.validation_name,
+    )
 
 
 def _joint_of_interest(case: ExplainedCase, recorded: RecordedView) -> str:
@@ -111,7 +135,9 @@ def _place(place: Place) -> dict[str, Any]:
     shown = ', '.join(f'{a:.1f} … {b:.1f}' for a, b in place.intervals[:6])
     more = len(place.intervals) - 6
     return {
-        'stage': place.stage, 'joint': place.joint, 'regime': place.regime,
+        'stage': place.stage,
+        'joint': place.joint,
+        'regime': place.regime,
         'bars': [{'signal': s, 'share': place.shares.get(s, 0.0)} for s in place.signals],
         'intervals': shown + (f' s and {more} more' if more > 0 else ' s') if shown else '',
         'band': f'{low:.2g} … {high:.2g} Hz' if high > 0 else '',
@@ -120,13 +146,22 @@ def _place(place: Place) -> dict[str, Any]:
 
 def _effect(effect: NamedEffect) -> dict[str, Any]:
     rows = [
-        {'name': name, 'value': f'{e.value:.4g}', 'low': f'{e.low:.4g}', 'high': f'{e.high:.4g}',
-         'unit': e.unit}
+        {
+            'name': name,
+            'value': f'{e.value:.4g}',
+            'low': f'{e.low:.4g}',
+            'high': f'{e.high:.4g}',
+            'unit': e.unit,
+        }
         for name, e in effect.parameters.items()
     ] or [{'name': '', 'value': '', 'low': '', 'high': '', 'unit': ''}]
     return {
-        'id': effect.id, 'joint': effect.joint, 'equation': effect.equation,
-        'source': effect.source, 'alternatives': effect.alternatives, 'rows': rows,
+        'id': effect.id,
+        'joint': effect.joint,
+        'equation': effect.equation,
+        'source': effect.source,
+        'alternatives': effect.alternatives,
+        'rows': rows,
         'probability': f'{100 * effect.probability:.0f} %',
     }
 
@@ -135,8 +170,7 @@ def _tables(case: ExplainedCase, recorded: RecordedView) -> list[dict[str, Any]]
     units = {name: one.unit for name, one in recorded.signals.items()}
     tables = [_table('held-out blocks of this recording', case.ladder, units)]
     if case.validation:
-        tables.append(_table(
-            f'second recording: {case.validation_name}', case.validation, units))
+        tables.append(_table(f'second recording: {case.validation_name}', case.validation, units))
     return tables
 
 
@@ -147,12 +181,18 @@ def _table(title: str, ladder: Ladder, units: Mapping[str, str]) -> dict[str, An
         fits = [ladder[rung].get(signal) for rung in rungs]
         least = min(f.rmse for f in fits if f is not None)
         cells = [
-            {'text': '', 'best': False} if f is None else
-            {'text': f'{f.rmse:.4g} ({f.ratio:.2f})', 'best': f.rmse <= 1.02 * least}
+            {'text': '', 'best': False}
+            if f is None
+            else {'text': f'{f.rmse:.4g} ({f.ratio:.2f})', 'best': f.rmse <= 1.02 * least}
             for f in fits
         ]
-        rows.append({'signal': signal.replace('/measured_js', ''), 'unit': units.get(signal, ''),
-                     'cells': cells})
+        rows.append(
+            {
+                'signal': signal.replace('/measured_js', ''),
+                'unit': units.get(signal, ''),
+                'cells': cells,
+            }
+        )
     return {'title': title, 'rungs': [SHORT_TITLES[r] for r in rungs], 'rows': rows}
 
 
@@ -161,9 +201,11 @@ def _candidates(case: ExplainedCase, most: int = 6) -> list[dict[str, str]]:
     return [
         {
             'name': ' + '.join(f'{i} ({j})' for i, j in c.effects) or 'nominal, refitted',
-            'score': f'{c.score:.1f}', 'behind': f'{c.score - ranked[0].score:.1f}',
+            'score': f'{c.score:.1f}',
+            'behind': f'{c.score - ranked[0].score:.1f}',
             'misfit': f'{np.sqrt(c.misfit):.2f}',
-        } for c in ranked
+        }
+        for c in ranked
     ]
 
 

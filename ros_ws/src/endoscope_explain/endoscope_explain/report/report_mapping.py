@@ -139,9 +139,7 @@ def _symbolic(term: UnknownTerm | None) -> dict[str, Any] | None:
         'node': term.node,
         'unit': term.unit,
         'states': dict(term.states),
-        'coefficients': [
-            _estimate(c, f'coefficient {i}') for i, c in enumerate(term.coefficients)
-        ],
+        'coefficients': [_estimate(c, f'coefficient {i}') for i, c in enumerate(term.coefficients)],
         'explained': _finite(term.explained, 'explained'),
         'siblings': list(term.siblings),
     }
@@ -160,9 +158,11 @@ def _experiment(case: ExplainedCase) -> dict[str, Any] | None:
             'joint': experiment.joint,
             'duration_s': _finite(experiment.time[-1], 'duration'),
             'largest_angle_rad': max(
-                (abs(v) for row in experiment.command for v in row), default=0.0),
+                (abs(v) for row in experiment.command for v in row), default=0.0
+            ),
             'predicted_distance': {
-                k: _finite(v, 'distance') for k, v in experiment.distances.items()},
+                k: _finite(v, 'distance') for k, v in experiment.distances.items()
+            },
         },
     }
 
@@ -176,5 +176,3 @@ def _finite(value: float, where: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f'{where} is {value}: the report holds finite numbers only')
     return value
-
-

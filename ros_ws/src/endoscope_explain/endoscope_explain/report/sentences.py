@@ -29,11 +29,14 @@ def verdict_sentence(case: ExplainedCase) -> str:
     after = worst_ratio(case.ladder, 'augmented')
     better = (
         f'with that, the worst signal is {_times(after)} its noise on held-out data, '
-        f'before {_times(before)}')
+        f'before {_times(before)}'
+    )
     named = '; '.join(_named(effect) for effect in case.effects)
     if case.verdict is Verdict.CONSISTENT:
-        return (f'Nothing is left out and no parameter is beyond its tolerance: what remains is '
-                f'{_times(after)} the noise.')
+        return (
+            f'Nothing is left out and no parameter is beyond its tolerance: what remains is '
+            f'{_times(after)} the noise.'
+        )
     if case.verdict is Verdict.PARAMETERS_DIFFER:
         return f'{_differing(case)}; {better}.'
     if case.verdict is Verdict.UNKNOWN_PHYSICS:
@@ -67,7 +70,8 @@ def _unknown(case: ExplainedCase, better: str) -> str:
     return (
         f'No effect of the catalogue explains what acts on the {term.node} of {term.joint}; '
         f'{term.expression} ({term.unit}) accounts for {100 * term.explained:.0f} % of it'
-        f'{siblings}.')
+        f'{siblings}.'
+    )
 
 
 def _times(ratio: float) -> str:

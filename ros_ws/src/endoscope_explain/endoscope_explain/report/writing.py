@@ -35,4 +35,5 @@ def write_report(case: ExplainedCase, folder: Path) -> None:
     if case.next_experiment is not None:
         experiment = case.next_experiment
         write_command_file(
-            folder / EXPERIMENT_FILE, experiment.time, experiment.command, experiment.joints)
+            folder / EXPERIMENT_FILE, experiment.time, experiment.command, experiment.joints
+        )

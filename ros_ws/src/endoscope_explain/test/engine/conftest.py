@@ -28,7 +28,9 @@ def record(plant: PlantDescription, command: np.ndarray, seed: int = 1) -> Recor
     sensors = SensorModel(plant.sensors, seed)
     slow = slice(None, None, 25)
     return Recording(
-        'simulated', 0.0, (joint,),
+        'simulated',
+        0.0,
+        (joint,),
         Series.of(COMMAND, answer.time, shaft),
         Series.of(WIRES, answer.time, sensors.tension(answer.tension)),
         Series.of(BENDING, answer.time[slow], sensors.bending(answer.bending[slow])),
@@ -40,8 +42,7 @@ def record(plant: PlantDescription, command: np.ndarray, seed: int = 1) -> Recor
 
 def rig(*effects, **changed: float) -> PlantDescription:
     """A rig with one joint, with effects and other parameters than nominal."""
-    return PlantDescription(
-        joints={'bend_x': JointParameters(**changed)}, effects=tuple(effects))
+    return PlantDescription(joints={'bend_x': JointParameters(**changed)}, effects=tuple(effects))
 
 
 @pytest.fixture(scope='session')

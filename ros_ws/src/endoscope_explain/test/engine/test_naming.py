@@ -10,7 +10,8 @@ OTHER = {'wire_stiffness': 2200.0, 'capstan_exponent': 0.83, 'joint_friction': 0
 
 def test_a_rig_like_its_description_is_consistent(one_joint):
     explanation = explain_recording(
-        one_joint.record(one_joint.rig(), one_joint.motion()), one_joint.rig(), jobs=1)
+        one_joint.record(one_joint.rig(), one_joint.motion()), one_joint.rig(), jobs=1
+    )
     assert explanation.verdict is Verdict.CONSISTENT
     assert explanation.effects == ()
     assert explanation.adequate
@@ -18,7 +19,8 @@ def test_a_rig_like_its_description_is_consistent(one_joint):
 
 def test_other_parameters_are_found_and_no_effect_is_named(one_joint):
     explanation = explain_recording(
-        one_joint.record(one_joint.rig(**OTHER), one_joint.motion()), one_joint.rig(), jobs=1)
+        one_joint.record(one_joint.rig(**OTHER), one_joint.motion()), one_joint.rig(), jobs=1
+    )
     assert explanation.verdict is Verdict.PARAMETERS_DIFFER
     assert explanation.effects == ()
     for name, value in OTHER.items():
@@ -28,15 +30,19 @@ def test_other_parameters_are_found_and_no_effect_is_named(one_joint):
         assert estimate.in_band
 
 
-@pytest.mark.parametrize(('effect_id', 'parameters', 'verdict'), [
-    ('joint_stop', {'angle_rad': 0.55, 'stiffness': 0.15}, Verdict.MISSING_PHYSICS),
-    ('load_cell_gain', {'gain': 0.9, 'wire': 1.0}, Verdict.SENSOR_FAULT),
-    ('transport_delay', {'delay_s': 0.03}, Verdict.MISSING_PHYSICS),
-])
+@pytest.mark.parametrize(
+    ('effect_id', 'parameters', 'verdict'),
+    [
+        ('joint_stop', {'angle_rad': 0.55, 'stiffness': 0.15}, Verdict.MISSING_PHYSICS),
+        ('load_cell_gain', {'gain': 0.9, 'wire': 1.0}, Verdict.SENSOR_FAULT),
+        ('transport_delay', {'delay_s': 0.03}, Verdict.MISSING_PHYSICS),
+    ],
+)
 def test_the_effect_that_was_left_out_is_named(effect_id, parameters, verdict, one_joint):
     true = one_joint.rig(EffectSpec(effect_id, 'bend_x', parameters), **OTHER)
     explanation = explain_recording(
-        one_joint.record(true, one_joint.motion()), one_joint.rig(), jobs=1)
+        one_joint.record(true, one_joint.motion()), one_joint.rig(), jobs=1
+    )
     assert explanation.verdict is verdict
     assert [e.id for e in explanation.effects] == [effect_id]
     named = explanation.effects[0]
@@ -63,7 +69,7 @@ def test_physics_outside_the_catalogue_is_unknown_and_given_as_a_formula(monkeyp
         run(states.copy(), histories.copy(), p, on, inputs, *rest)
         for _ in range(4):
             angle = rest[-1][0, :, OUT_JOINT]
-            inputs[0, :, IN_PUSH_MOMENT] = 0.006 * np.exp(-((angle - bump_at) / 0.08) ** 2)
+            inputs[0, :, IN_PUSH_MOMENT] = 0.006 * np.exp(-(((angle - bump_at) / 0.08) ** 2))
             run(states.copy(), histories.copy(), p, on, inputs, *rest)
 
     monkeypatch.setattr(simulator, 'run_joints', with_bump)
@@ -85,8 +91,11 @@ def test_what_was_there_in_health_is_not_explained_again(one_joint):
     worn = one_joint.rig(*healthy.effects, bias, **OTHER)
     command = one_joint.motion()
     explanation = explain_recording(
-        one_joint.record(worn, command, 1), one_joint.rig(),
-        baseline=one_joint.record(healthy, command, 2), jobs=1)
+        one_joint.record(worn, command, 1),
+        one_joint.rig(),
+        baseline=one_joint.record(healthy, command, 2),
+        jobs=1,
+    )
     assert explanation.baseline_used
     assert [e.id for e in explanation.effects] == ['tracker_bias']
     assert explanation.effects[0].parameters['bias_rad'].value == pytest.approx(0.05, rel=0.1)
@@ -94,5 +103,6 @@ def test_what_was_there_in_health_is_not_explained_again(one_joint):
 
 def test_a_rig_that_was_not_moved_cannot_be_explained(one_joint):
     explanation = explain_recording(
-        one_joint.record(one_joint.rig(), np.zeros(3000)), one_joint.rig(), jobs=1)
+        one_joint.record(one_joint.rig(), np.zeros(3000)), one_joint.rig(), jobs=1
+    )
     assert explanation.verdict is Verdict.INSUFFICIENT_DATA

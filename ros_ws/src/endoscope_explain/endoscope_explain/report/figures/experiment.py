@@ -18,8 +18,9 @@ def experiment_figure(experiment: NextExperiment) -> str:
         axis = figure.subplots()
         for column, joint in enumerate(experiment.joints):
             x, y = thinned(time, angle[:, column])
-            axis.plot(x, y, lw=1.2, color=INK if joint == experiment.joint else '#9aa5b1',
-                      label=joint)
+            axis.plot(
+                x, y, lw=1.2, color=INK if joint == experiment.joint else '#9aa5b1', label=joint
+            )
         axis.set_xlabel('time (s)')
         axis.set_ylabel('command (deg)')
         axis.legend(loc='upper right', ncols=2, fontsize=8)

@@ -18,8 +18,13 @@ from endoscope_explain.report.figures.style import (
 )
 
 RUNGS = ('nominal', 'refitted', 'augmented', 'gaussian_process', 'neural_network')
-MARKERS = {'nominal': 'o', 'refitted': 's', 'augmented': 'D', 'gaussian_process': '^',
-           'neural_network': 'v'}
+MARKERS = {
+    'nominal': 'o',
+    'refitted': 's',
+    'augmented': 'D',
+    'gaussian_process': '^',
+    'neural_network': 'v',
+}
 
 
 def ladder_figure(ladder: Ladder) -> str:
@@ -43,12 +48,25 @@ def ladder_figure(ladder: Ladder) -> str:
         for name in rungs:
             fits = [ladder[name].get(signal) for signal in signals]
             known = [(r, f.ratio) for r, f in zip(rows, fits, strict=True) if f is not None]
-            axis.plot([v for _, v in known], [r for r, _ in known], MARKERS[name],
-                      color=RUNG_COLOUR[name], ms=6.5, label=RUNG_TITLE[name],
-                      mfc='none' if name in ('gaussian_process', 'neural_network') else None)
+            axis.plot(
+                [v for _, v in known],
+                [r for r, _ in known],
+                MARKERS[name],
+                color=RUNG_COLOUR[name],
+                ms=6.5,
+                label=RUNG_TITLE[name],
+                mfc='none' if name in ('gaussian_process', 'neural_network') else None,
+            )
         axis.axvline(1.0, color=INK, lw=0.8, ls=':')
-        axis.annotate('noise', (1.0, 1.0), xycoords=('data', 'axes fraction'), fontsize=8,
-                      xytext=(3, -2), textcoords='offset points', va='top')
+        axis.annotate(
+            'noise',
+            (1.0, 1.0),
+            xycoords=('data', 'axes fraction'),
+            fontsize=8,
+            xytext=(3, -2),
+            textcoords='offset points',
+            va='top',
+        )
         axis.set_xscale('log')
         axis.set_yticks(rows, [s.replace('/measured_js', '') for s in signals])
         axis.set_ylim(-0.6, len(signals) - 0.2)
@@ -57,9 +75,7 @@ def ladder_figure(ladder: Ladder) -> str:
         return svg(figure)
 
 
-def parameters_figure(
-    parameters: Mapping[str, Mapping[str, NominalEstimate]]
-) -> str:
+def parameters_figure(parameters: Mapping[str, Mapping[str, NominalEstimate]]) -> str:
     """Plot each fitted nominal parameter as a multiple of its described value, with intervals.
 
     Parameters
@@ -82,7 +98,8 @@ def parameters_figure(
                 if estimate is None or estimate.nominal == 0.0:
                     continue
                 value, low, high = (
-                    v / estimate.nominal for v in (estimate.value, estimate.low, estimate.high))
+                    v / estimate.nominal for v in (estimate.value, estimate.low, estimate.high)
+                )
                 colour = INK if estimate.in_band else GUILTY
                 axis.plot([low, high], [row, row], color=colour, lw=2.0, solid_capstyle='round')
                 axis.plot([value], [row], 'o', color=colour, ms=4.5)

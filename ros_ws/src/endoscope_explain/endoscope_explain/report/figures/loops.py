@@ -80,12 +80,19 @@ def loops_figure(
             angle = np.degrees(np.interp(time, *command))
             for name, values, width in _curves(one, inside):
                 x, y = thinned(angle, values)
-                axis.plot(x, y, color=RUNG_COLOUR[name], lw=width,
-                          label=RUNG_TITLE[name], zorder=1 if name == 'measured' else 2)
+                axis.plot(
+                    x,
+                    y,
+                    color=RUNG_COLOUR[name],
+                    lw=width,
+                    label=RUNG_TITLE[name],
+                    zorder=1 if name == 'measured' else 2,
+                )
             axis.set_title(_title(one))
             axis.set_xlabel('command (deg)')
         figure.legend(
-            *axis.get_legend_handles_labels(), loc='outside upper right', ncols=3, fontsize=8)
+            *axis.get_legend_handles_labels(), loc='outside upper right', ncols=3, fontsize=8
+        )
         return svg(figure)
 
 
@@ -99,8 +106,14 @@ def signals_figure(recorded: RecordedView, joint: str, passage: tuple[float, flo
             inside = (one.time >= passage[0]) & (one.time <= passage[1])
             for name, values, width in _curves(one, inside):
                 x, y = thinned(one.time[inside], values)
-                axis.plot(x, y, color=RUNG_COLOUR[name], lw=width, label=RUNG_TITLE[name],
-                          zorder=1 if name == 'measured' else 2)
+                axis.plot(
+                    x,
+                    y,
+                    color=RUNG_COLOUR[name],
+                    lw=width,
+                    label=RUNG_TITLE[name],
+                    zorder=1 if name == 'measured' else 2,
+                )
             axis.set_title(_title(one))
         axes[0].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8)
         axes[-1].set_xlabel('time (s)')
@@ -124,5 +137,3 @@ def _curves(one: SignalView, inside: NDArray[np.bool_]) -> list[tuple[str, Array
 def _title(one: SignalView) -> str:
     name = one.signal.partition(':')[2]
     return f'{name}, bending (deg)' if one.quantity == 'bending' else f'{name}, tension (N)'
-
-

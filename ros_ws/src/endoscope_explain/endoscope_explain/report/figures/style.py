@@ -57,7 +57,7 @@ def svg(figure: Figure) -> str:
     text = io.StringIO()
     figure.savefig(text, format='svg', metadata={'Date': None})
     content = text.getvalue()
-    return content[content.index('<svg'):]
+    return content[content.index('<svg') :]
 
 
 def thinned(*columns: Array, most: int = MOST_POINTS) -> tuple[Array, ...]:

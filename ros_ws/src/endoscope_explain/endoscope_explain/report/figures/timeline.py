@@ -97,4 +97,4 @@ def _misfit(views: Sequence[SignalView]) -> tuple[Array, dict[str, Array]]:
             total += np.bincount(index, one.residual(name) ** 2, count)
             number += np.bincount(index, None, count)
         levels[name] = np.sqrt(total / np.where(number > 0, number, np.nan))
-    return (np.arange(count) + 0.5) * WINDOW_S, levels
+    return (np.arange(count, dtype=np.float64) + 0.5) * WINDOW_S, levels
