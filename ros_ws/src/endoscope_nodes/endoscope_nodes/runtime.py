@@ -35,6 +35,7 @@ from endoscope_nodes.ticker import Ticker
 # An unbounded spin of the EventsExecutor never returns in the Jazzy wheels; a bounded one does.
 # Eleven days.
 FOREVER_S = 1e6
+SHUTDOWN_S = 2.0
 
 
 @dataclass(frozen=True)
@@ -224,7 +225,8 @@ class Runtime:
             self._close_nodes()
         finally:
             try:
-                self.executor.shutdown()
+                # Like its spins, an unbounded shutdown of this executor may never return.
+                self.executor.shutdown(timeout_sec=SHUTDOWN_S)
             finally:
                 self.context.try_shutdown()
 
