@@ -140,7 +140,7 @@ def _screened(
     found = parallel_map(screened, tasks, jobs)
     chosen = []
     for index in range(len(parents)):
-        own = sorted((p for (i, _), p in zip(tasks, found, strict=True) if i == index),
+        own = sorted((p for (i, _), p in zip(tasks, found, strict=True) if i == index and p),
                      key=lambda p: -p[0].gain)[:LOOKED_AT]
         chosen += [(index, p[0]) for p in own if p[0].gain > LEAST_GAIN]
         chosen += [(index, p[1]) for p in own[:LOOKED_AT_TWICE]

@@ -7,7 +7,7 @@ import numpy as np
 from endoscope_explain.compose import Composition
 from endoscope_explain.score import PARAMETER_PRICE
 from endoscope_explain.search import JointSearch
-from endoscope_explain.whiteness import is_noise
+from endoscope_explain.whiteness import is_noise, slips
 
 NAMED = 20.0
 """Fall of the score that a first effect must bring; noise alone brings a few."""
@@ -17,8 +17,10 @@ ADDED_SHARE = 0.25
 """Share of the fall so far that a further effect must bring: less is an error of form."""
 EXPLAINED = 0.68
 """Share of the misfit's logarithm that the catalogue must explain to be called adequate."""
-BARELY = 0.25
+BARELY = 0.2
 """Share below which a name would mislead: the physics is another one, and none is named."""
+EXPLAINED_IN_SLIPS = 0.25
+"""The same where wires stick and slip: the instant of a slip is nobody's to predict."""
 NEARLY_NOISE = 100.0
 """Score above noise alone at which an error of form needs no further explanation."""
 RIVAL = 25.0
@@ -70,7 +72,8 @@ def decide(search: JointSearch) -> Decision:
     left = chosen.score - chosen.floor()
     explained = 1.0 if above <= 0.0 or is_noise(chosen.fit) else 1.0 - left / above
     adequate = is_noise(chosen.fit) or left < NEARLY_NOISE or (
-        bool(chosen.effects) and explained >= EXPLAINED)
+        bool(chosen.effects) and explained >= (
+            EXPLAINED_IN_SLIPS if slips(chosen.fit.model.observation) else EXPLAINED))
     margins, gaps, alternatives = {}, {}, {}
     tried = search.tried()
     measure = _likelihood if is_noise(chosen.fit) else _score

@@ -17,6 +17,8 @@ Flags = NDArray[np.bool_]
 CLOCK_SKEW = CATALOGUE['clock_skew']
 STEP = 1.0e-2
 """Difference step of a coordinate: large against the integrator's error, small against bends."""
+REACH = 0.7
+"""Largest step of a coordinate: further away the derivative says little."""
 SLOW = 0.2
 """An approximate derivative is renewed once a step lowers the cost by less than this share."""
 
@@ -127,7 +129,8 @@ def jacobian(model: JointModel, theta: Array, at: Array, columns: list[int] | No
 
 
 def bounded_step(hessian: Array, gradient: Array, theta: Array, low: Array, high: Array) -> Array:
-    """Newton step that stays within bounds: coordinates that hit one are fixed, one by one."""
+    """Newton step within bounds and `REACH`: coordinates that hit one are fixed, one by one."""
+    low, high = np.maximum(low, theta - REACH), np.minimum(high, theta + REACH)
     free = np.ones(len(theta), dtype=bool)
     step = np.zeros(len(theta))
     for _ in range(len(theta) + 1):

@@ -15,13 +15,18 @@ from endoscope_core.effects.slots import NOMINAL_KEYS
 from endoscope_explain.explanation import Estimate, NominalEstimate
 from endoscope_explain.fit import Fit
 from endoscope_explain.free_parameters import BAND
+from endoscope_explain.whiteness import is_noise
 
 Array = NDArray[np.float64]
 
 BLOCK_S = 1.0
 NINETY_PERCENT = 1.645
-WIDENING = 1.5
+WIDENING = 2.0
 """Calibrated on concealed cases: what the sandwich misses when the form differs."""
+FORM = 0.01
+"""Relative error of a parameter by form alone, where nothing but noise is left."""
+FORM_SEEN = 0.03
+"""The same where an error of form is seen."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +69,12 @@ def covariance(fit: Fit) -> Array:
 
 def intervals(fit: Fit) -> Intervals:
     """90 % intervals of a fit, within the parameters' bounds."""
-    reach = NINETY_PERCENT * WIDENING * np.sqrt(np.diag(covariance(fit)))
     free = fit.model.free
+    share = FORM if is_noise(fit) else FORM_SEEN
+    form = np.array([share * (1.0 if item.logarithmic else abs(t))
+                     for item, t in zip(free, fit.theta, strict=True)])
+    reach = np.hypot(
+        NINETY_PERCENT * WIDENING * np.sqrt(np.diag(covariance(fit))), NINETY_PERCENT * form)
     return Intervals(
         tuple(item.name for item in free), tuple(item.index for item in free),
         np.array([item.value(t) for item, t in zip(free, fit.theta, strict=True)]),

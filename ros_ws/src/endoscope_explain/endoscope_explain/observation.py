@@ -214,9 +214,8 @@ def _channel(
     count = np.diff(np.r_[first, len(time)]).astype(float)
     noise = np.sqrt(white**2 / count + rounding**2)
     if may_chatter:
-        # Slips are no noise that an average removes.
         scatter = np.add.reduceat(fast_scatter(values, white), first) / count
-        noise = np.sqrt(noise**2 + scatter**2)
+        noise = np.sqrt(noise**2 + scatter**2 / count)
     return Channel(
         signal, quantity, QUANTITY_UNITS[quantity], output, scale, tick, place - tick, first,
         count, np.add.reduceat(time, first) / count, np.add.reduceat(values, first) / count,

@@ -86,8 +86,8 @@ def promises(anchor: Fit, effect_ids: Iterable[str]) -> list[Promise]:
             ratio = -float(moved @ left) / size if size > 1e-6 else 0.0
             if ratio < 0.0:
                 start, ratio = _mirrored(effect_id, start), -ratio
-            gain = 0.5 * ratio * ratio * size if start else 0.0
-            found.append(Promise(effect_id, start, gain, ratio))
+            if start:
+                found.append(Promise(effect_id, start, 0.5 * ratio * ratio * size, ratio))
     return sorted(found, key=lambda p: -p.gain)
 
 

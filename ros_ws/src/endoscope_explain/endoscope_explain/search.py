@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.effects.slots import NOMINAL_KEYS
 from endoscope_core.plant.kernel import OUT_JOINT
 from endoscope_explain.compose import (
     Composition,
@@ -15,7 +17,7 @@ from endoscope_explain.compose import (
     searchable_effects,
 )
 from endoscope_explain.evaluate import simulate_joint
-from endoscope_explain.fit import Fit
+from endoscope_explain.fit import Fit, JointModel, fit
 from endoscope_explain.free_parameters import BAND
 from endoscope_explain.observation import JointObservation, couple
 from endoscope_explain.parallel import parallel_map
@@ -27,9 +29,11 @@ Flags = NDArray[np.bool_]
 
 SINGLES_POLISHED = 6
 PAIRS_POLISHED = 3
-RIVALS = 60.0
-"""Score within which the second best single is worth adding to as well."""
-HOPELESS = 0.1
+REPLACED_POLISHED = 2
+BEAM = 3
+RIVALS = 0.5
+"""Share of the best composition's gain from which on a lesser one is worth adding to as well."""
+HOPELESS = 0.03
 """Where no single effect removes this share of the excess misfit, no second one is tried."""
 
 
@@ -106,5 +110,34 @@ def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = 2) -> JointSearch:
         if not grown or is_noise(grown[0].fit) or (
                 grown[0].score > nominal.score - HOPELESS * (nominal.score - grown[0].floor())):
             break
-        parents = [(c, (c.fit,)) for c in grown[:2] if c.score < grown[0].score + RIVALS]
+        needed = RIVALS * (nominal.score - grown[0].score)
+        parents = [(c, (c.fit,)) for c in grown[:BEAM] if nominal.score - c.score >= needed]
+    if len(levels) > 1 and levels[-1] and not is_noise(levels[-1][0].fit):
+        levels.append(tuple(sorted(
+            (*levels[-1], *_replaced(nominal, levels[-1][0], jobs)), key=lambda c: c.score)))
+        del levels[-2]
     return JointSearch(nominal, tuple(levels))
+
+
+def _replaced(nominal: Composition, best: Composition, jobs: int) -> list[Composition]:
+    """Compositions with another effect in the place of each effect but the last one of the best.
+
+    An effect that was chosen while others were missing may stand for what they left open; seen
+    beside the others, the right one does better.
+    """
+    last = CATALOGUE[best.effects[-1]]
+    count = len(last.parameters)
+    places = range(last.first_parameter, last.first_parameter + count)
+    shared = nominal.fit.model
+    flags = shared.flags.copy()
+    flags[last.flag] = True
+    base, _ = best.fit.model.packed(best.fit.theta)
+    kept = [i for i, item in enumerate(best.fit.model.free)
+            if item.index < len(NOMINAL_KEYS) or item.index in places]
+    model = JointModel(
+        shared.observation, base, flags, tuple(best.fit.model.free[i] for i in kept))
+    alone = fit(model, best.fit.theta[kept], iterations=4)
+    parent = Composition((best.effects[-1],), alone, score(alone))
+    start = Fit(model, best.fit.theta[kept], model.residuals(best.fit.theta[kept]),
+                alone.jacobian, np.inf)
+    return grow([(parent, (start, alone))], searchable_effects(), jobs, REPLACED_POLISHED)

@@ -3,11 +3,14 @@
 import numpy as np
 
 from endoscope_explain.fit import Fit
+from endoscope_explain.observation import JointObservation
 
 BLOCK = 50
 """Samples of a block whose mean tells slow misfit that single samples hide."""
 LIMIT = 5.0
 """Standard deviations of the noise's own scatter that a mean square may exceed."""
+NOTABLE = 0.1
+"""Share of a wire's samples with more scatter than noise from which on it is said to slip."""
 WHITE = frozenset({'tension', 'bending'})
 """Quantities whose noise is white; rounding errors of the others are not."""
 
@@ -32,6 +35,12 @@ def excess(fit: Fit) -> dict[str, float]:
 def is_noise(fit: Fit) -> bool:
     """Return whether no white channel shows more than noise."""
     return all(z < LIMIT for z in excess(fit).values())
+
+
+def slips(observation: JointObservation) -> bool:
+    """Return whether wires stick and slip in a notable share of a recording."""
+    wires = [c for c in observation.channels if c.quantity == 'tension']
+    return any(float(np.mean(c.noise > 1.3 * np.min(c.noise))) > NOTABLE for c in wires)
 
 
 def _z(values: np.ndarray) -> float:
