@@ -36,6 +36,7 @@ from endoscope_nodes.ticker import Ticker
 # Eleven days.
 FOREVER_S = 1e6
 SHUTDOWN_S = 2.0
+SWITCH_INTERVAL_S = 2e-4
 
 
 @dataclass(frozen=True)
@@ -173,6 +174,8 @@ class Runtime:
         # A collection that walks over all that was imported would cost many ticks.
         gc.collect()
         gc.freeze()
+        # By default a thread that writes a recording may keep the executor waiting for 5 ms.
+        sys.setswitchinterval(SWITCH_INTERVAL_S)
 
     def check_parameters(self) -> None:
         """Refuse overrides that no node knows.
