@@ -28,7 +28,9 @@ def test_a_plant_with_every_effect_survives_the_round_trip(tmp_path):
         sensors=SensorParameters(tracker_rate=60.0),
         effects=tuple(
             EffectSpec(definition.id, 'bend_y', {p.name: p.typical for p in definition.parameters})
-            for definition in CATALOGUE.values()))
+            for definition in CATALOGUE.values()
+        ),
+    )
     save_plant(plant, tmp_path / 'plant.yaml')
     assert load_plant(tmp_path / 'plant.yaml') == plant
     assert [path.name for path in tmp_path.iterdir()] == ['plant.yaml']
@@ -54,31 +56,42 @@ def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
     assert plant.joints['bend_x'].presliding_distance == 2e-4
 
 
-@pytest.mark.parametrize(('text', 'message'), [
-    ('joins: {}', 'unknown key joins in the plant: did you mean joints'),
-    ('joints: {bend_z: {}}', 'unknown key bend_z in joints: did you mean bend_'),
-    ('joints: {}', 'joints is empty'),
-    ('joints: {bend_x: {capstan_exponant: 1}}', 'did you mean capstan_exponent'),
-    ('joints: {bend_x: {xyz: 1}}', 'unknown key xyz in joints.bend_x: valid are pretension'),
-    ('joints: {bend_x: {pretension: five}}', "joints.bend_x.pretension is 'five': give a number"),
-    ('joints: {bend_x: {pretension: true}}', 'give a number'),
-    ('joints: {bend_x: {wire_stiffness: -1}}', 'wire_stiffness is -1.0: it must be positive'),
-    ('joints: {bend_x: {wire_stiffness: .nan}}', 'give a finite number'),
-    ('joints: [bend_x]', 'joints must be a mapping'),
-    ('sensors: {tracker_nois: 1}', 'did you mean tracker_noise'),
-    ('sensors: {tracker_rate: 0}', 'tracker_rate is 0.0: it must be positive'),
-    ('effects: {}\njoint: 1', 'unknown key joint in the plant: did you mean joints'),
-    ('effects: gravity', 'effects must be a list'),
-    ('effects: [{joint: bend_x}]', r'effects\[0\] has no id'),
-    ('effects: [{id: gravity}]', r'effects\[0\] has no joint'),
-    ('effects: [{id: gravty, joint: bend_x}]', 'unknown effect gravty: did you mean gravity'),
-    ('effects: [{id: gravity, joint: bend_x, parameter: {}}]', 'did you mean parameters'),
-    ('effects: [{id: gravity, joint: bend_x, parameters: {moment: 1}}]', 'did you mean moment_nm'),
-    ('effects: [{id: gravity, joint: bend_x, parameters: {moment_nm: 9}}]',
-     'gravity: moment_nm is 9, it must be between 0 and 0.1 N m'),
-    ('joints: {bend_x: }\neffects: [{id: gravity, joint: bend_y}]', 'joint bend_y'),
-    ('a: [', 'is not YAML'),
-])
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('joins: {}', 'unknown key joins in the plant: did you mean joints'),
+        ('joints: {bend_z: {}}', 'unknown key bend_z in joints: did you mean bend_'),
+        ('joints: {}', 'joints is empty'),
+        ('joints: {bend_x: {capstan_exponant: 1}}', 'did you mean capstan_exponent'),
+        ('joints: {bend_x: {xyz: 1}}', 'unknown key xyz in joints.bend_x: valid are pretension'),
+        (
+            'joints: {bend_x: {pretension: five}}',
+            "joints.bend_x.pretension is 'five': give a number",
+        ),
+        ('joints: {bend_x: {pretension: true}}', 'give a number'),
+        ('joints: {bend_x: {wire_stiffness: -1}}', 'wire_stiffness is -1.0: it must be positive'),
+        ('joints: {bend_x: {wire_stiffness: .nan}}', 'give a finite number'),
+        ('joints: [bend_x]', 'joints must be a mapping'),
+        ('sensors: {tracker_nois: 1}', 'did you mean tracker_noise'),
+        ('sensors: {tracker_rate: 0}', 'tracker_rate is 0.0: it must be positive'),
+        ('effects: {}\njoint: 1', 'unknown key joint in the plant: did you mean joints'),
+        ('effects: gravity', 'effects must be a list'),
+        ('effects: [{joint: bend_x}]', r'effects\[0\] has no id'),
+        ('effects: [{id: gravity}]', r'effects\[0\] has no joint'),
+        ('effects: [{id: gravty, joint: bend_x}]', 'unknown effect gravty: did you mean gravity'),
+        ('effects: [{id: gravity, joint: bend_x, parameter: {}}]', 'did you mean parameters'),
+        (
+            'effects: [{id: gravity, joint: bend_x, parameters: {moment: 1}}]',
+            'did you mean moment_nm',
+        ),
+        (
+            'effects: [{id: gravity, joint: bend_x, parameters: {moment_nm: 9}}]',
+            'gravity: moment_nm is 9, it must be between 0 and 0.1 N m',
+        ),
+        ('joints: {bend_x: }\neffects: [{id: gravity, joint: bend_y}]', 'joint bend_y'),
+        ('a: [', 'is not YAML'),
+    ],
+)
 def test_what_is_wrong_is_named_in_one_line(tmp_path, text, message):
     path = written(tmp_path, text)
     with pytest.raises(PlantFileError, match=message) as caught:

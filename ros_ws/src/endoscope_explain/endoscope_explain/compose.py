@@ -87,11 +87,17 @@ def nominal_anchors(
     refitted, described : Fit
     """
     model = nominal_model(observation, base, flags, band)
-    theta = np.array([
-        item.mean if item.logarithmic else item.coordinate(1.0) for item in model.free])
+    theta = np.array(
+        [item.mean if item.logarithmic else item.coordinate(1.0) for item in model.free]
+    )
     residuals = model.residuals(theta)
-    described = Fit(model, theta, residuals, jacobian(model, theta, residuals),
-                    0.5 * float(residuals @ residuals))
+    described = Fit(
+        model,
+        theta,
+        residuals,
+        jacobian(model, theta, residuals),
+        0.5 * float(residuals @ residuals),
+    )
     return fit(model, theta, known_jacobian=described.jacobian), described
 
 
@@ -131,8 +137,12 @@ def grow(
 def _screened(
     parents: Sequence[Parent], effect_ids: Sequence[str], jobs: int
 ) -> list[tuple[int, Promise]]:
-    tasks = [(index, effect_id) for index, (parent, _) in enumerate(parents)
-             for effect_id in effect_ids if effect_id not in parent.effects]
+    tasks = [
+        (index, effect_id)
+        for index, (parent, _) in enumerate(parents)
+        for effect_id in effect_ids
+        if effect_id not in parent.effects
+    ]
 
     def screened(task: tuple[int, str]) -> list[Promise]:
         return promises(parents[task[0]][1][0], [task[1]])
@@ -140,11 +150,14 @@ def _screened(
     found = parallel_map(screened, tasks, jobs)
     chosen = []
     for index in range(len(parents)):
-        own = sorted((p for (i, _), p in zip(tasks, found, strict=True) if i == index and p),
-                     key=lambda p: -p[0].gain)[:LOOKED_AT]
+        own = sorted(
+            (p for (i, _), p in zip(tasks, found, strict=True) if i == index and p),
+            key=lambda p: -p[0].gain,
+        )[:LOOKED_AT]
         chosen += [(index, p[0]) for p in own if p[0].gain > LEAST_GAIN]
-        chosen += [(index, p[1]) for p in own[:LOOKED_AT_TWICE]
-                   if len(p) > 1 and p[1].gain > LEAST_GAIN]
+        chosen += [
+            (index, p[1]) for p in own[:LOOKED_AT_TWICE] if len(p) > 1 and p[1].gain > LEAST_GAIN
+        ]
     return chosen
 
 
@@ -158,7 +171,8 @@ def _looks(
 
     best: dict[frozenset[str], Look] = {}
     for (index, promise), (theta, cost) in zip(
-            chosen, parallel_map(looked, chosen, jobs), strict=True):
+        chosen, parallel_map(looked, chosen, jobs), strict=True
+    ):
         parent, anchors = parents[index]
         effects = (*parent.effects, promise.effect_id)
         key = frozenset(effects)
@@ -173,6 +187,8 @@ def _polished(looks: Sequence[Look], jobs: int) -> list[Composition]:
         done = polish(looks[index])
         return done.theta, done.residuals, done.jacobian, done.cost
 
-    fits = [Fit(item.model, *found) for item, found in zip(
-        looks, parallel_map(numbers, range(len(looks)), jobs), strict=True)]
+    fits = [
+        Fit(item.model, *found)
+        for item, found in zip(looks, parallel_map(numbers, range(len(looks)), jobs), strict=True)
+    ]
     return [Composition(item.effects, f, score(f)) for item, f in zip(looks, fits, strict=True)]

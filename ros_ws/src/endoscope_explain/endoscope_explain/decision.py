@@ -66,14 +66,23 @@ def decide(search: JointSearch) -> Decision:
                 break
             chosen = better
     above = nominal.score - nominal.floor()
-    if chosen.effects and not is_noise(chosen.fit) and (
-            nominal.score - chosen.score < BARELY * above):
+    if (
+        chosen.effects
+        and not is_noise(chosen.fit)
+        and (nominal.score - chosen.score < BARELY * above)
+    ):
         chosen = nominal
     left = chosen.score - chosen.floor()
     explained = 1.0 if above <= 0.0 or is_noise(chosen.fit) else 1.0 - left / above
-    adequate = is_noise(chosen.fit) or left < NEARLY_NOISE or (
-        bool(chosen.effects) and explained >= (
-            EXPLAINED_IN_SLIPS if slips(chosen.fit.model.observation) else EXPLAINED))
+    adequate = (
+        is_noise(chosen.fit)
+        or left < NEARLY_NOISE
+        or (
+            bool(chosen.effects)
+            and explained
+            >= (EXPLAINED_IN_SLIPS if slips(chosen.fit.model.observation) else EXPLAINED)
+        )
+    )
     margins, gaps, alternatives = {}, {}, {}
     tried = search.tried()
     measure = _likelihood if is_noise(chosen.fit) else _score
@@ -85,8 +94,10 @@ def decide(search: JointSearch) -> Decision:
         rivals = sorted(
             (measure(c) - best, next(iter(frozenset(c.effects) - rest)))
             for c in tried
-            if len(c.effects) == len(chosen.effects) and rest < frozenset(c.effects)
-            and effect_id not in c.effects)
+            if len(c.effects) == len(chosen.effects)
+            and rest < frozenset(c.effects)
+            and effect_id not in c.effects
+        )
         gaps[effect_id] = min(rivals[0][0] if rivals else np.inf, margins[effect_id])
         reach = RIVAL if measure is _likelihood else max(RIVAL, RIVAL_SHARE * margins[effect_id])
         alternatives[effect_id] = tuple(name for gap, name in rivals if gap < reach)
@@ -111,7 +122,7 @@ def _better(
     candidates = sorted(alike, key=_likelihood) if alike else level
     for candidate in candidates:
         if candidate.score < chosen.score - needed or (
-                not chosen.effects and alike
-                and _likelihood(candidate) < _likelihood(chosen) - needed):
+            not chosen.effects and alike and _likelihood(candidate) < _likelihood(chosen) - needed
+        ):
             return candidate
     return None

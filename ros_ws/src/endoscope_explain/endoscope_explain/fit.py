@@ -61,15 +61,19 @@ class JointModel:
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest coordinates."""
-        return (np.array([item.coordinate(item.low) for item in self.free]),
-                np.array([item.coordinate(item.high) for item in self.free]))
+        return (
+            np.array([item.coordinate(item.low) for item in self.free]),
+            np.array([item.coordinate(item.high) for item in self.free]),
+        )
 
     def prior(self, theta: Array) -> Array:
         """Deviations from the priors' means in spreads."""
-        return np.array([
-            0.0 if math.isinf(item.spread) else (coordinate - item.mean) / item.spread
-            for item, coordinate in zip(self.free, theta, strict=True)
-        ])
+        return np.array(
+            [
+                0.0 if math.isinf(item.spread) else (coordinate - item.mean) / item.spread
+                for item, coordinate in zip(self.free, theta, strict=True)
+            ]
+        )
 
     def prior_weight(self) -> Array:
         """Inverse spreads."""
@@ -187,12 +191,13 @@ def fit(
     current = model.residuals(theta)
 
     def cost_of(values: Array, at: Array) -> float:
-        return 0.5 * float(np.sum((weight * values)**2) + np.sum(model.prior(at)**2))
+        return 0.5 * float(np.sum((weight * values) ** 2) + np.sum(model.prior(at) ** 2))
 
     cost = cost_of(current, theta)
     damping = 1e-4
-    derivative = (jacobian(model, theta, current) if known_jacobian is None
-                  else known_jacobian.copy())
+    derivative = (
+        jacobian(model, theta, current) if known_jacobian is None else known_jacobian.copy()
+    )
     exact = known_jacobian is None
     for _ in range(iterations):
         weighted = derivative * weight[:, None]

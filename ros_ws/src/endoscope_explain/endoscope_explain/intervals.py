@@ -50,48 +50,64 @@ class Intervals:
 
 def covariance(fit: Fit) -> Array:
     """Sandwich covariance (n, n) of the coordinates of a fit."""
-    prior = np.diag(fit.model.prior_weight()**2)
+    prior = np.diag(fit.model.prior_weight() ** 2)
     ridge = 1e-9 * np.diag(np.maximum(np.sum(fit.jacobian**2, axis=0), 1e-12))
     curvature = np.linalg.inv(fit.jacobian.T @ fit.jacobian + prior + ridge)
     middle = prior.copy()
     observation = fit.model.observation
     gradients = fit.jacobian * fit.residuals[:, None]
-    blocks = np.concatenate([
-        np.floor(channel.time / BLOCK_S).astype(int) for channel in observation.channels])
+    blocks = np.concatenate(
+        [np.floor(channel.time / BLOCK_S).astype(int) for channel in observation.channels]
+    )
     sums = np.zeros((int(blocks.max()) + 1, fit.jacobian.shape[1]))
     np.add.at(sums, blocks, gradients)
     middle += sums.T @ sums
     sandwich = curvature @ middle @ curvature
     # Quantised channels scatter less than white noise; nothing is known better than it allows.
-    return np.asarray(np.where(np.eye(len(sandwich)) > 0,
-                               np.maximum(sandwich, curvature), sandwich))
+    return np.asarray(
+        np.where(np.eye(len(sandwich)) > 0, np.maximum(sandwich, curvature), sandwich)
+    )
 
 
 def intervals(fit: Fit) -> Intervals:
     """90 % intervals of a fit, within the parameters' bounds."""
     free = fit.model.free
     share = FORM if is_noise(fit) else FORM_SEEN
-    form = np.array([share * (1.0 if item.logarithmic else abs(t))
-                     for item, t in zip(free, fit.theta, strict=True)])
+    form = np.array(
+        [
+            share * (1.0 if item.logarithmic else abs(t))
+            for item, t in zip(free, fit.theta, strict=True)
+        ]
+    )
     reach = np.hypot(
-        NINETY_PERCENT * WIDENING * np.sqrt(np.diag(covariance(fit))), NINETY_PERCENT * form)
+        NINETY_PERCENT * WIDENING * np.sqrt(np.diag(covariance(fit))), NINETY_PERCENT * form
+    )
     return Intervals(
-        tuple(item.name for item in free), tuple(item.index for item in free),
+        tuple(item.name for item in free),
+        tuple(item.index for item in free),
         np.array([item.value(t) for item, t in zip(free, fit.theta, strict=True)]),
         np.array([item.value(t) for item, t in zip(free, fit.theta - reach, strict=True)]),
-        np.array([item.value(t) for item, t in zip(free, fit.theta + reach, strict=True)]))
+        np.array([item.value(t) for item, t in zip(free, fit.theta + reach, strict=True)]),
+    )
 
 
-def nominal_estimates(fit: Fit, described: Array, units: dict[str, str]) -> dict[
-        str, NominalEstimate]:
+def nominal_estimates(
+    fit: Fit, described: Array, units: dict[str, str]
+) -> dict[str, NominalEstimate]:
     """Estimates of the nominal parameters of a fit, beside those described (parameters,)."""
     found = intervals(fit)
     return {
         name: NominalEstimate(
-            float(value), float(low), float(high), units.get(name, ''), float(described[index]),
-            bool(abs(np.log(value / described[index])) <= np.log1p(BAND)))
+            float(value),
+            float(low),
+            float(high),
+            units.get(name, ''),
+            float(described[index]),
+            bool(abs(np.log(value / described[index])) <= np.log1p(BAND)),
+        )
         for name, index, value, low, high in zip(
-            found.names, found.indices, found.values, found.low, found.high, strict=True)
+            found.names, found.indices, found.values, found.low, found.high, strict=True
+        )
         if name in NOMINAL_KEYS and 0 <= index < len(NOMINAL_KEYS)
     }
 
@@ -106,7 +122,8 @@ def effect_estimates(fit: Fit, first: int, units: dict[str, str]) -> dict[str, E
         if index in found.indices:
             i = found.indices.index(index)
             estimates[name] = Estimate(
-                float(found.values[i]), float(found.low[i]), float(found.high[i]), unit)
+                float(found.values[i]), float(found.low[i]), float(found.high[i]), unit
+            )
         else:
             value = float(packed[index])
             estimates[name] = Estimate(value, value, value, unit)

@@ -158,8 +158,13 @@ def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObserva
 
 
 def _channels(
-    recording: Recording, j: int, joint: str, gear: float, sensors: SensorParameters,
-    begin: float, ticks: int,
+    recording: Recording,
+    j: int,
+    joint: str,
+    gear: float,
+    sensors: SensorParameters,
+    begin: float,
+    ticks: int,
 ) -> tuple[Channel, ...]:
     encoder_step = 2.0 * pi / sensors.encoder_counts
     plan = (
@@ -180,10 +185,20 @@ def _channels(
             continue
         # Rounding is white only where the noise itself spreads readings over several steps.
         dithered = white >= 0.3 * step
-        channels.append(_channel(
-            signal_name(quantity, joint, wire), quantity, output, scale, time, values, period,
-            sqrt(white**2 + (step**2 / 12.0 if dithered else 0.0)),
-            0.0 if dithered else step / sqrt(12.0), quantity == 'tension'))
+        channels.append(
+            _channel(
+                signal_name(quantity, joint, wire),
+                quantity,
+                output,
+                scale,
+                time,
+                values,
+                period,
+                sqrt(white**2 + (step**2 / 12.0 if dithered else 0.0)),
+                0.0 if dithered else step / sqrt(12.0),
+                quantity == 'tension',
+            )
+        )
     return tuple(channels)
 
 
@@ -198,8 +213,16 @@ def _valid_column(
 
 
 def _channel(
-    signal: str, quantity: str, output: int, scale: float, time: Array, values: Array,
-    period: float, white: float, rounding: float, may_chatter: bool,
+    signal: str,
+    quantity: str,
+    output: int,
+    scale: float,
+    time: Array,
+    values: Array,
+    period: float,
+    white: float,
+    rounding: float,
+    may_chatter: bool,
 ) -> Channel:
     place = time / TICK
     # Stamps on a tick, to the nanosecond, take the tick's own row.
@@ -217,6 +240,16 @@ def _channel(
         scatter = np.add.reduceat(fast_scatter(values, white), first) / count
         noise = np.sqrt(noise**2 + scatter**2 / count)
     return Channel(
-        signal, quantity, QUANTITY_UNITS[quantity], output, scale, tick, place - tick, first,
-        count, np.add.reduceat(time, first) / count, np.add.reduceat(values, first) / count,
-        noise)
+        signal,
+        quantity,
+        QUANTITY_UNITS[quantity],
+        output,
+        scale,
+        tick,
+        place - tick,
+        first,
+        count,
+        np.add.reduceat(time, first) / count,
+        np.add.reduceat(values, first) / count,
+        noise,
+    )

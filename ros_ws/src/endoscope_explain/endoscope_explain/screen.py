@@ -44,8 +44,10 @@ def starting_points(effect_id: str) -> list[dict[str, float]]:
     """Combinations of an effect's starting values and discrete choices, each once."""
     parameters = CATALOGUE[effect_id].parameters
     values = [tuple(dict.fromkeys(p.choices or p.starts or (p.typical,))) for p in parameters]
-    return [dict(zip([p.name for p in parameters], combination, strict=True))
-            for combination in product(*values)]
+    return [
+        dict(zip([p.name for p in parameters], combination, strict=True))
+        for combination in product(*values)
+    ]
 
 
 def with_effect(model: JointModel, effect_id: str, start: dict[str, float]) -> JointModel:
@@ -78,8 +80,10 @@ def promises(anchor: Fit, effect_ids: Iterable[str]) -> list[Promise]:
     for effect_id in effect_ids:
         for start in starting_points(effect_id):
             model = with_effect(anchor.model, effect_id, start)
-            own = [item.coordinate(float(model.base[item.index]))
-                   for item in model.free[len(anchor.theta):]]
+            own = [
+                item.coordinate(float(model.base[item.index]))
+                for item in model.free[len(anchor.theta) :]
+            ]
             moved = model.residuals(np.concatenate([anchor.theta, own])) - anchor.residuals
             moved -= span @ (span.T @ moved)
             size = float(moved @ moved)

@@ -64,6 +64,7 @@ def all_anchors(
     band: float = BAND,
 ) -> list[tuple[Fit, Fit]]:
     """Refit the nominal plant of every joint, and let the joints see each other's angle."""
+
     def numbers(index: int) -> tuple[tuple[Array, Array, Array, float], ...]:
         observation = observations[index]
         fits = nominal_anchors(observation, *packed[observation.joint], band)
@@ -71,7 +72,8 @@ def all_anchors(
 
     anchors = []
     for observation, found in zip(
-            observations, parallel_map(numbers, range(len(observations)), jobs), strict=True):
+        observations, parallel_map(numbers, range(len(observations)), jobs), strict=True
+    ):
         model = nominal_model(observation, *packed[observation.joint], band)
         anchors.append((Fit(model, *found[0]), Fit(model, *found[1])))
     angles = []
@@ -107,14 +109,22 @@ def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = 2) -> JointSearch:
         polished = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
         grown = grow(parents, searchable_effects(), jobs, polished)
         levels.append(tuple(grown))
-        if not grown or is_noise(grown[0].fit) or (
-                grown[0].score > nominal.score - HOPELESS * (nominal.score - grown[0].floor())):
+        if (
+            not grown
+            or is_noise(grown[0].fit)
+            or (grown[0].score > nominal.score - HOPELESS * (nominal.score - grown[0].floor()))
+        ):
             break
         needed = RIVALS * (nominal.score - grown[0].score)
         parents = [(c, (c.fit,)) for c in grown[:BEAM] if nominal.score - c.score >= needed]
     if len(levels) > 1 and levels[-1] and not is_noise(levels[-1][0].fit):
-        levels.append(tuple(sorted(
-            (*levels[-1], *_replaced(nominal, levels[-1][0], jobs)), key=lambda c: c.score)))
+        levels.append(
+            tuple(
+                sorted(
+                    (*levels[-1], *_replaced(nominal, levels[-1][0], jobs)), key=lambda c: c.score
+                )
+            )
+        )
         del levels[-2]
     return JointSearch(nominal, tuple(levels))
 
@@ -132,12 +142,15 @@ def _replaced(nominal: Composition, best: Composition, jobs: int) -> list[Compos
     flags = shared.flags.copy()
     flags[last.flag] = True
     base, _ = best.fit.model.packed(best.fit.theta)
-    kept = [i for i, item in enumerate(best.fit.model.free)
-            if item.index < len(NOMINAL_KEYS) or item.index in places]
-    model = JointModel(
-        shared.observation, base, flags, tuple(best.fit.model.free[i] for i in kept))
+    kept = [
+        i
+        for i, item in enumerate(best.fit.model.free)
+        if item.index < len(NOMINAL_KEYS) or item.index in places
+    ]
+    model = JointModel(shared.observation, base, flags, tuple(best.fit.model.free[i] for i in kept))
     alone = fit(model, best.fit.theta[kept], iterations=4)
     parent = Composition((best.effects[-1],), alone, score(alone))
-    start = Fit(model, best.fit.theta[kept], model.residuals(best.fit.theta[kept]),
-                alone.jacobian, np.inf)
+    start = Fit(
+        model, best.fit.theta[kept], model.residuals(best.fit.theta[kept]), alone.jacobian, np.inf
+    )
     return grow([(parent, (start, alone))], searchable_effects(), jobs, REPLACED_POLISHED)

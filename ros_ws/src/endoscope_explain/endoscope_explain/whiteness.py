@@ -27,7 +27,7 @@ def excess(fit: Fit) -> dict[str, float]:
             continue
         values = fit.residuals[part]
         count = len(values) // BLOCK
-        means = values[:count * BLOCK].reshape(count, BLOCK).mean(axis=1) * np.sqrt(BLOCK)
+        means = values[: count * BLOCK].reshape(count, BLOCK).mean(axis=1) * np.sqrt(BLOCK)
         found[channel.signal] = max(_z(values), _z(means))
     return found
 

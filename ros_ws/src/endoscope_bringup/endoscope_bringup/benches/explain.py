@@ -27,6 +27,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run and print; return 0 if every figure is reached, else 1."""
+    from endoscope_bringup.benches.explain_speed import measure_speed
     from endoscope_explain.benchmark.figures_of_merit import figures
     from endoscope_explain.benchmark.kept_outcomes import run_and_keep
     from endoscope_explain.benchmark.printing import (
@@ -35,7 +36,6 @@ def run(args: argparse.Namespace) -> int:
         peers_table,
         table,
     )
-    from endoscope_bringup.benches.explain_speed import measure_speed
 
     speed = measure_speed(args.seed, args.jobs)
     outcomes = run_and_keep(args.cases, args.seed, args.jobs, not args.no_peers, args.keep)

@@ -75,7 +75,7 @@ def plant_from_mapping(content: Any) -> PlantDescription:
     """
     sections = _section(content, 'the plant')
     _check_keys(sections, ('joints', 'sensors', 'effects'), 'the plant')
-    joints_given = dict.fromkeys(JOINT_NAMES)
+    joints_given: Mapping[str, Any] = dict.fromkeys(JOINT_NAMES)
     if sections.get('joints') is not None:
         joints_given = _section(sections['joints'], 'joints')
     _check_keys(joints_given, JOINT_NAMES, 'joints')
@@ -83,7 +83,8 @@ def plant_from_mapping(content: Any) -> PlantDescription:
         raise ValueError('joints is empty: name bend_x, bend_y or both')
     joints = {
         name: JointParameters(**_numbers(joints_given[name], JointParameters, f'joints.{name}'))
-        for name in JOINT_NAMES if name in joints_given
+        for name in JOINT_NAMES
+        if name in joints_given
     }
     sensors = SensorParameters(**_numbers(sections.get('sensors'), SensorParameters, 'sensors'))
     listed = sections.get('effects') or []

@@ -42,8 +42,8 @@ def order_stamps(series: Series, joint: str) -> tuple[Series, list[Finding]]:
                 'recording',
                 (series.topic,),
                 ((first, first + worst),),
-                f'{int(backward.sum())} stamps of {series.topic} run backwards, by {worst:.3f} s at '
-                f'most (first at {first:.3f} s)',
+                f'{int(backward.sum())} stamps of {series.topic} run backwards, by {worst:.3f} s '
+                f'at most (first at {first:.3f} s)',
                 'sorted by stamp',
                 evidence={'count': float(backward.sum()), 'worst_s': worst},
             )
@@ -143,7 +143,8 @@ def gap_findings(
             'recording',
             topics,
             tuple(sorted({(a, b) for _, a, b, _ in every})),
-            f'samples are missing: {counts}; the longest gap lasts {length:.3f} s from {begin:.3f} s',
+            f'samples are missing: {counts}; the longest gap lasts {length:.3f} s '
+            f'from {begin:.3f} s',
             'nothing is judged where samples are missing',
             parameters={
                 'time_s': onset,

@@ -52,8 +52,7 @@ def conditions(recording: Recording, j: int, gear: float) -> list[Condition]:
     grid = np.arange(0.0, recording.duration, GRID_S)
     motor = _motor(recording, j, gear, grid)
     speed = _speed(motor)
-    bending = np.interp(
-        grid, recording.bending.time, _smoothed(recording.bending.values[:, j], 5))
+    bending = np.interp(grid, recording.bending.time, _smoothed(recording.bending.values[:, j], 5))
     tension = recording.tension.values[:, j].sum(axis=1)
     tension = np.interp(grid, recording.tension.time, tension)
     moving = np.abs(speed) > STANDING_RAD_PER_S
@@ -80,15 +79,18 @@ def conditions(recording: Recording, j: int, gear: float) -> list[Condition]:
             Condition(f'above +{degrees} of bending', bending > level),
             Condition(f'below -{degrees} of bending', bending < -level),
         ]
-    found.append(Condition(
-        f'within {np.degrees(0.2 * largest):.0f} deg of straight', np.abs(bending) < 0.2 * largest))
+    found.append(
+        Condition(
+            f'within {np.degrees(0.2 * largest):.0f} deg of straight',
+            np.abs(bending) < 0.2 * largest,
+        )
+    )
     high = float(np.quantile(tension, 0.75))
     found.append(Condition(f'where the wires carry more than {high:.1f} N', tension > high))
     for other, name in enumerate(recording.joints):
         if other != j:
             its_speed = _speed(_motor(recording, other, gear, grid))
-            found.append(Condition(
-                f'while {name} moves', np.abs(its_speed) > STANDING_RAD_PER_S))
+            found.append(Condition(f'while {name} moves', np.abs(its_speed) > STANDING_RAD_PER_S))
     for share in (0.25, 0.5, 0.75):
         time = share * recording.duration
         found.append(Condition(f'after {time:.0f} s', grid > time))

@@ -68,12 +68,11 @@ def information(energy: Array, active: Mask, within: Mask) -> float:
     if share <= time_share:
         return 0.0
     return float(
-        share * np.log(share / time_share) + (1 - share) * np.log((1 - share) / (1 - time_share)))
+        share * np.log(share / time_share) + (1 - share) * np.log((1 - share) / (1 - time_share))
+    )
 
 
-def _best(
-    energy: Array, states: Sequence[Condition], within: Mask, seed: int
-) -> Condition | None:
+def _best(energy: Array, states: Sequence[Condition], within: Mask, seed: int) -> Condition | None:
     scored = [(information(energy, s.active, within), i) for i, s in enumerate(states)]
     value, index = max(scored)
     if value < LEAST_NATS:

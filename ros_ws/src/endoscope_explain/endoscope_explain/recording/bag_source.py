@@ -88,9 +88,12 @@ def recording_from_bag(
 
     has = {
         joint: [
-            (command, [command_names[joint]]), (wires, list(wire_names(joint))), (bending, [joint]),
+            (command, [command_names[joint]]),
+            (wires, list(wire_names(joint))),
+            (bending, [joint]),
             *([] if motor is None else [(motor, [motor_name(joint)])]),
-        ] for joint in plant.joints
+        ]
+        for joint in plant.joints
     }
     joints = []
     for joint, needed in has.items():
@@ -114,8 +117,7 @@ def recording_from_bag(
         received = np.asarray((chosen.log_ns - origin_ns) * 1e-9, dtype=np.float64)
         return Series.of(topic, time, np.ascontiguousarray(values), received)
 
-    shaft = series(
-        command.topic, command, [command_names[j] for j in joints], 'position')
+    shaft = series(command.topic, command, [command_names[j] for j in joints], 'position')
     if not bag.has(COMMAND, namespace):
         gears = np.array([plant.joints[j].gear for j in joints])
         shaft = Series.of(DESIRED, shaft.time, shaft.values * gears, shaft.received)

@@ -54,18 +54,27 @@ def timeline_figure(
             _shade(axis, places)
         time, angle = thinned(*command)
         motion.plot(time, np.degrees(angle), color='#9aa5b1', lw=1.0, label='command')
-        motion.plot(bending.time, np.degrees(bending.measured), color=INK, lw=0.9,
-                    label='bending, measured')
+        motion.plot(
+            bending.time, np.degrees(bending.measured), color=INK, lw=0.9, label='bending, measured'
+        )
         motion.set_ylabel('deg')
         motion.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=8)
         motion.set_title(f'Motion of {joint}')
         centres, levels = _misfit(views)
         for name, level in levels.items():
-            misfit.step(centres, level, where='mid', color=RUNG_COLOUR[name], lw=1.1,
-                        label=RUNG_TITLE[name])
+            misfit.step(
+                centres, level, where='mid', color=RUNG_COLOUR[name], lw=1.1, label=RUNG_TITLE[name]
+            )
         misfit.axhline(1.0, color=INK, lw=0.8, ls=':')
-        misfit.annotate('noise', (1.0, 1.0), xycoords=('axes fraction', 'data'), fontsize=8,
-                        xytext=(-2, 3), textcoords='offset points', ha='right')
+        misfit.annotate(
+            'noise',
+            (1.0, 1.0),
+            xycoords=('axes fraction', 'data'),
+            fontsize=8,
+            xytext=(-2, 3),
+            textcoords='offset points',
+            ha='right',
+        )
         misfit.set_yscale('log')
         misfit.set_ylim(0.5, max(10.0, 2.0 * float(np.nanmax(levels['nominal']))))
         misfit.set_ylabel('misfit / noise')
@@ -79,8 +88,14 @@ def timeline_figure(
 def _shade(axis: Axes, places: Sequence[Place]) -> None:
     for number, place in enumerate(places[:2]):
         for begin, end in place.intervals:
-            axis.axvspan(begin, max(end, begin + 0.05), color=SHADE, lw=0, zorder=0,
-                         alpha=1.0 if number == 0 else 0.6)
+            axis.axvspan(
+                begin,
+                max(end, begin + 0.05),
+                color=SHADE,
+                lw=0,
+                zorder=0,
+                alpha=1.0 if number == 0 else 0.6,
+            )
         if place.onset_s is not None:
             axis.axvline(place.onset_s, color=GUILTY, lw=1.2)
 

@@ -1,0 +1,1 @@
+"""How often an explanation is right, on concealed cases of an independent generator."""
