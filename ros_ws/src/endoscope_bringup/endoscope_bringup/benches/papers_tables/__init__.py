@@ -1,0 +1,7 @@
+"""The papers' tables beside ours, one module each.
+
+A module here has ``TITLE: str`` and ``rows(settings: PapersBench) -> list[Row]``; `TABLES` names
+them in the order of printing. Heavy imports belong into `rows`.
+"""
+
+TABLES: tuple[str, ...] = ()

@@ -1,0 +1,113 @@
+"""One printed line of a table: the papers' figure, ours, and what is aimed at."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+FEWEST_CONFIGURATIONS = 5
+
+
+@dataclass(frozen=True)
+class PapersBench:
+    """What every table of the bench is asked for.
+
+    Parameters
+    ----------
+    seed : int
+        Chooses tubes, rigs and noise.
+    tubes : int
+        Tube configurations for each row, at least five.
+    report : callable
+        Takes a line that says how far it has come.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer tubes than five, or the seed is negative.
+    """
+
+    seed: int
+    tubes: int
+    report: Callable[[str], None]
+
+    def __post_init__(self) -> None:
+        if self.tubes < FEWEST_CONFIGURATIONS:
+            raise ValueError(
+                f'{self.tubes} tube configurations are too few: give {FEWEST_CONFIGURATIONS} '
+                'or more'
+            )
+        if self.seed < 0:
+            raise ValueError(f'seed = {self.seed} must not be negative')
+
+
+@dataclass(frozen=True)
+class Row:
+    """One figure.
+
+    Parameters
+    ----------
+    name : str
+        What is measured, with its unit.
+    values : sequence of float
+        Ours, one for each tube configuration (or fold, or recording).
+    paper : str
+        The papers' figure as they print it; empty where they have none.
+    at_most, at_least : float, optional
+        What the mean of `values` is to keep.
+    digits : int
+        Digits after the point.
+    note : str
+        What a reader must know to take the figure right.
+    """
+
+    name: str
+    values: Sequence[float]
+    paper: str = ''
+    at_most: float | None = None
+    at_least: float | None = None
+    digits: int = 2
+    note: str = ''
+
+    @property
+    def reached(self) -> bool | None:
+        """Whether the aim is kept; None where there is none. What is not finite keeps none."""
+        if self.at_most is None and self.at_least is None:
+            return None
+        mean = float(np.mean(self.values))
+        return (self.at_most is None or mean <= self.at_most) and (
+            self.at_least is None or mean >= self.at_least
+        )
+
+    @property
+    def ours(self) -> str:
+        """Mean and standard deviation."""
+        mean, spread = np.mean(self.values), np.std(self.values)
+        if len(self.values) == 1:
+            return f'{mean:.{self.digits}f}'
+        return f'{mean:.{self.digits}f} ± {spread:.{self.digits}f}'
+
+    @property
+    def aim(self) -> str:
+        """The aim in words; empty where there is none."""
+        parts = []
+        if self.at_least is not None:
+            parts.append(f'≥ {self.at_least:g}')
+        if self.at_most is not None:
+            parts.append(f'≤ {self.at_most:g}')
+        return ' and '.join(parts)
+
+
+def table_text(rows: Sequence[Row]) -> str:
+    """Rows in columns: figure, paper, ours, number of values, aim and whether it is kept."""
+    cells = [('figure', 'paper', 'ours (mean ± sd)', 'n', 'aim', '')]
+    for row in rows:
+        verdict = {None: '', True: 'kept', False: 'MISSED'}[row.reached]
+        cells.append((row.name, row.paper or '-', row.ours, str(len(row.values)), row.aim, verdict))
+    widths = [max(len(line[k]) for line in cells) for k in range(len(cells[0]))]
+    lines = [
+        '  '.join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in cells
+    ]
+    notes = list(dict.fromkeys(row.note for row in rows if row.note))
+    return '\n'.join([*lines, *(f'  {note}' for note in notes)])
