@@ -1,8 +1,9 @@
 """One MCAP chunk with its message indexes, built from many messages at once.
 
 The `mcap` library adds messages one by one, which costs a recorder as much as a tenth of a core and
-stalls whoever shares its process while an index is written; here the heads and the indexes of all
-messages of a chunk are made as arrays. Format: https://mcap.dev/spec.
+stalls whoever shares its process while an index is written. Here a message gets its head when it
+comes, and the indexes of a chunk are made as arrays, so that little is left to do at its end.
+Format: https://mcap.dev/spec.
 """
 
 import operator
@@ -22,10 +23,21 @@ from endoscope_bags.mcap_scan import MESSAGE_HEAD, MESSAGE_HEAD_LENGTH
 # Upper bound of what a message adds to a file besides its own bytes: head and index entry.
 MESSAGE_OVERHEAD = MESSAGE_HEAD.itemsize + 16
 _INDEX_ENTRY = np.dtype([('time', '<u8'), ('offset', '<u8')])
-_COLUMNS = tuple(operator.itemgetter(k) for k in range(5))
+_HEAD = struct.Struct('<BQHIQQ')
+_LOG_NS, _CHANNEL, _RECORD = operator.itemgetter(0), operator.itemgetter(1), operator.itemgetter(3)
 
-ChunkMessage = tuple[int, int, int, int, bytes]
-"""log_ns, channel id, sequence, publish_ns, data: in this order messages are sorted."""
+ChunkMessage = tuple[int, int, int, bytes]
+"""log_ns, channel id, sequence, message record: in this order messages are sorted."""
+
+
+def chunk_message(
+    log_ns: int, channel: int, sequence: int, publish_ns: int, data: bytes
+) -> ChunkMessage:
+    """Return a message, with its head, as `encode_chunk` takes it."""
+    head = _HEAD.pack(
+        Opcode.MESSAGE, len(data) + MESSAGE_HEAD_LENGTH, channel, sequence, log_ns, publish_ns
+    )
+    return log_ns, channel, sequence, head + data
 
 
 @dataclass(frozen=True)
@@ -51,41 +63,39 @@ class EncodedChunk:
 def encode_chunk(messages: Sequence[ChunkMessage]) -> EncodedChunk:
     """Sort messages (at least one) by receipt and make a zstd chunk with checksum of them."""
     messages = sorted(messages)
-    log_ns, channel, sequence, publish_ns, data = (list(map(get, messages)) for get in _COLUMNS)
-    heads = np.empty(len(messages), dtype=MESSAGE_HEAD)
-    size = np.fromiter(map(len, data), dtype=np.int64, count=len(data))
-    heads['opcode'] = Opcode.MESSAGE
-    heads['length'] = size + MESSAGE_HEAD_LENGTH
-    heads['channel'] = channel
-    heads['sequence'] = sequence
-    heads['log'] = log_ns
-    heads['publish'] = publish_ns
-    offsets = np.cumsum(size + MESSAGE_HEAD.itemsize) - size - MESSAGE_HEAD.itemsize
-    records = b''.join(_interleaved(heads.tobytes(), data))
+    n = len(messages)
+    log_ns = np.fromiter(map(_LOG_NS, messages), np.int64, n)
+    channel = np.fromiter(map(_CHANNEL, messages), np.int64, n)
+    parts = list(map(_RECORD, messages))
+    size = np.fromiter(map(len, parts), np.int64, n)
+    records = b''.join(parts)
     body = Chunk(
         compression='zstd',
         data=zstandard.compress(records),
-        message_start_time=log_ns[0],
-        message_end_time=log_ns[-1],
+        message_start_time=int(log_ns[0]),
+        message_end_time=int(log_ns[-1]),
         uncompressed_crc=zlib.crc32(records),
         uncompressed_size=len(records),
     )
     builder = RecordBuilder()
     body.write(builder)
     chunk = builder.end()
+    by_channel = np.argsort(channel, kind='stable')
+    entries = np.empty(n, dtype=_INDEX_ENTRY)
+    entries['time'] = log_ns[by_channel]
+    entries['offset'] = (np.cumsum(size) - size)[by_channel]
+    entry_bytes = entries.tobytes()
+    channels, each = np.unique(channel, return_counts=True)
+    counts = dict(zip(channels.tolist(), each.tolist(), strict=True))
     indexes: list[bytes] = []
-    counts: dict[int, int] = {}
     positions: dict[int, int] = {}
-    position = len(chunk)
-    for identifier in dict.fromkeys(channel):
-        rows = heads['channel'] == identifier
-        entries = np.empty(int(rows.sum()), dtype=_INDEX_ENTRY)
-        entries['time'] = heads['log'][rows]
-        entries['offset'] = offsets[rows]
+    position, begin = len(chunk), 0
+    for identifier, count in counts.items():
+        end = begin + count * _INDEX_ENTRY.itemsize
         positions[identifier] = position
-        counts[identifier] = len(entries)
-        indexes.append(_message_index(identifier, entries.tobytes()))
+        indexes.append(_message_index(identifier, entry_bytes[begin:end]))
         position += len(indexes[-1])
+        begin = end
     return EncodedChunk(
         chunk,
         b''.join(indexes),
@@ -102,14 +112,6 @@ def encode_chunk(messages: Sequence[ChunkMessage]) -> EncodedChunk:
         ),
         counts,
     )
-
-
-def _interleaved(heads: bytes, data: Sequence[bytes]) -> list[bytes]:
-    size = MESSAGE_HEAD.itemsize
-    parts: list[bytes] = [b''] * (2 * len(data))
-    parts[0::2] = [heads[k : k + size] for k in range(0, len(heads), size)]
-    parts[1::2] = data
-    return parts
 
 
 def _message_index(channel: int, entries: bytes) -> bytes:

@@ -4,6 +4,7 @@ import contextlib
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from endoscope_bags import BagError, BagWriter, open_bag
@@ -263,7 +264,9 @@ def test_zeros_after_a_crash_of_the_machine_are_a_cut(tmp_path):
 def test_a_flipped_bit_is_noticed(tmp_path):
     path = write(tmp_path / 'bag.mcap')
     data = bytearray(path.read_bytes())
-    data[len(data) // 3] ^= 0x10
+    with path.open('rb') as stream:
+        first = make_reader(stream).get_summary().chunk_indexes[0]
+    data[first.chunk_start_offset + first.chunk_length // 2] ^= 0x10
     path.write_bytes(data)
     with pytest.raises(CorruptBagError, match=r'chunk 1 .* is damaged'):
         open_bag(path)

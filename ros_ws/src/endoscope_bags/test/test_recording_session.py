@@ -57,10 +57,10 @@ def test_a_batch_is_sorted_over_its_topics(tmp_path):
 def test_what_waits_too_long_is_handed_over(tmp_path):
     session = RecordingSession(tmp_path / 'bag', threaded=False)
     session.accept(arrivals(session.add_topic('/a', STRING), [0]))
-    session.flush_stale(500 * MS)
+    session.flush_stale(100 * MS)
     file = tmp_path / 'bag' / 'bag_0.mcap'
     empty = file.stat().st_size
-    session.flush_stale(700 * MS)
+    session.flush_stale(150 * MS)
     assert file.stat().st_size > empty
     assert open_bag(tmp_path / 'bag', salvage=True).message_count == 1
     session.close()

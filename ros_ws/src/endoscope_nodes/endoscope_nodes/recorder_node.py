@@ -33,6 +33,7 @@ from endoscope_nodes.runtime import Runtime, run_nodes
 
 _STAMP = struct.Struct('<iI')
 _SECOND = 1_000_000_000
+_LOOK_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,7 @@ class RecorderNode(EndoscopeNode):
         self._topics = p.topics
         self._session: RecordingSession | None = None
         self._sources: list[_Source] = []
+        self._to_look_at: list[_Source] = []
         self._untyped: list[str] = []
         self._last_tick_ns = 0
         self._said_loss = 0
@@ -98,7 +100,9 @@ class RecorderNode(EndoscopeNode):
         else:
             self.ticker.every(p.drain_period, self._drain)
         # The graph is looked at in real time: publishers come before simulated time begins.
-        self.create_timer(1.0, self._look_around, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(
+            _LOOK_PERIOD_S, self._look_around, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
         self.diagnostics.add('recording', self._report)
         if p.autostart:
             try:
@@ -139,7 +143,7 @@ class RecorderNode(EndoscopeNode):
             raise BagError('not recording')
         self._collect(self.ticker.now_ns())
         session, self._session = self._session, None
-        sources, self._sources = self._sources, []
+        sources, self._sources, self._to_look_at = self._sources, [], []
         for source in sources:
             source.subscription.close()
         report = self.last_report = session.close()
@@ -213,25 +217,33 @@ class RecorderNode(EndoscopeNode):
         self._sources.append(source)
 
     def _look_around(self) -> None:
-        """Find the types of topics that nobody had published yet, and adapt to their QoS."""
+        """Adapt one topic to its publishers; after the last one see what else there is.
+
+        One at a time, because the graph's answer for all of them would cost a tick.
+        """
         session = self._session
         if session is None:
             return
+        if self._to_look_at:
+            self._adapt(self._to_look_at.pop())
+            return
         self._subscribe_untyped()
-        for source in self._sources:
-            publishers = self.get_publishers_info_by_topic(source.name)
-            qos = suitable_qos(source.asked, publishers)
-            if publishers and (qos.durability, qos.reliability) != (
-                source.subscription.qos.durability,
-                source.subscription.qos.reliability,
-            ):
-                self._collect(self.ticker.now_ns())
-                source.subscription.close()
-                source.subscription = RawSubscription(self, source.kind, source.name, qos)
+        self._to_look_at = list(self._sources)
         report = session.report()
         if report.lost_count > self._said_loss:
             self._said_loss = report.lost_count
             self.get_logger().error(str(report))
+
+    def _adapt(self, source: _Source) -> None:
+        publishers = self.get_publishers_info_by_topic(source.name)
+        qos = suitable_qos(source.asked, publishers)
+        if publishers and (qos.durability, qos.reliability) != (
+            source.subscription.qos.durability,
+            source.subscription.qos.reliability,
+        ):
+            self._collect(self.ticker.now_ns())
+            source.subscription.close()
+            source.subscription = RawSubscription(self, source.kind, source.name, qos)
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         self._collect(stamp_ns)

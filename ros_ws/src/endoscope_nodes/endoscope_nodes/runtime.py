@@ -36,7 +36,9 @@ from endoscope_nodes.ticker import Ticker
 # Eleven days.
 FOREVER_S = 1e6
 SHUTDOWN_S = 2.0
-SWITCH_INTERVAL_S = 2e-4
+SWITCH_INTERVAL_S = 5e-5
+# A collection of the second generation takes most of a tick: ten times rarer than by default.
+GC_THRESHOLDS = (7000, 10, 10)
 
 
 @dataclass(frozen=True)
@@ -174,6 +176,7 @@ class Runtime:
         # A collection that walks over all that was imported would cost many ticks.
         gc.collect()
         gc.freeze()
+        gc.set_threshold(*GC_THRESHOLDS)
         # By default a thread that writes a recording may keep the executor waiting for 5 ms.
         sys.setswitchinterval(SWITCH_INTERVAL_S)
 

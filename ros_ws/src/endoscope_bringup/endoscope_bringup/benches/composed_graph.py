@@ -26,6 +26,8 @@ TARGET_LATENCY_P99_MS = 1.0
 TARGET_CORES = 1.0
 TARGET_LOCK_STEP = 2.0
 _SETTLING_S = 2.0
+# Before the queue of a thousand commands is full.
+_MOVING_S = 0.5
 _SIMULATED = ('--ros-args', '-p', 'use_sim_time:=true')
 _PLAYING = {'source': 'motion', 'motion': 'periodic'}
 
@@ -97,13 +99,13 @@ def run_graph_bench(seconds: float) -> ComposedFigure:
             graph.enable()
             graph.serve(_SETTLING_S)
             driver, ticker = graph.node('motor_driver'), graph.runtime.ticker
-            driver.latency_ns = deque()
+            latency = graph.kept(driver.latency_ns)
             ticks, missed, cpu = ticker.ticks, ticker.missed, time.process_time()
             began = time.monotonic()
             graph.serve(seconds)
             elapsed, cpu = time.monotonic() - began, time.process_time() - cpu
             ticks, missed = ticker.ticks - ticks, ticker.missed - missed
-            latency = sorted(driver.latency_ns)
+            latency.sort()
             machine = graph.node('supervisor').machine
             state = f'{machine.state} {machine.cause}'.strip()
             report = graph.node('recorder').stop()
@@ -183,6 +185,18 @@ class _Composition:
         )
         self.runtime.spin_until(future, seconds + self._PATIENCE_S)
         self._first.destroy_timer(timer)
+
+    def kept(self, newest: deque[int]) -> list[int]:
+        """Keep from now on what passes through a queue that a node holds short."""
+        values: list[int] = []
+        newest.clear()
+
+        def move() -> None:
+            values.extend(newest)
+            newest.clear()
+
+        self._first.create_timer(_MOVING_S, move, clock=self._steady)
+        return values
 
     def advance(self, seconds: float) -> None:
         future = self.node('conductor').advance(seconds)
