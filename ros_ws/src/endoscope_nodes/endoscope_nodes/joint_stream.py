@@ -19,6 +19,8 @@ from endoscope_bags.cdr_layout import QUANTITIES, joint_state_layout
 from endoscope_bags.errors import MalformedMessageError
 
 _SECOND = 1_000_000_000
+# Four bytes are never equal to five.
+_NOT_LEARNT = (0, 4, bytes(5))
 _STAMP_END = 12
 
 
@@ -88,7 +90,7 @@ class JointReader:
     def __init__(self, names: Sequence[str], exact: bool = False) -> None:
         self._names = tuple(names)
         self._exact = exact
-        self._spans: list[tuple[int, int, bytes]] = [(0, 4, b'none')]
+        self._spans: list[tuple[int, int, bytes]] = [_NOT_LEARNT]
         self._struct = struct.Struct('<iI')
         self._slices: list[slice] = []
         self._pick: list[int] | None = None
@@ -112,7 +114,7 @@ class JointReader:
         return JointSample(values[0] * _SECOND + values[1], *fields)
 
     def _learn(self, data: bytes) -> None:
-        self._spans = [(0, 4, b'none')]
+        self._spans = [_NOT_LEARNT]
         layout = joint_state_layout(data)
         wrong = [n for n in self._names if n not in layout.names]
         if wrong or (self._exact and len(layout.names) != len(self._names)):
