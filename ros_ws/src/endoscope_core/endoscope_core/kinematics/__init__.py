@@ -1,5 +1,34 @@
-"""From bending angles to the pose of the tip, and back."""
+"""From bending angles to the pose of the tip, and back; from a tracker's frame to the base's."""
 
 from endoscope_core.kinematics.constant_curvature import bending_from_orientation, tip_pose
+from endoscope_core.kinematics.rotation import (
+    about_z,
+    angle_between,
+    conjugate,
+    mean_orientation,
+    multiply,
+    rotate,
+    unit_quaternion,
+)
+from endoscope_core.kinematics.straight_registration import (
+    RegistrationError,
+    StillnessLimits,
+    StraightRegistration,
+    register_straight,
+)
 
-__all__ = ['bending_from_orientation', 'tip_pose']
+__all__ = [
+    'RegistrationError',
+    'StillnessLimits',
+    'StraightRegistration',
+    'about_z',
+    'angle_between',
+    'bending_from_orientation',
+    'conjugate',
+    'mean_orientation',
+    'multiply',
+    'register_straight',
+    'rotate',
+    'tip_pose',
+    'unit_quaternion',
+]

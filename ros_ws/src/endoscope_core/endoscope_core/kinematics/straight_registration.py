@@ -1,0 +1,160 @@
+"""Where the instrument's base is in the tracker's frame, from readings of the straight instrument.
+
+The tracker reports the sensor in the tip in a frame of its own, which has nothing to do with the
+instrument.  With the instrument straight, its sensor points along the base's z axis; what the
+sensor turned since then, seen in the straight sensor's frame, is the bending:
+``bending rotation = straight^-1 * now``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.kinematics.rotation import (
+    about_z,
+    angle_between,
+    conjugate,
+    mean_orientation,
+    multiply,
+    rotate,
+    unit_quaternion,
+)
+
+Array = NDArray[np.float64]
+
+
+class RegistrationError(EndoscopeError, ValueError):
+    """The readings do not show a straight instrument at rest; the message says why."""
+
+
+@dataclass(frozen=True)
+class StillnessLimits:
+    """How still the tip must be while it is registered.
+
+    Attributes
+    ----------
+    readings
+        Fewest readings.
+    angle, distance
+        Largest root mean square deviation of orientation in rad and of position in m.
+    drift_angle, drift_distance
+        Largest difference between the means of the first and of the second half.
+    """
+
+    readings: int = 30
+    angle: float = 0.015
+    distance: float = 0.001
+    drift_angle: float = 0.005
+    drift_distance: float = 0.0005
+
+
+@dataclass(frozen=True)
+class StraightRegistration:
+    """Pose of the sensor in the tracker's frame while the instrument was straight.
+
+    Attributes
+    ----------
+    position
+        In m, shape (3,).
+    orientation
+        Unit quaternion x, y, z, w, shape (4,).
+    """
+
+    position: tuple[float, ...]
+    orientation: tuple[float, ...]
+
+    def in_base(
+        self, position: ArrayLike, orientation: ArrayLike, *, roll: float, length: float
+    ) -> tuple[Array, Array]:
+        """Pose of the tip in the frame of the instrument's base.
+
+        Parameters
+        ----------
+        position, orientation
+            Of the sensor in the tracker's frame: m, shape (3,), and x, y, z, w, shape (4,).
+        roll
+            Angle in rad from the base's x axis to the sensor's x axis about z, as it is mounted.
+        length
+            Length of the bending section in m: where the tip of the straight instrument is.
+
+        Returns
+        -------
+        position : ndarray, shape (3,)
+            In m.
+        orientation : ndarray, shape (4,)
+            Unit quaternion x, y, z, w.
+        """
+        back = conjugate(self.orientation)
+        mounted = about_z(roll)
+        moved = rotate(back, np.asarray(position, dtype=float) - np.asarray(self.position))
+        turned = multiply(back, unit_quaternion(orientation))
+        tip = rotate(mounted, moved) + np.array([0.0, 0.0, length])
+        return tip, multiply(multiply(mounted, turned), conjugate(mounted))
+
+
+def register_straight(
+    positions: Sequence[ArrayLike],
+    orientations: Sequence[ArrayLike],
+    limits: StillnessLimits | None = None,
+) -> StraightRegistration:
+    """Average readings of the straight instrument, unless it moved.
+
+    Parameters
+    ----------
+    positions
+        N positions in m, each of shape (3,).
+    orientations
+        N unit quaternions x, y, z, w, each of shape (4,).
+    limits
+        What counts as still.
+
+    Returns
+    -------
+    StraightRegistration
+
+    Raises
+    ------
+    RegistrationError
+        Too few readings, or the tip was not still.
+    """
+    limits = limits or StillnessLimits()
+    count = len(positions)
+    if count < limits.readings:
+        raise RegistrationError(
+            f'{count} readings of the tip in the last second, {limits.readings} are needed: '
+            'keep the sensor in the measurement volume and ask again'
+        )
+    place = np.asarray(positions, dtype=float)
+    turn = np.asarray(orientations, dtype=float)
+    position, orientation = place.mean(axis=0), mean_orientation(turn)
+    half = count // 2
+    checks = (
+        ('turned by', _rms([angle_between(orientation, q) for q in turn]), limits.angle, 'rad'),
+        ('moved by', _rms(np.linalg.norm(place - position, axis=1)), limits.distance, 'm'),
+        (
+            'kept turning, by',
+            angle_between(mean_orientation(turn[:half]), mean_orientation(turn[half:])),
+            limits.drift_angle,
+            'rad',
+        ),
+        (
+            'kept moving, by',
+            float(np.linalg.norm(place[:half].mean(axis=0) - place[half:].mean(axis=0))),
+            limits.drift_distance,
+            'm',
+        ),
+    )
+    for what, found, allowed, unit in checks:
+        if found > allowed:
+            raise RegistrationError(
+                f'the tip {what} {found:.2g} {unit} within a second, {allowed:.2g} {unit} is '
+                'allowed: let the straight instrument rest and ask again'
+            )
+    return StraightRegistration(tuple(position.tolist()), tuple(orientation.tolist()))
+
+
+def _rms(values: ArrayLike) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
