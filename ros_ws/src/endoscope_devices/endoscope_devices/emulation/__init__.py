@@ -1,0 +1,1 @@
+"""Cables between a driver and an emulated device, whose faults a test chooses."""

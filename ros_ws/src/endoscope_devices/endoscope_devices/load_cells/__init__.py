@@ -1,0 +1,30 @@
+"""Wire tensions from load cells behind a Modbus transmitter."""
+
+from endoscope_devices.load_cells.calibration_file import LoadCellCalibration, load_calibration
+from endoscope_devices.load_cells.modbus_load_cells import (
+    CONNECTIONS,
+    ModbusLoadCells,
+    WireReading,
+    modbus_rtu,
+    modbus_tcp,
+)
+from endoscope_devices.load_cells.tare import (
+    TareError,
+    apply_saved_tare,
+    save_tare,
+    tare_path,
+)
+
+__all__ = [
+    'CONNECTIONS',
+    'LoadCellCalibration',
+    'ModbusLoadCells',
+    'TareError',
+    'WireReading',
+    'apply_saved_tare',
+    'load_calibration',
+    'modbus_rtu',
+    'modbus_tcp',
+    'save_tare',
+    'tare_path',
+]

@@ -1,0 +1,193 @@
+"""Modbus requests and replies as bytes, by pymodbus; only the one right reply is accepted.
+
+Frames follow "Modbus over Serial Line" V1.02 (RTU, sections 2.3 and 2.5.1: CRC-16, polynomial
+A001h, start FFFFh) and "Modbus Messaging on TCP/IP" V1.0b (MBAP header, section 3.1.3); functions 3
+and 4 follow "Modbus Application Protocol" V1.1b3, sections 6.3 and 6.4.  pymodbus's clients hunt
+for a frame in whatever arrives and repeat requests; here a reply is known by its length before it
+is read, and anything else is an error that is counted by kind.
+"""
+
+from enum import StrEnum
+from typing import Protocol
+
+from pymodbus.exceptions import ModbusIOException
+from pymodbus.framer import FramerRTU, FramerSocket
+from pymodbus.pdu import DecodePDU, ExceptionResponse
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersRequest,
+    ReadHoldingRegistersResponse,
+    ReadInputRegistersRequest,
+    ReadInputRegistersResponse,
+)
+
+_REQUESTS = {3: ReadHoldingRegistersRequest, 4: ReadInputRegistersRequest}
+_REPLIES = {3: ReadHoldingRegistersResponse, 4: ReadInputRegistersResponse}
+_MBAP = 7
+
+
+class ReplyTrouble(StrEnum):
+    """Why a reply is not accepted."""
+
+    SILENCE = 'no reply'
+    CHECKSUM = 'wrong CRC'
+    MALFORMED = 'malformed'
+    REFUSED = 'refused by the transmitter'
+
+
+class ReplyError(Exception):
+    """A reply that is not accepted.
+
+    Attributes
+    ----------
+    trouble
+        The kind.
+    """
+
+    def __init__(self, trouble: ReplyTrouble, words: str) -> None:
+        super().__init__(f'{trouble}: {words}')
+        self.trouble = trouble
+
+
+class Framing(Protocol):
+    """How requests and replies lie in bytes; one request is out at a time."""
+
+    def request(self, address: int, count: int) -> bytes:
+        """Bytes that ask for registers.
+
+        Parameters
+        ----------
+        address, count
+            First register and number of registers.
+        """
+
+    def length(self, head: bytes) -> int:
+        """How long the reply is, as far as its first bytes tell.
+
+        Parameters
+        ----------
+        head
+            What has come so far; at least two bytes more are always wanted than decide.
+        """
+
+    def accept(self, reply: bytes) -> tuple[int, ...] | None:
+        """Registers of the reply to the last request; None if it answers an earlier one.
+
+        Raises
+        ------
+        ReplyError
+            It is not the reply to that request.
+        """
+
+
+class _Decoding:
+    """What RTU and TCP have in common: the protocol data unit."""
+
+    def __init__(self, unit: int, function: int) -> None:
+        self.unit = unit
+        self.function = function
+        self.count = 0
+        self.decoder = DecodePDU(False)
+
+    def pdu(self, address: int, count: int, transaction: int) -> ReadHoldingRegistersRequest:
+        self.count = count
+        return _REQUESTS[self.function](
+            address=address, count=count, dev_id=self.unit, transaction_id=transaction
+        )
+
+    def registers(self, unit: int, pdu: bytes) -> tuple[int, ...]:
+        if unit != self.unit:
+            raise ReplyError(ReplyTrouble.MALFORMED, f'from unit {unit}, asked was {self.unit}')
+        if len(pdu) == 2 and pdu[0] == self.function | 0x80:
+            raise ReplyError(ReplyTrouble.REFUSED, f'Modbus exception {pdu[1]}')
+        if pdu[0] != self.function or len(pdu) != 2 + 2 * self.count or pdu[1] != 2 * self.count:
+            raise ReplyError(ReplyTrouble.MALFORMED, f'{len(pdu)} bytes of function {pdu[0]}')
+        try:
+            reply = self.decoder.decode(pdu)
+        except ModbusIOException as error:
+            raise ReplyError(ReplyTrouble.MALFORMED, str(error)) from error
+        if isinstance(reply, ExceptionResponse) or type(reply) is not _REPLIES[self.function]:
+            raise ReplyError(ReplyTrouble.MALFORMED, f'a {type(reply).__name__}')
+        return tuple(reply.registers)
+
+
+class RtuFraming:
+    """Modbus RTU.
+
+    Parameters
+    ----------
+    unit
+        Modbus address.
+    function
+        3 or 4.
+    """
+
+    def __init__(self, unit: int, function: int) -> None:
+        self._decoding = _Decoding(unit, function)
+        self._framer = FramerRTU(self._decoding.decoder)
+
+    def request(self, address: int, count: int) -> bytes:
+        """See :class:`Framing`.
+
+        Parameters
+        ----------
+        address, count
+            First register and number of registers.
+        """
+        return self._framer.buildFrame(self._decoding.pdu(address, count, 0))
+
+    def length(self, head: bytes) -> int:
+        """See :class:`Framing`: address, function, byte count or exception code, data, CRC."""
+        if len(head) < 3 or head[1] & 0x80:
+            return 5
+        return 5 + head[2]
+
+    def accept(self, reply: bytes) -> tuple[int, ...] | None:
+        """See :class:`Framing`; RTU replies carry nothing that tells an earlier one."""
+        if len(reply) < 5:
+            raise ReplyError(ReplyTrouble.MALFORMED, f'{len(reply)} bytes')
+        if not FramerRTU.check_CRC(reply[:-2], int.from_bytes(reply[-2:], 'big')):
+            raise ReplyError(ReplyTrouble.CHECKSUM, f'in {len(reply)} bytes')
+        return self._decoding.registers(reply[0], reply[1:-2])
+
+
+class TcpFraming:
+    """Modbus TCP.
+
+    Parameters
+    ----------
+    unit
+        Modbus address.
+    function
+        3 or 4.
+    """
+
+    def __init__(self, unit: int, function: int) -> None:
+        self._decoding = _Decoding(unit, function)
+        self._framer = FramerSocket(self._decoding.decoder)
+        self._transaction = 0
+
+    def request(self, address: int, count: int) -> bytes:
+        """See :class:`Framing`; each request has a transaction number of its own.
+
+        Parameters
+        ----------
+        address, count
+            First register and number of registers.
+        """
+        self._transaction = self._transaction % 0xFFFF + 1
+        return self._framer.buildFrame(self._decoding.pdu(address, count, self._transaction))
+
+    def length(self, head: bytes) -> int:
+        """See :class:`Framing`: the header's length field counts from the unit on."""
+        if len(head) < _MBAP:
+            return _MBAP + 2
+        return 6 + int.from_bytes(head[4:6], 'big')
+
+    def accept(self, reply: bytes) -> tuple[int, ...] | None:
+        """See :class:`Framing`."""
+        if len(reply) < _MBAP + 2 or len(reply) != self.length(reply) or reply[2:4] != b'\0\0':
+            raise ReplyError(ReplyTrouble.MALFORMED, f'header {reply[:_MBAP].hex(" ")}')
+        _, unit, transaction, pdu = self._framer.decode(reply)
+        if transaction != self._transaction:
+            return None
+        return self._decoding.registers(unit, pdu)

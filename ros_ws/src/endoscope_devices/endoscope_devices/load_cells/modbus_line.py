@@ -1,0 +1,214 @@
+"""Byte streams to a transmitter: a serial port or a TCP connection, with a deadline on reading."""
+
+import select
+import socket
+import time
+from typing import Protocol
+
+import serial
+
+from endoscope_devices.load_cells.calibration_file import SerialSettings
+from endoscope_devices.motor_device import DeviceError
+
+# A Modbus frame has at most 260 bytes (Modbus Messaging on TCP/IP V1.0b, section 3.1.3).
+LONGEST = 260
+MODBUS_TCP_PORT = 502
+
+
+class LineLostError(DeviceError):
+    """The line went away: unplugged, or closed by the other side."""
+
+
+class Line(Protocol):
+    """A byte stream, used by one thread."""
+
+    def open(self) -> None:
+        """Connect.
+
+        Raises
+        ------
+        LineLostError
+            It cannot be opened; the message says what to look at.
+        """
+
+    def write(self, data: bytes) -> None:
+        """Send bytes.
+
+        Raises
+        ------
+        LineLostError
+            It went away.
+        """
+
+    def read(self, wanted: int, deadline_ns: int) -> bytes:
+        """Bytes that arrive until there are ``wanted`` or the deadline has passed.
+
+        Parameters
+        ----------
+        wanted
+            Most bytes.
+        deadline_ns
+            In ns of ``time.monotonic_ns``.
+
+        Raises
+        ------
+        LineLostError
+            It went away.
+        """
+
+    def close(self) -> None:
+        """Let go of it."""
+
+
+class SerialLine:
+    """A serial port.
+
+    Parameters
+    ----------
+    port
+        Device path.
+    settings
+        Baud rate, parity, stop bits.
+    """
+
+    def __init__(self, port: str, settings: SerialSettings) -> None:
+        self._path = port
+        self._settings = settings
+        self._port: serial.Serial | None = None
+
+    def open(self) -> None:
+        """See :class:`Line`."""
+        try:
+            self._port = serial.Serial(
+                self._path,
+                self._settings.baud,
+                parity=self._settings.parity,
+                stopbits=self._settings.stop_bits,
+                timeout=0.0,
+                write_timeout=1.0,
+                exclusive=True,
+            )
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise LineLostError(
+                f'serial port {self._path} cannot be opened ({error}): is it plugged in and yours?'
+            ) from error
+
+    def write(self, data: bytes) -> None:
+        """See :class:`Line`."""
+        try:
+            self._opened.write(data)
+        except (serial.SerialException, OSError) as error:
+            raise LineLostError(f'serial port {self._path} is gone: {error}') from error
+
+    def read(self, wanted: int, deadline_ns: int) -> bytes:
+        """See :class:`Line`.
+
+        Parameters
+        ----------
+        wanted, deadline_ns
+            Most bytes, and until when in ns.
+        """
+        data = b''
+        try:
+            while len(data) < wanted:
+                port = self._opened
+                port.timeout = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
+                part = port.read(wanted - len(data))
+                if not part:
+                    break
+                data += part
+        except (serial.SerialException, OSError) as error:
+            raise LineLostError(f'serial port {self._path} is gone: {error}') from error
+        return data
+
+    def close(self) -> None:
+        """See :class:`Line`."""
+        if self._port is not None:
+            self._port.close()
+            self._port = None
+
+    @property
+    def _opened(self) -> serial.Serial:
+        if self._port is None:
+            raise LineLostError(f'serial port {self._path} is closed')
+        return self._port
+
+
+class TcpLine:
+    """A TCP connection.
+
+    Parameters
+    ----------
+    address
+        ``HOST`` or ``HOST:PORT``; the port is 502 by default.
+    timeout
+        For connecting, in s.
+
+    Raises
+    ------
+    DeviceError
+        The address cannot be understood.
+    """
+
+    def __init__(self, address: str, timeout: float = 1.0) -> None:
+        host, _, port = address.partition(':')
+        if not host or (port and not port.isdecimal()) or int(port or 1) not in range(1, 65536):
+            raise DeviceError(f"'{address}' is no address: give HOST or HOST:PORT")
+        self._address = (host, int(port) if port else MODBUS_TCP_PORT)
+        self._timeout = timeout
+        self._socket: socket.socket | None = None
+
+    def open(self) -> None:
+        """See :class:`Line`."""
+        try:
+            self._socket = socket.create_connection(self._address, self._timeout)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        except OSError as error:
+            raise LineLostError(
+                f'{self._name} does not accept a connection ({error}): is the transmitter on?'
+            ) from error
+
+    def write(self, data: bytes) -> None:
+        """See :class:`Line`."""
+        try:
+            self._opened.sendall(data)
+        except OSError as error:
+            raise LineLostError(f'{self._name} is gone: {error}') from error
+
+    def read(self, wanted: int, deadline_ns: int) -> bytes:
+        """See :class:`Line`.
+
+        Parameters
+        ----------
+        wanted, deadline_ns
+            Most bytes, and until when in ns.
+        """
+        data = b''
+        try:
+            while len(data) < wanted:
+                left = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
+                if not select.select([self._opened], [], [], left)[0]:
+                    break
+                part = self._opened.recv(wanted - len(data))
+                if not part:
+                    raise LineLostError(f'{self._name} closed the connection')
+                data += part
+        except OSError as error:
+            raise LineLostError(f'{self._name} is gone: {error}') from error
+        return data
+
+    def close(self) -> None:
+        """See :class:`Line`."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    @property
+    def _name(self) -> str:
+        return f'{self._address[0]}:{self._address[1]}'
+
+    @property
+    def _opened(self) -> socket.socket:
+        if self._socket is None:
+            raise LineLostError(f'{self._name} is not connected')
+        return self._socket

@@ -1,0 +1,236 @@
+"""Load cells behind a Modbus transmitter, read by a thread of their own."""
+
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from endoscope_devices.load_cells.calibration_file import LoadCellCalibration
+from endoscope_devices.load_cells.channel_check import ChannelCheck
+from endoscope_devices.load_cells.modbus_framing import (
+    Framing,
+    ReplyError,
+    ReplyTrouble,
+    RtuFraming,
+    TcpFraming,
+)
+from endoscope_devices.load_cells.modbus_line import Line, LineLostError, SerialLine, TcpLine
+from endoscope_devices.load_cells.register_reader import RegisterReader
+from endoscope_devices.load_cells.registers import REGISTER_TYPES, decode_number
+from endoscope_devices.load_cells.tare import TareWindow, with_zero, zero_after_tare
+
+_REOPEN_S = 0.2
+_SILENT_NS = 250_000_000
+_KEPT = 2000
+
+
+@dataclass(frozen=True)
+class WireReading:
+    """Believable tensions of all W wires.
+
+    Attributes
+    ----------
+    time_ns
+        When they were asked for, in ns of ``time.monotonic_ns``.
+    tension
+        In N, shape (W,).
+    """
+
+    time_ns: int
+    tension: tuple[float, ...]
+
+
+class ModbusLoadCells:
+    """Reads all wires at the calibration's rate and keeps what can be believed.
+
+    A reading in which one channel cannot be believed is no reading: the others would pass for a
+    whole one.  A line that goes away is opened again for as long as the device is open.
+
+    Parameters
+    ----------
+    calibration
+        Registers, sensitivities and limits.
+    line, framing
+        How to reach the transmitter; see :func:`modbus_rtu` and :func:`modbus_tcp`.
+    """
+
+    def __init__(self, calibration: LoadCellCalibration, line: Line, framing: Framing) -> None:
+        self.calibration = calibration
+        self._line = line
+        self._reader = RegisterReader(line, framing, calibration.transmitter.reply_timeout)
+        cells = calibration.wires.values()
+        self._first = min(cell.register for cell in cells)
+        self._count = (
+            max(cell.register + REGISTER_TYPES[cell.type].registers for cell in cells) - self._first
+        )
+        self._checks = [
+            ChannelCheck(name, cell, calibration.faults) for name, cell in calibration.wires.items()
+        ]
+        self._window = TareWindow(tuple(calibration.wires), calibration.tare)
+        self._lock = threading.Lock()
+        self._readings: deque[WireReading] = deque(maxlen=_KEPT)
+        self._counts: Counter[str] = Counter()
+        self._good_ns: int | None = None
+        self._link_trouble = 'not connected yet'
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='load cells', daemon=True)
+
+    def open(self) -> None:
+        """Start to read; a transmitter that is not there yet is waited for."""
+        self._thread.start()
+
+    def take(self) -> list[WireReading]:
+        """Readings since the last call, oldest first; never waits for the line."""
+        taken = []
+        while self._readings:
+            taken.append(self._readings.popleft())
+        return taken
+
+    def note_shafts(self, velocity: Sequence[float]) -> None:
+        """Say how fast the motor shafts turn, so that moving wires are not tared.
+
+        Parameters
+        ----------
+        velocity
+            In rad/s, shape (J,).
+        """
+        with self._lock:
+            self._window.note_shafts(time.monotonic_ns(), velocity)
+
+    def tare(self) -> LoadCellCalibration:
+        """Take the mean tension of the last second for zero from now on.
+
+        Returns
+        -------
+        LoadCellCalibration
+            With the new zeros.
+
+        Raises
+        ------
+        TareError
+            The wires move, are loaded, or cannot be read.
+        """
+        with self._lock:
+            mean = self._window.mean(time.monotonic_ns())
+            self.calibration = with_zero(self.calibration, zero_after_tare(self.calibration, mean))
+            for check, cell in zip(self._checks, self.calibration.wires.values(), strict=True):
+                check.cell = cell
+            self._window = TareWindow(tuple(self.calibration.wires), self.calibration.tare)
+            return self.calibration
+
+    def health(self) -> tuple[str, dict[str, object]]:
+        """What is wrong (empty if nothing), and figures for diagnostics."""
+        good = self._good_ns
+        age = None if good is None else time.monotonic_ns() - good
+        faults = [check.fault for check in self._checks if check.fault]
+        trouble = '; '.join(faults)
+        if not trouble and (age is None or age > _SILENT_NS):
+            trouble = self._link_trouble or 'no believable reading yet'
+        figures: dict[str, object] = {
+            'age of the last reading [ms]': 'never' if age is None else round(age * 1e-6, 1),
+            'readings': self._counts['readings'],
+            'not believed': self._counts['not believed'],
+            'connections': self._counts['connections'],
+            'unexpected bytes': self._reader.unexpected,
+        }
+        figures |= {str(kind): self._counts[kind] for kind in ReplyTrouble}
+        for name, check in zip(self.calibration.wires, self._checks, strict=True):
+            figures[f'{name}: zero [counts]'] = check.cell.zero
+            figures[f'{name}: spikes'] = check.spikes
+        return trouble, figures
+
+    def close(self) -> None:
+        """Stop reading and let go of the line."""
+        self._stop.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._line.open()
+                self._counts['connections'] += 1
+                self._link_trouble = ''
+                self._read_on()
+            except LineLostError as error:
+                self._link_trouble = str(error)
+            finally:
+                self._line.close()
+            self._stop.wait(_REOPEN_S)
+
+    def _read_on(self) -> None:
+        period = 1.0 / self.calibration.transmitter.rate
+        due = time.monotonic()
+        while not self._stop.wait(max(0.0, due - time.monotonic())):
+            due = max(due + period, time.monotonic())
+            try:
+                reading = self._reader.read(self._first, self._count)
+            except ReplyError as error:
+                self._counts[error.trouble] += 1
+                self._link_trouble = str(error)
+                continue
+            self._link_trouble = ''
+            with self._lock:
+                self._judge(reading.asked_ns, reading.registers)
+
+    def _judge(self, time_ns: int, registers: tuple[int, ...]) -> None:
+        big = self.calibration.transmitter.big_word_first
+        tension = []
+        for check in self._checks:
+            start = check.cell.register - self._first
+            words = registers[start : start + REGISTER_TYPES[check.cell.type].registers]
+            tension.append(check.read(time_ns, decode_number(words, check.cell.type, big)))
+        believed = tuple(value for value in tension if value is not None)
+        if len(believed) < len(tension):
+            self._counts['not believed'] += 1
+            return
+        self._counts['readings'] += 1
+        self._good_ns = time_ns
+        self._window.add(time_ns, believed)
+        self._readings.append(WireReading(time_ns, believed))
+
+
+def modbus_rtu(port: str, calibration: LoadCellCalibration) -> ModbusLoadCells:
+    """Load cells at a serial port.
+
+    Parameters
+    ----------
+    port
+        Device path.
+    calibration
+        With the line's settings.
+    """
+    transmitter = calibration.transmitter
+    return ModbusLoadCells(
+        calibration,
+        SerialLine(port, transmitter.serial),
+        RtuFraming(transmitter.unit, transmitter.function),
+    )
+
+
+def modbus_tcp(address: str, calibration: LoadCellCalibration) -> ModbusLoadCells:
+    """Load cells at a TCP address.
+
+    Parameters
+    ----------
+    address
+        ``HOST`` or ``HOST:PORT``.
+    calibration
+        Registers and limits.
+
+    Raises
+    ------
+    DeviceError
+        The address cannot be understood.
+    """
+    transmitter = calibration.transmitter
+    return ModbusLoadCells(
+        calibration, TcpLine(address), TcpFraming(transmitter.unit, transmitter.function)
+    )
+
+
+CONNECTIONS: dict[str, Callable[[str, LoadCellCalibration], ModbusLoadCells]] = {
+    'modbus_rtu': modbus_rtu,
+    'modbus_tcp': modbus_tcp,
+}

@@ -1,0 +1,193 @@
+"""Takes the wires' tension of the last second as zero, and keeps it."""
+
+import datetime
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from endoscope_core.atomic_output import write_text
+from endoscope_core.errors import EndoscopeError
+from endoscope_devices.load_cells.calibration_file import LoadCellCalibration, TareLimits
+from endoscope_devices.strict_yaml import DeviceFileError, load_section
+
+WINDOW_NS = 1_000_000_000
+_FEWEST = 20
+
+
+class TareError(EndoscopeError, RuntimeError):
+    """The wires cannot be tared now; the message says why."""
+
+
+class TareWindow:
+    """Readings of the last second, of which a zero can be made.
+
+    Parameters
+    ----------
+    wires
+        Names of the W wires.
+    limits
+        When a tare is refused.
+    """
+
+    def __init__(self, wires: Sequence[str], limits: TareLimits) -> None:
+        self._wires = tuple(wires)
+        self._limits = limits
+        self._readings: deque[tuple[int, tuple[float, ...]]] = deque()
+        self._moved_ns: int | None = None
+
+    def add(self, time_ns: int, tension: tuple[float, ...]) -> None:
+        """Take a good reading.
+
+        Parameters
+        ----------
+        time_ns
+            In ns of a monotonic clock.
+        tension
+            In N, shape (W,).
+        """
+        self._readings.append((time_ns, tension))
+        while self._readings[0][0] < time_ns - WINDOW_NS:
+            self._readings.popleft()
+
+    def note_shafts(self, time_ns: int, velocity: Sequence[float]) -> None:
+        """Take the speed of the motor shafts.
+
+        Parameters
+        ----------
+        time_ns
+            In ns of the same clock.
+        velocity
+            In rad/s, shape (J,).
+        """
+        if any(not abs(v) <= self._limits.shaft_speed for v in velocity):
+            self._moved_ns = time_ns
+
+    def mean(self, now_ns: int) -> tuple[float, ...]:
+        """Mean tension of the last second in N, shape (W,).
+
+        Parameters
+        ----------
+        now_ns
+            In ns of the same clock.
+
+        Raises
+        ------
+        TareError
+            Too few readings, the wires move, noise or drift or the tension itself is too large.
+        """
+        since = now_ns - WINDOW_NS
+        values = np.array([tension for time_ns, tension in self._readings if time_ns >= since])
+        if len(values) < _FEWEST:
+            raise TareError(
+                f'{len(values)} good readings in the last second, {_FEWEST} are needed: see the '
+                'diagnostics of the load cells'
+            )
+        if self._moved_ns is not None and self._moved_ns >= since:
+            raise TareError('the wires move: let the motors rest for a second')
+        mean = values.mean(axis=0)
+        half = len(values) // 2
+        drift = np.abs(values[:half].mean(axis=0) - values[half:].mean(axis=0))
+        for what, found, allowed in (
+            ('changes by', drift, self._limits.drift),
+            ('is noisy by', values.std(axis=0), self._limits.noise),
+            ('is', np.abs(mean), self._limits.largest),
+        ):
+            worst = int(np.argmax(found))
+            if found[worst] > allowed:
+                raise TareError(
+                    f'{self._wires[worst]} {what} {found[worst]:.3g} N, at most {allowed:.3g} N '
+                    'can be tared: slacken the wires and let them rest'
+                )
+        return tuple(mean.tolist())
+
+
+def with_zero(calibration: LoadCellCalibration, zero: Sequence[float]) -> LoadCellCalibration:
+    """The calibration with other zeros.
+
+    Parameters
+    ----------
+    calibration
+        What it was.
+    zero
+        Counts without tension, one a wire in the calibration's order.
+    """
+    cells = {
+        name: replace(cell, zero=float(count))
+        for (name, cell), count in zip(calibration.wires.items(), zero, strict=True)
+    }
+    return replace(calibration, wires=cells)
+
+
+def zero_after_tare(calibration: LoadCellCalibration, tension: Sequence[float]) -> list[float]:
+    """Counts without tension, once ``tension`` is taken for zero.
+
+    Parameters
+    ----------
+    calibration
+        In force while the tension was measured.
+    tension
+        In N, one a wire in the calibration's order.
+    """
+    return [
+        cell.zero + cell.sign * value / cell.newton_per_count
+        for cell, value in zip(calibration.wires.values(), tension, strict=True)
+    ]
+
+
+def tare_path(calibration: str | Path) -> Path:
+    """Where the tare of a calibration file is kept: beside it."""
+    return Path(calibration).with_suffix('.tare.yaml')
+
+
+def save_tare(path: str | Path, calibration: LoadCellCalibration) -> None:
+    """Keep the zeros of a calibration.
+
+    Parameters
+    ----------
+    path
+        See :func:`tare_path`.
+    calibration
+        Whose zeros.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written.
+    """
+    now = datetime.datetime.now(datetime.UTC).isoformat(timespec='seconds')
+    content = {
+        'calibration_sha256': calibration.digest,
+        'tared': now,
+        'zero': {name: cell.zero for name, cell in calibration.wires.items()},
+    }
+    write_text(path, yaml.safe_dump(content, sort_keys=False))
+
+
+def apply_saved_tare(path: str | Path, calibration: LoadCellCalibration) -> LoadCellCalibration:
+    """The calibration with the zeros that were kept, if any were.
+
+    Parameters
+    ----------
+    path
+        See :func:`tare_path`.
+    calibration
+        As read from its file.
+
+    Raises
+    ------
+    DeviceFileError
+        The tare cannot be read, or belongs to another state of the calibration file.
+    """
+    if not Path(path).exists():
+        return calibration
+    file = load_section(path, 'tare', ('calibration_sha256', 'tared', 'zero'))
+    if file.text('calibration_sha256') != calibration.digest:
+        raise DeviceFileError(
+            f'tare {path} was taken with another calibration: remove it, then tare again'
+        )
+    section = file.section('zero', tuple(calibration.wires))
+    return with_zero(calibration, [section.number(name, -1e12, 1e12) for name in calibration.wires])

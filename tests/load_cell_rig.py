@@ -1,0 +1,61 @@
+"""A load-cell transmitter on a real line, whose cells a test pulls and breaks."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from endoscope_devices.load_cells.transmitter_emulator import TransmitterEmulator
+from endoscope_nodes.names import WIRES
+
+NEWTON_PER_COUNT = 0.001
+ZERO = 120
+BROKEN = 8_388_607
+SATURATED = 95_000
+
+CALIBRATION = f"""
+transmitter: {{rate: 200, reply_timeout: 0.05}}
+wires:
+  wire_x_pos: {{register: 0, type: int32, newton_per_count: {NEWTON_PER_COUNT}, zero: {ZERO}}}
+  wire_x_neg: {{register: 2, type: int32, newton_per_count: {NEWTON_PER_COUNT}, zero: {ZERO}}}
+  wire_y_pos: {{register: 4, type: int32, newton_per_count: {NEWTON_PER_COUNT}, zero: {ZERO}}}
+  wire_y_neg: {{register: 6, type: int32, newton_per_count: {NEWTON_PER_COUNT}, zero: {ZERO}}}
+faults:
+  broken_below: -200000
+  broken_above: 200000
+  saturated_below: -20000
+  saturated_above: 90000
+"""
+
+
+class Cells:
+    """Four cells with a count or two of noise; a test sets tension and faults by wire."""
+
+    def __init__(self) -> None:
+        self.tension = dict.fromkeys(WIRES, 5.0)
+        self.count = {}
+        self.freeze = set()
+        self.busy = False
+        self._noise = np.random.default_rng(3)
+        self._last = dict.fromkeys(WIRES, 0)
+
+    def __call__(self, _time):
+        if self.busy:
+            return None
+        words = []
+        for wire in WIRES:
+            if wire not in self.freeze:
+                pulled = round(self.tension[wire] / NEWTON_PER_COUNT) + ZERO
+                self._last[wire] = pulled + int(self._noise.integers(-2, 3))
+            words += struct.unpack('>HH', struct.pack('>i', self.count.get(wire, self._last[wire])))
+        return words
+
+
+def write_calibration(folder: Path) -> Path:
+    path = folder / 'cells.yaml'
+    path.write_text(CALIBRATION)
+    return path
+
+
+def transmitter(cells: Cells, **line) -> TransmitterEmulator:
+    return TransmitterEmulator(cells, 2 * len(WIRES), **line)
