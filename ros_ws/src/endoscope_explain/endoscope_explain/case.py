@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from endoscope_core.plant import PlantDescription
 from endoscope_explain.audit import AuditReport
 from endoscope_explain.explanation import ChannelFit, Explanation, NamedEffect, Verdict
+from endoscope_explain.locate.chain_cut import ChainCut
 from endoscope_explain.recording import Recording
 
 Ladder = Mapping[str, Mapping[str, ChannelFit]]
@@ -99,6 +100,8 @@ class ExplainedCase:
     validation_name, baseline_name : str
         Empty if none was given.
     next_experiment : NextExperiment or None
+    cuts : tuple of ChainCut
+        Whether the refitted plant does better when the measured motor drives it.
     runtime_s : float
     """
 
@@ -114,4 +117,5 @@ class ExplainedCase:
     validation_name: str = ''
     baseline_name: str = ''
     next_experiment: NextExperiment | None = None
+    cuts: tuple[ChainCut, ...] = ()
     runtime_s: float = 0.0

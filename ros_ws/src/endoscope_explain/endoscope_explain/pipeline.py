@@ -12,6 +12,7 @@ from endoscope_explain.case import ExplainedCase, NextExperiment, Place
 from endoscope_explain.combine import combined_effects, combined_verdict, improved_plant
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.ladder import ladders
+from endoscope_explain.locate.chain_cut import cut_at_motor
 from endoscope_explain.locate.locating import (
     locate_effects,
     locate_findings,
@@ -159,7 +160,9 @@ def explain_case(
         validation_name='' if inputs.validation is None else inputs.validation.name,
         baseline_name='' if inputs.baseline is None else inputs.baseline.name,
     )
-    case = replace(case, places=_places(case))
+    case = replace(
+        case, places=_places(case), cuts=cut_at_motor(audit.recording, explanation.refitted)
+    )
     if extras:
         # Before the black boxes, whose libraries start threads: a fork is not safe after that.
         case = replace(case, next_experiment=_next(case, jobs, tell))

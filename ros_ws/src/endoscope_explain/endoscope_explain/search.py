@@ -5,8 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.effects.slots import NOMINAL_KEYS
 from endoscope_core.plant.kernel import OUT_JOINT
 from endoscope_explain.compose import (
     Composition,
@@ -17,10 +15,11 @@ from endoscope_explain.compose import (
     searchable_effects,
 )
 from endoscope_explain.evaluate import simulate_joint
-from endoscope_explain.fit import Fit, JointModel, fit
+from endoscope_explain.fit import Fit
 from endoscope_explain.free_parameters import BAND
 from endoscope_explain.observation import JointObservation, couple
 from endoscope_explain.parallel import parallel_map
+from endoscope_explain.reconsider import reconsidered
 from endoscope_explain.score import score
 from endoscope_explain.whiteness import is_noise
 
@@ -29,7 +28,6 @@ Flags = NDArray[np.bool_]
 
 SINGLES_POLISHED = 6
 PAIRS_POLISHED = 3
-REPLACED_POLISHED = 2
 BEAM = 3
 RIVALS = 0.5
 """Share of the best composition's gain from which on a lesser one is worth adding to as well."""
@@ -117,40 +115,15 @@ def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = 2) -> JointSearch:
             break
         needed = RIVALS * (nominal.score - grown[0].score)
         parents = [(c, (c.fit,)) for c in grown[:BEAM] if nominal.score - c.score >= needed]
-    if len(levels) > 1 and levels[-1] and not is_noise(levels[-1][0].fit):
-        levels.append(
-            tuple(
-                sorted(
-                    (*levels[-1], *_replaced(nominal, levels[-1][0], jobs)), key=lambda c: c.score
-                )
-            )
-        )
-        del levels[-2]
+    if len(levels) == 2 and levels[1]:
+        singles, pairs = reconsidered(nominal, levels[1][0], jobs)
+        levels = [_sorted(levels[0], singles), _sorted(levels[1], pairs)]
     return JointSearch(nominal, tuple(levels))
 
 
-def _replaced(nominal: Composition, best: Composition, jobs: int) -> list[Composition]:
-    """Compositions with another effect in the place of each effect but the last one of the best.
-
-    An effect that was chosen while others were missing may stand for what they left open; seen
-    beside the others, the right one does better.
-    """
-    last = CATALOGUE[best.effects[-1]]
-    count = len(last.parameters)
-    places = range(last.first_parameter, last.first_parameter + count)
-    shared = nominal.fit.model
-    flags = shared.flags.copy()
-    flags[last.flag] = True
-    base, _ = best.fit.model.packed(best.fit.theta)
-    kept = [
-        i
-        for i, item in enumerate(best.fit.model.free)
-        if item.index < len(NOMINAL_KEYS) or item.index in places
-    ]
-    model = JointModel(shared.observation, base, flags, tuple(best.fit.model.free[i] for i in kept))
-    alone = fit(model, best.fit.theta[kept], iterations=4)
-    parent = Composition((best.effects[-1],), alone, score(alone))
-    start = Fit(
-        model, best.fit.theta[kept], model.residuals(best.fit.theta[kept]), alone.jacobian, np.inf
-    )
-    return grow([(parent, (start, alone))], searchable_effects(), jobs, REPLACED_POLISHED)
+def _sorted(found: tuple[Composition, ...], more: list[Composition]) -> tuple[Composition, ...]:
+    """Compositions best first, each set of effects once."""
+    unique: dict[frozenset[str], Composition] = {}
+    for composition in sorted((*found, *more), key=lambda c: c.score):
+        unique.setdefault(frozenset(composition.effects), composition)
+    return tuple(unique.values())

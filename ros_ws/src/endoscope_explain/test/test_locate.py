@@ -6,6 +6,7 @@ import pytest
 from endoscope_core.effects import CATALOGUE
 from endoscope_core.plant import EffectSpec, PlantDescription
 from endoscope_explain.explanation import Estimate, NamedEffect
+from endoscope_explain.locate.chain_cut import cut_at_motor
 from endoscope_explain.locate.locating import STAGE_OF_PARAMETER, locate_effects
 from endoscope_explain.locate.regime import information
 
@@ -80,3 +81,22 @@ def test_information_is_zero_for_a_state_that_tells_nothing():
 def test_every_nominal_parameter_has_a_stage():
     names = {f.name for f in dataclasses.fields(PLANT.joints['bend_x'])}
     assert set(STAGE_OF_PARAMETER) == names
+
+
+@pytest.mark.parametrize(
+    ('effect', 'before'),
+    [
+        (EffectSpec('transport_delay', 'bend_x', {'delay_s': 0.04}), True),
+        (EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.4}), False),
+    ],
+)
+def test_cutting_the_chain_at_the_motor_tells_on_which_side_the_fault_is(record, effect, before):
+    recording = record(dataclasses.replace(PLANT, effects=(effect,)), duration=10.0)
+    cut = next(c for c in cut_at_motor(recording, PLANT) if c.joint == 'bend_x')
+    assert cut.by_command > 3.0
+    assert cut.before_the_motor is before
+
+
+def test_without_a_recorded_shaft_there_is_no_cut(record):
+    recording = record(duration=3.0)
+    assert cut_at_motor(recording.with_series({'shaft_position': None}), PLANT) == ()

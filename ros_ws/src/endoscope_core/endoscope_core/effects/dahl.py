@@ -12,15 +12,14 @@ def path_length(way: float, shake: float) -> float:
 
 
 @compiled
-def slid(slide: float, ratio: float, ceiling: float, shake: float) -> float:
-    """Dahl state after sliding `ratio` pre-sliding distances (signed), towards +-`ceiling`.
+def slid(slide: float, ratio: float, shake: float) -> float:
+    """Dahl state after sliding `ratio` pre-sliding distances (signed); stays in [-1, 1].
 
-    Solves ``z' = v - s z / ceiling`` with the path's speed ``s``, which is ``|v|`` without
-    `shake`, the pre-sliding distances shaken to and fro meanwhile.
+    Solves ``z' = v - s z`` with the path's speed ``s``, which is ``|v|`` without `shake`, the
+    pre-sliding distances shaken to and fro meanwhile.
     """
     path = path_length(ratio, shake)
     if path == 0.0:
         return slide
-    size = path / ceiling
-    share = 1.0 - math.exp(-size) if size > 0.02 else size * (1.0 - size * (0.5 - size / 6.0))
-    return slide + share * (ceiling * ratio / path - slide)
+    share = 1.0 - math.exp(-path) if path > 0.02 else path * (1.0 - path * (0.5 - path / 6.0))
+    return slide + share * (ratio / path - slide)

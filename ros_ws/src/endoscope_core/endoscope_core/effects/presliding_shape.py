@@ -65,7 +65,7 @@ def slid(state: Array, parameters: Array, place: int, ratio: float) -> float:
     way = 1.0 if ratio > 0.0 else -1.0
     rest = 1.0 - state[place] * way
     if abs(excess) < 1e-6:
-        state[place] = dahl.slid(state[place], ratio, 1.0, 0.0)
+        state[place] = dahl.slid(state[place], ratio, 0.0)
     elif rest > 0.0:
         state[place] = way * (1.0 - _rest_after(rest, abs(ratio), excess))
     mean = 0.0

@@ -11,15 +11,15 @@ DEFINITION = define(
     'stribeck_friction',
     Stage.TRANSMISSION,
     physics='Sheath friction is higher at low sliding speed; where it falls so steeply that the '
-    'wire cannot slide smoothly, the wire shudders.',
-    equation="z' = (v - s z / g) / xs, g = 1 + rise exp(-s_g / stribeck_speed); s, s_g: mean "
-    'speeds of a wire that shudders at the speed of neutral stability, else |v|',
-    source='LuGre: Canudas de Wit et al., IEEE Trans. Autom. Control 40(3), 1995; averaged over '
-    'fast shudder as in Iannelli et al., Automatica 42(4), 2006',
+    'wire cannot slide smoothly, wire and joint shudder and shake friction off.',
+    equation="phi(s) = phi (1 + rise exp(-s / stribeck_speed)), z' = (v - s z) / xs; mean speed "
+    's of the path: |v| and, below the speed of neutral stability, shudder times that',
+    source='Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, eq. 6; averaged '
+    'over fast shudder as in Iannelli et al., Automatica 42(4), 2006',
     parameters=(
         EffectParameter('rise', '-', 0.0, 3.0, 0.5, off=0.0, starts=(0.4,)),
-        EffectParameter('stribeck_speed', 'm/s', 1e-5, 2e-2, 1e-3, starts=(3e-4, 2e-3)),
-        EffectParameter('shudder', '-', 0.0, 3.0, 1.0, starts=(0.1, 1.0)),
+        EffectParameter('stribeck_speed', 'm/s', 1e-5, 2e-2, 1e-3, starts=(5e-4, 3e-3)),
+        EffectParameter('shudder', '-', 0.8, 5.0, 1.0),
     ),
 )
 ON = DEFINITION.flag
@@ -29,26 +29,37 @@ SHUDDER = RISE + 2
 BRAKING = SLOTS.state_block()
 """By how much the wires' friction would brake the joint per unit of exponent and radius, N."""
 
-FRICTION_SHARE = 0.5
-"""Share of the shudder's speed at which the mean friction of a shuddering wire is found; from
-iterating ``v -> pull(v) / damping`` to its invariant distribution."""
+FRICTION_SHARE = 0.9
+"""Share of the shudder's speed at which a shuddering wire's mean friction is found."""
 
 
 @compiled
-def ceiling_and_shudder(state: Array, parameters: Array, speed: float) -> tuple[float, float]:
-    """Value that the pre-sliding states approach at a steady speed, and the wire's shudder.
+def factor_and_shudder(state: Array, parameters: Array, speed: float) -> tuple[float, float]:
+    """Factor on the capstan exponent at a mean sliding speed, and the wire's shudder.
 
-    Both speeds in m/s. The friction follows the speed over the pre-sliding distance. A capstan
-    exponent that followed at once would leave the massless joint's speed ambiguous below the speed
-    where the friction's fall outweighs the joint's damping. There a wire jumps to and fro between
-    fast and slow sliding; what remains on average is shaken friction.
+    Both speeds in m/s. Where friction's fall with speed outweighs the joint's damping, the
+    massless joint's speed is ambiguous, and it jumps to and fro between fast and slow sliding many
+    times a millisecond. The averages of that motion vary smoothly with every parameter; the motion
+    itself is chaotic and cannot be fitted.
     """
     stribeck_speed = parameters[SPEED]
     lever = 0.5 * parameters[JOINT_RADIUS]
     steepest = parameters[RISE] / stribeck_speed * lever * lever * state[BRAKING]
     instability = steepest * parameters[CAPSTAN_EXPONENT] / parameters[JOINT_DAMPING]
-    # A smooth max(0, log(instability)): the fall is exponential in the speed.
-    neutral = stribeck_speed * 0.5 * math.log1p(instability * instability)
-    shudder = parameters[SHUDDER] * neutral
-    friction_speed = dahl.path_length(speed, FRICTION_SHARE * shudder)
-    return 1.0 + parameters[RISE] * math.exp(-friction_speed / stribeck_speed), shudder
+    shudder = parameters[SHUDDER] * stribeck_speed * _shudder_of(instability)
+    mean_speed = dahl.path_length(speed, FRICTION_SHARE * shudder)
+    return 1.0 + parameters[RISE] * math.exp(-mean_speed / stribeck_speed), shudder
+
+
+@compiled
+def _shudder_of(instability: float) -> float:
+    """Mean of |y|, where that of y is zero, over the orbit of ``y = a - instability exp(-|y|)``.
+
+    y is the sliding speed in Stribeck speeds. Fitted to iterates of the map for instabilities from
+    3 to 24; zero, smoothly, where the map has one stable point.
+    """
+    if instability <= 0.0:
+        return 0.0
+    excess = (1.15 * math.log(instability) - 0.75) / 0.3
+    mean = 0.3 * (math.log1p(math.exp(excess)) if excess < 30.0 else excess)
+    return mean * min(1.0, (instability / 0.9) ** 4)

@@ -80,7 +80,6 @@ from endoscope_core.plant.transmission import (
     half_exponent,
     is_distributed,
     pretension_now,
-    sliding_law,
     wire_tension,
 )
 
@@ -164,7 +163,7 @@ def advance_tick(
             if on[torque_limit.ON]:
                 state[SLIDE_A], state[SLIDE_B] = za, zb
                 v = 0.5 * r * (state[PULLEY_SPEED] + wire_end_speed)
-                phi = friction_exponent(state, p, on, time, tick)
+                phi, _ = friction_exponent(state, p, on, v, time, tick)
                 stretch = r * (pulley - wire_end) + shift
                 loads = proximal_tensions(state, p, on, pretension, phi, v, stretch, shift)
                 step = torque_limit.yielding(p, m_new - m, loads)
@@ -174,14 +173,16 @@ def advance_tick(
         pulley_speed = (pulley_new - pulley) / dt
 
         v = 0.5 * r * (pulley_speed + wire_end_speed)
-        phi = friction_exponent(state, p, on, time, tick)
-        ceiling, shudder = sliding_law(state, p, on, v)
+        phi, shudder = friction_exponent(state, p, on, v, time, tick)
         shake = shudder * dt / xs
+        # The wires' mean speed is half the motor's and half the joint's, and it is the joint's
+        # half that shudders.
+        joint_shudder = 2.0 * shudder / r
         wire_step = r * (pulley_new - pulley)
         stretch = r * (0.5 * (pulley + pulley_new) - wire_end) + shift
         if chained:
             ta, tb, ka, kb = sheath_chain.distal_tensions(
-                state, p, on, pretension, shift, phi, ceiling, wire_step
+                state, p, on, pretension, shift, phi, wire_step
             )
             phi *= 1.0 - p[distributed_friction.SHARE]
         else:
@@ -193,9 +194,9 @@ def advance_tick(
         da, db = math.exp(-ea), math.exp(-eb)
         state[stribeck_friction.BRAKING] = abs(ta * da * za - tb * db * zb)
 
-        steep_a = presliding.steepness(state, p, on, WIRE_A, za, v, ceiling, shudder)
-        steep_b = presliding.steepness(state, p, on, WIRE_B, zb, -v, ceiling, shudder)
-        steep_j = presliding.steepness(state, p, on, AT_JOINT, zj, dq, 1.0, 0.0)
+        steep_a = presliding.steepness(state, p, on, WIRE_A, za, v, shudder)
+        steep_b = presliding.steepness(state, p, on, WIRE_B, zb, -v, shudder)
+        steep_j = presliding.steepness(state, p, on, AT_JOINT, zj, dq, joint_shudder)
         pull = r * (ta * da - tb * db)
         grip = 0.5 * r * r / xs * (grip_a * ta * da * steep_a + grip_b * tb * db * steep_b)
         pull_slope = r * r * (ka * da + kb * db) + grip
@@ -230,11 +231,11 @@ def advance_tick(
         wire_end_speed = (q + offset - wire_end) / dt if loaded_tip else mean_dq
         wire_end = q + offset
         slid = 0.5 * r * (pulley_speed + wire_end_speed) * dt
-        za = presliding.slid(state, p, on, WIRE_A, za, slid / xs, ceiling, shake)
-        zb = presliding.slid(state, p, on, WIRE_B, zb, -slid / xs, ceiling, shake)
-        zj = presliding.slid(state, p, on, AT_JOINT, zj, mean_dq * dt / qs, 1.0, 0.0)
+        za = presliding.slid(state, p, on, WIRE_A, za, slid / xs, shake)
+        zb = presliding.slid(state, p, on, WIRE_B, zb, -slid / xs, shake)
+        zj = presliding.slid(state, p, on, AT_JOINT, zj, mean_dq * dt / qs, joint_shudder * dt / qs)
         if chained:
-            sheath_chain.follow(state, p, ceiling, shake, wire_step, r * mean_dq * dt)
+            sheath_chain.follow(state, p, shake, wire_step, r * mean_dq * dt)
         if on[wire_creep.ON]:
             wire_creep.advance(state, p, ta - pretension, tb - pretension, dt)
         if on[friction_run_in.ON]:
@@ -253,7 +254,7 @@ def advance_tick(
         pulley_speed = dm
     v = 0.5 * r * (pulley_speed + (wire_end_speed if loaded_tip else dq))
     end = state[TICKS] * tick
-    phi = friction_exponent(state, p, on, end, tick)
+    phi, _ = friction_exponent(state, p, on, v, end, tick)
     loads = proximal_tensions(
         state, p, on, pretension_now(p, on, end), phi, v, r * (pulley - wire_end) + shift, shift
     )

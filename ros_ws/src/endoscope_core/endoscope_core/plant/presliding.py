@@ -12,7 +12,6 @@ def steepness(
     place: int,
     slide: float,
     speed: float,
-    ceiling: float,
     shudder: float,
 ) -> float:
     """Growth of a friction state by displacement in pre-sliding distances, in a speed's way."""
@@ -21,7 +20,7 @@ def steepness(
         way = speed / dahl.path_length(speed, shudder)
     if presliding_shape.acts(p, on, place):
         return presliding_shape.steepness(state, p, place, way)
-    return max(0.0, 1.0 - slide * way / ceiling)
+    return 1.0 - slide * way
 
 
 @compiled
@@ -32,10 +31,9 @@ def slid(
     place: int,
     slide: float,
     ratio: float,
-    ceiling: float,
     shake: float,
 ) -> float:
-    """Friction state after sliding `ratio` pre-sliding distances (signed), towards +-`ceiling`."""
+    """Friction state after sliding `ratio` pre-sliding distances (signed)."""
     if presliding_shape.acts(p, on, place):
-        return ceiling * presliding_shape.slid(state, p, place, ratio / ceiling)
-    return dahl.slid(slide, ratio, ceiling, shake)
+        return presliding_shape.slid(state, p, place, ratio)
+    return dahl.slid(slide, ratio, shake)

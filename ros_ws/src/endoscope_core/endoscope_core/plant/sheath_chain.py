@@ -55,7 +55,6 @@ def _eliminate(
     pretension: float,
     common: float,
     phi: float,
-    ceiling: float,
     motor_step: float,
 ) -> tuple[float, float]:
     """Tension in N at the joint after a substep if the joint stood still, and its slope in N/m.
@@ -66,8 +65,6 @@ def _eliminate(
         First state of this wire's chain.
     phi : float
         Capstan exponent of the whole chain.
-    ceiling : float
-        What the nodes' pre-sliding states approach.
     motor_step : float
         By how much the motor pulls the wire in this substep, m.
     """
@@ -81,7 +78,7 @@ def _eliminate(
         pulled = 1.0 / released
         way = 1.0 if state[chain + STEP + i] > 0.0 else -1.0
         grip = share * (before * released + after * pulled)
-        grip *= max(0.0, 1.0 - slide * way / ceiling) / p[PRESLIDING_DISTANCE]
+        grip *= (1.0 - slide * way) / p[PRESLIDING_DISTANCE]
         towards = slope_before * released
         away = slope_after * pulled
         pivot = towards * (1.0 - gain) + away + grip
@@ -98,7 +95,6 @@ def _follow(
     state: Array,
     chain: int,
     p: Array,
-    ceiling: float,
     shake: float,
     motor_step: float,
     joint_step: float,
@@ -110,7 +106,7 @@ def _follow(
         step = state[chain + OFFSET + i] + state[chain + GAIN + i] * beyond
         state[chain + STRETCH + i + 1] += step - beyond
         slide = chain + SLIDE + i
-        state[slide] = dahl.slid(state[slide], step / p[PRESLIDING_DISTANCE], ceiling, shake)
+        state[slide] = dahl.slid(state[slide], step / p[PRESLIDING_DISTANCE], shake)
         state[chain + STEP + i] = step
     state[chain + STRETCH] += motor_step - step
 
@@ -123,7 +119,6 @@ def distal_tensions(
     pretension: float,
     shift: float,
     phi: float,
-    ceiling: float,
     wire_step: float,
 ) -> tuple[float, float, float, float]:
     """Tensions in N of both wires at the joint in a substep, and their slopes in N/m.
@@ -137,18 +132,12 @@ def distal_tensions(
         Stretch in m of the positive wire that neither motor nor joint causes.
     phi : float
         Capstan exponent of the whole sheath.
-    ceiling : float
-        What the pre-sliding states approach.
     wire_step : float
         By how much the motor pulls the positive wire in this substep, m.
     """
     phi *= p[SHARE]
-    ta, ka = _eliminate(
-        state, WIRE_A, p, on, pretension, shift - state[CREEP_A], phi, ceiling, wire_step
-    )
-    tb, kb = _eliminate(
-        state, WIRE_B, p, on, pretension, -shift - state[CREEP_B], phi, ceiling, -wire_step
-    )
+    ta, ka = _eliminate(state, WIRE_A, p, on, pretension, shift - state[CREEP_A], phi, wire_step)
+    tb, kb = _eliminate(state, WIRE_B, p, on, pretension, -shift - state[CREEP_B], phi, -wire_step)
     # The chain is solved for the end of the substep, the joint for its middle.
     return ta, tb, 2.0 * ka, 2.0 * kb
 
@@ -157,11 +146,10 @@ def distal_tensions(
 def follow(
     state: Array,
     p: Array,
-    ceiling: float,
     shake: float,
     wire_step: float,
     joint_step: float,
 ) -> None:
     """Move the nodes of both wires, once the joint has let out `joint_step` m of the positive."""
-    _follow(state, WIRE_A, p, ceiling, shake, wire_step, joint_step)
-    _follow(state, WIRE_B, p, ceiling, shake, -wire_step, -joint_step)
+    _follow(state, WIRE_A, p, shake, wire_step, joint_step)
+    _follow(state, WIRE_B, p, shake, -wire_step, -joint_step)

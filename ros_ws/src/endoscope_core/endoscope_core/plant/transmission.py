@@ -39,25 +39,28 @@ def wire_tension(p: Array, on: Flags, pretension: float, stretch: float) -> tupl
 
 
 @compiled
-def sliding_law(state: Array, p: Array, on: Flags, speed: float) -> tuple[float, float]:
-    """What the wires' pre-sliding states approach at a steady speed, and the wires' shudder.
+def friction_exponent(
+    state: Array,
+    p: Array,
+    on: Flags,
+    speed: float,
+    time: float,
+    tick: float,
+) -> tuple[float, float]:
+    """Capstan exponent of the whole sheath, as the mean over the tick around `time`; and shudder.
 
-    Both speeds in m/s.
+    Sliding speed and the wires' shudder are in m/s.
     """
-    if on[stribeck_friction.ON]:
-        return stribeck_friction.ceiling_and_shudder(state, p, speed)
-    return 1.0, 0.0
-
-
-@compiled
-def friction_exponent(state: Array, p: Array, on: Flags, time: float, tick: float) -> float:
-    """Capstan exponent of the whole sheath, as the mean over the tick around `time`."""
     phi = p[CAPSTAN_EXPONENT]
+    shudder = 0.0
+    if on[stribeck_friction.ON]:
+        factor, shudder = stribeck_friction.factor_and_shudder(state, p, speed)
+        phi *= factor
     if on[friction_run_in.ON]:
         phi *= friction_run_in.friction_factor(state, p)
     if on[configuration_change.ON]:
         phi *= configuration_change.friction_factor(p, time, tick)
-    return phi
+    return phi, shudder
 
 
 @compiled

@@ -85,6 +85,7 @@ def html_page(case: ExplainedCase) -> str:
         sentence=verdict_sentence(case),
         chain=chain_svg(_guilty(case)),
         places=[_place(place) for place in case.places],
+        cut=_cut(case, joint),
         effects=[_effect(effect) for effect in case.effects],
         joint=joint,
         passage=passage,
@@ -142,6 +143,18 @@ def _place(place: Place) -> dict[str, Any]:
         'intervals': shown + (f' s and {more} more' if more > 0 else ' s') if shown else '',
         'band': f'{low:.2g} … {high:.2g} Hz' if high > 0 else '',
     }
+
+
+def _cut(case: ExplainedCase, joint: str) -> str:
+    cut = next((c for c in case.cuts if c.joint == joint), None)
+    if cut is None or cut.by_command < 2.0:
+        return ''
+    where = 'before' if cut.before_the_motor else 'behind'
+    return (
+        f'Driven by the measured motor instead of the command, the refitted plant misses wires and '
+        f'tip of {joint} by {cut.by_motor:.1f} instead of {cut.by_command:.1f} times the noise: '
+        f'most of what is missing acts {where} the encoder.'
+    )
 
 
 def _effect(effect: NamedEffect) -> dict[str, Any]:

@@ -1,0 +1,115 @@
+"""Cut the chain at the motor: drive what lies behind it with the measured shaft."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from endoscope_core.plant import PlantDescription
+from endoscope_core.plant.kernel import IN_MOTOR, OUTPUTS, run_joints
+from endoscope_core.plant.packing import pack, rest_state
+from endoscope_explain.evaluate import SUBSTEPS
+from endoscope_explain.observation import TICK, JointObservation, observe
+from endoscope_explain.predicted_signals import reading_lead, simulate_rig
+from endoscope_explain.recording import Recording
+
+Array = NDArray[np.float64]
+
+SMOOTHED_S = 0.021
+"""Window over which the encoder's steps are smoothed: shorter than the servo's answer."""
+BEHIND = ('tension', 'bending')
+
+
+@dataclass(frozen=True)
+class ChainCut:
+    """Misfit of wires and tip of one joint, in noise units (rms).
+
+    Attributes
+    ----------
+    joint : str
+    by_command : float
+        Driven by the command, through the simulated servo.
+    by_motor : float
+        Driven by the measured shaft.
+    """
+
+    joint: str
+    by_command: float
+    by_motor: float
+
+    @property
+    def before_the_motor(self) -> bool:
+        """Whether what is wrong lies before the motor's encoder."""
+        return self.by_motor < 0.5 * self.by_command
+
+
+def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCut, ...]:
+    """Compare both ways of driving wires and joint.
+
+    Parameters
+    ----------
+    recording : Recording
+        As audited.
+    plant : PlantDescription
+        Its parameters refitted, nothing added.
+
+    Returns
+    -------
+    tuple of ChainCut
+        Of each joint; empty where the shaft was not recorded.
+    """
+    if recording.shaft_position is None:
+        return ()
+    observations = observe(recording, plant)
+    whole = simulate_rig(observations, plant)
+    lead = reading_lead(observations, whole)
+    parameters, flags = pack(plant)
+    cuts = []
+    for j, observation in enumerate(observations):
+        row = plant.joint_names().index(observation.joint)
+        inputs = observation.inputs.copy()
+        inputs[0, :, IN_MOTOR] = _measured_motor(
+            recording,
+            recording.joints.index(observation.joint),
+            plant.joints[observation.joint].gear,
+            lead,
+            inputs.shape[1],
+        )
+        packed = parameters[row : row + 1]
+        states, histories = rest_state(packed, np.array([observation.start]))
+        out = np.empty((1, inputs.shape[1], OUTPUTS))
+        run_joints(
+            states, histories, packed, flags[row : row + 1], inputs, False, TICK, SUBSTEPS, out
+        )
+        cuts.append(
+            ChainCut(
+                observation.joint,
+                _misfit(observation, whole[j], lead),
+                _misfit(observation, out[0], lead),
+            )
+        )
+    return tuple(cuts)
+
+
+def _measured_motor(recording: Recording, j: int, gear: float, lead: float, ticks: int) -> Array:
+    shaft = recording.shaft_position
+    if shaft is None:
+        raise ValueError('the shaft was not recorded')
+    period = float(np.median(np.diff(shaft.time)))
+    width = max(5, 2 * int(0.5 * SMOOTHED_S / period) + 1)
+    angle = savgol_filter(shaft.values[:, j] / gear, width, 2)
+    begin = float(recording.command.time[0])
+    # The angle that the motor shall have reached at the end of each tick.
+    ends = TICK * np.arange(1, ticks + 1)
+    return np.interp(ends, shaft.time - begin + lead * TICK, angle)
+
+
+def _misfit(observation: JointObservation, outputs: Array, lead: float) -> float:
+    total, count = 0.0, 0
+    for channel in observation.channels:
+        if channel.quantity in BEHIND:
+            wrong = (channel.predicted(outputs, lead) - channel.value) / channel.noise
+            total += float(wrong @ wrong)
+            count += len(wrong)
+    return float(np.sqrt(total / max(count, 1)))

@@ -1,0 +1,76 @@
+"""A second look at a composition of two effects: whether each is needed, and the right one.
+
+What was fitted while another effect was missing may have stopped in the wrong place. Seen from the
+composition's own numbers, one effect alone may do, or another one may do better beside the other.
+"""
+
+import numpy as np
+
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.effects.slots import NOMINAL_KEYS
+from endoscope_explain.compose import Composition, grow, searchable_effects
+from endoscope_explain.fit import Fit, JointModel, fit
+from endoscope_explain.score import score
+from endoscope_explain.whiteness import is_noise
+
+REPLACED_POLISHED = 2
+ALONE_STEPS = 6
+
+
+def alone(nominal: Composition, pair: Composition, effect_id: str) -> tuple[Composition, Fit]:
+    """One effect of a pair by itself, refitted from where the pair has it.
+
+    Parameters
+    ----------
+    nominal, pair : Composition
+    effect_id : str
+        Of the pair.
+
+    Returns
+    -------
+    refitted : Composition
+    as_in_pair : Fit
+        The effect with the pair's numbers, before the refit.
+    """
+    definition = CATALOGUE[effect_id]
+    first = definition.first_parameter
+    places = range(first, first + len(definition.parameters))
+    flags = nominal.fit.model.flags.copy()
+    flags[definition.flag] = True
+    base, _ = pair.fit.model.packed(pair.fit.theta)
+    free = pair.fit.model.free
+    kept = [
+        i for i, item in enumerate(free) if item.index < len(NOMINAL_KEYS) or item.index in places
+    ]
+    model = JointModel(nominal.fit.model.observation, base, flags, tuple(free[i] for i in kept))
+    theta = pair.fit.theta[kept]
+    refitted = fit(model, theta, iterations=ALONE_STEPS)
+    as_in_pair = Fit(model, theta, model.residuals(theta), refitted.jacobian, np.inf)
+    return Composition((effect_id,), refitted, score(refitted)), as_in_pair
+
+
+def reconsidered(
+    nominal: Composition, pair: Composition, jobs: int
+) -> tuple[list[Composition], list[Composition]]:
+    """Look again at both effects of a pair.
+
+    Parameters
+    ----------
+    nominal, pair : Composition
+    jobs : int
+        Processes side by side.
+
+    Returns
+    -------
+    singles : list of Composition
+        Each effect alone.
+    pairs : list of Composition
+        Others in the place of the effect that was chosen first.
+    """
+    found = [alone(nominal, pair, effect_id) for effect_id in pair.effects]
+    singles = [single for single, _ in found]
+    if is_noise(pair.fit):
+        return singles, []
+    last, as_in_pair = found[-1]
+    pairs = grow([(last, (as_in_pair, last.fit))], searchable_effects(), jobs, REPLACED_POLISHED)
+    return singles, pairs
