@@ -19,11 +19,14 @@ class MotorReading:
     ----------
     position, velocity, effort
         rad, rad/s and N m, shape (J,).
+    age
+        Time in s since it was measured.
     """
 
     position: tuple[float, ...]
     velocity: tuple[float, ...]
     effort: tuple[float, ...]
+    age: float = 0.0
 
 
 class MotorDevice(Protocol):
@@ -45,7 +48,10 @@ class MotorDevice(Protocol):
         """
 
     def set_torque(self, on: bool) -> None:
-        """Let the servos hold their goal, or let them go."""
+        """Let the servos hold where they are and then follow goals, or let them go.
+
+        Switching torque on is what ends the refusal of goals after a trouble; nothing else does.
+        """
 
     def exchange(self, goal: Sequence[float], periods: int) -> MotorReading | None:
         """Set the goal and give the newest reading.
@@ -63,8 +69,11 @@ class MotorDevice(Protocol):
             None while there is no new valid reading.
         """
 
-    def health(self) -> tuple[str, dict[str, object]]:
-        """What is wrong (empty if nothing), and figures for diagnostics."""
+    def trouble(self) -> str:
+        """What forbids motion now, empty if nothing; asked for in every tick."""
+
+    def health(self) -> dict[str, object]:
+        """Figures for diagnostics."""
 
     def close(self) -> None:
         """Let go of the device."""

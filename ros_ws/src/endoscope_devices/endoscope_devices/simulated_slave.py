@@ -73,9 +73,13 @@ class SimulatedSlave:
             tuple(sensors.shaft_effort(sample.shaft_effort).tolist()),
         )
 
-    def health(self) -> tuple[str, dict[str, object]]:
+    def trouble(self) -> str:
         """A simulation has nothing to complain about."""
-        return '', {}
+        return ''
+
+    def health(self) -> dict[str, object]:
+        """Nor to tell."""
+        return {}
 
     def close(self) -> None:
         """Nothing to let go of."""

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -21,6 +22,9 @@ from endoscope_nodes.parameters import parameter
 from endoscope_nodes.qos import EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.stream_watch import StreamWatch
+
+# Subcomponents whose errors forbid motion; their nodes tell them at once.
+_VITAL = frozenset(('motor_driver: device', 'load_cells: cells'))
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,7 @@ class SupervisorNode(EndoscopeNode):
         )
         JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
         self.create_subscription(String, STATE_COMMAND, self._on_command, EVENT)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, EVENT)
         self.diagnostics.add('operating state', self._report)
         self.ticker.every(p.check_period, self._check_streams)
         self.ticker.every(1.0, self._publish)
@@ -89,6 +94,15 @@ class SupervisorNode(EndoscopeNode):
             self._report_cause('tension', trouble)
         else:
             self.machine.clear_cause('tension')
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name not in _VITAL:
+                continue
+            if status.level == ERROR:
+                self._report_cause(status.name, f'{status.name}: {status.message}')
+            else:
+                self.machine.clear_cause(status.name)
 
     def _check_streams(self) -> None:
         for watch in (self._motor, self._wires):

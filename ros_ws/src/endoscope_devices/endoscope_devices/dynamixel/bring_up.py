@@ -1,0 +1,195 @@
+"""Sets a servo up, and refuses it unless everything reads back as it was written."""
+
+from collections.abc import Sequence
+
+from endoscope_devices.dynamixel.control_table import (
+    BUS_WATCHDOG,
+    CURRENT_BASED_POSITION,
+    CURRENT_LIMIT,
+    DRIVE_MODE,
+    GOAL_CURRENT,
+    GOAL_POSITION,
+    HARDWARE_ERROR_STATUS,
+    MODELS,
+    OPERATING_MODE,
+    PRESENT_POSITION,
+    PROFILE_ACCELERATION,
+    PROFILE_VELOCITY,
+    RETURN_DELAY_TIME,
+    SHUTDOWN,
+    STATUS_RETURN_LEVEL,
+    TORQUE_ENABLE,
+    Register,
+    ServoModel,
+    hardware_errors_in_words,
+)
+from endoscope_devices.dynamixel.packet_handler import QUIET_S, BusError, PacketHandler
+from endoscope_devices.dynamixel.servo_block import MAP_ADDRESS, MAP_BYTES
+from endoscope_devices.dynamixel.settings import BusSettings
+
+# Overload, electrical shock and overheating let the shaft go, as the maker sets it.
+_SHUTDOWN = 0b110100
+_EVERY_STATUS = 2
+
+
+class SetUpError(BusError):
+    """A servo is not as it was set; motion is refused."""
+
+
+def wanted_registers(settings: BusSettings) -> dict[Register, int]:
+    """What every servo's registers shall hold before it may be enabled, in counts.
+
+    Parameters
+    ----------
+    settings
+        Of the bus.
+    """
+    return {
+        RETURN_DELAY_TIME: settings.return_delay_counts,
+        DRIVE_MODE: 0,
+        OPERATING_MODE: CURRENT_BASED_POSITION,
+        CURRENT_LIMIT: settings.current_counts,
+        SHUTDOWN: _SHUTDOWN,
+        STATUS_RETURN_LEVEL: _EVERY_STATUS,
+        BUS_WATCHDOG: settings.watchdog_counts,
+        GOAL_CURRENT: settings.current_counts,
+        PROFILE_ACCELERATION: 0,
+        PROFILE_VELOCITY: 0,
+    }
+
+
+def bring_up(bus: PacketHandler, device: int, settings: BusSettings) -> ServoModel:
+    """Set one servo up with its torque off.
+
+    Registers of the EEPROM, which wears, are written only where they differ.
+
+    Parameters
+    ----------
+    bus
+        Where it is.
+    device
+        Its id.
+    settings
+        What to set.
+
+    Returns
+    -------
+    ServoModel
+        What it is.
+
+    Raises
+    ------
+    BusError
+        It does not answer, is another model, reports a hardware error, or does not keep what was
+        written.
+    """
+    number, _ = bus.ping(device)
+    if number not in MODELS:
+        known = ', '.join(model.name for model in MODELS.values())
+        raise SetUpError(f'servo {device} has model number {number}; this driver is for {known}')
+    _refuse_hardware_errors(bus, device)
+    bus.write_register(device, TORQUE_ENABLE, 0)
+    bus.write_register(device, BUS_WATCHDOG, 0)
+    for register, counts in wanted_registers(settings).items():
+        if not register.eeprom or bus.read_register(device, register) != counts:
+            bus.write_register(device, register, counts)
+    bus.write(device, MAP_ADDRESS, MAP_BYTES)
+    bus.drain(QUIET_S)
+    verify(bus, device, settings)
+    return MODELS[number]
+
+
+def verify(
+    bus: PacketHandler, device: int, settings: BusSettings, but: Register | None = None
+) -> None:
+    """Read back what :func:`bring_up` wrote.
+
+    Whole areas are read, each of a length that nothing else has, so that no answer to an earlier
+    question can be taken for them.
+
+    Parameters
+    ----------
+    bus
+        Where the servo is.
+    device
+        Its id.
+    settings
+        What it shall hold.
+    but
+        A register that may differ.
+
+    Raises
+    ------
+    BusError
+        It does not answer, or a register differs.
+    """
+    wanted = wanted_registers(settings)
+    for area in ([r for r in wanted if r.eeprom], [r for r in wanted if not r.eeprom]):
+        found = _read_area(bus, device, area)
+        for register in area:
+            if found[register] != wanted[register] and register is not but:
+                raise SetUpError(
+                    f'servo {device} is not enabled: {register.name}({register.address}) reads '
+                    f'{found[register]} instead of {wanted[register]}'
+                )
+    if bus.read(device, MAP_ADDRESS, len(MAP_BYTES)).data != MAP_BYTES:
+        raise SetUpError(f'servo {device} is not enabled: it does not keep its indirect addresses')
+    _refuse_hardware_errors(bus, device)
+
+
+def _read_area(
+    bus: PacketHandler, device: int, registers: Sequence[Register]
+) -> dict[Register, int]:
+    first = min(register.address for register in registers)
+    size = max(register.address + register.size for register in registers) - first
+    data = bus.read(device, first, size).data
+    return {
+        register: register.decode(
+            data[register.address - first : register.address - first + register.size]
+        )
+        for register in registers
+    }
+
+
+def _refuse_hardware_errors(bus: PacketHandler, device: int) -> None:
+    status = bus.read_register(device, HARDWARE_ERROR_STATUS)
+    if status:
+        raise SetUpError(
+            f'servo {device} reports {hardware_errors_in_words(status)}; once its cause is gone, '
+            'restart it (power, service motor/reboot, or `endoscope doctor --reboot`)'
+        )
+
+
+def enable(bus: PacketHandler, devices: Sequence[int], settings: BusSettings) -> None:
+    """Let servos hold the positions where they are.
+
+    Parameters
+    ----------
+    bus
+        Where they are.
+    devices
+        Their ids.
+    settings
+        What they must hold.
+
+    Raises
+    ------
+    BusError
+        Anything is not as it was set; no torque is switched on then.
+    """
+    for device in devices:
+        # Only 0 ends the error state of a watchdog that has tripped, and until then goals are
+        # read-only.
+        bus.write_register(device, BUS_WATCHDOG, 0)
+        here = bus.read_register(device, PRESENT_POSITION)
+        bus.write_register(device, GOAL_POSITION, here)
+        verify(bus, device, settings, but=BUS_WATCHDOG)
+    for device in devices:
+        bus.write_register(device, BUS_WATCHDOG, settings.watchdog_counts)
+        bus.write_register(device, TORQUE_ENABLE, 1)
+        found = _read_area(bus, device, (TORQUE_ENABLE, BUS_WATCHDOG))
+        if found != {TORQUE_ENABLE: 1, BUS_WATCHDOG: settings.watchdog_counts}:
+            raise SetUpError(
+                f'servo {device} does not switch its torque on: Torque Enable(64) reads '
+                f'{found[TORQUE_ENABLE]}, Bus Watchdog(98) {found[BUS_WATCHDOG]}'
+            )

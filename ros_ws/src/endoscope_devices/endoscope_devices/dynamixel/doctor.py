@@ -1,0 +1,248 @@
+"""Finds ports and servos, and says what to change before they can be used."""
+
+import errno
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from serial.tools import list_ports
+
+from endoscope_devices.dynamixel.control_table import (
+    BAUD_CODES,
+    CURRENT_LIMIT,
+    HARDWARE_ERROR_STATUS,
+    MODELS,
+    OPERATING_MODE,
+    PRESENT_INPUT_VOLTAGE,
+    PRESENT_TEMPERATURE,
+    RETURN_DELAY_TIME,
+    TEMPERATURE_LIMIT,
+    TORQUE_ENABLE,
+    Register,
+    hardware_errors_in_words,
+)
+from endoscope_devices.dynamixel.packet_handler import BusError, PacketHandler
+from endoscope_devices.dynamixel.serial_port import BusPort, latency_timer
+from endoscope_devices.dynamixel.wire_time import bytes_of_cycle, cycles_per_second
+from endoscope_devices.motor_device import DeviceError
+
+# 'Specifications': 10.0 to 14.8 V; firmware: notes at Bus Watchdog(98) and 'Fast Sync Read'.
+_VOLTAGE = (10.0, 14.8)
+_WATCHDOG_FIRMWARE = 38
+_WANTED_RATE = 1000.0
+_WANTED_LATENCY_S = 1e-3
+_NEAR_LIMIT_DEGC = 10
+
+
+@dataclass
+class ServoFinding:
+    """What a servo says of itself.
+
+    Attributes
+    ----------
+    device, baud
+        Id, and the speed at which it was found.
+    model, firmware
+        Name and version.
+    voltage, temperature
+        V and °C.
+    hardware
+        Hardware errors in words.
+    mode, current_limit, return_delay, torque
+        Settings; A and s.
+    """
+
+    device: int
+    baud: int
+    model: str
+    firmware: int
+    voltage: float = 0.0
+    temperature: int = 0
+    hardware: str = ''
+    mode: int = 0
+    current_limit: float = 0.0
+    return_delay: float = 0.0
+    torque: bool = False
+
+    def __str__(self) -> str:
+        return (
+            f'  servo {self.device}: {self.model}, firmware {self.firmware}, {self.baud} baud, '
+            f'{self.voltage:.1f} V, {self.temperature} °C, '
+            f'{self.hardware or "no hardware error"}\n'
+            f'    operating mode {self.mode}, current limit {self.current_limit:.2f} A, '
+            f'return delay {self.return_delay * 1e6:.0f} us, '
+            f'torque {"on" if self.torque else "off"}'
+        )
+
+
+@dataclass
+class PortFinding:
+    """What is behind a port.
+
+    Attributes
+    ----------
+    port
+        Device file.
+    latency
+        Latency timer in s, None where the adapter has none.
+    servos
+        What was found.
+    advice
+        What to change, one line each.
+    """
+
+    port: str
+    latency: float | None = None
+    servos: list[ServoFinding] = field(default_factory=list)
+    advice: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        timer = 'none' if self.latency is None else f'{self.latency * 1e3:.0f} ms'
+        lines = [f'{self.port}: latency timer {timer}, {len(self.servos)} servos']
+        lines += map(str, self.servos)
+        lines += (f'  change: {line}' for line in self.advice)
+        return '\n'.join(lines)
+
+
+def serial_ports() -> list[str]:
+    """Device files of all serial adapters."""
+    return sorted(port.device for port in list_ports.comports())
+
+
+def examine(port: str, bauds: Sequence[int] = tuple(BAUD_CODES.values())) -> PortFinding:
+    """Look for servos on a port at several speeds, without changing anything.
+
+    Parameters
+    ----------
+    port
+        Device file.
+    bauds
+        Bits per second.
+    """
+    finding = PortFinding(port, latency_timer(port))
+    try:
+        for baud in bauds:
+            _listen(finding, baud)
+    except DeviceError as error:
+        finding.advice.append(_told(port, error))
+    else:
+        finding.advice += advise(finding)
+    return finding
+
+
+def reboot(port: str, baud: int, device: int) -> None:
+    """Restart a servo, which ends its shutdown.
+
+    Parameters
+    ----------
+    port
+        Device file.
+    baud
+        Speed of the servo.
+    device
+        Its id.
+
+    Raises
+    ------
+    DeviceError
+        The port cannot be used, or the servo does not answer.
+    """
+    line = BusPort(port, baud)
+    line.open()
+    try:
+        PacketHandler(line).reboot(device)
+    finally:
+        line.close()
+
+
+def advise(finding: PortFinding) -> list[str]:
+    """Say what to change about what was found.
+
+    Parameters
+    ----------
+    finding
+        Of a port that could be used.
+    """
+    advice = []
+    if finding.latency is not None and finding.latency > _WANTED_LATENCY_S:
+        name = Path(finding.port).resolve().name
+        advice.append(
+            f'latency timer: echo 1 | sudo tee /sys/class/tty/{name}/device/latency_timer'
+        )
+    if not finding.servos:
+        return [*advice, 'no servo answers at any speed: check power, cable and adapter']
+    speeds = sorted({servo.baud for servo in finding.servos})
+    if len(speeds) > 1:
+        advice.append(
+            f'speeds {", ".join(map(str, speeds))}: give all servos of a bus the same Baud Rate(8)'
+        )
+    for servo in finding.servos:
+        advice += (f'servo {servo.device}: {line}' for line in _advise_servo(servo))
+    limit = cycles_per_second(speeds[0], len(finding.servos))
+    if limit < _WANTED_RATE:
+        advice.append(
+            f'{speeds[0]} baud carries {limit:.0f} cycles a second of {len(finding.servos)} servos '
+            f'({bytes_of_cycle(len(finding.servos))} bytes): set Baud Rate(8) to 3 (1 Mbaud) or '
+            'more, and the parameter `baud` with it'
+        )
+    return advice
+
+
+def _advise_servo(servo: ServoFinding) -> list[str]:
+    advice = []
+    if servo.model not in {model.name for model in MODELS.values()}:
+        advice.append(f'{servo.model} is not one that the driver knows')
+    if servo.firmware < _WATCHDOG_FIRMWARE:
+        advice.append(
+            f'firmware {servo.firmware} has no bus watchdog: update it to {_WATCHDOG_FIRMWARE} or '
+            'newer'
+        )
+    if servo.hardware:
+        advice.append(
+            f'{servo.hardware}: remove the cause, then '
+            f'`endoscope doctor --reboot {servo.device} --baud {servo.baud}`'
+        )
+    if not _VOLTAGE[0] <= servo.voltage <= _VOLTAGE[1]:
+        advice.append(
+            f'supply of {servo.voltage:.1f} V: give {_VOLTAGE[0]:g} to {_VOLTAGE[1]:g} V, best 12'
+        )
+    if servo.temperature >= TEMPERATURE_LIMIT.initial - _NEAR_LIMIT_DEGC:
+        advice.append(f'{servo.temperature} °C: let it cool')
+    return advice
+
+
+def _listen(finding: PortFinding, baud: int) -> None:
+    line = BusPort(finding.port, baud)
+    line.open()
+    try:
+        bus = PacketHandler(line)
+        for device, (number, firmware) in sorted(bus.broadcast_ping().items()):
+            model = MODELS[number].name if number in MODELS else f'model number {number}'
+            servo = ServoFinding(device, baud, model, firmware)
+            finding.servos.append(servo)
+            try:
+                _ask(bus, servo)
+            except BusError as error:
+                finding.advice.append(str(error))
+    finally:
+        line.close()
+
+
+def _ask(bus: PacketHandler, servo: ServoFinding) -> None:
+    def value(register: Register) -> float:
+        return bus.read_register(servo.device, register) * register.scale
+
+    servo.voltage = value(PRESENT_INPUT_VOLTAGE)
+    servo.temperature = int(value(PRESENT_TEMPERATURE))
+    servo.hardware = hardware_errors_in_words(int(value(HARDWARE_ERROR_STATUS)))
+    servo.mode = int(value(OPERATING_MODE))
+    servo.current_limit = value(CURRENT_LIMIT)
+    servo.return_delay = value(RETURN_DELAY_TIME)
+    servo.torque = bool(value(TORQUE_ENABLE))
+
+
+def _told(port: str, error: DeviceError) -> str:
+    cause = error.__cause__
+    if isinstance(cause, OSError) and cause.errno == errno.EACCES:
+        return f'{port}: no permission: sudo usermod -a -G dialout $USER, and log in again'
+    return str(error)

@@ -1,0 +1,1 @@
+"""Servos on a pseudo-terminal that keep to the maker's manual; see doc/dynamixel_emulator.md."""

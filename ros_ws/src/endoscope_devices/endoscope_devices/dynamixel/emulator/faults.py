@@ -1,0 +1,58 @@
+"""What can go wrong on an emulated line."""
+
+from dataclasses import dataclass, field
+from random import Random
+
+
+@dataclass
+class LineFaults:
+    """Faults in force on a line.
+
+    Attributes
+    ----------
+    silent
+        Ids of servos whose cable is out.
+    damage_rate
+        Share of packets, both ways, in which bits are flipped.
+    bits
+        How many bits at most in each of them.
+    delay_s
+        By how much the next answers are late.
+    delayed
+        How many they are.
+    repeated
+        How many of the next answers are sent twice.
+    chance
+        Source of chance.
+    """
+
+    silent: set[int] = field(default_factory=set)
+    damage_rate: float = 0.0
+    bits: int = 3
+    delay_s: float = 0.0
+    delayed: int = 0
+    repeated: int = 0
+    chance: Random = field(default_factory=lambda: Random(1))
+
+    def damaged(self, packet: bytes) -> bytes:
+        """Return the packet, perhaps with flipped bits."""
+        if self.chance.random() >= self.damage_rate:
+            return packet
+        hurt = bytearray(packet)
+        for _ in range(self.chance.randint(1, self.bits)):
+            hurt[self.chance.randrange(len(hurt))] ^= 1 << self.chance.randrange(8)
+        return bytes(hurt)
+
+    def delay(self) -> float:
+        """Delay of the next answer in s."""
+        if self.delayed <= 0:
+            return 0.0
+        self.delayed -= 1
+        return self.delay_s
+
+    def repeats(self) -> int:
+        """How often the next answer is sent."""
+        if self.repeated <= 0:
+            return 1
+        self.repeated -= 1
+        return 2

@@ -1,0 +1,342 @@
+"""Requests and answers on the bus, each answer matched to its request.
+
+What differs from the SDK's packet handler: requests are stuffed, an answer is taken by id, kind and
+length after the line was emptied, each servo's error byte is kept, and the time-out is the time on
+the wire plus a margin instead of 34 ms of busy waiting.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from endoscope_devices.dynamixel.answers import AnswerCollector, Reply
+from endoscope_devices.dynamixel.control_table import (
+    ALERT,
+    RETURN_DELAY_UNIT,
+    Register,
+    error_in_words,
+)
+from endoscope_devices.dynamixel.packet import (
+    BROADCAST_ID,
+    LARGEST_ID,
+    STATUS,
+    STATUS_OVERHEAD,
+    Instruction,
+    PacketReader,
+    encode,
+)
+from endoscope_devices.dynamixel.serial_port import BusPort, byte_time, latency_timer
+from endoscope_devices.motor_device import DeviceError
+
+REPLY_MARGIN_S = 3e-3
+QUIET_S = 0.03
+_PING_SIZE = 3
+_PING_PAUSE_S = 3e-3
+_LONGEST_RETURN_DELAY_S = 254 * RETURN_DELAY_UNIT
+
+
+class BusError(DeviceError):
+    """A servo did not do what it was asked; the message names it."""
+
+
+class NoReplyError(BusError):
+    """No valid answer came in time."""
+
+
+class RefusedError(BusError):
+    """The servo answered with an error number."""
+
+
+@dataclass
+class BusCounts:
+    """What has been seen on the bus.
+
+    Attributes
+    ----------
+    requests, answers
+        Requests that want an answer, and answers taken.
+    missing
+        Answers that did not come in time.
+    stray
+        Valid packets that answered no open request: late, repeated, or of another servo.
+    damaged
+        Packets dropped for their CRC.
+    """
+
+    requests: int = 0
+    answers: int = 0
+    missing: int = 0
+    stray: int = 0
+    damaged: int = 0
+
+
+@dataclass
+class PacketHandler:
+    """Speaks Protocol 2.0 on an open port.
+
+    Parameters
+    ----------
+    port
+        Open.
+    margin
+        Time in s granted to an answer beyond its time on the wire.
+
+    Attributes
+    ----------
+    counts
+        Counts requests and answers.
+    return_delay
+        Return delay of the servos in s, as far as known; the largest there is until then.
+    """
+
+    port: BusPort
+    margin: float = REPLY_MARGIN_S
+    counts: BusCounts = field(default_factory=BusCounts)
+    return_delay: float = _LONGEST_RETURN_DELAY_S
+
+    def __post_init__(self) -> None:
+        self.margin += latency_timer(self.port.port_name) or 0.0
+
+    def time_out(self, sent: int, answers: Sequence[int]) -> float:
+        """Time in s within which all answers must have come.
+
+        Parameters
+        ----------
+        sent
+            Bytes of the request.
+        answers
+            Data bytes of each answer.
+        """
+        on_the_wire = sent + sum(STATUS_OVERHEAD + size for size in answers)
+        return (
+            on_the_wire * byte_time(self.port.baudrate)
+            + self.return_delay * len(answers)
+            + self.margin
+        )
+
+    def drain(self, quiet: float) -> None:
+        """Throw away what still arrives, so that it answers no later request.
+
+        Parameters
+        ----------
+        quiet
+            Time in s for which the line must be quiet; a line that never is is left after ten
+            times that.
+        """
+        latest = time.monotonic() + 10.0 * quiet
+        while self.port.receive(time.monotonic() + quiet) and time.monotonic() < latest:
+            pass
+
+    def ping(self, device: int) -> tuple[int, int]:
+        """Model number and firmware version of a servo.
+
+        Parameters
+        ----------
+        device
+            Its id.
+
+        Raises
+        ------
+        NoReplyError
+            It does not answer.
+        """
+        reply = self._ask(device, Instruction.PING, b'', _PING_SIZE)
+        return reply.data[0] | reply.data[1] << 8, reply.data[2]
+
+    def read(self, device: int, address: int, size: int) -> Reply:
+        """Read bytes of a servo's control table.
+
+        Parameters
+        ----------
+        device
+            Its id.
+        address, size
+            First byte and number of bytes.
+
+        Raises
+        ------
+        NoReplyError, RefusedError
+            It does not answer, or with an error.
+        """
+        return self._ask(device, Instruction.READ, _words(address, size), size)
+
+    def write(self, device: int, address: int, data: bytes) -> None:
+        """Write bytes of a servo's control table.
+
+        Parameters
+        ----------
+        device
+            Its id.
+        address
+            First byte.
+        data
+            What to write.
+
+        Raises
+        ------
+        NoReplyError, RefusedError
+            It does not answer, or with an error.
+        """
+        self._ask(device, Instruction.WRITE, _words(address) + data, 0)
+
+    def reboot(self, device: int) -> None:
+        """Restart a servo: all of RAM is lost and torque is off.
+
+        Parameters
+        ----------
+        device
+            Its id.
+
+        Raises
+        ------
+        NoReplyError, RefusedError
+            It does not answer, or with an error.
+        """
+        self._ask(device, Instruction.REBOOT, b'', 0)
+
+    def read_register(self, device: int, register: Register) -> int:
+        """Value of a register in counts; see :meth:`read`.
+
+        Parameters
+        ----------
+        device
+            Id of the servo.
+        register
+            Which.
+        """
+        return register.decode(self.read(device, register.address, register.size).data)
+
+    def write_register(self, device: int, register: Register, counts: int) -> None:
+        """Set a register; see :meth:`write`.
+
+        Parameters
+        ----------
+        device
+            Id of the servo.
+        register
+            Which.
+        counts
+            Its new value.
+        """
+        self.write(device, register.address, register.encode(counts))
+
+    def _ask(self, device: int, instruction: Instruction, parameters: bytes, size: int) -> Reply:
+        request = encode(device, instruction, parameters)
+        replies = self.transact(request, [device], size)
+        if device not in replies:
+            self.drain(QUIET_S)
+        what = f'servo {device} on {self.port.port_name}'
+        if device not in replies:
+            raise NoReplyError(
+                f'{what} does not answer at {self.port.baudrate} baud; check power and cable, or '
+                'look for it with `endoscope doctor`'
+            )
+        reply = replies[device]
+        if reply.error & ~ALERT:
+            raise RefusedError(
+                f'{what} refuses {instruction.name.lower()} of {parameters.hex(" ")}: '
+                f'{error_in_words(reply.error)}'
+            )
+        return reply
+
+    def transact(
+        self, request: bytes, devices: Sequence[int], size: int, fast: bool = False
+    ) -> dict[int, Reply]:
+        """Send bytes and collect the answers of some servos.
+
+        Parameters
+        ----------
+        request
+            One packet or more; those before the last want no answer.
+        devices
+            Who answers, in this order.
+        size
+            Data bytes of each answer.
+        fast
+            Whether all answer in one packet (fast sync read).
+
+        Returns
+        -------
+        dict
+            Answers by id; those that did not come are missing. Raises OSError when the adapter is
+            gone.
+        """
+        port = self.port
+        port.clearPort()
+        port.send(request)
+        deadline = time.monotonic() + self.time_out(len(request), [size] * len(devices))
+        self.counts.requests += len(devices)
+        collector = AnswerCollector(devices, size, fast)
+        in_time = True
+        while in_time and not collector.complete:
+            in_time = time.monotonic() < deadline
+            data = port.receive(deadline)
+            if not data:
+                break
+            collector.feed(data)
+        self.counts.answers += len(collector.replies)
+        self.counts.missing += len(devices) - len(collector.replies)
+        self.counts.stray += collector.stray
+        self.counts.damaged += collector.reader.wrong_crc
+        return collector.replies
+
+    def broadcast_ping(self) -> dict[int, tuple[int, int]]:
+        """Model number and firmware version of every servo on the line, by id.
+
+        Servos answer one after the other by id; the time waited is the one that the SDK waits, 3 ms
+        for each id there can be.
+        """
+        self.port.clearPort()
+        self.port.send(encode(BROADCAST_ID, Instruction.PING))
+        deadline = time.monotonic() + self.margin + _PING_PAUSE_S * (LARGEST_ID + 1)
+        reader = PacketReader()
+        found: dict[int, tuple[int, int]] = {}
+        while time.monotonic() < deadline:
+            for packet in reader.feed(self.port.receive(deadline)):
+                data = packet.parameters
+                if packet.instruction == STATUS and len(data) == 1 + _PING_SIZE:
+                    found[packet.device] = (data[1] | data[2] << 8, data[3])
+        return found
+
+
+def sync_read_request(address: int, size: int, devices: Sequence[int], fast: bool = False) -> bytes:
+    """Bytes that make several servos answer with the same registers.
+
+    Parameters
+    ----------
+    address, size
+        First byte and number of bytes.
+    devices
+        Their ids, in the order of the answers.
+    fast
+        Whether to answer in one packet.
+    """
+    instruction = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
+    return encode(BROADCAST_ID, instruction, _words(address, size) + bytes(devices))
+
+
+def sync_write_request(address: int, size: int, data: Mapping[int, bytes]) -> bytes:
+    """Bytes that set the same registers of several servos, which do not answer.
+
+    Parameters
+    ----------
+    address, size
+        First byte and number of bytes.
+    data
+        What to write, by id.
+
+    Raises
+    ------
+    ValueError
+        An id that no servo has, or data of another size.
+    """
+    parameters = _words(address, size)
+    for device, value in data.items():
+        if not 0 <= device <= LARGEST_ID or len(value) != size:
+            raise ValueError(f'{len(value)} bytes for servo {device} in a sync write of {size}')
+        parameters += bytes((device,)) + value
+    return encode(BROADCAST_ID, Instruction.SYNC_WRITE, parameters)
+
+
+def _words(*values: int) -> bytes:
+    return b''.join(value.to_bytes(2, 'little') for value in values)

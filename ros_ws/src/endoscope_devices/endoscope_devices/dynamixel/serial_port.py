@@ -1,0 +1,109 @@
+"""The SDK's port handler with what it lacks: 4.5 Mbaud, one owner, and waiting without spinning."""
+
+import select
+import time
+from pathlib import Path
+
+import serial
+from dynamixel_sdk import PortHandler
+
+from endoscope_devices.dynamixel.control_table import BAUD_CODES
+from endoscope_devices.motor_device import DeviceError
+
+BITS_PER_BYTE = 10
+_TTY = Path('/sys/class/tty')
+
+
+def byte_time(baud: int) -> float:
+    """Seconds that one byte takes (8 data bits, no parity, 1 stop bit).
+
+    Parameters
+    ----------
+    baud
+        Bits per second.
+    """
+    return BITS_PER_BYTE / baud
+
+
+def latency_timer(port_name: str) -> float | None:
+    """Time in s that a USB adapter of FTDI holds short replies back; None if it says nothing."""
+    file = _TTY / Path(port_name).resolve().name / 'device' / 'latency_timer'
+    return float(file.read_text()) * 1e-3 if file.is_file() else None
+
+
+class BusPort(PortHandler):
+    """A serial port with a Dynamixel bus behind it.
+
+    Parameters
+    ----------
+    port_name
+        Device file.
+    baud
+        Bits per second.
+    """
+
+    def __init__(self, port_name: str, baud: int) -> None:
+        super().__init__(port_name)
+        self.baudrate = baud
+
+    def getCFlagBaud(self, baudrate: int) -> int:
+        """Accept the speeds of the servos; the SDK's list ends at 4 Mbaud."""
+        return baudrate if baudrate in BAUD_CODES.values() else -1
+
+    def setupPort(self, cflag_baud: int) -> bool:
+        """Open the port and lock it: a second master would garble the bus."""
+        super().setupPort(cflag_baud)
+        self.ser.exclusive = True
+        return True
+
+    def open(self) -> None:
+        """Open the port.
+
+        Raises
+        ------
+        DeviceError
+            There is no such port, it cannot be used, or the speed is none of the servos'.
+        """
+        try:
+            opened = self.openPort()
+        except serial.SerialException as error:
+            self.close()
+            raise DeviceError(_why(self.port_name, error)) from error
+        if not opened:
+            known = ', '.join(str(baud) for baud in BAUD_CODES.values())
+            raise DeviceError(f'{self.port_name}: servos do not know {self.baudrate} baud: {known}')
+
+    def close(self) -> None:
+        """Let go of the port, open or not."""
+        if self.ser is not None:
+            self.closePort()
+
+    def send(self, data: bytes) -> None:
+        """Write all bytes; raises OSError when the adapter is gone."""
+        self.writePort(data)
+
+    def receive(self, deadline: float) -> bytes:
+        """Bytes that are there, waiting for the first of them.
+
+        Parameters
+        ----------
+        deadline
+            Time of ``time.monotonic`` in s up to which to wait. What came before it but could not
+            be fetched in time, as when this process was held up, is still given.
+
+        Returns
+        -------
+        bytes
+            Empty if nothing came; raises OSError when the adapter is gone.
+        """
+        wait = max(0.0, deadline - time.monotonic())
+        ready, _, _ = select.select([self.ser.fileno()], [], [], wait)
+        return bytes(self.ser.read(4096)) if ready else b''
+
+
+def _why(port: str, error: serial.SerialException) -> str:
+    if not Path(port).exists():
+        return f'{port}: there is no such port; plug the adapter in or give another port'
+    if 'exclusively lock' in str(error):
+        return f'{port}: another program uses this port; end it first'
+    return f'{port}: {error}'

@@ -1,0 +1,106 @@
+"""How a Dynamixel bus and its servos are to be set up."""
+
+import math
+from dataclasses import dataclass
+
+from endoscope_devices.dynamixel.control_table import (
+    BUS_WATCHDOG,
+    CURRENT_LIMIT,
+    CURRENT_UNIT,
+    RETURN_DELAY_UNIT,
+    WATCHDOG_UNIT,
+)
+from endoscope_devices.motor_device import DeviceError
+
+
+@dataclass(frozen=True)
+class ServoMount:
+    """How a servo is built in.
+
+    Attributes
+    ----------
+    name
+        Of the motor it is.
+    device
+        Its id on the bus.
+    direction
+        1, or -1 where the shaft's positive sense is the servo's negative one.
+    zero
+        Servo angle in rad at which the shaft is at 0.
+    """
+
+    name: str
+    device: int
+    direction: int = 1
+    zero: float = math.pi
+
+    def shaft(self, servo: float) -> float:
+        """Shaft angle of a servo angle, in rad."""
+        return self.direction * (servo - self.zero)
+
+    def servo(self, shaft: float) -> float:
+        """Servo angle of a shaft angle, in rad."""
+        return self.zero + self.direction * shaft
+
+
+@dataclass(frozen=True)
+class BusSettings:
+    """Everything about the bus that a person may want to change.
+
+    Attributes
+    ----------
+    port, baud
+        Device file and bits per second.
+    current_limit
+        Current in A at which the servos' firmware limits the tension of the wires.
+    watchdog
+        Silence in s after which a servo stops by itself; a multiple of 20 ms is taken.
+    return_delay
+        Time in s that a servo waits before it answers.
+    rate
+        Cycles per second at most; 0 for as many as the bus carries.
+    goal_timeout
+        Time in s after which a goal that nobody renewed is given up and the measured position held.
+    fault_after
+        Silence of a servo in s after which motion is refused until it is enabled anew.
+    fast
+        Whether to use fast sync read (firmware 45 and newer).
+    """
+
+    port: str
+    baud: int = 1_000_000
+    current_limit: float = 0.5
+    watchdog: float = 0.1
+    return_delay: float = 0.0
+    rate: float = 1000.0
+    goal_timeout: float = 0.1
+    fault_after: float = 0.05
+    fast: bool = False
+
+    def __post_init__(self) -> None:
+        for register, counts in (
+            (BUS_WATCHDOG, self.watchdog_counts),
+            (CURRENT_LIMIT, self.current_counts),
+        ):
+            largest = register.high or 0
+            if not 1 <= counts <= largest:
+                unit, scale = register.unit, register.scale
+                raise DeviceError(
+                    f'{register.name} of {counts * scale:g} {unit} is not possible; give '
+                    f'{scale:g} to {largest * scale:g} {unit}'
+                )
+
+    @property
+    def watchdog_counts(self) -> int:
+        """Value of Bus Watchdog(98)."""
+        return math.ceil(self.watchdog / WATCHDOG_UNIT - 1e-9)
+
+    @property
+    def current_counts(self) -> int:
+        """Value of Current Limit(38), never more than was asked for."""
+        return int(self.current_limit / CURRENT_UNIT + 1e-9)
+
+    @property
+    def return_delay_counts(self) -> int:
+        """Value of Return Delay Time(9)."""
+        return round(self.return_delay / RETURN_DELAY_UNIT)

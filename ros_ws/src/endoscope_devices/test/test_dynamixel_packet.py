@@ -1,0 +1,105 @@
+"""Framing, stuffing and CRC, with vectors of the e-manual."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from endoscope_devices.dynamixel.control_table import (
+    CONTROL_TABLE,
+    CURRENT_LIMIT,
+    GOAL_CURRENT,
+    GOAL_POSITION,
+    GOAL_VELOCITY,
+    PRESENT_POSITION,
+    TABLE_SIZE,
+)
+from endoscope_devices.dynamixel.packet import (
+    BROADCAST_ID,
+    STATUS,
+    Instruction,
+    PacketReader,
+    crc16,
+    encode,
+    split_fast_answer,
+)
+from endoscope_devices.dynamixel.packet_handler import sync_write_request
+
+# Manual: 'Protocol 2.0', Ping, Read, Status, Reboot; the last is a write whose data look like a
+# header.
+GOLDEN = [
+    (1, Instruction.PING, '', 'fffffd00 01 0300 01 194e'),
+    (1, Instruction.READ, '8400 0400', 'fffffd00 01 0700 02 84000400 1d15'),
+    (1, STATUS, '00 a6000000', 'fffffd00 01 0800 55 00 a6000000 8cc0'),
+    (1, Instruction.REBOOT, '', 'fffffd00 01 0300 08 2f4e'),
+    (1, Instruction.WRITE, '7400 ffff fd00', 'fffffd00 01 0a00 03 7400 fffffdfd00 21e7'),
+]
+
+
+@pytest.mark.parametrize(('device', 'instruction', 'parameters', 'wire'), GOLDEN)
+def test_golden_vectors_both_ways(device, instruction, parameters, wire):
+    raw = bytes.fromhex(wire)
+    assert encode(device, instruction, bytes.fromhex(parameters)) == raw
+    (packet,) = PacketReader().feed(raw)
+    assert packet[:3] == (device, instruction, bytes.fromhex(parameters))
+    assert packet.size == len(raw)
+
+
+def test_the_crc_covers_all_before_it():
+    raw = bytes.fromhex(GOLDEN[1][3])
+    assert crc16(raw[:-2]) == int.from_bytes(raw[-2:], 'little')
+
+
+def test_a_sync_write_that_looks_like_a_header_is_stuffed():
+    data = GOAL_CURRENT.encode(-1) + GOAL_VELOCITY.encode(253)
+    raw = sync_write_request(GOAL_CURRENT.address, 6, {1: data})
+    assert bytes.fromhex('fffffdfd') in raw[4:]
+    (packet,) = PacketReader().feed(raw)
+    assert packet.parameters == bytes.fromhex('66000600 01') + data
+
+
+@given(
+    st.integers(0, 252),
+    st.sampled_from([*Instruction, STATUS]),
+    st.lists(st.sampled_from([b'\xff', b'\xfd', b'\x00', b'\x55']), max_size=200).map(b''.join),
+    st.integers(1, 40),
+)
+def test_what_is_sent_in_any_pieces_is_what_is_read(device, instruction, parameters, piece):
+    raw = encode(device, instruction, parameters)
+    assert b'\xff\xff\xfd\x00' not in raw[4:-2]
+    reader = PacketReader()
+    packets = []
+    stream = b'\xff\xff' + raw + raw
+    for start in range(0, len(stream), piece):
+        packets += reader.feed(stream[start : start + piece])
+    assert [p[:3] for p in packets] == [(device, instruction, parameters)] * 2
+    assert reader.wrong_crc == 0
+
+
+def test_an_answer_to_a_fast_sync_read_is_taken_apart_and_each_part_checked():
+    body = b''
+    length = 1 + 3 * 8
+    for device in (3, 7, 4):
+        body += bytes((0x80 if device == 7 else 0, device)) + bytes((device, 0xFF, 0xFF, 0xFD))
+        head = bytes((0xFF, 0xFF, 0xFD, 0, BROADCAST_ID, length, 0, STATUS))
+        body += crc16(head + body).to_bytes(2, 'little')
+    raw = head + body
+    (packet,) = PacketReader().feed(raw)
+    parts = split_fast_answer(packet, 4)
+    assert {device: error for device, (error, _) in parts.items()} == {3: 0, 7: 0x80, 4: 0}
+    assert parts[7][1] == bytes((7, 0xFF, 0xFF, 0xFD))
+    assert split_fast_answer(packet._replace(parameters=packet.parameters[::-1]), 4) == {}
+    assert split_fast_answer(packet, 5) == {}
+
+
+def test_values_have_their_sign():
+    assert PRESENT_POSITION.decode(b'\xff\xff\xff\xff') == -1
+    assert GOAL_CURRENT.encode(-1) == b'\xff\xff'
+    assert GOAL_POSITION.decode(GOAL_POSITION.encode(-1_048_575)) == -1_048_575
+    assert CURRENT_LIMIT.decode(b'\xa9\x04') == 1193
+
+
+def test_registers_do_not_overlap():
+    taken = [r.address + k for r in CONTROL_TABLE for k in range(r.size)]
+    assert len(taken) == len(set(taken))
+    assert max(taken) < TABLE_SIZE
+    assert len(CONTROL_TABLE) > 50
