@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, Joy
 from simulated_graph import SimulatedGraph
 
-from endoscope_nodes.names import JOINTS, SLAVE_COMMAND
-from endoscope_nodes.qos import COMMAND
+from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, SLAVE_COMMAND
+from endoscope_nodes.qos import COMMAND, EVENT
 
 
 class ForeignConsole:
@@ -17,6 +17,9 @@ class ForeignConsole:
     def __init__(self, graph):
         self._graph = graph
         self._publisher = graph.speak(JointState, SLAVE_COMMAND, COMMAND)
+        self._clutch = graph.speak(Joy, MASTER_CLUTCH, EVENT)
+        self._sent = 0
+        self.clutch = 1
         self.angle = 0.0
 
     def send(self, **changes):
@@ -25,8 +28,17 @@ class ForeignConsole:
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
         for field, value in changes.items():
             setattr(message, field, value)
+        if self._sent % 100 == 0:
+            self.hold(self.clutch)
+        self._sent += 1
         self._publisher.publish(message)
         self._graph.advance(0.001)
+
+    def hold(self, clutch):
+        self.clutch = clutch
+        if clutch is not None:
+            self._clutch.publish(Joy(buttons=[clutch]))
+            self._graph.advance(0.001)
 
     def move(self, ticks):
         for _ in range(ticks):
@@ -73,6 +85,7 @@ def test_a_late_command_is_refused_where_its_stamp_is_in_order(graph):
     console = ForeignConsole(graph)
     console.move(50)
     graph.advance(0.5)
+    console.hold(1)
     console.send(late_ns=-300_000_000)
     graph.advance(1.1)
     assert graph.reported('compensator: commands')['refused: late'] == '1'
@@ -112,3 +125,26 @@ def test_nothing_moves_unless_enabled(graph):
     assert drives == []
     assert graph.reported('compensator: commands')['refused: not enabled'] == '100'
     assert np.ptp([s.position for s in shafts], axis=0).max() < 0.002
+
+
+@pytest.mark.parametrize('clutch', [0, None], ids=['released', 'never heard of'])
+def test_nothing_moves_unless_the_clutch_is_held(graph, clutch):
+    console = ForeignConsole(graph)
+    console.clutch = clutch
+    drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
+    console.move(100)
+    assert drives == []
+    graph.advance(1.1)
+    assert graph.reported('compensator: commands')['refused: clutch not held'] == '100'
+    console.hold(1)
+    console.move(10)
+    assert len(drives) == 10
+
+
+def test_a_clutch_that_falls_silent_is_released(graph):
+    console = ForeignConsole(graph)
+    drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
+    console.move(20)
+    console.clutch = None
+    console.move(600)
+    assert 340 <= len(drives) <= 380

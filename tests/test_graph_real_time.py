@@ -8,7 +8,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import String
 
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
@@ -26,6 +26,7 @@ class ForeignConsole(Node):
         self.measured = []
         self.state = ''
         self.commands = self.create_publisher(JointState, NAMESPACE + 'slave/servo_jp', qos)
+        self.clutch = self.create_publisher(Joy, NAMESPACE + 'master/clutch', qos)
         self.orders = self.create_publisher(String, NAMESPACE + 'slave/state_command', qos)
         self.create_subscription(String, NAMESPACE + 'slave/operating_state', self._on_state, qos)
         self.create_subscription(
@@ -48,6 +49,7 @@ class ForeignConsole(Node):
         angle = 0.3 * (1.0 - math.cos(2.0 * t))
         message = JointState(name=['bend_y', 'bend_x'], position=[-angle, angle])
         message.header.stamp = now.to_msg()
+        self.clutch.publish(Joy(buttons=[1]))
         self.commands.publish(message)
         if t > 3.0 and not self.done.done():
             self.done.set_result(None)

@@ -82,6 +82,12 @@ def test_a_pause_makes_the_stream_stale_and_its_next_command_a_first_one():
     assert gate.check(1000 * MS, (0.15, 0.0), (), 1500 * MS, held=(0.0, 0.0)) is None
 
 
+def test_a_command_dated_ahead_may_go_no_further_than_its_receipt_allows():
+    gate = gate_after()
+    assert gate.check(10**6 * MS, (0.9, 0.0), (), 502 * MS) is Refusal.RATE
+    assert gate.check(10**6 * MS, (0.2, 0.0), (), 502 * MS) is None
+
+
 def test_reset_forgets_the_stream_but_not_the_counts():
     gate = gate_after(5)
     gate.refuse(Refusal.NOT_ENABLED)

@@ -35,3 +35,11 @@ def test_trouble_ends_when_tensions_are_back():
     assert guard.update((9.0, 0.0))
     assert guard.update((9.0, 0.0))
     assert guard.update((9.0, 0.0)) == ''
+
+
+def test_a_tension_that_stays_about_the_ceiling_stays_trouble():
+    guard = TensionGuard(NAMES, 10.0)
+    for _ in range(3):
+        guard.update((10.5, 0.0))
+    for k in range(30):
+        assert guard.update((9.9 + 0.2 * (k % 2), 0.0))

@@ -17,6 +17,7 @@ from endoscope_core.identification.class_parameters import (
 )
 from endoscope_core.safety import CommandGate, CommandLimits, Refusal
 from endoscope_nodes.calibration_result import class_of
+from endoscope_nodes.clutch_watch import ClutchWatch
 from endoscope_nodes.command_report import CommandReport
 from endoscope_nodes.compensator_parameters import CompensatorParameters
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report, status
@@ -79,6 +80,7 @@ class CompensatorNode(EndoscopeNode):
         self._motors = JointPublisher(self, MOTOR_COMMAND, MOTORS, ('position',), COMMAND)
         self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
         self._state = StateWatch(self, self.ticker, lambda _: self._start_anew())
+        self._clutch = ClutchWatch(self, self.ticker)
         self._shafts = LatestJointState(self, MOTOR_MEASURED, MOTORS, SENSOR_ASKED)
         JointSubscription(
             self,
@@ -164,6 +166,9 @@ class CompensatorNode(EndoscopeNode):
             self.gate.refuse(Refusal.NOT_ENABLED)
             return
         if self.calibration_gate.is_fresh(now):
+            return
+        if not self._clutch.held:
+            self.gate.refuse(Refusal.CLUTCH)
             return
         if self.gate.check(sample.stamp_ns, sample.position, sample.velocity, now) is not None:
             return

@@ -8,6 +8,7 @@ from sensor_msgs.msg import Joy
 from endoscope_core.safety import ClutchFollower
 from endoscope_core.signals import MOTIONS
 from endoscope_core.signals.command_file import CommandFileError
+from endoscope_nodes.clutch_watch import ClutchWatch
 from endoscope_nodes.console_motion import (
     SampledMotion,
     load_command_file,
@@ -23,7 +24,6 @@ from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.state_watch import StateWatch
 from endoscope_nodes.ticker import TICK_NS
 
-CLUTCH_TIMEOUT_NS = 350_000_000
 HANDLE_TIMEOUT_NS = 100_000_000
 
 
@@ -78,8 +78,7 @@ class ConsoleNode(EndoscopeNode):
         self._command = [0.0] * (2 * len(JOINTS))
         self._played: SampledMotion | None = None
         self._next = 0
-        self._clutch = False
-        self._clutch_ns = -CLUTCH_TIMEOUT_NS
+        self._clutch_said = False
         self._handle: JointSample | None = None
         self._handle_ns = -HANDLE_TIMEOUT_NS
         self._settings = self.parameters(ConsoleParameters, self._on_parameters, self._load)
@@ -91,10 +90,10 @@ class ConsoleNode(EndoscopeNode):
         self._clutch_out = self.create_publisher(Joy, MASTER_CLUTCH, EVENT)
         self._state = StateWatch(self, self.ticker)
         JointSubscription(self, MASTER_MEASURED, JOINTS, self._on_handle, SENSOR_ASKED)
-        self.create_subscription(Joy, MASTER_CLUTCH, self._on_clutch, EVENT)
+        self._clutch = ClutchWatch(self, self.ticker)
         self._on_parameters(self._settings)
         self.diagnostics.add('commands', self._report)
-        self.ticker.every(0.1, self._publish_clutch)
+        self.ticker.every(0.1, self._repeat_clutch)
         self.ticker.add(self._on_tick)
 
     @property
@@ -128,19 +127,23 @@ class ConsoleNode(EndoscopeNode):
             self._handle = sample
             self._handle_ns = self.ticker.monotonic_ns()
 
-    def _on_clutch(self, message: Joy) -> None:
-        self._clutch = bool(message.buttons) and message.buttons[0] == 1
-        self._clutch_ns = self.ticker.monotonic_ns()
+    @property
+    def _playing(self) -> bool:
+        return self._played is not None and self._state.enabled
 
-    def _publish_clutch(self) -> None:
-        now = self.ticker.now_ns()
-        if self._played is None or now == 0:
-            return
-        message = Joy(buttons=[int(self._state.enabled)])
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(now, 1_000_000_000)
+    def _repeat_clutch(self) -> None:
+        if self._played is not None and self.ticker.now_ns():
+            self._publish_clutch(self.ticker.now_ns())
+
+    def _publish_clutch(self, stamp_ns: int) -> None:
+        self._clutch_said = self._playing
+        message = Joy(buttons=[int(self._clutch_said)])
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
         self._clutch_out.publish(message)
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
+        if self._playing != self._clutch_said:
+            self._publish_clutch(stamp_ns)
         if self._played is not None:
             if self._state.enabled:
                 self._command = self._played.row(self._next)
@@ -153,7 +156,7 @@ class ConsoleNode(EndoscopeNode):
 
     def _follow(self, stamp_ns: int, periods: int) -> None:
         now = self.ticker.monotonic_ns()
-        held = self._clutch and now - self._clutch_ns <= CLUTCH_TIMEOUT_NS
+        held = self._clutch.held
         alive = self._handle is not None and now - self._handle_ns <= HANDLE_TIMEOUT_NS
         if not (held and alive and self._state.enabled) or self._handle is None:
             self._follower.release()
@@ -172,7 +175,7 @@ class ConsoleNode(EndoscopeNode):
         values: dict[str, object] = {
             'source': source,
             'published': self._commands.count,
-            'clutch held': self._clutch,
+            'clutch held': self._clutch.held,
             'following': self._follower.engaged,
         }
         if self._played is not None:

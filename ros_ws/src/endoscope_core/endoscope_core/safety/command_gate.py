@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 _NS = 1e-9
+# How much longer than between their receipts the time between the stamps of two commands may be.
+_JITTER_NS = 20_000_000
 
 
 class Refusal(StrEnum):
     """Why a command is not obeyed."""
 
     NOT_ENABLED = 'not enabled'
+    CLUTCH = 'clutch not held'
     MALFORMED = 'malformed'
     NOT_FINITE = 'not finite'
     STAMP = 'stamp not increasing'
@@ -136,9 +139,10 @@ class CommandGate:
         streaming = self._received_ns is not None and (
             received_ns - self._received_ns <= self.limits.max_age_ns
         )
-        refusal = (
-            self._check_rate(stamp_ns, position) if streaming else self._check_step(position, held)
-        )
+        if streaming:
+            refusal = self._check_rate(stamp_ns, position, received_ns)
+        else:
+            refusal = self._check_step(position, held)
         if refusal is not None:
             return refusal
         self._position = tuple(position)
@@ -162,12 +166,15 @@ class CommandGate:
             self._offset_ns = min(self._offset_ns + drift, difference)
         return difference - self._offset_ns
 
-    def _check_rate(self, stamp_ns: int, position: Sequence[float]) -> Refusal | None:
-        allowed = self.limits.max_speed * (stamp_ns - self._stamp_ns) * _NS
+    def _check_rate(
+        self, stamp_ns: int, position: Sequence[float], received_ns: int
+    ) -> Refusal | None:
+        # The sender's stamps alone would let it jump as far as it likes to date a command ahead.
+        waited_ns = received_ns - (self._received_ns or 0) + _JITTER_NS
+        elapsed = min(stamp_ns - self._stamp_ns, waited_ns) * _NS
         for value, before in zip(position, self._position, strict=True):
-            if abs(value - before) > allowed:
-                speed = abs(value - before) / ((stamp_ns - self._stamp_ns) * _NS)
-                return self.refuse(Refusal.RATE, f'{speed:.4g} rad/s')
+            if abs(value - before) > self.limits.max_speed * elapsed:
+                return self.refuse(Refusal.RATE, f'{abs(value - before) / elapsed:.4g} rad/s')
         return None
 
     def _check_step(

@@ -3,12 +3,16 @@
 import math
 from collections.abc import Sequence
 
+RELEASE = 0.9
+
 
 class TensionGuard:
     """Says when a wire is pulled too hard.
 
     A wire is over the ceiling once ``samples`` readings in a row are: a single spike of a load cell
     is not a tension.  A reading that is not a number counts as over the ceiling, for it hides one.
+    That is over only at nine tenths of the ceiling, for a motor that stops keeps the tension about
+    where it was.
 
     Parameters
     ----------
@@ -38,6 +42,7 @@ class TensionGuard:
             What is wrong, naming the wire; empty while all is well.
         """
         high = False
+        low = max(tension, default=0.0) <= RELEASE * self._ceiling
         for wire, value in enumerate(tension):
             if math.isfinite(value) and value <= self._ceiling:
                 if value > self.peak:
@@ -54,7 +59,7 @@ class TensionGuard:
                     f'over the ceiling of {self._ceiling:.1f} N'
                 )
         if self.trouble:
-            self._clear = 0 if high else self._clear + 1
+            self._clear = self._clear + 1 if low and not high else 0
             if self._clear >= self._samples:
                 self.trouble = ''
                 self._clear = 0
