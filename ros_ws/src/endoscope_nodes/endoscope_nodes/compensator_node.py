@@ -1,11 +1,13 @@
 """Turns desired bending into motor commands that make up for the hysteresis."""
 
+from dataclasses import asdict
+
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
 
 from endoscope_core.control import (
-    BoucWenFeedforward,
+    Feedforward,
     FeedforwardLaw,
     FeedforwardSettings,
 )
@@ -64,10 +66,10 @@ class CompensatorNode(EndoscopeNode):
         self._settings = p
         self.gate = CommandGate(self._limits(p.command_timeout))
         self.calibration_gate = CommandGate(self._limits(p.calibration_timeout))
-        self._feedforward = BoucWenFeedforward(len(JOINTS), FeedforwardSettings(lead=p.lead))
-        self._passing = BoucWenFeedforward(len(JOINTS))
+        self._feedforward = Feedforward(len(JOINTS), FeedforwardSettings(lead=p.lead))
+        self._passing = Feedforward(len(JOINTS))
         # Loads what is compiled now: the first command must not wait for it.
-        BoucWenFeedforward(len(JOINTS)).step(_NOTHING, _NOTHING, 1e-3)
+        Feedforward(len(JOINTS)).step(_NOTHING, _NOTHING, 1e-3)
         self._sets, self._trouble = self._load_sets(p.parameter_sets)
         self._class_deg: int | None = None
         self._source = NOBODY
@@ -251,7 +253,7 @@ class CompensatorNode(EndoscopeNode):
         if self._class_deg is not None:
             values['class_deg'] = self._class_deg
         for joint, parameters in zip(JOINTS, law.parameters, strict=False):
-            values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
+            values |= {f'{joint}.{key}': value for key, value in asdict(parameters).items()}
         message = DiagnosticArray()
         message.header.stamp = Time(nanoseconds=now).to_msg()
         message.status = [status('compensator: model', OK, self._model_in_words(), values)]

@@ -1,20 +1,40 @@
 """Compensation laws: feed-forward and feedback."""
 
-from endoscope_core.control.adaptive_backlash import AdaptiveBacklashController, TrackerMeasurement
+from endoscope_core.control.adaptive_backlash import AdaptiveBacklashController
 from endoscope_core.control.adaptive_backlash_law import AdaptiveBacklashSettings
-from endoscope_core.control.bouc_wen_feedforward import (
+from endoscope_core.control.adaptive_physical_inverse import AdaptivePhysicalInverse
+from endoscope_core.control.feedforward import (
+    ADAPTIVE_PHYSICAL,
     MODES,
-    BoucWenFeedforward,
+    PHYSICAL,
+    Feedforward,
     FeedforwardLaw,
     FeedforwardSettings,
 )
+from endoscope_core.control.physical_inverse import PhysicalInverse, PhysicalInverseSettings
+from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
+from endoscope_core.control.recursive_hysteresis import (
+    RecursiveHysteresisController,
+    RecursiveHysteresisSettings,
+)
+from endoscope_core.control.tracker_feedback import TrackerFeedback, TrackerMeasurement
 
 __all__ = [
+    'ADAPTIVE_PHYSICAL',
     'MODES',
+    'PHYSICAL',
     'AdaptiveBacklashController',
     'AdaptiveBacklashSettings',
-    'BoucWenFeedforward',
+    'AdaptivePhysicalInverse',
+    'Feedforward',
     'FeedforwardLaw',
     'FeedforwardSettings',
+    'PhysicalInverse',
+    'PhysicalInverseSettings',
+    'PlantLearning',
+    'PlantLearningSettings',
+    'RecursiveHysteresisController',
+    'RecursiveHysteresisSettings',
+    'TrackerFeedback',
     'TrackerMeasurement',
 ]

@@ -1,65 +1,53 @@
-"""Feedback correction from a slow tracker, for all joints, that comes and goes without a jump."""
+"""The second paper's adaptive law in the loop with a slow tracker."""
 
 from __future__ import annotations
-
-import bisect
-import math
-from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.control.adaptive_backlash_law import (
     AdaptationState,
     AdaptiveBacklashSettings,
     adapt,
-    direction_step,
     learnt_term,
     robust_term,
 )
-
-Vector = Sequence[float] | NDArray[np.float64]
-
-STALE_AFTER = 0.15
-FADE_TIME = 1.0
-HISTORY = 0.6
+from endoscope_core.control.tracker_feedback import FADE_TIME, STALE_AFTER, TrackerFeedback
 
 
-@dataclass(frozen=True)
-class TrackerMeasurement:
-    """Bending angles (J,) in rad that held at `stamp` (s, on the clock of the desired angles)."""
+class AdaptiveBacklashJoint:
+    """`adapt` with its state and the filter of the robust term.
 
-    stamp: float
-    angle: Vector
+    Parameters
+    ----------
+    settings : AdaptiveBacklashSettings
+    """
+
+    def __init__(self, settings: AdaptiveBacklashSettings) -> None:
+        self.settings = settings
+        self.state = AdaptationState()
+        self._robust = 0.0
+
+    def learn(
+        self, error: float, correction: float, desired: float, direction: float, dt: float
+    ) -> None:
+        """One step of the adaptive laws; see `JointLaw`."""
+        self.state = adapt(self.settings, self.state, error, desired, direction, dt)
+
+    def correction(self, desired: float, direction: float, dt: float) -> float:
+        """``g theta + D s`` and the filtered robust term, rad."""
+        blend = min(1.0, dt / self.settings.filter_time)
+        self._robust += blend * (robust_term(self.settings, self.state) - self._robust)
+        return learnt_term(self.state, desired, direction) + self._robust
 
 
-@dataclass(frozen=True)
-class _Desired:
-    time: float
-    angle: tuple[float, ...]
-    foreseen: tuple[float, ...]
-    direction: tuple[float, ...]
-
-
-class AdaptiveBacklashController:
-    """Adaptive backlash law of the second paper on every joint, safe to switch at any time.
-
-    The correction is to be added to the joint-equivalent feed-forward command. A measurement is
-    compared with what was desired at its own stamp, so that a late tracker is no error. While the
-    tracker is stale the estimates stand still and the correction fades out; it fades in again, with
-    what was learnt, once measurements return.
+class AdaptiveBacklashController(TrackerFeedback[AdaptiveBacklashJoint]):
+    """Adaptive backlash law of the second paper (section 2.4) on every joint.
 
     Parameters
     ----------
     joints : int
         Number of joints.
     settings : AdaptiveBacklashSettings, optional
-    stale_after : float
-        s without a measurement after which the tracker counts as lost.
-    fade_time : float
-        s from no to full weight of the correction and back.
+    stale_after, fade_time : float
+        s; see `TrackerFeedback`.
     """
 
     def __init__(
@@ -69,170 +57,12 @@ class AdaptiveBacklashController:
         stale_after: float = STALE_AFTER,
         fade_time: float = FADE_TIME,
     ) -> None:
-        if not (stale_after > 0.0 and fade_time > 0.0):
-            raise ValueError(
-                f'stale_after = {stale_after} s and fade_time = {fade_time} s must be positive'
-            )
-        self.settings = settings or AdaptiveBacklashSettings()
-        self.refused = 0
-        self._joints = joints
-        self._stale_after = stale_after
-        self._fade_time = fade_time
-        self._activated = False
-        self._weight = 0.0
-        self._states = [AdaptationState()] * joints
-        self._robust = [0.0] * joints
-        self._last_stamp = -math.inf
-        self._history: deque[_Desired] = deque()
-
-    @property
-    def activated(self) -> bool:
-        """Whether the controller has been asked to act."""
-        return self._activated
-
-    @property
-    def weight(self) -> float:
-        """Share of the correction that is applied, 0 to 1."""
-        return self._weight
+        chosen = settings or AdaptiveBacklashSettings()
+        super().__init__(
+            joints, chosen, lambda: AdaptiveBacklashJoint(chosen), stale_after, fade_time
+        )
 
     @property
     def estimates(self) -> tuple[AdaptationState, ...]:
         """What has been learnt, for each joint."""
-        return tuple(self._states)
-
-    def activate(self) -> None:
-        """Begin to learn, and to correct as soon as the tracker is fresh."""
-        self._activated = True
-
-    def deactivate(self) -> None:
-        """Stop learning and let the correction fade out."""
-        self._activated = False
-
-    def forget(self) -> None:
-        """Drop what has been learnt, for a new tube shape or new feed-forward parameters.
-
-        Call while the weight is 0, or the correction jumps.
-        """
-        self._states = [AdaptationState()] * self._joints
-        self._robust = [0.0] * self._joints
-
-    def tracker_fresh(self, time: float) -> bool:
-        """Whether the last accepted measurement is recent enough at `time` (s)."""
-        return time - self._last_stamp <= self._stale_after
-
-    def step(
-        self,
-        time: float,
-        desired: Vector,
-        velocity: Vector,
-        measurement: TrackerMeasurement | None = None,
-    ) -> NDArray[np.float64]:
-        """Correction for this instant.
-
-        Parameters
-        ----------
-        time : float
-            s, later than at the step before.
-        desired, velocity : sequence of float, shape (J,)
-            Desired angle and velocity, rad and rad/s.
-        measurement : TrackerMeasurement, optional
-            One that has arrived since the step before. One that is older than the last, from the
-            future, or not finite is refused and counted in `refused`.
-
-        Returns
-        -------
-        ndarray, shape (J,)
-            rad to be added to the joint-equivalent command; at most `output_limit`.
-
-        Raises
-        ------
-        ValueError
-            If time does not advance or an input has another size or is not finite; nothing changes
-            then.
-        """
-        angle = self._checked('desired', desired)
-        speed = self._checked('velocity', velocity)
-        dt = self._elapsed(time)
-        self._remember(time, angle, speed)
-        if measurement is not None:
-            self._learn(measurement, time)
-        acting = self._activated and self.tracker_fresh(time)
-        change = dt / self._fade_time
-        self._weight = (
-            min(1.0, self._weight + change) if acting else max(0.0, self._weight - change)
-        )
-        now = self._history[-1]
-        blend = min(1.0, dt / self.settings.filter_time)
-        limit = self.settings.output_limit
-        correction = []
-        for j, state in enumerate(self._states):
-            self._robust[j] += blend * (robust_term(self.settings, state) - self._robust[j])
-            raw = learnt_term(state, now.foreseen[j], now.direction[j]) + self._robust[j]
-            correction.append(self._weight * min(limit, max(-limit, raw)))
-        return np.array(correction)
-
-    def _elapsed(self, time: float) -> float:
-        if not math.isfinite(time):
-            raise ValueError(f'time = {time} must be finite')
-        if not self._history:
-            return 0.0
-        dt = time - self._history[-1].time
-        if dt <= 0.0:
-            raise ValueError(
-                f'time must advance: {time:.6f} s after {self._history[-1].time:.6f} s'
-            )
-        return dt
-
-    def _remember(self, time: float, angle: list[float], speed: list[float]) -> None:
-        foreseen = tuple(a + self.settings.lead * v for a, v in zip(angle, speed, strict=True))
-        if self._history:
-            last = self._history[-1]
-            direction = tuple(
-                direction_step(self.settings, s, new - old)
-                for s, new, old in zip(last.direction, foreseen, last.foreseen, strict=True)
-            )
-        else:
-            direction = (0.0,) * self._joints
-        self._history.append(_Desired(time, tuple(angle), foreseen, direction))
-        while self._history[0].time < time - HISTORY:
-            self._history.popleft()
-
-    def _learn(self, measurement: TrackerMeasurement, time: float) -> None:
-        measured = [float(angle) for angle in measurement.angle]
-        stamp = measurement.stamp
-        usable = (
-            len(measured) == self._joints
-            and all(map(math.isfinite, measured))
-            and self._last_stamp < stamp <= time
-        )
-        if not usable:
-            self.refused += 1
-            return
-        dt = min(stamp - self._last_stamp, self._stale_after)
-        self._last_stamp = stamp
-        then = self._at(stamp)
-        answered = self._at(stamp - self.settings.response_delay)
-        if not self._activated or then is None or answered is None:
-            return
-        self._states = [
-            adapt(
-                self.settings,
-                state,
-                measured[j] - then.angle[j],
-                answered.foreseen[j],
-                answered.direction[j],
-                dt,
-            )
-            for j, state in enumerate(self._states)
-        ]
-
-    def _at(self, time: float) -> _Desired | None:
-        """What was desired at `time`, None if that is forgotten or was before the start."""
-        index = bisect.bisect_right(self._history, time, key=lambda item: item.time) - 1
-        return self._history[index] if index >= 0 else None
-
-    def _checked(self, name: str, values: Vector) -> list[float]:
-        numbers = [float(value) for value in values]
-        if len(numbers) != self._joints or not all(map(math.isfinite, numbers)):
-            raise ValueError(f'{name} must be {self._joints} finite numbers, not {numbers}')
-        return numbers
+        return tuple(law.state for law in self.laws)

@@ -41,8 +41,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from endoscope_core.hysteresis.bouc_wen_kernel import bouc_wen_normalised_step
-
 
 @dataclass(frozen=True)
 class AdaptiveBacklashSettings:
@@ -174,11 +172,6 @@ def robust_term(settings: AdaptiveBacklashSettings, state: AdaptationState) -> f
 def learnt_term(state: AdaptationState, desired: float, direction: float) -> float:
     """``g theta + D s`` in rad."""
     return state.gain * desired + state.backlash * direction
-
-
-def direction_step(settings: AdaptiveBacklashSettings, direction: float, delta: float) -> float:
-    """Direction memory ``s`` in [-1, 1] after the desired angle has moved by `delta` rad."""
-    return bouc_wen_normalised_step(direction, delta, settings.direction_travel, 0.0, 1.0)
 
 
 def _limit(value: float, bound: float) -> float:

@@ -1,10 +1,33 @@
-"""Hysteresis models as pure steps of state over input."""
+"""Hysteresis models as pure steps of state over input, and their inverses."""
 
+from endoscope_core.hysteresis.asymmetric_bouc_wen import AsymmetricBoucWenParameters
 from endoscope_core.hysteresis.bouc_wen import (
     BoucWenParameters,
     bouc_wen_forward,
     bouc_wen_inverse,
     bouc_wen_step,
 )
+from endoscope_core.hysteresis.dahl import DahlParameters
+from endoscope_core.hysteresis.memory_model import MemoryModel, direct_inverse, forward
+from endoscope_core.hysteresis.play import PlayParameters
+from endoscope_core.hysteresis.prandtl_ishlinskii import (
+    PrandtlIshlinskiiParameters,
+    prandtl_ishlinskii_forward,
+    prandtl_ishlinskii_inverse,
+)
 
-__all__ = ['BoucWenParameters', 'bouc_wen_forward', 'bouc_wen_inverse', 'bouc_wen_step']
+__all__ = [
+    'AsymmetricBoucWenParameters',
+    'BoucWenParameters',
+    'DahlParameters',
+    'MemoryModel',
+    'PlayParameters',
+    'PrandtlIshlinskiiParameters',
+    'bouc_wen_forward',
+    'bouc_wen_inverse',
+    'bouc_wen_step',
+    'direct_inverse',
+    'forward',
+    'prandtl_ishlinskii_forward',
+    'prandtl_ishlinskii_inverse',
+]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,11 +13,15 @@ from endoscope_core.hysteresis.bouc_wen_kernel import (
     bouc_wen_normalised_path,
     bouc_wen_normalised_step,
 )
+from endoscope_core.hysteresis.inverse_safety import (
+    GREATEST_ALPHA,
+    GREATEST_INVERSE_SLOPE,
+    GREATEST_LAG,
+    SMALLEST_ALPHA,
+    check_numbers,
+    numbers_by_name,
+)
 
-SMALLEST_ALPHA = 0.2
-GREATEST_ALPHA = 3.0
-GREATEST_LAG = math.radians(120.0)
-GREATEST_INVERSE_SLOPE = 40.0
 GREATEST_EXPONENT = 5.0
 
 
@@ -63,11 +67,7 @@ class BoucWenParameters:
     n: float
 
     def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if not math.isfinite(value):
-                raise ValueError(
-                    f'Bouc-Wen parameter {name} is {value}: it must be a finite number'
-                )
+        check_numbers('Bouc-Wen', asdict(self))
         checks = [
             (
                 SMALLEST_ALPHA <= self.alpha <= GREATEST_ALPHA,
@@ -121,6 +121,26 @@ class BoucWenParameters:
         """Greatest slope of ``theta_FF`` over ``theta_d``."""
         return (1.0 - self.beta * self.A * max(1.0, 1.0 + self.rho)) / self.alpha
 
+    @property
+    def offset(self) -> float:
+        """Equation 3 has none."""
+        return 0.0
+
+    def memory_step(self, y: float, delta: float, angle: float) -> float:
+        """``h / h_max`` after a move by `delta` rad to `angle`."""
+        return float(bouc_wen_normalised_step(y, delta, self.travel, self.rho, self.n))
+
+    def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
+        """``h / h_max`` (N,) along a driving angle (N,) in rad."""
+        states: NDArray[np.float64] = bouc_wen_normalised_path(
+            driver, y0, self.travel, self.rho, self.n
+        )
+        return states
+
+    def lag_at(self, angle: float) -> float:
+        """Half-width of a saturated loop, rad."""
+        return self.lag
+
     @classmethod
     def from_shape(
         cls, alpha: float, lag: float, travel: float, rho: float, n: float
@@ -163,14 +183,7 @@ class BoucWenParameters:
         ValueError
             If a name is missing or unknown, or the parameters are unsafe.
         """
-        wanted = {field.name for field in fields(cls)}
-        if set(values) != wanted:
-            odd = ', '.join(sorted(set(values) ^ wanted))
-            raise ValueError(
-                f'Bouc-Wen parameters must be exactly {", ".join(sorted(wanted))}; '
-                f'wrong or missing: {odd}'
-            )
-        return cls(**{name: float(value) for name, value in values.items()})
+        return cls(**numbers_by_name('Bouc-Wen', cls, values))
 
 
 def bouc_wen_step(parameters: BoucWenParameters, h: float, delta: float) -> float:

@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.control import (
+    ADAPTIVE_PHYSICAL,
     AdaptiveBacklashController,
-    BoucWenFeedforward,
+    Feedforward,
     FeedforwardLaw,
+    RecursiveHysteresisController,
     TrackerMeasurement,
 )
 from endoscope_core.metrics import tracking_rmse
@@ -41,7 +43,12 @@ class TrackingTrial:
 
 
 def run_tracking_trial(
-    plant: PlantDescription, signal: Signal, law: FeedforwardLaw, feedback: bool, seed: int
+    plant: PlantDescription,
+    signal: Signal,
+    law: FeedforwardLaw,
+    feedback: bool,
+    seed: int,
+    controller: AdaptiveBacklashController | RecursiveHysteresisController | None = None,
 ) -> TrackingTrial:
     """Drive every joint of a rig along a signal.
 
@@ -52,16 +59,22 @@ def run_tracking_trial(
         Desired angle of every joint.
     law : FeedforwardLaw
     feedback : bool
-        Whether the adaptive controller corrects from the tracker's noisy readings.
+        Whether the tracker's noisy readings are used: learnt from by the law in mode
+        'adaptive_physical', otherwise by the controller.
     seed : int
         Of the tracker's noise.
+    controller : optional
+        What corrects from the tracker; the adaptive law of the second paper if not given.
     """
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, seed)
     joints = len(rig.joints)
     gears = np.array([plant.joints[name].gear for name in rig.joints])
-    feedforward, controller = BoucWenFeedforward(joints), AdaptiveBacklashController(joints)
+    feedforward = Feedforward(joints)
     feedforward.select(law)
-    if feedback:
+    learns = law.mode == ADAPTIVE_PHYSICAL
+    if controller is None:
+        controller = AdaptiveBacklashController(joints)
+    if feedback and not learns:
         controller.activate()
     tracked_every = round(1.0 / (plant.sensors.tracker_rate * TICK))
     time = np.arange(0.0, signal.steady[1], TICK)
@@ -75,6 +88,8 @@ def run_tracking_trial(
         measured = None
         if k % tracked_every == 0:
             measured = TrackerMeasurement(now, sensors.bending(sample.bending))
+            if feedback and learns:
+                feedforward.measure(0.0, measured.angle)
         correction = controller.step(now, desired, velocity, measured)
         command[k] = feedforward.step(desired, velocity, TICK) + correction
         rig.advance(gears * command[k])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endoscope_core.control import BoucWenFeedforward, FeedforwardLaw, FeedforwardSettings
+from endoscope_core.control import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.hysteresis import BoucWenParameters, bouc_wen_inverse
 
 TICK = 1e-3
@@ -37,13 +37,13 @@ def run(feedforward, start, end):
 
 
 def test_without_a_model_the_desired_angle_passes():
-    commands = run(BoucWenFeedforward(2), 0.0, 0.5)
+    commands = run(Feedforward(2), 0.0, 0.5)
     expected = [desired_at(t) for t in np.arange(0.0, 0.5, TICK)]
     np.testing.assert_allclose(commands, expected, atol=1e-12)
 
 
 def test_without_lead_it_is_equation_5():
-    feedforward = BoucWenFeedforward(1, FeedforwardSettings(lead=0.0, speed_limit=1e3))
+    feedforward = Feedforward(1, FeedforwardSettings(lead=0.0, speed_limit=1e3))
     feedforward.select(FeedforwardLaw('bouc_wen', (LARGE,)))
     theta = np.sin(np.arange(0.0, 7.0, TICK))
     commands = [feedforward.step([x], [0.0], TICK)[0] for x in theta]
@@ -53,7 +53,7 @@ def test_without_lead_it_is_equation_5():
 @given(laws, laws, st.floats(0.2, 1.2))
 def test_a_switch_while_moving_leaves_no_jump(before, after, when):
     settings_ = FeedforwardSettings()
-    feedforward = BoucWenFeedforward(2, settings_)
+    feedforward = Feedforward(2, settings_)
     feedforward.select(before)
     last = run(feedforward, 0.0, when)[-1]
     feedforward.select(after)
@@ -64,7 +64,7 @@ def test_a_switch_while_moving_leaves_no_jump(before, after, when):
 
 
 def test_the_offset_of_a_switch_is_worked_off():
-    switched, straight = BoucWenFeedforward(2), BoucWenFeedforward(2)
+    switched, straight = Feedforward(2), Feedforward(2)
     law = FeedforwardLaw('bouc_wen', (SMALL, LARGE))
     straight.select(law)
     run(switched, 0.0, 1.0)
@@ -75,7 +75,7 @@ def test_the_offset_of_a_switch_is_worked_off():
 
 
 def test_it_goes_on_from_a_command_that_someone_else_sent():
-    feedforward = BoucWenFeedforward(2)
+    feedforward = Feedforward(2)
     feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))
     feedforward.rebase([0.4, -0.2])
     first = feedforward.step([0.0, 0.0], [0.0, 0.0], TICK)
@@ -89,7 +89,7 @@ def test_it_goes_on_from_a_command_that_someone_else_sent():
 
 @given(st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5)), min_size=2, max_size=40))
 def test_command_and_its_speed_are_bounded_whatever_is_desired(desired):
-    feedforward = BoucWenFeedforward(2)
+    feedforward = Feedforward(2)
     feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))
     commands = np.array([feedforward.step(angle, [0.0, 0.0], TICK) for angle in desired])
     assert np.all(np.abs(commands) <= (1.5 + 0.8) / 0.9)
@@ -108,7 +108,7 @@ def test_command_and_its_speed_are_bounded_whatever_is_desired(desired):
     ],
 )
 def test_bad_input_is_refused_and_changes_nothing(inputs):
-    feedforward = BoucWenFeedforward(2)
+    feedforward = Feedforward(2)
     feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))
     run(feedforward, 0.0, 0.2)
     before = feedforward.command
@@ -122,7 +122,7 @@ def test_laws_that_would_guess_are_refused():
         FeedforwardLaw('bouc_when', (SMALL,))
     with pytest.raises(ValueError, match='calibrate first'):
         FeedforwardLaw('bouc_wen')
-    feedforward = BoucWenFeedforward(2)
+    feedforward = Feedforward(2)
     with pytest.raises(ValueError, match='2 wanted'):
         feedforward.select(FeedforwardLaw('bouc_wen', (SMALL,)))
     assert feedforward.law == NONE

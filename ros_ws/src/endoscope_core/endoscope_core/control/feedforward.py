@@ -1,0 +1,280 @@
+"""Feed-forward compensation of all joints, whose mode can be changed while it runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.control.adaptive_physical_inverse import AdaptivePhysicalInverse
+from endoscope_core.control.joint_inverse import HysteresisInverse, JointInverse, Passing
+from endoscope_core.control.physical_inverse import PhysicalInverse
+from endoscope_core.hysteresis.inverse import MODELS, HysteresisParameters
+from endoscope_core.plant import JointParameters
+
+Vector = Sequence[float] | NDArray[np.float64]
+LawParameters = HysteresisParameters | JointParameters
+
+PHYSICAL = 'physical'
+ADAPTIVE_PHYSICAL = 'adaptive_physical'
+MODES = ('none', *MODELS, PHYSICAL, ADAPTIVE_PHYSICAL)
+
+
+def parameters_of(mode: str) -> type[LawParameters]:
+    """Kind of parameters that a mode other than 'none' works with."""
+    return JointParameters if mode in (PHYSICAL, ADAPTIVE_PHYSICAL) else MODELS[mode]
+
+
+@dataclass(frozen=True)
+class FeedforwardLaw:
+    """What the compensator does with a desired angle.
+
+    Parameters
+    ----------
+    mode : str
+        One of `MODES`. 'none' passes the desired angle through, the names of hysteresis models
+        invert them, 'physical' inverts the plant and 'adaptive_physical' also learns the plant from
+        the tracker.
+    parameters : tuple
+        One for each joint, of the mode's kind; may be empty in mode 'none'.
+
+    Raises
+    ------
+    ValueError
+        If the mode is unknown, or lacks parameters of its kind: no motion is guessed.
+    """
+
+    mode: str = 'none'
+    parameters: tuple[LawParameters, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.mode not in MODES:
+            raise ValueError(
+                f'unknown compensation mode {self.mode!r}: choose one of {", ".join(MODES)}'
+            )
+        if self.mode == 'none':
+            return
+        if not self.parameters:
+            raise ValueError(f'mode {self.mode!r} needs parameters for each joint: calibrate first')
+        kind = parameters_of(self.mode)
+        for given in self.parameters:
+            if not isinstance(given, kind):
+                raise ValueError(
+                    f'mode {self.mode!r} needs {kind.__name__}, not {type(given).__name__}'
+                )
+
+
+@dataclass(frozen=True)
+class FeedforwardSettings:
+    """How the feed-forward moves in time.
+
+    Parameters
+    ----------
+    lead : float
+        s by which the desired angle is foreseen, ``theta_d + lead theta_d'``: the servo's own lag,
+        so that the motor has crossed the dead zone when the joint is to turn back. 0 gives equation
+        5 as printed. The physical modes know their servo and take no notice.
+    speed_limit : float
+        Greatest speed of the command in rad/s. A reversal at high acceleration asks for more; the
+        motor could not follow it and a gate before the motor would refuse it.
+    offset_rate : float
+        Greatest speed in rad/s at which the jump left by a switch is worked off.
+    offset_time : float
+        Time constant in s of the last part of that.
+    resting_travel : float
+        rad over which the memory of the direction builds up in mode 'none'.
+    """
+
+    lead: float = 0.06
+    speed_limit: float = 20.0
+    offset_rate: float = 0.5
+    offset_time: float = 0.3
+    resting_travel: float = math.radians(1.0)
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.lead <= 0.5):
+            raise ValueError(f'lead = {self.lead} s must lie in [0, 0.5]')
+        for name in ('speed_limit', 'offset_rate', 'offset_time', 'resting_travel'):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f'{name} = {value} must be positive and finite')
+
+
+@dataclass
+class _Joint:
+    """One joint on its way; angles in rad."""
+
+    inverse: JointInverse
+    desired: float
+    velocity: float
+    wanted: float
+    command: float
+    offset: float = 0.0
+
+
+class Feedforward:
+    """Feed-forward of all joints; its law can be changed while it runs without a jump.
+
+    Parameters
+    ----------
+    joints : int
+        Number of joints.
+    settings : FeedforwardSettings, optional
+
+    Notes
+    -----
+    The difference between what the old law put out and what the new one wants becomes an offset
+    that is worked off at `offset_rate`. The command's speed is at most `speed_limit` in every mode.
+    """
+
+    def __init__(self, joints: int, settings: FeedforwardSettings | None = None) -> None:
+        self.settings = settings or FeedforwardSettings()
+        self.law = FeedforwardLaw()
+        self._count = joints
+        self._joints: list[_Joint] = []
+        self._start: list[float] | None = None
+
+    @property
+    def command(self) -> NDArray[np.float64] | None:
+        """Last command (J,) in rad, None before the first step."""
+        return np.array([joint.command for joint in self._joints]) if self._joints else None
+
+    @property
+    def offset(self) -> NDArray[np.float64]:
+        """What is left of the last switch, (J,) in rad; zero before the first step."""
+        return np.array([joint.offset for joint in self._joints] or [0.0] * self._count)
+
+    @property
+    def learnt(self) -> tuple[JointParameters, ...]:
+        """Parameters as learnt so far, for each joint that learns."""
+        return tuple(
+            joint.inverse.parameters
+            for joint in self._joints
+            if isinstance(joint.inverse, AdaptivePhysicalInverse)
+        )
+
+    def select(self, law: FeedforwardLaw) -> None:
+        """Put another law in force from the next step on; the command goes on from where it is.
+
+        Raises
+        ------
+        ValueError
+            If the law has parameters for another number of joints; the law in force stays.
+        """
+        if law.parameters and len(law.parameters) != self._count:
+            raise ValueError(
+                f'parameters for {len(law.parameters)} joints given, {self._count} wanted'
+            )
+        self.law = law
+        for j, joint in enumerate(self._joints):
+            before = joint.inverse.direction
+            joint.inverse = self._inverse(j)
+            joint.wanted = joint.inverse.begin(before, joint.desired, joint.velocity, joint.command)
+            joint.offset = joint.command - joint.wanted
+
+    def rebase(self, command: Vector) -> None:
+        """Go on from this command (J,) in rad, sent by someone else meanwhile, without a jump.
+
+        Raises
+        ------
+        ValueError
+            If the command has another size or is not finite.
+        """
+        start = self._checked('command', command)
+        if not self._joints:
+            self._start = start
+            return
+        for joint, angle in zip(self._joints, start, strict=True):
+            joint.command = angle
+            joint.wanted = joint.inverse.begin(
+                joint.inverse.direction, joint.desired, joint.velocity, angle
+            )
+            joint.offset = angle - joint.wanted
+
+    def step(self, desired: Vector, velocity: Vector, dt: float) -> NDArray[np.float64]:
+        """Command for the desired angle.
+
+        Parameters
+        ----------
+        desired, velocity : sequence of float, shape (J,)
+            Desired angle and velocity, rad and rad/s.
+        dt : float
+            s since the last step, positive.
+
+        Returns
+        -------
+        ndarray, shape (J,)
+            Joint-equivalent motor angle in rad, without any feedback correction.
+
+        Raises
+        ------
+        ValueError
+            If an input has another size or is not finite, or `dt` is not positive; nothing changes
+            then.
+        """
+        angles = self._checked('desired', desired)
+        speeds = self._checked('velocity', velocity)
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise ValueError(f'dt = {dt} s must be positive and finite')
+        if not self._joints:
+            self._begin(angles, speeds)
+        return np.array(
+            [
+                self._step(joint, angle, speed, dt)
+                for joint, angle, speed in zip(self._joints, angles, speeds, strict=True)
+            ]
+        )
+
+    def measure(self, age: float, angle: Vector) -> None:
+        """Let the modes that learn have bending angles (J,) in rad that held `age` s ago.
+
+        Raises
+        ------
+        ValueError
+            If the angles have another size or are not finite.
+        """
+        angles = self._checked('angle', angle)
+        for joint, measured in zip(self._joints, angles, strict=False):
+            if isinstance(joint.inverse, AdaptivePhysicalInverse):
+                joint.inverse.measured(age, measured)
+
+    def _step(self, joint: _Joint, desired: float, velocity: float, dt: float) -> float:
+        c = self.settings
+        joint.wanted = joint.inverse.wanted(desired, velocity, dt)
+        joint.desired, joint.velocity = desired, velocity
+        joint.offset -= _limit(joint.offset * min(1.0, dt / c.offset_time), c.offset_rate * dt)
+        joint.command += _limit(joint.wanted + joint.offset - joint.command, c.speed_limit * dt)
+        joint.inverse.sent(joint.command, dt)
+        return joint.command
+
+    def _begin(self, angles: list[float], speeds: list[float]) -> None:
+        start = self._start
+        for j, (angle, speed) in enumerate(zip(angles, speeds, strict=True)):
+            inverse = self._inverse(j)
+            rests_at = angle if start is None else start[j]
+            wanted = inverse.begin(0.0, angle, speed, rests_at)
+            command = wanted if start is None else start[j]
+            self._joints.append(_Joint(inverse, angle, speed, wanted, command, command - wanted))
+
+    def _inverse(self, number: int) -> JointInverse:
+        if self.law.mode == 'none':
+            return Passing(self.settings.resting_travel)
+        parameters = self.law.parameters[number]
+        if not isinstance(parameters, JointParameters):
+            return HysteresisInverse(parameters, self.settings.lead)
+        if self.law.mode == PHYSICAL:
+            return PhysicalInverse(parameters)
+        return AdaptivePhysicalInverse(parameters)
+
+    def _checked(self, name: str, values: Vector) -> list[float]:
+        numbers = [float(value) for value in values]
+        if len(numbers) != self._count or not all(map(math.isfinite, numbers)):
+            raise ValueError(f'{name} must be {self._count} finite numbers, not {numbers}')
+        return numbers
+
+
+def _limit(value: float, bound: float) -> float:
+    return min(bound, max(-bound, value))

@@ -1,0 +1,186 @@
+"""Recursive least squares of the plant's hysteresis parameters, from a slow and late tracker."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.control.physical_inverse import InternalModel
+from endoscope_core.plant import JointParameters
+
+Array = NDArray[np.float64]
+
+LEARNT = {
+    'capstan_exponent': 0.7,
+    'wire_stiffness': 0.1,
+    'pretension': 0.03,
+    'joint_friction': 0.1,
+    'joint_stiffness': 0.1,
+}
+"""What is learnt, and the standard deviation of its logarithm before anything was measured."""
+
+_STRAIGHTEST, _MOST_BENT = 0.02, 4.5
+
+
+@dataclass(frozen=True)
+class PlantLearningSettings:
+    """How fast the tube is believed to change and how far the tracker is believed.
+
+    Parameters
+    ----------
+    tracker_noise : float
+        rad, with what the model cannot explain.
+    timing : float
+        s by which model and tracker may be apart: a measurement counts little while the tip darts.
+    drift : float
+        Standard deviation of the change of ``log(capstan_exponent)`` in one second.
+    surprise : float
+        Innovation, in its standard deviations, that counts as surprising.
+    surprises : int
+        Surprising measurements in a row after which the tube is taken to have changed.
+    """
+
+    tracker_noise: float = 0.01
+    timing: float = 0.02
+    drift: float = 0.03
+    surprise: float = 3.5
+    surprises: int = 3
+
+
+class PlantLearning:
+    """Recursive prediction-error estimator of one joint (Ljung 1999, section 11.4).
+
+    The internal model predicts the tip; copies with one parameter moved by 2 % each give the
+    sensitivities; the update is that of recursive least squares with a prior and a random walk of
+    the capstan exponent instead of forgetting, so that what motion does not excite is kept. After
+    several surprises in a row the exponent's variance returns to the prior (covariance resetting,
+    Goodwin and Sin 1984, section 3.3): the tube has been bent.
+
+    Parameters
+    ----------
+    parameters : JointParameters
+        To begin with.
+    model : InternalModel
+        Of these parameters, in its present state; goes on as the predictor.
+    settings : PlantLearningSettings, optional
+    """
+
+    _STEP = 0.02
+    _HISTORY = 0.5
+    _FARTHEST = 0.5
+
+    def __init__(
+        self,
+        parameters: JointParameters,
+        model: InternalModel,
+        settings: PlantLearningSettings | None = None,
+    ) -> None:
+        self.settings = settings or PlantLearningSettings()
+        self.parameters = parameters
+        self.resets = 0
+        self._first = parameters
+        self._names = tuple(LEARNT)
+        self._prior = np.array(list(LEARNT.values())) ** 2
+        self._logs = np.zeros(len(LEARNT))
+        self.covariance = np.diag(self._prior)
+        self._model = model
+        self._shifted = [
+            model.copy_as(self._scaled(self._step_of(i))) for i in range(len(self._names))
+        ]
+        self._time = 0.0
+        self._last = -math.inf
+        self._history: deque[tuple[float, Array]] = deque()
+        self._surprises = 0
+
+    def sent(self, command: float, dt: float) -> None:
+        """Advance the copies by a command (rad) in force for `dt` s, after the predictor itself."""
+        for shifted in self._shifted:
+            shifted.advance(command, dt)
+        self._time += dt
+        tips = np.array([self._model.tip, *(shifted.tip for shifted in self._shifted)])
+        self._history.append((self._time, tips))
+        while self._history[0][0] < self._time - self._HISTORY:
+            self._history.popleft()
+
+    def measured(self, age: float, angle: float) -> JointParameters:
+        """Learn from a bending angle (rad) that held `age` s ago; return the parameters now.
+
+        A measurement older than half a second or than the last one is left out.
+        """
+        time = self._time - age
+        found = self._at(time)
+        if found is None or time <= self._last:
+            return self.parameters
+        elapsed = min(1.0, time - self._last)
+        self._last = time
+        tips, speed = found
+        sensitivity = (tips[1:] - tips[0]) / self._STEP
+        self.covariance[0, 0] += self.settings.drift**2 * elapsed
+        noise = self.settings.tracker_noise**2 + (self.settings.timing * speed) ** 2
+        innovation = angle - tips[0]
+        self._watch(innovation, sensitivity, noise)
+        gain_side = self.covariance @ sensitivity
+        spread = noise + float(sensitivity @ gain_side)
+        # A single reading may not move the estimates by more than three deviations (Huber).
+        limit = 3.0 * math.sqrt(spread)
+        bounded = min(limit, max(-limit, innovation))
+        self._logs = self._logs + gain_side / spread * bounded
+        covariance = self.covariance - np.outer(gain_side, gain_side) / spread
+        self.covariance = 0.5 * (covariance + covariance.T)
+        self._bound()
+        self._take()
+        return self.parameters
+
+    def _watch(self, innovation: float, sensitivity: Array, noise: float) -> None:
+        spread = noise + float(sensitivity @ self.covariance @ sensitivity)
+        if innovation**2 > self.settings.surprise**2 * spread:
+            self._surprises += 1
+        else:
+            self._surprises = 0
+        if self._surprises >= self.settings.surprises:
+            self._surprises = 0
+            self.resets += 1
+            self.covariance[0, :] = self.covariance[:, 0] = 0.0
+            self.covariance[0, 0] = self._prior[0]
+
+    def _at(self, time: float) -> tuple[Array, float] | None:
+        """Tips that were predicted for `time` and the speed of the first, None if unknown."""
+        for k in range(len(self._history) - 1, 0, -1):
+            stamp, tips = self._history[k]
+            before, earlier = self._history[k - 1]
+            if before < time <= stamp:
+                weight = (time - before) / (stamp - before)
+                speed = abs(float(tips[0] - earlier[0])) / (stamp - before)
+                return earlier + weight * (tips - earlier), speed
+        return None
+
+    def _bound(self) -> None:
+        first = self._first.capstan_exponent
+        low = np.full(len(self._names), -self._FARTHEST)
+        high = -low
+        low[0], high[0] = math.log(_STRAIGHTEST / first), math.log(_MOST_BENT / first)
+        self._logs = np.clip(self._logs, low, high)
+
+    def _take(self) -> None:
+        self.parameters = self._scaled(self._logs)
+        self._model.change_nominal(self.parameters)
+        for i, shifted in enumerate(self._shifted):
+            shifted.change_nominal(self._scaled(self._logs + self._step_of(i)))
+
+    def _step_of(self, number: int) -> Array:
+        step = np.zeros(len(self._names))
+        step[number] = self._STEP
+        return step
+
+    def _scaled(self, logs: Array) -> JointParameters:
+        return replace(
+            self._first,
+            **{
+                name: getattr(self._first, name) * math.exp(log)
+                for name, log in zip(self._names, logs.tolist(), strict=True)
+            },
+        )

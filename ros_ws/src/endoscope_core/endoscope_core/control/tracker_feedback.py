@@ -1,0 +1,285 @@
+"""Feedback correction from a slow tracker, for all joints, that comes and goes without a jump."""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.hysteresis.bouc_wen_kernel import bouc_wen_normalised_step
+
+Vector = Sequence[float] | NDArray[np.float64]
+
+STALE_AFTER = 0.15
+FADE_TIME = 1.0
+HISTORY = 0.6
+
+
+@dataclass(frozen=True)
+class TrackerMeasurement:
+    """Bending angles (J,) in rad that held at `stamp` (s, on the clock of the desired angles)."""
+
+    stamp: float
+    angle: Vector
+
+
+class FeedbackTiming(Protocol):
+    """What the settings of every law say about time and reach."""
+
+    @property
+    def lead(self) -> float:
+        """S by which the desired angle is foreseen, as in the feed-forward."""
+        ...
+
+    @property
+    def response_delay(self) -> float:
+        """S from command to answer."""
+        ...
+
+    @property
+    def direction_travel(self) -> float:
+        """Rad of desired motion over which the direction memory turns round."""
+        ...
+
+    @property
+    def output_limit(self) -> float:
+        """Limit of the correction, rad."""
+        ...
+
+
+class JointLaw(Protocol):
+    """What is learnt of one joint and what it says is missing."""
+
+    def learn(
+        self, error: float, correction: float, desired: float, direction: float, dt: float
+    ) -> None:
+        """Learn from one measurement.
+
+        Parameters
+        ----------
+        error : float
+            Measured less desired angle at the instant of the measurement, rad.
+        correction, desired, direction : float
+            Correction in force (rad), desired angle (rad) and direction memory that it answers to.
+        dt : float
+            s since the measurement before.
+        """
+        ...
+
+    def correction(self, desired: float, direction: float, dt: float) -> float:
+        """Correction in rad for the desired angle (rad) and direction, `dt` s after the last."""
+        ...
+
+
+@dataclass
+class _Desired:
+    time: float
+    angle: tuple[float, ...]
+    foreseen: tuple[float, ...]
+    direction: tuple[float, ...]
+    correction: tuple[float, ...]
+
+
+class TrackerFeedback[Law: JointLaw]:
+    """A learning law on every joint, safe to switch at any time.
+
+    The correction is to be added to the joint-equivalent feed-forward command. A measurement is
+    compared with what was desired at its own stamp, so that a late tracker is no error. While the
+    tracker is stale the laws stand still and the correction fades out; it fades in again, with what
+    was learnt, once measurements return.
+
+    Parameters
+    ----------
+    joints : int
+        Number of joints.
+    timing : FeedbackTiming
+    new_law : callable
+        Makes the law of one joint, with nothing learnt.
+    stale_after : float
+        s without a measurement after which the tracker counts as lost.
+    fade_time : float
+        s from no to full weight of the correction and back.
+    """
+
+    def __init__(
+        self,
+        joints: int,
+        timing: FeedbackTiming,
+        new_law: Callable[[], Law],
+        stale_after: float = STALE_AFTER,
+        fade_time: float = FADE_TIME,
+    ) -> None:
+        if not (stale_after > 0.0 and fade_time > 0.0):
+            raise ValueError(
+                f'stale_after = {stale_after} s and fade_time = {fade_time} s must be positive'
+            )
+        self.timing = timing
+        self._new_law = new_law
+        self.refused = 0
+        self._joints = joints
+        self._none = (0.0,) * joints
+        self._stale_after = stale_after
+        self._fade_time = fade_time
+        self._activated = False
+        self._weight = 0.0
+        self._laws = [new_law() for _ in range(joints)]
+        self._last_stamp = -math.inf
+        self._history: deque[_Desired] = deque()
+
+    @property
+    def activated(self) -> bool:
+        """Whether the controller has been asked to act."""
+        return self._activated
+
+    @property
+    def weight(self) -> float:
+        """Share of the correction that is applied, 0 to 1."""
+        return self._weight
+
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """The laws with what they have learnt, for each joint."""
+        return tuple(self._laws)
+
+    def activate(self) -> None:
+        """Begin to learn, and to correct as soon as the tracker is fresh."""
+        self._activated = True
+
+    def deactivate(self) -> None:
+        """Stop learning and let the correction fade out."""
+        self._activated = False
+
+    def forget(self) -> None:
+        """Drop what has been learnt, for a new tube shape or new feed-forward parameters.
+
+        Call while the weight is 0, or the correction jumps.
+        """
+        self._laws = [self._new_law() for _ in range(self._joints)]
+
+    def tracker_fresh(self, time: float) -> bool:
+        """Whether the last accepted measurement is recent enough at `time` (s)."""
+        return time - self._last_stamp <= self._stale_after
+
+    def step(
+        self,
+        time: float,
+        desired: Vector,
+        velocity: Vector,
+        measurement: TrackerMeasurement | None = None,
+    ) -> NDArray[np.float64]:
+        """Correction for this instant.
+
+        Parameters
+        ----------
+        time : float
+            s, later than at the step before.
+        desired, velocity : sequence of float, shape (J,)
+            Desired angle and velocity, rad and rad/s.
+        measurement : TrackerMeasurement, optional
+            One that has arrived since the step before. One that is older than the last, from the
+            future, or not finite is refused and counted in `refused`.
+
+        Returns
+        -------
+        ndarray, shape (J,)
+            rad to be added to the joint-equivalent command; at most `output_limit`.
+
+        Raises
+        ------
+        ValueError
+            If time does not advance or an input has another size or is not finite; nothing changes
+            then.
+        """
+        angle = self._checked('desired', desired)
+        speed = self._checked('velocity', velocity)
+        dt = self._elapsed(time)
+        self._remember(time, angle, speed)
+        if measurement is not None:
+            self._learn(measurement, time)
+        acting = self._activated and self.tracker_fresh(time)
+        change = dt / self._fade_time
+        self._weight = (
+            min(1.0, self._weight + change) if acting else max(0.0, self._weight - change)
+        )
+        now = self._history[-1]
+        limit = self.timing.output_limit
+        correction = []
+        for j, law in enumerate(self._laws):
+            raw = law.correction(now.foreseen[j], now.direction[j], dt)
+            correction.append(self._weight * min(limit, max(-limit, raw)))
+        now.correction = tuple(correction)
+        return np.array(correction)
+
+    def _elapsed(self, time: float) -> float:
+        if not math.isfinite(time):
+            raise ValueError(f'time = {time} must be finite')
+        if not self._history:
+            return 0.0
+        dt = time - self._history[-1].time
+        if dt <= 0.0:
+            raise ValueError(
+                f'time must advance: {time:.6f} s after {self._history[-1].time:.6f} s'
+            )
+        return dt
+
+    def _remember(self, time: float, angle: list[float], speed: list[float]) -> None:
+        foreseen = tuple(a + self.timing.lead * v for a, v in zip(angle, speed, strict=True))
+        if self._history:
+            last = self._history[-1]
+            direction = tuple(
+                direction_step(self.timing.direction_travel, s, new - old)
+                for s, new, old in zip(last.direction, foreseen, last.foreseen, strict=True)
+            )
+        else:
+            direction = (0.0,) * self._joints
+        self._history.append(_Desired(time, tuple(angle), foreseen, direction, self._none))
+        while self._history[0].time < time - HISTORY:
+            self._history.popleft()
+
+    def _learn(self, measurement: TrackerMeasurement, time: float) -> None:
+        measured = [float(angle) for angle in measurement.angle]
+        stamp = measurement.stamp
+        usable = (
+            len(measured) == self._joints
+            and all(map(math.isfinite, measured))
+            and self._last_stamp < stamp <= time
+        )
+        if not usable:
+            self.refused += 1
+            return
+        dt = min(stamp - self._last_stamp, self._stale_after)
+        self._last_stamp = stamp
+        then = self._at(stamp)
+        answered = self._at(stamp - self.timing.response_delay)
+        if not self._activated or then is None or answered is None:
+            return
+        for j, law in enumerate(self._laws):
+            law.learn(
+                measured[j] - then.angle[j],
+                answered.correction[j],
+                answered.foreseen[j],
+                answered.direction[j],
+                dt,
+            )
+
+    def _at(self, time: float) -> _Desired | None:
+        """What was desired at `time`, None if that is forgotten or was before the start."""
+        index = bisect.bisect_right(self._history, time, key=lambda item: item.time) - 1
+        return self._history[index] if index >= 0 else None
+
+    def _checked(self, name: str, values: Vector) -> list[float]:
+        numbers = [float(value) for value in values]
+        if len(numbers) != self._joints or not all(map(math.isfinite, numbers)):
+            raise ValueError(f'{name} must be {self._joints} finite numbers, not {numbers}')
+        return numbers
+
+
+def direction_step(travel: float, direction: float, delta: float) -> float:
+    """Direction memory in [-1, 1] after the desired angle has moved by `delta` rad."""
+    return float(bouc_wen_normalised_step(direction, delta, travel, 0.0, 1.0))
