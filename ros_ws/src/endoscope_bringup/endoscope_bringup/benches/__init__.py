@@ -1,3 +1,11 @@
 """The benches of `endoscope bench`, one module each, of the same form as the subcommands."""
 
-BENCHES: tuple[str, ...] = ('graph', 'recorder', 'explain', 'simulate', 'compensation', 'papers')
+BENCHES: tuple[str, ...] = (
+    'graph',
+    'recorder',
+    'explain',
+    'simulate',
+    'compensation',
+    'papers',
+    'motor_bus',
+)

@@ -17,5 +17,6 @@ COMMANDS: tuple[str, ...] = (
     'train',
     'identify',
     'effects',
+    'doctor',
     'bench',
 )

@@ -40,7 +40,7 @@ from endoscope_devices.dynamixel.servo_block import (
 )
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_devices.dynamixel.tick_clock import Freshness
-from endoscope_devices.motor_device import MotorReading
+from endoscope_devices.motor_device import DeviceError, MotorReading
 
 _RETRY_S = 0.5
 _HEALTH_PERIOD_S = 0.5
@@ -198,6 +198,8 @@ class BusThread:
 
     def trouble(self) -> str:
         """What is wrong; a trouble that has passed is still told for a while."""
+        if self._thread.ident is not None and not self._thread.is_alive():
+            return 'the thread of the bus has ended; start the motor driver anew'
         recent = time.monotonic_ns() - self._trouble_ns < _TROUBLE_SHOWN_S * 1e9
         return self._trouble if recent else ''
 
@@ -211,7 +213,7 @@ class BusThread:
                 if self._bus is None:
                     self._connect()
                 self._serve()
-            except (OSError, BusError) as error:
+            except (OSError, DeviceError) as error:
                 self._fail(str(error))
                 self._disconnect()
                 self._stopping.wait(_RETRY_S)

@@ -30,6 +30,7 @@ from endoscope_devices.motor_device import DeviceError
 
 REPLY_MARGIN_S = 3e-3
 QUIET_S = 0.03
+_ATTEMPTS = 3
 _PING_SIZE = 3
 _PING_PAUSE_S = 3e-3
 _LONGEST_RETURN_DELAY_S = 254 * RETURN_DELAY_UNIT
@@ -192,7 +193,7 @@ class PacketHandler:
         NoReplyError, RefusedError
             It does not answer, or with an error.
         """
-        self._ask(device, Instruction.REBOOT, b'', 0)
+        self._ask(device, Instruction.REBOOT, b'', 0, attempts=1)
 
     def read_register(self, device: int, register: Register) -> int:
         """Value of a register in counts; see :meth:`read`.
@@ -220,24 +221,31 @@ class PacketHandler:
         """
         self.write(device, register.address, register.encode(counts))
 
-    def _ask(self, device: int, instruction: Instruction, parameters: bytes, size: int) -> Reply:
+    def _ask(
+        self,
+        device: int,
+        instruction: Instruction,
+        parameters: bytes,
+        size: int,
+        attempts: int = _ATTEMPTS,
+    ) -> Reply:
         request = encode(device, instruction, parameters)
-        replies = self.transact(request, [device], size)
-        if device not in replies:
-            self.drain(QUIET_S)
         what = f'servo {device} on {self.port.port_name}'
-        if device not in replies:
-            raise NoReplyError(
-                f'{what} does not answer at {self.port.baudrate} baud; check power and cable, or '
-                'look for it with `endoscope doctor`'
-            )
-        reply = replies[device]
-        if reply.error & ~ALERT:
-            raise RefusedError(
-                f'{what} refuses {instruction.name.lower()} of {parameters.hex(" ")}: '
-                f'{error_in_words(reply.error)}'
-            )
-        return reply
+        for _ in range(attempts):
+            reply = self.transact(request, [device], size).get(device)
+            if reply is None:
+                self.drain(QUIET_S)
+                continue
+            if reply.error & ~ALERT:
+                raise RefusedError(
+                    f'{what} refuses {instruction.name.lower()} of {parameters.hex(" ")}: '
+                    f'{error_in_words(reply.error)}'
+                )
+            return reply
+        raise NoReplyError(
+            f'{what} does not answer at {self.port.baudrate} baud; check power and cable, or '
+            'look for it with `endoscope doctor`'
+        )
 
     def transact(
         self, request: bytes, devices: Sequence[int], size: int, fast: bool = False

@@ -1,6 +1,7 @@
 """The SDK's port handler with what it lacks: 4.5 Mbaud, one owner, and waiting without spinning."""
 
 import select
+import termios
 import time
 from pathlib import Path
 
@@ -55,6 +56,13 @@ class BusPort(PortHandler):
         super().setupPort(cflag_baud)
         self.ser.exclusive = True
         return True
+
+    def clearPort(self) -> None:
+        """Throw away what has been received; raises OSError when the adapter is gone."""
+        try:
+            super().clearPort()
+        except termios.error as error:
+            raise OSError(*error.args) from error
 
     def open(self) -> None:
         """Open the port.

@@ -52,6 +52,8 @@ def _answer(bus: EmulatedBus, action: str, *arguments: float) -> object:
     with bus.paused() as faults:
         if action == 'silence':
             faults.silent = {int(device) for device in arguments}
+        elif action == 'stick':
+            bus.servos[int(arguments[0])].stuck = {int(address) for address in arguments[1:]}
         elif action in _FAULTS:
             setattr(faults, action, *arguments)
         elif action == 'trace':

@@ -85,6 +85,8 @@ class EmulatedServo:
         Time in s and shaft angle in rad, each millisecond.
     supply
         Input voltage in V.
+    stuck
+        Addresses of registers that acknowledge a write and do not keep it, as worn cells do.
     """
 
     def __init__(
@@ -97,6 +99,7 @@ class EmulatedServo:
         self.shaft = FirstOrderShaft() if shaft is None else shaft
         self.trace: deque[tuple[float, float]] = deque(maxlen=_TRACE_LENGTH)
         self.supply = 12.0
+        self.stuck: set[int] = set()
         self._memory = bytearray(TABLE_SIZE)
         for register in CONTROL_TABLE:
             if register.eeprom:
@@ -188,7 +191,8 @@ class EmulatedServo:
             changes.append((register, register.decode(part)))
             k += register.size
         for register, counts in changes:
-            self._apply(register, counts)
+            if register.address not in self.stuck:
+                self._apply(register, counts)
         return ErrorNumber.NONE
 
     def _write_map(self, address: int, data: bytes) -> ErrorNumber:
@@ -264,9 +268,13 @@ class EmulatedServo:
         self._store(table.GOAL_CURRENT, self.value(table.CURRENT_LIMIT))
 
     def _step(self) -> None:
-        if not self.answers(self._now):
+        if self.answers(self._now):
+            self._work()
+        else:
             self.shaft.velocity = 0.0
-            return
+        self.trace.append((self._now, self.shaft.position))
+
+    def _work(self) -> None:
         torque = bool(self.value(table.TORQUE_ENABLE))
         self._watch_bus(torque)
         limit = self.value(table.CURRENT_LIMIT)
@@ -279,7 +287,6 @@ class EmulatedServo:
         self._watch_load(torque, abs(current) >= 0.999 * limit * CURRENT_UNIT > 0.0)
         if self.supply < self.value(table.MIN_VOLTAGE_LIMIT) * 0.1:
             self._detect(_VOLTAGE_BIT)
-        self.trace.append((self._now, self.shaft.position))
 
     def _watch_bus(self, torque: bool) -> None:
         """Bus Watchdog(98): with torque on, a silence stops the shaft and goals are read-only."""

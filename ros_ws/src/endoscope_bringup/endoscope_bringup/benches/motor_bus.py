@@ -1,0 +1,125 @@
+"""`endoscope bench motor_bus`: cycles per second of two servos, beside what the line carries."""
+
+import argparse
+import time
+from dataclasses import dataclass
+
+_STEP_S = 1e-3
+
+
+@dataclass(frozen=True)
+class MotorBusFigure:
+    """What one run measured.
+
+    Attributes
+    ----------
+    baud
+        Bits per second.
+    cycle_bytes
+        Bytes of a cycle.
+    limit, rate
+        Cycles per second that the line carries, and that were run.
+    readings
+        New readings per second; a servo's clock tells milliseconds apart, no less.
+    failed
+        Cycles without a valid reading.
+    """
+
+    baud: int
+    cycle_bytes: int
+    limit: float
+    rate: float
+    readings: float
+    failed: int
+
+    def __str__(self) -> str:
+        return (
+            f'{self.baud:>9} {self.cycle_bytes:>7} {self.limit:>11.1f} {self.rate:>11.1f} '
+            f'{100.0 * self.rate / self.limit:>7.1f} % {self.readings:>11.1f} {self.failed:>7}'
+        )
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `motor_bus`."""
+    parser = subparsers.add_parser(
+        'motor_bus',
+        help='cycles per second of two emulated servos, beside what the line carries',
+        description='Runs the motor bus (a sync write and a sync read a cycle, torque on) against '
+        'two servos that are emulated on a pseudo-terminal with the delays of the line. Exits 1 '
+        'where a cycle fails.',
+    )
+    parser.add_argument(
+        '--bauds',
+        type=int,
+        nargs='+',
+        default=[57_600, 1_000_000, 4_000_000],
+        help='bits per second (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--seconds', type=float, default=10.0, help='length of a run (default: %(default)g)'
+    )
+    parser.add_argument('--fast', action='store_true', help='use fast sync read')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a line for each speed; return 1 if a cycle failed."""
+    print('     baud   bytes  line [1/s]  cycles/s    share  readings/s  failed')
+    failed = 0
+    for baud in args.bauds:
+        figure = run_motor_bus_bench(baud, args.seconds, args.fast)
+        print(figure, flush=True)
+        failed += figure.failed
+    return 1 if failed else 0
+
+
+def run_motor_bus_bench(baud: int, seconds: float, fast: bool = False) -> MotorBusFigure:
+    """Run two servos as fast as the bus goes.
+
+    Parameters
+    ----------
+    baud
+        Bits per second.
+    seconds
+        Length of the run.
+    fast
+        Whether to use fast sync read.
+
+    Raises
+    ------
+    RuntimeError
+        The servos cannot be enabled.
+    """
+    from endoscope_devices.dynamixel.bus_thread import BusThread
+    from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
+    from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
+    from endoscope_devices.dynamixel.wire_time import bytes_of_cycle, cycles_per_second
+
+    mounts = [ServoMount('motor_x', 1), ServoMount('motor_y', 2)]
+    with EmulatorProcess(baud=baud) as emulator:
+        bus = BusThread(BusSettings(emulator.port, baud, rate=0.0, fast=fast), mounts)
+        bus.start()
+        try:
+            bus.set_torque(True)
+            until = time.monotonic() + 5.0
+            while not bus.armed:
+                if time.monotonic() > until:
+                    raise RuntimeError(f'the servos are not enabled: {bus.trouble()}')
+                time.sleep(_STEP_S)
+            before, began = (bus.figures.cycles, bus.figures.readings), time.monotonic()
+            failures = sum(bus.figures.failures.values())
+            while (elapsed := time.monotonic() - began) < seconds:
+                bus.set_goal((0.0, 0.0))
+                time.sleep(_STEP_S)
+            cycles = bus.figures.cycles - before[0]
+            readings = bus.figures.readings - before[1]
+            failures = sum(bus.figures.failures.values()) - failures
+        finally:
+            bus.stop()
+    return MotorBusFigure(
+        baud,
+        bytes_of_cycle(len(mounts)),
+        cycles_per_second(baud, len(mounts)),
+        cycles / elapsed,
+        readings / elapsed,
+        failures,
+    )

@@ -1,0 +1,175 @@
+"""Servos behind the motor driver's interface: set-up, motion, and what is refused."""
+
+import time
+
+import pytest
+
+from endoscope_devices.dynamixel.bring_up import SetUpError
+from endoscope_devices.dynamixel.control_table import CURRENT_UNIT
+from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
+from endoscope_devices.dynamixel.emulator.bus import EmulatedBus
+from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
+from endoscope_devices.dynamixel.emulator.servo import EmulatedServo
+from endoscope_devices.dynamixel.packet_handler import NoReplyError, PacketHandler, RefusedError
+from endoscope_devices.dynamixel.serial_port import BusPort
+from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
+from endoscope_devices.motor_device import DeviceError
+
+MOUNTS = (ServoMount('motor_x', 1), ServoMount('motor_y', 2, direction=-1))
+PATIENCE_S = 20.0
+
+
+@pytest.fixture
+def emulator():
+    with EmulatorProcess() as emulator:
+        yield emulator
+
+
+@pytest.fixture
+def motors(emulator):
+    motors = DynamixelMotors(BusSettings(emulator.port), MOUNTS)
+    motors.open()
+    yield motors
+    motors.close()
+
+
+def drive(motors, goal, until):
+    """Renew the goal each millisecond until something holds; the readings on the way."""
+    readings = []
+    deadline = time.monotonic() + PATIENCE_S
+    while not until():
+        assert time.monotonic() < deadline, (motors.trouble(), motors.health())
+        reading = motors.exchange(goal, 1)
+        if reading is not None:
+            readings.append(reading)
+        time.sleep(1e-3)
+    return readings
+
+
+def near(motors, goal):
+    def reached():
+        newest = motors.bus.newest
+        return newest is not None and all(
+            abs(p - g) < 2e-3 for p, g in zip(newest.reading.position, goal, strict=True)
+        )
+
+    return reached
+
+
+def test_the_servos_are_set_up_as_asked(emulator, motors):
+    for device in (1, 2):
+        state = emulator.state(device)
+        assert (state['mode'], state['watchdog'], state['torque']) == (5, 5, 0)
+        assert state['current_limit'] == int(0.5 / CURRENT_UNIT)
+
+
+def test_goals_are_followed_in_the_sense_of_the_shafts(emulator, motors):
+    motors.set_torque(True)
+    drive(motors, (0.0, 0.0), lambda: motors.bus.armed)
+    readings = drive(motors, (0.3, 0.2), near(motors, (0.3, 0.2)))
+    assert max(r.velocity[0] for r in readings) > 0.5
+    assert readings[-1].effort[1] == pytest.approx(0.2 * 0.2, abs=0.01)
+    assert emulator.state(1)['position'] > 3.4
+    assert emulator.state(2)['position'] < 3.0
+    assert motors.trouble() == ''
+
+
+def test_enabling_does_not_move_the_shafts(emulator, motors):
+    motors.set_torque(True)
+    drive(motors, (0.3, 0.0), near(motors, (0.3, 0.0)))
+    motors.set_torque(False)
+    drive(motors, (0.0, 0.0), lambda: emulator.state(1)['torque'] == 0)
+    began = time.monotonic()
+    motors.set_torque(True)
+    deadline = began + PATIENCE_S
+    while not motors.bus.armed:
+        assert time.monotonic() < deadline
+        time.sleep(1e-3)
+    track = [position for _, position in emulator.do('trace', 1, began)]
+    assert max(track) - min(track) < 2e-3
+
+
+def test_without_torque_no_goal_is_sent(emulator, motors):
+    before = emulator.state(1)['goal']
+    drive(motors, (0.5, 0.5), lambda: motors.bus.figures.readings > 100)
+    assert emulator.state(1)['goal'] == before
+
+
+def test_a_setting_that_is_not_kept_is_refused_by_name(emulator):
+    emulator.do('stick', 2, 38)
+    with pytest.raises(SetUpError, match=r'servo 2 .*Current Limit\(38\) reads 1193'):
+        DynamixelMotors(BusSettings(emulator.port), MOUNTS).open()
+
+
+def test_torque_that_does_not_come_on_is_refused(emulator, motors):
+    emulator.do('stick', 1, 64)
+    motors.set_torque(True)
+    drive(motors, (0.0, 0.0), lambda: 'does not switch its torque on' in motors.trouble())
+    assert not motors.bus.armed
+
+
+def test_another_model_is_refused():
+    with EmulatedBus([EmulatedServo(1, model=1060)]) as bus:
+        motors = DynamixelMotors(BusSettings(bus.port), MOUNTS[:1])
+        with pytest.raises(SetUpError, match='model number 1060'):
+            motors.open()
+
+
+def test_a_missing_servo_is_named(emulator):
+    mounts = (MOUNTS[0], ServoMount('motor_y', 7))
+    with pytest.raises(NoReplyError, match=r'servo 7 .*does not answer at 1000000 baud'):
+        DynamixelMotors(BusSettings(emulator.port), mounts).open()
+
+
+def test_a_port_that_cannot_be_used_is_named(emulator, motors):
+    with pytest.raises(DeviceError, match='there is no such port'):
+        BusPort('/dev/ttyNone', 1_000_000).open()
+    with pytest.raises(DeviceError, match='another program uses this port'):
+        BusPort(emulator.port, 1_000_000).open()
+    with pytest.raises(DeviceError, match='do not know 1234 baud'):
+        BusPort(emulator.port, 1234).open()
+
+
+@pytest.mark.parametrize(
+    ('changes', 'words'),
+    [({'watchdog': 3.0}, 'Bus Watchdog'), ({'current_limit': 4.0}, 'Current Limit')],
+)
+def test_settings_that_no_servo_can_have_are_refused(changes, words):
+    with pytest.raises(DeviceError, match=words):
+        BusSettings('/dev/ttyNone', **changes)
+
+
+@pytest.mark.parametrize('fast', [False, True])
+def test_four_and_a_half_megabaud_and_fast_sync_read(fast):
+    with EmulatorProcess(baud=4_500_000) as emulator:
+        motors = DynamixelMotors(BusSettings(emulator.port, 4_500_000, fast=fast), MOUNTS)
+        motors.open()
+        try:
+            drive(motors, (0.0, 0.0), lambda: motors.bus.figures.readings > 50)
+        finally:
+            motors.close()
+        assert motors.bus.figures.failures == {}
+
+
+@pytest.fixture
+def handler():
+    with EmulatedBus([EmulatedServo(1)]) as bus:
+        port = BusPort(bus.port, 1_000_000)
+        port.open()
+        yield PacketHandler(port)
+        port.close()
+
+
+def test_the_time_out_is_the_time_on_the_wire_and_a_margin(handler):
+    handler.return_delay = 0.0
+    wire = (16 + 2 * (11 + 13)) * 10 / 1_000_000
+    assert handler.time_out(16, [13, 13]) == pytest.approx(wire + handler.margin)
+    assert handler.margin < 0.01
+
+
+def test_a_refusal_is_an_error_with_its_reason(handler):
+    with pytest.raises(RefusedError, match=r'servo 1 .*refuses write .*cannot be accessed'):
+        handler.write(1, 132, bytes(4))
+    with pytest.raises(RefusedError, match='out of range'):
+        handler.write(1, 8, b'\x09')
+    assert handler.read(1, 132, 4).data == (2048).to_bytes(4, 'little')
