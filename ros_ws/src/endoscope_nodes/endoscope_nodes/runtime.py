@@ -21,6 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from endoscope_nodes.discovery import stay_on_this_machine
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.matching import all_matched
 from endoscope_nodes.parameters import (
@@ -87,6 +88,7 @@ class Runtime:
         overrides: Mapping[str, Mapping[str, object]] | None = None,
     ) -> None:
         self.context = rclpy.get_default_context() if context is None else context
+        stay_on_this_machine()
         try:
             rclpy.init(
                 args=None if args is None else list(args),

@@ -16,6 +16,7 @@ from std_msgs.msg import String
 
 from endoscope_bringup.benches.process_cpu import cpu_seconds
 from endoscope_core.safety import OperatingState
+from endoscope_nodes.discovery import stay_on_this_machine
 from endoscope_nodes.names import OPERATING_STATE, STATE_COMMAND
 from endoscope_nodes.qos import EVENT, RESULT
 
@@ -133,6 +134,7 @@ class _Watcher:
 
     def __init__(self, domain: int) -> None:
         self._context = Context()
+        stay_on_this_machine()
         rclpy.init(args=[], context=self._context, domain_id=domain)
         self._node = rclpy.create_node(
             'bench_watcher', context=self._context, namespace='endoscope'

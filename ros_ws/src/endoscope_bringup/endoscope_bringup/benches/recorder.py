@@ -135,9 +135,11 @@ class _Sender:
         from sensor_msgs.msg import JointState
 
         from endoscope_bags.cdr_encoding import encode_joint_state
+        from endoscope_nodes.discovery import stay_on_this_machine
         from endoscope_nodes.qos import SENSOR_OFFERED
 
         self._context = Context()
+        stay_on_this_machine()
         rclpy.init(context=self._context)
         self._node = rclpy.create_node('bench_sender', context=self._context)
         self._publishers = [
