@@ -117,6 +117,12 @@ class AsymmetricBoucWenParameters:
         bounded = min(GREATEST_ANGLE, max(-GREATEST_ANGLE, angle))
         return max(0.0, self.lag + self.skew * bounded)
 
+    def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same for many angles (N,)."""
+        bounded = np.clip(angles, -GREATEST_ANGLE, GREATEST_ANGLE)
+        lags: NDArray[np.float64] = np.maximum(0.0, self.lag + self.skew * bounded)
+        return lags
+
     def to_dict(self) -> dict[str, float]:
         """The parameters by name."""
         return asdict(self)

@@ -141,6 +141,10 @@ class BoucWenParameters:
         """Half-width of a saturated loop, rad."""
         return self.lag
 
+    def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same for many angles (N,)."""
+        return np.full(angles.shape, self.lag)
+
     @classmethod
     def from_shape(
         cls, alpha: float, lag: float, travel: float, rho: float, n: float

@@ -32,6 +32,10 @@ class MemoryModel(Protocol):
         """Half-width of a saturated loop along the actual angle, rad."""
         ...
 
+    def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same for many angles (N,)."""
+        ...
+
     def memory_step(self, y: float, delta: float, angle: float) -> float:
         """Memory after a move by `delta` rad to `angle`."""
         ...
@@ -48,7 +52,7 @@ class MemoryModel(Protocol):
 def forward(model: MemoryModel, theta: ArrayLike, y0: float = 0.0) -> NDArray[np.float64]:
     """Actual angle (N,) for a driving angle (N,), both in rad; the memory begins at `y0`."""
     driver = _series(theta)
-    lags = np.array([model.lag_at(angle) for angle in driver.tolist()])
+    lags = model.lags_at(driver)
     result: NDArray[np.float64] = (
         model.alpha * driver + model.offset - lags * model.memory_path(driver, y0)
     )
@@ -58,7 +62,7 @@ def forward(model: MemoryModel, theta: ArrayLike, y0: float = 0.0) -> NDArray[np
 def direct_inverse(model: MemoryModel, theta_d: ArrayLike, y0: float = 0.0) -> NDArray[np.float64]:
     """Command (N,) for a desired angle (N,), both in rad; the memory begins at `y0`."""
     driver = _series(theta_d)
-    lags = np.array([model.lag_at(angle) for angle in driver.tolist()])
+    lags = model.lags_at(driver)
     result: NDArray[np.float64] = (
         driver - model.offset + lags * model.memory_path(driver, y0)
     ) / model.alpha

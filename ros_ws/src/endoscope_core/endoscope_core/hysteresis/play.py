@@ -75,6 +75,10 @@ class PlayParameters:
         """Half-width of the loop, rad."""
         return self.lag
 
+    def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same for many angles (N,)."""
+        return np.full(angles.shape, self.lag)
+
     def to_dict(self) -> dict[str, float]:
         """The parameters by name."""
         return asdict(self)

@@ -1,11 +1,5 @@
 """Parameters of hysteresis models from recordings."""
 
-from endoscope_core.identification.bouc_wen_fit import (
-    IdentificationError,
-    ModelFit,
-    Recording,
-    fit_model,
-)
 from endoscope_core.identification.class_parameters import (
     ClassParameterError,
     class_parameter_sets,
@@ -14,6 +8,13 @@ from endoscope_core.identification.class_parameters import (
     parameters_for_class,
 )
 from endoscope_core.identification.feedforward_fit import FeedforwardFit, fit_feedforward
+from endoscope_core.identification.hysteresis_fit import (
+    IdentificationError,
+    ModelFit,
+    Recording,
+    closed_cycle,
+    fit_model,
+)
 from endoscope_core.identification.servo_lag import Servo
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     'Recording',
     'Servo',
     'class_parameter_sets',
+    'closed_cycle',
     'fit_feedforward',
     'fit_model',
     'identify_classes',

@@ -12,8 +12,8 @@ import numpy as np
 from endoscope_core.dataset import CalibrationDataset
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.hysteresis import BoucWenParameters
-from endoscope_core.identification.bouc_wen_fit import ModelFit, Recording, fit_model
 from endoscope_core.identification.feedforward_fit import FeedforwardFit, fit_feedforward
+from endoscope_core.identification.hysteresis_fit import ModelFit, Recording, fit_model
 from endoscope_core.identification.servo_lag import Servo
 from endoscope_core.signals import CALIBRATION_RATE
 

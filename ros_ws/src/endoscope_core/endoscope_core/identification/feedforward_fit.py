@@ -6,8 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from endoscope_core.hysteresis import BoucWenParameters, bouc_wen_forward, bouc_wen_inverse
-from endoscope_core.hysteresis.bouc_wen import GREATEST_INVERSE_SLOPE, GREATEST_LAG
+from endoscope_core.hysteresis import (
+    PrandtlIshlinskiiParameters,
+    direct_inverse,
+    forward,
+    prandtl_ishlinskii_forward,
+    prandtl_ishlinskii_inverse,
+)
+from endoscope_core.hysteresis.inverse import HysteresisParameters
+from endoscope_core.identification.feedforward_candidates import candidates_for
 from endoscope_core.identification.servo_lag import Servo
 from endoscope_core.signals import Signal, sum_of_sines
 from endoscope_core.signals.commissioning import teleoperation_like
@@ -15,26 +22,23 @@ from endoscope_core.signals.commissioning import teleoperation_like
 Array = NDArray[np.float64]
 
 _STEP = 0.004
-_RHO = -0.9
-# Parameters rounded for a file must still pass the limit.
-_SLOPE = 0.99 * GREATEST_INVERSE_SLOPE
 _DEG = float(np.pi / 180.0)
 
 
 @dataclass(frozen=True)
 class FeedforwardFit:
-    """Parameters for equation 5.
+    """Parameters for the inverse: equation 5 of the first paper, or that of another model.
 
     Parameters
     ----------
-    parameters : BoucWenParameters
+    parameters : HysteresisParameters
     rmse : float
         rad that the feed-forward leaves on the identified model.
     uncompensated_rmse : float
         rad without it.
     """
 
-    parameters: BoucWenParameters
+    parameters: HysteresisParameters
     rmse: float
     uncompensated_rmse: float
 
@@ -49,19 +53,16 @@ def design_motions() -> list[Signal]:
 
 
 def fit_feedforward(
-    model: BoucWenParameters, servo: Servo, lead: float, seed: int = 0
+    model: HysteresisParameters, servo: Servo, lead: float, seed: int = 0
 ) -> FeedforwardFit:
-    """Choose the parameters of equation 5 for the least tracking error on an identified model.
+    """Choose the parameters of the inverse for the least tracking error on an identified model.
 
-    The search (differential evolution, as for the model) runs over `alpha`, lag and `n` within a
-    box. The steeper the inverse, the better it crosses the dead zone; it is therefore nearly as
-    steep as `BoucWenParameters` allows, and the travel follows from that, so that every candidate
-    is safe by construction. `rho` hardly matters and is kept where the state leaves saturation
-    gently.
+    The search (differential evolution, as for the model) runs over the box of `candidates_for`, in
+    which every point is safe.
 
     Parameters
     ----------
-    model : BoucWenParameters
+    model : HysteresisParameters
         Of the transmission, from `fit_model`.
     servo : Servo
         Between command and motor.
@@ -72,15 +73,14 @@ def fit_feedforward(
     """
     cases = [_Case.of(signal, lead) for signal in design_motions()]
 
-    def error(candidate: BoucWenParameters | None) -> float:
+    def error(candidate: HysteresisParameters | None) -> float:
         squares = [case.errors(candidate, model, servo) ** 2 for case in cases]
         return float(np.mean(np.concatenate(squares)))
 
-    reach = min(2.5 * model.lag + 0.2, GREATEST_LAG)
-    bounds = [(0.7 * model.alpha, 1.4 * model.alpha), (0.01, reach), (1.0, 4.0)]
+    candidates = candidates_for(model)
     found = differential_evolution(
-        lambda x: error(_candidate(x)),
-        bounds,
+        lambda x: error(candidates.make(x.tolist())),
+        candidates.bounds,
         rng=np.random.default_rng(seed),
         popsize=6,
         maxiter=30,
@@ -88,14 +88,20 @@ def fit_feedforward(
         polish=False,
     )
     return FeedforwardFit(
-        _candidate(found.x), float(np.sqrt(found.fun)), float(np.sqrt(error(None)))
+        candidates.make(found.x.tolist()), float(np.sqrt(found.fun)), float(np.sqrt(error(None)))
     )
 
 
-def _candidate(x: Array) -> BoucWenParameters:
-    alpha, lag, n = (float(value) for value in x)
-    travel = lag / (alpha * _SLOPE - 1.0)
-    return BoucWenParameters.from_shape(alpha, lag, travel, _RHO, n)
+def _inverse(parameters: HysteresisParameters, desired: Array) -> Array:
+    if isinstance(parameters, PrandtlIshlinskiiParameters):
+        return prandtl_ishlinskii_inverse(parameters, desired)
+    return direct_inverse(parameters, desired)
+
+
+def _forward(parameters: HysteresisParameters, driver: Array) -> Array:
+    if isinstance(parameters, PrandtlIshlinskiiParameters):
+        return prandtl_ishlinskii_forward(parameters, driver)
+    return forward(parameters, driver)
 
 
 @dataclass(frozen=True)
@@ -113,8 +119,8 @@ class _Case:
         return cls(angle, angle + lead * velocity, scored)
 
     def errors(
-        self, candidate: BoucWenParameters | None, model: BoucWenParameters, servo: Servo
+        self, candidate: HysteresisParameters | None, model: HysteresisParameters, servo: Servo
     ) -> Array:
-        command = self.desired if candidate is None else bouc_wen_inverse(candidate, self.foreseen)
-        reached = bouc_wen_forward(model, servo.answer(command, _STEP))
+        command = self.desired if candidate is None else _inverse(candidate, self.foreseen)
+        reached = _forward(model, servo.answer(command, _STEP))
         return (reached - self.desired)[self.scored]

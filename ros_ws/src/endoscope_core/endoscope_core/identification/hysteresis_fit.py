@@ -1,0 +1,271 @@
+"""Parameters of hysteresis models from recordings, in two steps.
+
+First the model of the transmission, equations 3 and 4 driven by the motor: what the recording
+shows. Then the feed-forward, equations 4 and 5 driven by the desired angle: the parameters with
+which it makes *that model* follow. The paper puts the first set straight into equation 5; but there
+`h` is driven by the desired angle instead of the motor's, which is further by the very dead zone
+that is to be crossed, so that the state turns too late at every reversal.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import differential_evolution, lsq_linear
+
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.hysteresis import (
+    BoucWenParameters,
+    PrandtlIshlinskiiParameters,
+    forward,
+    prandtl_ishlinskii_forward,
+)
+from endoscope_core.hysteresis.inverse import HysteresisParameters
+from endoscope_core.hysteresis.inverse_safety import (
+    GREATEST_ALPHA,
+    GREATEST_OFFSET,
+    SMALLEST_ALPHA,
+)
+from endoscope_core.hysteresis.prandtl_ishlinskii import SMALLEST_FIRST_WEIGHT, play_states
+from endoscope_core.identification.model_families import FAMILIES, ModelFamily
+
+Array = NDArray[np.float64]
+
+ELEMENTS = 20
+_SMALLEST_MOTION = float(np.deg2rad(1.0))
+
+
+class IdentificationError(EndoscopeError, ValueError):
+    """A recording from which nothing can be identified."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Motor and joint of one recording, evenly sampled.
+
+    Parameters
+    ----------
+    driver : ndarray, shape (N,)
+        Joint-equivalent motor angle in rad.
+    actual : ndarray, shape (N,)
+        Bending angle in rad.
+    rested : bool
+        Whether it begins at rest and without memory, so that `h` begins at zero.
+    scored : ndarray of bool, shape (N,), optional
+        Samples that count; all if not given.
+    """
+
+    driver: Array
+    actual: Array
+    rested: bool = True
+    scored: NDArray[np.bool_] | None = None
+
+    def centred(self, values: Array) -> Array:
+        """The samples that count of values (N, ...), less their mean."""
+        counted = values if self.scored is None else values[self.scored]
+        return counted - np.mean(counted, axis=0)
+
+
+def closed_cycle(driver: Array, actual: Array) -> Recording:
+    """One period from rest, as it would go on for ever.
+
+    A model fitted to the first period alone may drift in the second, for nothing in the first says
+    that loops close. Here the period is followed by itself, and the part before the first turning
+    point, which belongs to the way from rest, counts only the first time.
+
+    Parameters
+    ----------
+    driver, actual : ndarray, shape (N,)
+        Joint-equivalent motor angle and bending angle in rad, from rest, over one whole period.
+    """
+    turn = int(np.argmax(np.abs(driver[: len(driver) // 2])))
+    scored = np.ones(2 * len(driver), dtype=np.bool_)
+    scored[len(driver) : len(driver) + turn] = False
+    return Recording(np.tile(driver, 2), np.tile(actual, 2), scored=scored)
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """A model of a transmission.
+
+    Parameters
+    ----------
+    parameters : HysteresisParameters
+    rmse : float
+        rad, of modelled less measured angle, an offset of each recording removed.
+    evaluations : int
+        Simulations that the search took.
+    model : str
+        Name of the model.
+    offset : float
+        rad, measured less modelled angle, mean of the recordings; part of the parameters where the
+        model has an offset.
+    """
+
+    parameters: HysteresisParameters
+    rmse: float
+    evaluations: int
+    model: str = 'bouc_wen'
+    offset: float = 0.0
+
+    def __str__(self) -> str:
+        rows = []
+        for name, value in self.parameters.to_dict().items():
+            numbers = value if isinstance(value, list) else [value]
+            rows.append(f'  {name:<12}' + ' '.join(f'{number:10.4f}' for number in numbers))
+        return '\n'.join([f'{self.model}, {np.rad2deg(self.rmse):.2f} deg rms', *rows])
+
+    def predict(self, driver: Array, y0: float = 0.0) -> Array:
+        """Actual angle (N,) in rad for a driving angle (N,), offset included.
+
+        `y0` is the memory at the first sample; Prandtl-Ishlinskii begins at rest.
+        """
+        parameters = self.parameters
+        if isinstance(parameters, PrandtlIshlinskiiParameters):
+            return prandtl_ishlinskii_forward(parameters, driver)
+        missing = self.offset if isinstance(parameters, BoucWenParameters) else 0.0
+        return forward(parameters, driver, y0) + missing
+
+
+def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc_wen') -> ModelFit:
+    """Fit a hysteresis model to one or more recordings of the same tube or class.
+
+    For given shape (such as travel and sharpness) and initial memory, the gain, the lag and an
+    offset for each recording enter linearly and follow from bounded least squares; only the shape
+    is searched (variable projection, Golub and Pereyra 1973). The search is differential evolution
+    (Storn and Price 1997), a relative of the papers' genetic algorithm: unlike their interior-point
+    method it needs no start and does not stay in the local minima that sharpness and travel make;
+    unlike a plain genetic algorithm it has only one to six unknowns left, keeps to its box, and
+    repeats with its seed. L-BFGS-B, bounded too, then polishes. The weights of Prandtl-Ishlinskii
+    are bounded least squares over 20 fixed thresholds: convex, solved exactly, with no search.
+
+    What comes out is safe by construction: the boxes are those of the parameter classes, and where
+    the inverse would be too steep the travel is lengthened.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    seed : int
+        Of the search.
+    model : str
+        One of `endoscope_core.hysteresis.inverse.MODELS`.
+
+    Raises
+    ------
+    IdentificationError
+        If the model is unknown, there is no recording, one is empty or not finite, or the motor or
+        the joint hardly moves.
+    """
+    _check(recordings)
+    if model == 'prandtl_ishlinskii':
+        return _fit_play_stack(recordings)
+    if model not in FAMILIES:
+        known = ', '.join([*FAMILIES, 'prandtl_ishlinskii'])
+        raise IdentificationError(f'unknown model {model!r}: choose one of {known}')
+    family = FAMILIES[model]
+    starts = [k for k, recording in enumerate(recordings) if not recording.rested]
+    size = len(family.shape_bounds)
+
+    def memories(x: Array) -> list[Array]:
+        first = np.zeros(len(recordings))
+        first[starts] = x[size:]
+        return [
+            family.path(recording.driver, y0, x[:size])
+            for recording, y0 in zip(recordings, first.tolist(), strict=True)
+        ]
+
+    def cost(x: Array) -> float:
+        return _linear_part(family, recordings, memories(x))[1]
+
+    found = differential_evolution(
+        cost,
+        [*family.shape_bounds, *[(-1.0, 1.0)] * len(starts)],
+        rng=np.random.default_rng(seed),
+        popsize=8,
+        maxiter=60,
+        tol=1e-5,
+    )
+    factors, _ = _linear_part(family, recordings, memories(found.x))
+    first = np.zeros(len(recordings))
+    first[starts] = found.x[size:]
+    bare = family.build(found.x[:size], factors, 0.0)
+    residuals = [
+        r.actual - forward(bare, r.driver, y0)
+        for r, y0 in zip(recordings, first.tolist(), strict=True)
+    ]
+    offset = _mean_offset(recordings, residuals)
+    centred = [r.centred(residual) for r, residual in zip(recordings, residuals, strict=True)]
+    spread = np.mean(np.concatenate(centred) ** 2)
+    parameters = family.build(found.x[:size], factors, offset if family.has_offset else 0.0)
+    return ModelFit(parameters, float(np.sqrt(spread)), int(found.nfev), model, offset)
+
+
+def _fit_play_stack(recordings: Sequence[Recording]) -> ModelFit:
+    reach = max(float(np.max(np.abs(r.driver))) for r in recordings)
+    thresholds = reach * np.arange(ELEMENTS) / ELEMENTS
+    columns = []
+    for r in recordings:
+        # What was before the recording is taken to be the way back from its far side.
+        rest = r.driver[0] if not r.rested else 0.0
+        columns.append(play_states(thresholds, r.driver, np.full(ELEMENTS, rest)))
+    matrix = np.concatenate([r.centred(c) for r, c in zip(recordings, columns, strict=True)])
+    target = np.concatenate([r.centred(r.actual) for r in recordings])
+    low = np.zeros(ELEMENTS)
+    low[0] = SMALLEST_FIRST_WEIGHT
+    found = lsq_linear(matrix, target, (low, np.full(ELEMENTS, GREATEST_ALPHA)))
+    weights = np.clip(found.x, low, GREATEST_ALPHA)
+    weights *= min(1.0, GREATEST_ALPHA / float(np.sum(weights)))
+    weights[0] = max(weights[0], SMALLEST_FIRST_WEIGHT, SMALLEST_ALPHA - float(np.sum(weights[1:])))
+    rmse = float(np.sqrt(np.mean((target - matrix @ weights) ** 2)))
+    left = [r.actual - c @ weights for r, c in zip(recordings, columns, strict=True)]
+    offset = float(np.clip(_mean_offset(recordings, left), -GREATEST_OFFSET, GREATEST_OFFSET))
+    parameters = PrandtlIshlinskiiParameters(
+        tuple(thresholds.tolist()), tuple(weights.tolist()), offset
+    )
+    return ModelFit(parameters, rmse, 1, 'prandtl_ishlinskii', offset)
+
+
+def _mean_offset(recordings: Sequence[Recording], residuals: Sequence[Array]) -> float:
+    means = [
+        np.mean(residual if r.scored is None else residual[r.scored])
+        for r, residual in zip(recordings, residuals, strict=True)
+    ]
+    return float(np.mean(means))
+
+
+def _linear_part(
+    family: ModelFamily, recordings: Sequence[Recording], memories: Sequence[Array]
+) -> tuple[Array, float]:
+    """Best factors and the mean square that they leave."""
+    columns = [family.columns(r.driver, y) for r, y in zip(recordings, memories, strict=True)]
+    target = np.concatenate([r.centred(r.actual) for r in recordings])
+    matrix = np.concatenate([r.centred(c) for r, c in zip(recordings, columns, strict=True)])
+    gram = matrix.T @ matrix + 1e-12 * np.eye(matrix.shape[1])
+    side = matrix.T @ target
+    solution = np.linalg.solve(gram, side)
+    low, high = np.array(family.linear_bounds).T
+    if np.any(solution < low) or np.any(solution > high):
+        root = np.linalg.cholesky(gram).T
+        solution = lsq_linear(root, np.linalg.solve(root.T, side), (low, high)).x
+        solution = np.clip(solution, low, high)
+    return solution, float(np.mean((target - matrix @ solution) ** 2))
+
+
+def _check(recordings: Sequence[Recording]) -> None:
+    if not recordings:
+        raise IdentificationError('there is no recording to identify from')
+    for k, recording in enumerate(recordings):
+        for name, values in (('motor', recording.driver), ('bending', recording.actual)):
+            if len(values) < 100 or not np.all(np.isfinite(values)):
+                raise IdentificationError(
+                    f'recording {k}: the {name} angle has {len(values)} samples, of which all must '
+                    'be finite and at least 100 there'
+                )
+            if np.ptp(values) < _SMALLEST_MOTION:
+                raise IdentificationError(
+                    f'recording {k}: the {name} angle moves by less than 1 deg, which shows no '
+                    'hysteresis; record a calibration or commissioning motion'
+                )
+        if len(recording.driver) != len(recording.actual):
+            raise IdentificationError(f'recording {k}: motor and bending differ in length')

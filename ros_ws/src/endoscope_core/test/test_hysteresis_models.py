@@ -1,0 +1,168 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from endoscope_core.hysteresis import (
+    AsymmetricBoucWenParameters,
+    BoucWenParameters,
+    DahlParameters,
+    PlayParameters,
+    PrandtlIshlinskiiParameters,
+    direct_inverse,
+    forward,
+    prandtl_ishlinskii_forward,
+    prandtl_ishlinskii_inverse,
+)
+from endoscope_core.hysteresis.dahl_kernel import dahl_step, play_step
+from endoscope_core.hysteresis.inverse import MODELS, inverse_of
+from endoscope_core.hysteresis.inverse_safety import GREATEST_INVERSE_SLOPE
+
+TIME = np.arange(0.0, 9.0, 0.01)
+MOTION = 0.9 * np.sin(TIME) + 0.5 * np.sin(1.73 * TIME)
+SAFE = {
+    'bouc_wen': BoucWenParameters.from_shape(0.9, 0.5, 0.06, -0.9, 2.0),
+    'asymmetric_bouc_wen': AsymmetricBoucWenParameters(
+        0.9, 0.5, 0.1, 0.05, 0.08, -0.5, 2.0, 0.1, 0.3, 1.5
+    ),
+    'dahl': DahlParameters(0.9, 0.5, 0.1, 1.6, -0.03),
+    'play': PlayParameters(0.9, 0.5, 0.05, 0.02),
+    'prandtl_ishlinskii': PrandtlIshlinskiiParameters(
+        (0.0, 0.2, 0.5, 0.8), (0.1, 0.3, 0.4, 0.2), 0.04
+    ),
+}
+steps = st.floats(-1e6, 1e6) | st.floats(-1.0, 1.0) | st.floats(-1e-9, 1e-9)
+
+
+def test_every_model_has_a_set_here():
+    assert set(SAFE) == set(MODELS)
+
+
+@given(st.floats(-1.0, 1.0), st.lists(steps, max_size=30), st.floats(0.01, 1.0), st.floats(0.5, 4))
+def test_dahl_stays_in_bounds_and_goes_with_its_driver(y, moves, travel, exponent):
+    for move in moves:
+        after = dahl_step(y, move, travel, exponent)
+        assert -1.0 <= after <= 1.0
+        assert (after - y) * np.sign(move) >= -1e-15
+        y = after
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0), st.floats(0.0, 1.0), st.floats(0.5, 4.0))
+def test_dahl_is_exact_so_a_step_may_be_cut_anywhere(y, move, cut, exponent):
+    whole = dahl_step(y, move, 0.4, exponent)
+    parts = dahl_step(dahl_step(y, cut * move, 0.4, exponent), move - cut * move, 0.4, exponent)
+    assert parts == pytest.approx(whole, abs=1e-9)
+
+
+@pytest.mark.parametrize('exponent', [0.6, 1.0, 1.7, 3.0])
+def test_dahl_solves_its_equation(exponent):
+    path, y = np.linspace(0.0, 0.9, 300), -0.7
+    found = [y]
+    for step in np.diff(path):
+        found.append(dahl_step(found[-1], step, 0.5, exponent))
+    truth = solve_ivp(
+        lambda _, v: max(0.0, 1.0 - v[0]) ** exponent / 0.5,
+        (0.0, 0.9),
+        [y],
+        t_eval=path,
+        rtol=1e-9,
+        atol=1e-11,
+    ).y[0]
+    np.testing.assert_allclose(found, truth, atol=1e-6)
+
+
+def test_a_play_is_a_play():
+    parameters = PlayParameters(0.8, 0.8 * 0.3, 0.3, 0.1)
+    state, expected = 0.0, []
+    for value in MOTION:
+        state = min(max(state, value - 0.3), value + 0.3)
+        expected.append(0.8 * state + 0.1)
+    np.testing.assert_allclose(forward(parameters, MOTION), expected, atol=1e-12)
+    assert play_step(0.4, 1e6, 0.3) == 1.0
+
+
+@given(
+    st.lists(st.floats(0.0, 0.3), min_size=1, max_size=8),
+    st.floats(0.03, 0.4),
+    st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=30),
+)
+def test_the_inverse_of_prandtl_ishlinskii_is_exact(weights, first, turning_points):
+    thresholds = tuple(0.15 * k for k in range(len(weights) + 1))
+    parameters = PrandtlIshlinskiiParameters(thresholds, (first + 0.2, *weights), 0.05)
+    desired = np.concatenate(
+        [
+            np.linspace(a, b, 7)
+            for a, b in zip([0.05, *turning_points], turning_points, strict=False)
+        ]
+    )
+    command = prandtl_ishlinskii_inverse(parameters, desired)
+    np.testing.assert_allclose(prandtl_ishlinskii_forward(parameters, command), desired, atol=1e-9)
+
+
+@pytest.mark.parametrize('name', SAFE)
+@given(st.lists(st.floats(-1.7, 1.7), min_size=2, max_size=30))
+@settings(max_examples=20)
+def test_inverses_keep_to_the_slope_that_they_promise(name, points):
+    inverse = inverse_of(SAFE[name], 0.3, points[0])
+    assert SAFE[name].inverse_slope <= GREATEST_INVERSE_SLOPE
+    before, angle = inverse.command(), points[0]
+    for target in points[1:]:
+        for part in np.linspace(angle, target, 20)[1:]:
+            inverse.move_to(part)
+            command = inverse.command()
+            change = abs(command - before)
+            assert change <= SAFE[name].inverse_slope * abs(target - angle) / 19.0 + 1e-9
+            assert (command - before) * (target - angle) >= -1e-9
+            before = command
+        angle = target
+        assert -1.0 - 1e-9 <= inverse.direction <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize('name', set(SAFE) - {'prandtl_ishlinskii'})
+def test_steps_of_the_inverse_are_those_of_the_whole_series(name):
+    inverse, commands = inverse_of(SAFE[name], 0.0, MOTION[0]), []
+    for angle in MOTION:
+        inverse.move_to(angle)
+        commands.append(inverse.command())
+    np.testing.assert_allclose(commands, direct_inverse(SAFE[name], MOTION), atol=1e-12)
+
+
+def test_an_asymmetric_model_with_equal_sides_is_the_symmetric_one():
+    equal = AsymmetricBoucWenParameters(0.9, 0.5, 0.0, 0.0, 0.3, 0.2, 2.0, 0.3, 0.2, 2.0)
+    symmetric = BoucWenParameters.from_shape(0.9, 0.5, 0.3, 0.2, 2.0)
+    np.testing.assert_allclose(forward(equal, MOTION), forward(symmetric, MOTION), atol=1e-12)
+
+
+@pytest.mark.parametrize('name', SAFE)
+def test_parameters_survive_a_file_and_nothing_else_is_taken(name):
+    values = SAFE[name].to_dict()
+    assert MODELS[name].from_dict(values) == SAFE[name]
+    with pytest.raises(ValueError, match='must be exactly'):
+        MODELS[name].from_dict({**values, 'gamma': 1.0})
+
+
+@pytest.mark.parametrize(
+    ('make', 'complaint'),
+    [
+        (lambda: DahlParameters(0.9, 0.5, 0.001, 1.0), 'too steep'),
+        (lambda: DahlParameters(0.9, 0.5, 0.1, 9.0), 'exponent'),
+        (lambda: DahlParameters(math.nan, 0.5, 0.1, 1.0), 'finite'),
+        (lambda: PlayParameters(0.1, 0.5, 0.1), 'alpha'),
+        (lambda: PlayParameters(0.9, 9.0, 1.0), 'lag'),
+        (lambda: PlayParameters(0.9, 0.5, 0.1, 2.0), 'offset'),
+        (
+            lambda: AsymmetricBoucWenParameters(0.5, 0.5, 0.48, 0, 1, 0, 1, 1, 0, 1),
+            'turns back',
+        ),
+        (lambda: PrandtlIshlinskiiParameters((0.0,), (0.001,)), 'first weight'),
+        (lambda: PrandtlIshlinskiiParameters((0.0, 0.0), (0.5, 0.5)), 'increase'),
+        (lambda: PrandtlIshlinskiiParameters((0.0, 0.1), (0.5, -0.1)), 'negative'),
+        (lambda: PrandtlIshlinskiiParameters((0.0,), (0.5, 0.1)), 'equally many'),
+    ],
+)
+def test_unsafe_parameters_are_refused(make, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        make()

@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+
+from endoscope_core.hysteresis import (
+    AsymmetricBoucWenParameters,
+    DahlParameters,
+    PlayParameters,
+    PrandtlIshlinskiiParameters,
+    forward,
+    prandtl_ishlinskii_forward,
+)
+from endoscope_core.hysteresis.inverse import MODELS
+from endoscope_core.hysteresis.inverse_safety import GREATEST_INVERSE_SLOPE
+from endoscope_core.identification import (
+    IdentificationError,
+    Recording,
+    Servo,
+    closed_cycle,
+    fit_feedforward,
+    fit_model,
+)
+
+TIME = np.arange(0.0, 9.0, 0.02)
+DRIVER = 1.5 * np.sin(TIME)
+TRUTHS = {
+    'dahl': DahlParameters(0.85, 0.5, 0.4, 1.7, 0.05),
+    'play': PlayParameters(0.85, 0.5, 0.55, -0.04),
+    'prandtl_ishlinskii': PrandtlIshlinskiiParameters(
+        tuple(1.5 / 20 * np.arange(20)), (0.1, *([0.0] * 5), 0.7, *([0.0] * 13)), 0.02
+    ),
+}
+
+
+def answer(parameters, driver):
+    if isinstance(parameters, PrandtlIshlinskiiParameters):
+        return prandtl_ishlinskii_forward(parameters, driver)
+    return forward(parameters, driver)
+
+
+@pytest.mark.parametrize('model', TRUTHS)
+def test_a_model_is_found_again(model):
+    truth = TRUTHS[model]
+    fit = fit_model([Recording(DRIVER, answer(truth, DRIVER))], 0, model)
+    np.testing.assert_allclose(fit.predict(DRIVER), answer(truth, DRIVER), atol=0.002)
+    assert fit.rmse < 1e-3
+    assert model in str(fit)
+
+
+def test_an_asymmetric_loop_is_fitted_better_by_the_asymmetric_model():
+    truth = AsymmetricBoucWenParameters(0.9, 0.5, 0.1, 0.05, 0.2, -0.5, 2.0, 0.3, 0.3, 1.5)
+    recordings = [Recording(DRIVER, forward(truth, DRIVER))]
+    plain, skewed = (fit_model(recordings, 0, m) for m in ('bouc_wen', 'asymmetric_bouc_wen'))
+    assert skewed.rmse < 0.3 * plain.rmse
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_whatever_is_recorded_what_comes_out_is_safe(model):
+    generator = np.random.default_rng(0)
+    driver = DRIVER[::4]
+    wild = np.cumsum(generator.normal(0.0, 0.3, driver.size)) - 3.0 * driver
+    fit = fit_model([Recording(driver, wild, rested=False)], 0, model)
+    assert fit.parameters.inverse_slope <= GREATEST_INVERSE_SLOPE * (1.0 + 1e-9)
+    again = MODELS[model].from_dict(fit.parameters.to_dict())
+    assert again == fit.parameters
+
+
+def test_the_search_repeats_with_its_seed():
+    recordings = [Recording(DRIVER, answer(TRUTHS['dahl'], DRIVER))]
+    assert fit_model(recordings, 3, 'dahl') == fit_model(recordings, 3, 'dahl')
+
+
+@pytest.mark.parametrize('model', set(MODELS) - {'bouc_wen'})
+def test_the_feed_forward_of_every_model_makes_a_backlash_follow(model):
+    fit = fit_model([Recording(DRIVER, answer(TRUTHS['play'], DRIVER))], 0, model)
+    found = fit_feedforward(fit.parameters, Servo(), lead=0.06)
+    assert found.rmse < 0.35 * found.uncompensated_rmse
+    assert found.parameters.inverse_slope <= GREATEST_INVERSE_SLOPE
+    assert isinstance(found.parameters, MODELS[model])
+
+
+def test_a_closed_cycle_says_that_loops_close():
+    period = np.arange(0.0, 2.0 * np.pi, 0.02)
+    driver = np.sin(period)
+    actual = answer(TRUTHS['play'], np.tile(driver, 2))[: driver.size]
+    recording = closed_cycle(driver, actual)
+    assert recording.scored.sum() < recording.driver.size
+    assert recording.scored[: driver.size].all()
+    fit = fit_model([recording], 0, 'play')
+    np.testing.assert_allclose(fit.predict(np.tile(driver, 2))[: driver.size], actual, atol=0.003)
+
+
+def test_an_unknown_model_is_refused():
+    with pytest.raises(IdentificationError, match='choose one of'):
+        fit_model([Recording(DRIVER, DRIVER)], 0, 'preisach')
