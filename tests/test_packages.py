@@ -21,6 +21,7 @@ NOT_SOURCE = {'__pycache__', '.mypy_cache', '.pytest_cache', '.ruff_cache'}
 # Names under which a distribution is imported, where they differ from its own.
 IMPORT_NAMES = {
     'dynamixel-sdk': 'dynamixel_sdk',
+    'ndicapi': 'ndicapy',
     'pyserial': 'serial',
     'pyyaml': 'yaml',
     'scikit-learn': 'sklearn',

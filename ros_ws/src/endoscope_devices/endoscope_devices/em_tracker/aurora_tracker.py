@@ -1,0 +1,235 @@
+"""Frames of one sensor of an Aurora, read by a thread of their own."""
+
+import threading
+import time
+from collections import Counter, deque
+from dataclasses import dataclass
+
+from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
+from endoscope_devices.em_tracker.frame_clock import FrameClock
+from endoscope_devices.em_tracker.tx_reply import (
+    MalformedReplyError,
+    PortStatus,
+    ToolReading,
+    parse_tx,
+)
+from endoscope_devices.motor_device import DeviceError
+
+_REOPEN_S = 0.3
+_SILENT_NS = 250_000_000
+_KEPT = 200
+_PAUSE_S = 0.002
+_GIVE_UP = 5
+# So many late frames in a row mean that the frames lie otherwise than thought: a second of them.
+_LATE_FOR_GOOD = 40
+
+
+@dataclass(frozen=True)
+class TrackerSettings:
+    """How the tracker is read.
+
+    Attributes
+    ----------
+    tool
+        Which of the enabled sensors, from 1 on in the order of their ports.
+    latency
+        Time in s from measuring a frame to having it ready, by which stamps are put back.
+    frame_rate
+        Frames a second in Hz.
+    oldest
+        A frame that comes later than this, in s, is not published: its time of measurement is past
+        any use.
+    """
+
+    tool: int = 1
+    latency: float = 0.0
+    frame_rate: float = 40.0
+    oldest: float = 0.1
+
+
+@dataclass(frozen=True)
+class TrackerReading:
+    """The sensor in a frame that was not seen before.
+
+    Attributes
+    ----------
+    time_ns
+        When it was measured, in ns of ``time.monotonic_ns``.
+    frame
+        Frame number.
+    position, orientation
+        m, shape (3,), and unit quaternion x, y, z, w, in the frame of the field generator.
+    """
+
+    time_ns: int
+    frame: int
+    position: tuple[float, ...]
+    orientation: tuple[float, ...]
+
+
+class AuroraTracker:
+    """Asks for the newest frame again and again, and keeps each that is new and shows the sensor.
+
+    A tracker that goes away is opened again for as long as the device is open.
+
+    Parameters
+    ----------
+    port
+        Device path.
+    settings
+        See :class:`TrackerSettings`.
+    """
+
+    def __init__(self, port: str, settings: TrackerSettings) -> None:
+        self._path = port
+        self._settings = settings
+        self._port = AuroraPort(port)
+        self._start_clock()
+        self._handle = -1
+        self._frame: int | None = None
+        self._readings: deque[TrackerReading] = deque(maxlen=_KEPT)
+        self._counts: Counter[str] = Counter()
+        self._good_ns: int | None = None
+        self._trouble = 'not connected yet'
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='aurora tracker', daemon=True)
+
+    def open(self) -> None:
+        """Start to read; a tracker that is not there yet is waited for."""
+        self._thread.start()
+
+    def take(self) -> list[TrackerReading]:
+        """Readings since the last call, oldest first; never waits for the tracker."""
+        taken = []
+        while self._readings:
+            taken.append(self._readings.popleft())
+        return taken
+
+    def health(self) -> tuple[str, dict[str, object]]:
+        """What is wrong (empty if nothing), and figures for diagnostics."""
+        good = self._good_ns
+        age = None if good is None else time.monotonic_ns() - good
+        trouble = self._trouble
+        if not trouble and (age is None or age > _SILENT_NS):
+            trouble = 'no frame'
+        figures: dict[str, object] = {
+            'age of the last reading [ms]': 'never' if age is None else round(age * 1e-6, 1)
+        }
+        for name in (
+            'readings',
+            'lost frames',
+            'missing',
+            'sensor broken',
+            'late',
+            'refused replies',
+            'silences',
+            'connections',
+        ):
+            figures[name] = self._counts[name]
+        return trouble, figures
+
+    def close(self) -> None:
+        """Stop tracking and let go of the port."""
+        self._stop.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._port.open()
+                self._bring_up()
+                self._counts['connections'] += 1
+                self._read_on()
+                self._port.ask('TSTOP:')
+            except DeviceError as error:
+                self._trouble = str(error)
+            finally:
+                self._port.close()
+            self._stop.wait(_REOPEN_S)
+
+    def _bring_up(self) -> None:
+        """Initialise and enable every sensor that is plugged in, and start tracking."""
+        for handle in _handles(self._port.ask('PHSR:02')):
+            self._port.ask(f'PINIT:{handle:02X}')
+        for handle in _handles(self._port.ask('PHSR:03')):
+            self._port.ask(f'PENA:{handle:02X}D')
+        enabled = _handles(self._port.ask('PHSR:04'))
+        if len(enabled) < self._settings.tool:
+            raise DeviceError(
+                f'tracker at {self._path} has {len(enabled)} sensors, number '
+                f'{self._settings.tool} is asked for: plug it in'
+            )
+        self._handle = enabled[self._settings.tool - 1]
+        self._frame = None
+        self._start_clock()
+        self._port.ask('TSTART:')
+
+    def _start_clock(self) -> None:
+        self._clock = FrameClock(self._settings.frame_rate)
+        self._late_in_a_row = 0
+
+    def _read_on(self) -> None:
+        failures = 0
+        while not self._stop.wait(_PAUSE_S):
+            try:
+                if failures:
+                    self._port.fence()
+                asked = time.monotonic_ns()
+                tools = parse_tx(self._port.ask('TX:0001'))
+            except TrackerReplyError as error:
+                failures += 1
+                self._counts['silences' if error.silent else 'refused replies'] += 1
+                self._trouble = str(error)
+                if failures >= _GIVE_UP:
+                    raise
+                continue
+            except MalformedReplyError as error:
+                failures += 1
+                self._counts['refused replies'] += 1
+                self._trouble = f'tracker, TX: {error}'
+                continue
+            failures = 0
+            self._take(asked, tools)
+
+    def _take(self, asked_ns: int, tools: list[ToolReading]) -> None:
+        tool = next((t for t in tools if t.handle == self._handle), None)
+        if tool is None:
+            self._trouble = f'sensor {self._settings.tool} was unplugged'
+            return
+        if tool.frame == self._frame:
+            return
+        if self._frame is not None and tool.frame > self._frame:
+            self._counts['lost frames'] += tool.frame - self._frame - 1
+        measured = self._clock.stamp(tool.frame, asked_ns)
+        self._frame = tool.frame
+        if tool.status & (PortStatus.SENSOR_BROKEN | PortStatus.PROCESSING_EXCEPTION):
+            self._counts['sensor broken'] += 1
+            self._trouble = 'a coil of the sensor is broken'
+        elif not tool.position or tool.status & PortStatus.OUT_OF_VOLUME:
+            self._counts['missing'] += 1
+            self._trouble = 'the sensor is out of the measurement volume'
+        elif asked_ns - measured > self._settings.oldest * 1e9:
+            self._counts['late'] += 1
+            self._late_in_a_row += 1
+            if self._late_in_a_row >= _LATE_FOR_GOOD:
+                self._start_clock()
+            self._trouble = f'frames come {(asked_ns - measured) * 1e-6:.0f} ms late'
+        else:
+            self._trouble = ''
+            self._late_in_a_row = 0
+            self._counts['readings'] += 1
+            self._good_ns = asked_ns
+            latency_ns = round(self._settings.latency * 1e9)
+            self._readings.append(
+                TrackerReading(measured - latency_ns, tool.frame, tool.position, tool.orientation)
+            )
+
+
+def _handles(reply: str) -> list[int]:
+    """Port handles of a reply to PHSR: a count, then handle and status of each."""
+    try:
+        count = int(reply[:2], 16)
+        return [int(reply[2 + 5 * k : 4 + 5 * k], 16) for k in range(count)]
+    except ValueError as error:
+        raise DeviceError(f"tracker, PHSR: '{reply}' lists no port handles") from error

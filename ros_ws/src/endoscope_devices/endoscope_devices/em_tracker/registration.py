@@ -1,0 +1,84 @@
+"""Registers the straight instrument from the last second of readings, and keeps the result."""
+
+import datetime
+from collections import deque
+from pathlib import Path
+
+import yaml
+
+from endoscope_core.atomic_output import write_text
+from endoscope_core.kinematics import StraightRegistration, register_straight, unit_quaternion
+from endoscope_devices.em_tracker.aurora_tracker import TrackerReading
+from endoscope_devices.strict_yaml import load_section
+
+WINDOW_NS = 1_000_000_000
+
+
+class RegistrationWindow:
+    """The readings of the last second."""
+
+    def __init__(self) -> None:
+        self._readings: deque[TrackerReading] = deque()
+
+    def add(self, reading: TrackerReading) -> None:
+        """Take a reading."""
+        self._readings.append(reading)
+        while self._readings[0].time_ns < reading.time_ns - WINDOW_NS:
+            self._readings.popleft()
+
+    def register(self, now_ns: int) -> StraightRegistration:
+        """Average them.
+
+        Parameters
+        ----------
+        now_ns
+            In ns of ``time.monotonic_ns``.
+
+        Raises
+        ------
+        RegistrationError
+            Too few, or the tip was not still.
+        """
+        recent = [r for r in self._readings if r.time_ns >= now_ns - WINDOW_NS]
+        return register_straight([r.position for r in recent], [r.orientation for r in recent])
+
+
+def save_registration(path: str | Path, registration: StraightRegistration) -> None:
+    """Keep a registration.
+
+    Parameters
+    ----------
+    path
+        YAML file to write.
+    registration
+        What to keep.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written.
+    """
+    content = {
+        'registered': datetime.datetime.now(datetime.UTC).isoformat(timespec='seconds'),
+        'position': list(registration.position),
+        'orientation': list(registration.orientation),
+    }
+    write_text(path, yaml.safe_dump(content, sort_keys=False))
+
+
+def load_registration(path: str | Path) -> StraightRegistration:
+    """Read what :func:`save_registration` wrote.
+
+    Parameters
+    ----------
+    path
+        YAML file.
+
+    Raises
+    ------
+    DeviceFileError
+        It cannot be read as a registration.
+    """
+    file = load_section(path, 'registration', ('registered', 'position', 'orientation'))
+    orientation = unit_quaternion(file.vector('orientation', 4))
+    return StraightRegistration(file.vector('position', 3), tuple(orientation.tolist()))

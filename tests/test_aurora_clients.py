@@ -1,0 +1,95 @@
+"""The emulated Aurora serves clients that nobody here wrote, unchanged.
+
+``ndiProbe`` keeps the interpreter to itself, so the emulator runs in a process of its own.
+"""
+
+import subprocess
+import sys
+import time
+
+import ndicapy
+import numpy as np
+import pytest
+from sksurgerynditracker.nditracker import NDITracker
+
+from endoscope_core.kinematics import about_z, angle_between
+from endoscope_devices.em_tracker.aurora_emulator import InstrumentInField
+
+BENDING = (0.5, -0.2)
+
+
+@pytest.fixture(scope='module')
+def port(tmp_path_factory):
+    link = tmp_path_factory.mktemp('aurora') / 'ttyAurora'
+    command = [sys.executable, '-m', 'endoscope_devices.em_tracker.aurora_emulator']
+    with subprocess.Popen(
+        [*command, '--link', str(link), '--bending', *map(str, BENDING)], stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdout.readline().decode().strip() == str(link)
+        yield str(link)
+        process.terminate()
+        assert process.wait() == 0
+    assert not link.exists()
+
+
+def expected():
+    view = InstrumentInField(lambda _: BENDING)(0.0)
+    x, y, z, w = view.orientation
+    return np.array((w, x, y, z)), 1e3 * np.array(view.position)
+
+
+def test_ndicapi_finds_and_tracks_it(port):
+    assert ndicapy.ndiProbe(port) == ndicapy.NDI_OKAY
+    device = ndicapy.ndiOpen(port)
+    try:
+        for command in ('INIT:', 'COMM:50000', 'PINIT:0A', 'PENA:0AD', 'TSTART:'):
+            assert ndicapy.ndiCommand(device, command) == 'OKAY'
+        quaternion, position = expected()
+        for mode, transform, frame in (
+            ('BX:0801', ndicapy.ndiGetBXTransform, ndicapy.ndiGetBXFrame),
+            ('TX:0801', ndicapy.ndiGetTXTransform, ndicapy.ndiGetTXFrame),
+        ):
+            ndicapy.ndiCommand(device, mode)
+            found = transform(device, b'\x0a')
+            np.testing.assert_allclose(found[:4], quaternion, atol=1e-4)
+            np.testing.assert_allclose(found[4:7], position, atol=0.01)
+            first = frame(device, b'\x0a')
+            time.sleep(0.1)
+            ndicapy.ndiCommand(device, mode)
+            assert frame(device, b'\x0a') > first
+        assert ndicapy.ndiCommand(device, 'TSTOP:') == 'OKAY'
+    finally:
+        ndicapy.ndiClose(device)
+
+
+def test_ndicapi_finds_a_tracker_that_was_left_tracking_at_another_rate(port):
+    assert ndicapy.ndiProbe(port) == ndicapy.NDI_OKAY
+    device = ndicapy.ndiOpen(port)
+    for command in ('INIT:', 'COMM:50000', 'PINIT:0A', 'PENA:0AD', 'TSTART:'):
+        ndicapy.ndiCommand(device, command)
+    ndicapy.ndiClose(device)
+    assert ndicapy.ndiProbe(port) == ndicapy.NDI_OKAY
+
+
+def test_scikit_surgery_tracks_it(port):
+    tracker = NDITracker({'tracker type': 'aurora', 'serial port': port, 'use quaternions': True})
+    try:
+        tracker.start_tracking()
+        handles, _, frames, poses, quality = tracker.get_frame()
+        time.sleep(0.1)
+        later = tracker.get_frame()[2]
+    finally:
+        tracker.close()
+    assert handles == [0x0A]
+    assert later[0] > frames[0]
+    quaternion, position = expected()
+    np.testing.assert_allclose(poses[0][0][:4], quaternion, atol=1e-6)
+    np.testing.assert_allclose(poses[0][0][4:], position, atol=1e-3)
+    assert quality[0] == pytest.approx(0.3)
+
+
+def test_the_sensor_may_be_mounted_at_any_angle():
+    straight = InstrumentInField(lambda _: (0.0, 0.0))(0.0)
+    turned = InstrumentInField(lambda _: (0.0, 0.0), roll=1.2)(0.0)
+    assert angle_between(straight.orientation, turned.orientation) == pytest.approx(1.2)
+    assert angle_between(about_z(0.0), about_z(1.2)) == pytest.approx(1.2)

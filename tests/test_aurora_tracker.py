@@ -1,0 +1,267 @@
+"""The tracker's driver over a real pseudo-terminal, with what goes wrong there."""
+
+import math
+import random
+import time
+
+import ndicapy
+import numpy as np
+import pytest
+
+from endoscope_core.kinematics import bending_from_orientation
+from endoscope_devices.em_tracker import (
+    AuroraTracker,
+    RegistrationWindow,
+    TrackerSettings,
+    load_registration,
+    save_registration,
+)
+from endoscope_devices.em_tracker.aurora_emulator import AuroraEmulator, InstrumentInField
+from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
+from endoscope_devices.em_tracker.aurora_unit import SensorView
+from endoscope_devices.em_tracker.tx_reply import MalformedReplyError, parse_tx
+
+PATIENCE_S = 20.0
+LATENCY = 0.03
+
+
+class Instrument:
+    """Bends, hides and breaks as a test says."""
+
+    def __init__(self):
+        self.bending = (0.0, 0.0)
+        self.hidden = False
+        self.broken = False
+        self._bent = InstrumentInField(lambda _: self.bending, roll=0.4)
+
+    def __call__(self, seconds):
+        if self.hidden:
+            return None
+        return SensorView(broken=True) if self.broken else self._bent(seconds)
+
+
+@pytest.fixture
+def instrument():
+    return Instrument()
+
+
+@pytest.fixture
+def emulator(tmp_path, instrument):
+    with AuroraEmulator([instrument], tmp_path / 'ttyAurora', latency=LATENCY) as emulator:
+        yield emulator
+
+
+@pytest.fixture
+def tracker(emulator):
+    tracker = AuroraTracker(str(emulator.link), TrackerSettings(latency=LATENCY))
+    tracker.open()
+    yield tracker
+    tracker.close()
+
+
+def until(condition):
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end, 'it does not come to it'
+        time.sleep(0.005)
+
+
+def collect(tracker, readings):
+    taken = []
+    until(lambda: taken.extend(tracker.take()) or len(taken) >= readings)
+    return taken
+
+
+def figure(tracker, name):
+    return tracker.health()[1][name]
+
+
+def test_each_frame_comes_once_with_the_time_at_which_it_was_measured(tracker, emulator):
+    readings = collect(tracker, 40)
+    frames = [reading.frame for reading in readings]
+    assert frames == sorted(set(frames))
+    lost = frames[-1] - frames[0] + 1 - len(frames)
+    assert figure(tracker, 'lost frames') >= lost
+    zero = emulator.unit.frame_zero
+    late = [r.time_ns * 1e-9 - zero - r.frame / 40.0 for r in readings[10:]]
+    assert np.ptp(late) < 0.012
+    assert -0.01 < np.median(late) < 0.025
+
+
+def test_a_frame_that_was_not_asked_for_is_counted_as_lost(tracker, emulator):
+    collect(tracker, 5)
+    before = figure(tracker, 'lost frames')
+    stop = [False]
+
+    def slow(data):
+        delay, stop[0] = (0.0 if stop[0] else 0.15), True
+        return [(delay, data)]
+
+    emulator.tap = slow
+    until(lambda: figure(tracker, 'lost frames') >= before + 3)
+
+
+def test_a_sensor_out_of_volume_is_no_reading(tracker, instrument):
+    collect(tracker, 5)
+    instrument.hidden = True
+    until(lambda: figure(tracker, 'missing') > 0)
+    tracker.take()
+    before = figure(tracker, 'missing')
+    until(lambda: figure(tracker, 'missing') > before + 10)
+    assert tracker.take() == []
+    assert 'out of the measurement volume' in tracker.health()[0]
+    instrument.hidden = False
+    collect(tracker, 5)
+    assert tracker.health()[0] == ''
+
+
+def test_a_broken_sensor_is_said(tracker, instrument):
+    collect(tracker, 5)
+    instrument.broken = True
+    until(lambda: 'coil of the sensor is broken' in tracker.health()[0])
+
+
+def test_a_tracker_that_is_unplugged_is_said_and_found_again(tracker, emulator):
+    collect(tracker, 5)
+    emulator.unplug()
+    until(lambda: 'ttyAurora cannot be opened' in tracker.health()[0])
+    emulator.plug_in()
+    tracker.take()
+    collect(tracker, 5)
+    assert figure(tracker, 'connections') == 2
+    assert tracker.health()[0] == ''
+
+
+def test_a_tracker_left_at_another_rate_is_reset_by_a_break(emulator):
+    first = AuroraPort(str(emulator.link))
+    first.open()
+    assert emulator.unit.baud == 115200
+    first._device, device = None, first._device
+    first.close()
+    ndicapy.ndiClose(device)
+    tracker = AuroraTracker(str(emulator.link), TrackerSettings())
+    tracker.open()
+    try:
+        collect(tracker, 5)
+    finally:
+        tracker.close()
+    assert emulator.unit.baud == 9600
+
+
+def test_a_late_reply_keeps_its_frame_and_is_left_out(tracker, emulator):
+    collect(tracker, 20)
+    number = [0]
+
+    def late(data):
+        number[0] += 1
+        return [(0.2 if number[0] % 10 == 0 and data.startswith(b'010A') else 0.0, data)]
+
+    emulator.tap = late
+    until(lambda: figure(tracker, 'late') + figure(tracker, 'silences') >= 2)
+    readings = collect(tracker, 30)
+    zero = emulator.unit.frame_zero
+    for reading in readings:
+        assert abs(reading.time_ns * 1e-9 - zero - reading.frame / 40.0) < 0.03
+
+
+def test_a_tracker_whose_frames_come_late_for_good_is_timed_anew(tracker, emulator):
+    collect(tracker, 20)
+    begun = time.monotonic()
+    # The tracker stops for a third of a second and counts on from where it was.
+    emulator.unit._now = lambda: max(begun, time.monotonic() - 0.3)
+    tracker.take()
+    until(lambda: figure(tracker, 'late') > 20)
+    collect(tracker, 5)
+    assert tracker.health()[0] == ''
+
+
+def test_a_missing_sensor_is_named(tmp_path, instrument):
+    with AuroraEmulator([instrument], tmp_path / 'tty') as emulator:
+        tracker = AuroraTracker(str(emulator.link), TrackerSettings(tool=2))
+        tracker.open()
+        try:
+            until(lambda: '1 sensors, number 2 is asked for' in tracker.health()[0])
+        finally:
+            tracker.close()
+
+
+def test_registered_straight_it_gives_both_bending_angles(tracker, instrument, tmp_path):
+    window = RegistrationWindow()
+    for reading in collect(tracker, 45):
+        window.add(reading)
+    registration = window.register(time.monotonic_ns())
+    save_registration(tmp_path / 'straight.yaml', registration)
+    again = load_registration(tmp_path / 'straight.yaml')
+    assert again.position == registration.position
+    assert again.orientation == pytest.approx(registration.orientation)
+    for bending in ((0.9, 0.0), (0.0, -0.7), (-0.5, 0.6)):
+        instrument.bending = bending
+        time.sleep(LATENCY + 0.05)
+        tracker.take()
+        reading = collect(tracker, 3)[-1]
+        _, orientation = again.in_base(reading.position, reading.orientation, roll=0.4, length=0.02)
+        assert bending_from_orientation(orientation) == pytest.approx(bending, abs=5e-4)
+
+
+def spoilt(data, rng):
+    """What a bad line makes of a reply; one in two hundred may lose its end and is waited for."""
+    bad = bytearray(data)
+    last = len(bad) - (0 if rng.random() < 0.005 else 1)
+    kind, at = rng.randrange(6), rng.randrange(last)
+    if kind == 0:
+        for _ in range(rng.randint(1, 3)):
+            bad[rng.randrange(last)] ^= 1 << rng.randrange(8)
+    elif kind == 1:
+        bad[at : min(at + 2, last)] = rng.randbytes(min(at + 2, last) - at)
+    elif kind == 2:
+        del bad[at : min(at + rng.randint(1, 4), last)]
+    elif kind == 3:
+        bad[at:at] = rng.randbytes(rng.randint(1, 4))
+    elif kind == 4:
+        bad[at:at] = bad[at : min(at + rng.randint(1, 4), last)]
+    else:
+        # Two digits change places, as no flipped bit does.
+        other = rng.randrange(last)
+        bad[at], bad[other] = bad[other], bad[at]
+    return bytes(bad)
+
+
+def test_no_wrong_value_in_10000_spoilt_replies(tmp_path):
+    rng = random.Random(20261121)
+    asked = [0]
+
+    def source(_):
+        asked[0] += 1
+        angle = 0.001 * (asked[0] % 1500)
+        return SensorView(
+            (0.001 * (asked[0] % 97), 0.0, -0.2),
+            (math.sin(angle), 0.0, 0.0, math.cos(angle)),
+        )
+
+    sent = [b'']
+
+    def spoil(data):
+        sent[0] = data
+        return [(0.0, spoilt(data, rng) if data.startswith(b'010A') else data)]
+
+    refused = same = 0
+    with AuroraEmulator([source], tmp_path / 'tty', line_speed=False) as emulator:
+        port = AuroraPort(str(emulator.link))
+        port.open()
+        for command in ('PINIT:0A', 'PENA:0AD', 'TSTART:'):
+            port.ask(command)
+        # A fresh frame each time, so that an earlier reply cannot pass for this one.
+        ticks = iter(range(10**6))
+        emulator.unit._now = lambda: emulator.unit.frame_zero + next(ticks) / 40.0 + 0.01
+        emulator.tap = spoil
+        while refused + same < 10_000:
+            try:
+                tools = parse_tx(port.ask('TX:0001'))
+            except (TrackerReplyError, MalformedReplyError):
+                refused += 1
+                continue
+            same += 1
+            assert tools == parse_tx(sent[0][:-5].decode())
+        emulator.tap = lambda data: [(0.0, data)]
+        port.close()
+    assert refused > 9_000
