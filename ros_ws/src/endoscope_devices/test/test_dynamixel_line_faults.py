@@ -78,14 +78,14 @@ def rig(tmp_path):
 
 def test_flipped_bits_make_no_wrong_reading(rig):
     rig.emulator.do('damage_rate', 0.03)
-    rig.swing(3.0)
+    rig.swing(1.5)
     rig.emulator.do('damage_rate', 0.0)
-    assert sum(rig.bus.figures.failures.values()) > 10
-    assert len(rig.readings) > 300
+    assert sum(rig.bus.figures.failures.values()) > 5
+    assert len(rig.readings) > 150
     rig.check_readings()
 
 
-@pytest.mark.parametrize('late', [0.004, 0.009, 0.05])
+@pytest.mark.parametrize('late', [0.006, 0.05])
 def test_late_answers_are_not_taken_for_those_of_the_next_request(rig, late):
     rig.emulator.do('delay_s', late)
     rig.emulator.do('delayed', 12)

@@ -8,4 +8,5 @@ BENCHES: tuple[str, ...] = (
     'compensation',
     'papers',
     'motor_bus',
+    'motor_faults',
 )

@@ -213,10 +213,15 @@ class BusThread:
                 if self._bus is None:
                     self._connect()
                 self._serve()
-            except (OSError, DeviceError) as error:
-                self._fail(str(error))
-                self._disconnect()
-                self._stopping.wait(_RETRY_S)
+            except OSError as error:
+                self._start_over(f'{self.settings.port}: the adapter is gone ({error})')
+            except DeviceError as error:
+                self._start_over(str(error))
+
+    def _start_over(self, trouble: str) -> None:
+        self._fail(trouble)
+        self._disconnect()
+        self._stopping.wait(_RETRY_S)
 
     def _connect(self) -> None:
         port = BusPort(self.settings.port, self.settings.baud)
@@ -382,7 +387,7 @@ class BusThread:
                     f'instruction for {self.settings.watchdog * 1e3:.0f} ms'
                 )
             if health.error & ALERT and not health.hardware:
-                health.hardware = 'hardware error'
+                self._disarm()
                 self._next_health_s = 0.0
                 self._health_turn = self._ids.index(mount.device)
             elif not health.error & ALERT:
@@ -404,15 +409,20 @@ class BusThread:
                 status = bus.read_register(device, HARDWARE_ERROR_STATUS)
                 health.hardware = hardware_errors_in_words(status)
         except BusError as error:
+            if health.error & ALERT:
+                health.hardware = 'a hardware error that it does not name'
             self.figures.failures['no answer'] += 1
             self.figures.last_failure = str(error)
             return
         health.voltage = int.from_bytes(slow[:2], 'little') * PRESENT_INPUT_VOLTAGE.scale
         health.temperature = slow[2]
 
-    def _fail(self, trouble: str) -> None:
+    def _disarm(self) -> None:
         if self.armed:
             self.armed = False
             self._held = None if self.newest is None else self.newest.reading.position
+
+    def _fail(self, trouble: str) -> None:
+        self._disarm()
         self._trouble = trouble
         self._trouble_ns = time.monotonic_ns()

@@ -1,0 +1,255 @@
+"""The nodes that move the motors, on emulated servos behind a real terminal, in real time."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.task import Future
+from std_msgs.msg import String
+
+from endoscope_devices.dynamixel.control_table import COUNT
+from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
+from endoscope_nodes.compensator_node import CompensatorNode
+from endoscope_nodes.console_node import ConsoleNode
+from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
+from endoscope_nodes.motor_driver_node import MotorDriverNode
+from endoscope_nodes.names import (
+    MOTOR_MEASURED,
+    MOTORS,
+    OPERATING_STATE,
+    STATE_COMMAND,
+    WIRES,
+    WIRES_MEASURED,
+)
+from endoscope_nodes.qos import EVENT, RESULT, SENSOR_ASKED, SENSOR_OFFERED
+from endoscope_nodes.recorder_node import RecorderNode
+from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.supervisor_node import SupervisorNode
+
+PATIENCE_S = 60.0
+RATE_HZ = 250
+MOVING_RAD = 0.1
+TENSION_N = 5.0
+_LOOK_S = 0.005
+_NODES: dict[str, type] = {
+    'motor_driver': MotorDriverNode,
+    'supervisor': SupervisorNode,
+    'compensator': CompensatorNode,
+    'console': ConsoleNode,
+}
+
+
+class MotorRig:
+    """Console, compensator, motor driver, supervisor and recorder, with two emulated servos.
+
+    The console plays ``60 sin t``, which passes uncompensated.  The tension of the wires is the
+    rig's own to say.
+
+    Parameters
+    ----------
+    folder
+        For the terminal's link and the bag.
+    apart
+        Nodes that live in processes of their own, so that they can be killed.
+    """
+
+    def __init__(self, folder: Path, apart: Sequence[str] = ()) -> None:
+        self.bag = folder / 'bag'
+        self.emulator = EmulatorProcess(link=folder / 'servos')
+        self.tension = TENSION_N
+        self.weighing = True
+        self.states: list[tuple[float, str]] = []
+        self.shafts: list[tuple[float, JointSample]] = []
+        self.messages: list[tuple[float, str, str]] = []
+        domain = 100 + os.getpid() % 130
+        overrides = self._parameters(apart)
+        self.runtime = Runtime(
+            args=['--ros-args', '--log-level', 'fatal'],
+            context=Context(),
+            domain_id=domain,
+            overrides={k: v for k, v in overrides.items() if k not in apart},
+        )
+        self._processes = {name: _start(name, overrides[name], domain) for name in apart}
+        for name, factory in _NODES.items():
+            if name not in apart:
+                self.runtime.add(factory)
+        self.runtime.add(RecorderNode)
+        self.runtime.prepare()
+        self.probe = Node('probe', context=self.runtime.context, namespace='endoscope')
+        self.runtime.executor.add_node(self.probe)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._orders = self.probe.create_publisher(String, STATE_COMMAND, EVENT)
+        self._wires = JointPublisher(self.probe, WIRES_MEASURED, WIRES, ('effort',), SENSOR_OFFERED)
+        self.probe.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
+        self.probe.create_subscription(DiagnosticArray, '/diagnostics', self._on_health, EVENT)
+        JointSubscription(self.probe, MOTOR_MEASURED, MOTORS, self._on_shafts, SENSOR_ASKED)
+        self.probe.create_timer(0.01, self._weigh, clock=self._steady)
+
+    def _parameters(self, apart: Sequence[str]) -> dict[str, dict[str, Any]]:
+        driver = {'device': 'dynamixel', 'port': self.emulator.port, 'bus_rate': float(RATE_HZ)}
+        parameters: dict[str, dict[str, Any]] = {
+            'motor_driver': driver,
+            'supervisor': {},
+            'compensator': {'mode': 'none'},
+            'console': {'source': 'motion'},
+            'recorder': {'bag': str(self.bag)},
+        }
+        first = next(name for name in _NODES if name not in apart)
+        for name in (first, *apart):
+            parameters[name]['tick_rate'] = RATE_HZ
+        return parameters
+
+    def node(self, name: str) -> Node:
+        """Give a node of this process.
+
+        Raises
+        ------
+        StopIteration
+            There is none of that name.
+        """
+        return next(node for node in self.runtime.nodes if node.get_name() == name)
+
+    @property
+    def state(self) -> str:
+        """Operating state as last heard."""
+        return self.states[-1][1] if self.states else ''
+
+    def _on_state(self, message: String) -> None:
+        self.states.append((time.monotonic(), message.data))
+
+    def _on_health(self, message: DiagnosticArray) -> None:
+        now = time.monotonic()
+        self.messages += ((now, status.name, status.message) for status in message.status)
+
+    def _on_shafts(self, sample: JointSample) -> None:
+        self.shafts.append((time.monotonic(), sample))
+
+    def _weigh(self) -> None:
+        if self.weighing:
+            self._wires.publish(time.time_ns(), *(self.tension,) * len(WIRES))
+
+    def last_message(self, name: str) -> str:
+        """What a subcomponent said last in the diagnostics."""
+        return next((text for _, which, text in reversed(self.messages) if which == name), '')
+
+    def wait(self, condition: Callable[[], bool], patience: float = PATIENCE_S) -> bool:
+        """Serve the nodes until something has come true; whether it did in time.
+
+        Parameters
+        ----------
+        condition
+            Looked at every few milliseconds.
+        patience
+            How long to wait, in s.
+        """
+        future = Future()
+
+        def look() -> None:
+            if not future.done() and condition():
+                future.set_result(None)
+
+        timer = self.probe.create_timer(_LOOK_S, look, clock=self._steady)
+        done = self.runtime.spin_until(future, patience)
+        self.probe.destroy_timer(timer)
+        return done
+
+    def order(self, text: str) -> None:
+        """Give a state command."""
+        self._orders.publish(String(data=text))
+
+    def enable_and_move(self) -> None:
+        """Enable the slave and wait until the shafts swing.
+
+        Raises
+        ------
+        RuntimeError
+            They do not.
+        """
+        tried = [0.0]
+
+        def moving() -> bool:
+            now = time.monotonic()
+            if self.state != 'ENABLED' and now - tried[0] > 0.5:
+                tried[0] = now
+                self.order('enable')
+            swung = bool(self.shafts) and abs(self.shafts[-1][1].position[0]) > MOVING_RAD
+            return swung and self.state == 'ENABLED'
+
+        if not self.wait(moving):
+            raise RuntimeError(f'the shafts do not move in {self.state or "no state"}')
+
+    def block(self, seconds: float) -> None:
+        """Hold the executor of all nodes up once, as an endless callback does."""
+
+        def hang() -> None:
+            timer.cancel()
+            time.sleep(seconds)
+
+        timer = self.probe.create_timer(_LOOK_S, hang, clock=self._steady)
+
+    def kill(self, name: str) -> None:
+        """End the process of a node with SIGKILL."""
+        self._processes[name].send_signal(signal.SIGKILL)
+        self._processes[name].wait()
+
+    def stopped_after(self, since: float) -> float | None:
+        """Seconds from ``since`` until both shafts stood still for good; None if they move.
+
+        Parameters
+        ----------
+        since
+            Monotonic time in s.
+        """
+        last = since
+        for device in (1, 2):
+            trace = self.emulator.do('trace', device, since)
+            window = 20
+            for (then, before), (_, after) in zip(trace, trace[window:], strict=False):
+                if abs(after - before) > COUNT:
+                    last = max(last, then + window * 1e-3)
+            if last >= trace[-1][0] - 0.1:
+                return None
+        return last - since
+
+    def close(self) -> None:
+        """End all nodes and processes; the bag is complete then."""
+        try:
+            self.runtime.executor.remove_node(self.probe)
+            self.probe.destroy_node()
+            self.runtime.close()
+        finally:
+            for process in self._processes.values():
+                process.kill()
+                process.wait()
+            self.emulator.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _start(name: str, parameters: dict[str, Any], domain: int) -> subprocess.Popen:
+    code = f'import sys; from endoscope_nodes.{name}_node import main; sys.exit(main())'
+    arguments = [word for k, v in parameters.items() for word in ('-p', f'{k}:={v}')]
+    return subprocess.Popen(
+        [sys.executable, '-c', code, '--ros-args', *arguments],
+        env=os.environ | {'ROS_DOMAIN_ID': str(domain)},
+        stderr=subprocess.DEVNULL,
+    )
