@@ -1,9 +1,14 @@
 """Calibration through the whole graph, and what makes it abort."""
 
+import dataclasses
+import math
+
 import numpy as np
 import pytest
 from simulated_graph import SimulatedGraph
-from tubes import tube_of_size
+from tubes import NODES_WITH_A_PLANT, tube_of_size
+
+from endoscope_core.plant import EffectSpec, PlantDescription, save_plant
 
 
 @pytest.mark.parametrize(('size_deg', 'seed'), [(50, 901), (80, 902)])
@@ -18,18 +23,60 @@ def test_finds_the_class_of_a_known_tube(tmp_path, size_deg, seed):
         assert float(values['probability']) == max(probabilities)
         assert float(values['backlash_size_deg']) == pytest.approx(size_deg, abs=3.0)
         assert float(values['duration']) < 11.0
+        low, high = float(values['regressed_size_low']), float(values['regressed_size_high'])
+        assert low < float(values['regressed_size']) < high
+        assert math.degrees(float(values['regressed_size'])) == pytest.approx(size_deg, abs=3.0)
         state = graph.nodes['compensator']
         assert state._class_deg == size_deg
 
 
-def test_a_calibration_from_anywhere_gives_the_same_class():
-    with SimulatedGraph() as graph:
+def test_a_brief_calibration_takes_less_than_five_seconds_to_compensated_motion(tmp_path):
+    overrides = tube_of_size(tmp_path, 70, 903) | {'calibration': {'motion': 'brief'}}
+    with SimulatedGraph(overrides=overrides) as graph:
+        graph.enable()
+        answer = graph.call_calibration()
+        assert answer.success, answer.message
+        graph.advance(5.0)
+        status = graph.results[-1].status[0]
+        assert status.level == b'\x00', status.message
+        values = {v.key: v.value for v in status.values}
+        assert values['class_deg'] == '70'
+        assert values['backlash_size_from'] == 'classifier'
+        assert float(values['backlash_size_deg']) == pytest.approx(70.0, abs=3.0)
+        assert graph.nodes['compensator']._class_deg == 70
+
+
+def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_path):
+    plant = PlantDescription()
+    slack = EffectSpec('wire_slack', 'bend_y', {'length_m': 0.004})
+    save_plant(dataclasses.replace(plant, effects=(slack,)), tmp_path / 'slack.yaml')
+    overrides = {node: {'plant_file': str(tmp_path / 'slack.yaml')} for node in NODES_WITH_A_PLANT}
+    overrides['calibration'] = {'motion': 'brief'}
+    with SimulatedGraph(overrides=overrides) as graph:
+        graph.nodes['compensator']._class_deg = 60
+        graph.enable()
+        assert graph.call_calibration().success
+        graph.advance(5.0)
+        status = graph.results[-1].status[0]
+        assert status.level == b'\x02'
+        values = {v.key: v.value for v in status.values}
+        assert values['class_deg'] == 'none'
+        assert values['reason'].startswith('none of the classes: the tensions')
+        assert graph.nodes['compensator']._class_deg is None
+        assert graph.states[-1] == 'ENABLED'
+
+
+@pytest.mark.parametrize('motion', ['sinusoid', 'brief'])
+def test_a_calibration_from_anywhere_gives_the_same_class_and_size(motion):
+    with SimulatedGraph(overrides={'calibration': {'motion': motion}}) as graph:
         graph.enable()
         at_rest = graph.calibrate()
         graph.set('console', source='motion', motion='non_periodic')
         graph.advance(4.3)
         moved = graph.calibrate()
         assert moved['class_deg'] == at_rest['class_deg']
+        sizes = [math.degrees(float(values['regressed_size'])) for values in (at_rest, moved)]
+        assert sizes[0] == pytest.approx(sizes[1], abs=0.5)
 
 
 def test_refused_unless_enabled():

@@ -10,6 +10,7 @@ from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bringup.cli import main
 from endoscope_core.classifier.inference import TensionClassifier
+from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.dataset import load_dataset
 from endoscope_core.hysteresis import BoucWenParameters, bouc_wen_forward
 from endoscope_core.identification import Servo, load_class_parameters
@@ -64,9 +65,21 @@ def test_a_data_set_does_not_replace_what_is_there(data, capsys):
     assert 'is not empty' in capsys.readouterr().err
 
 
-def test_training_leaves_weights_that_classify(data, tmp_path):
+def test_training_leaves_weights_that_tell_sizes(data, tmp_path):
     out = tmp_path / 'weights.pt'
     assert main(['train', '--data', str(data), '--out', str(out), '--folds', '2']) == 0
+    described = json.loads(out.with_suffix('.json').read_text())
+    assert '--motion sinusoid' in described['command']
+    assert '--model size' in described['command']
+    dataset = load_dataset(data)
+    result = load_classifier(out).classify(dataset.tension[0])
+    assert result.size == pytest.approx(dataset.backlash_size[0], abs=np.deg2rad(5.0))
+
+
+def test_training_the_papers_network_leaves_weights_that_classify(data, tmp_path):
+    out = tmp_path / 'weights.pt'
+    options = ['--model', 'cnn', '--folds', '2']
+    assert main(['train', '--data', str(data), '--out', str(out), *options]) == 0
     described = json.loads(out.with_suffix('.json').read_text())
     assert described['command'].startswith('endoscope dataset --seed 5 --per-class 2')
     assert np.sum(described['held_out']['confusion']) == 14
@@ -135,6 +148,7 @@ def test_a_bag_that_does_not_say_what_the_motors_did_is_refused(calibration, tmp
         ['identify', 'nowhere'],
         ['train', '--data', 'nowhere', '--out', 'x.pt'],
         ['dataset', '--out', 'x', '--per-class', '0'],
+        ['dataset', '--out', 'x', '--motion', 'breif'],
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(command, tmp_path, monkeypatch, capsys):

@@ -17,7 +17,7 @@ from endoscope_core.dataset.calibration_dataset import ARRAYS_FILE, MANIFEST_FIL
 from endoscope_core.dataset.rig_variation import backlash_sizes
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.plant import JointParameters
-from endoscope_core.signals import calibration_sinusoid
+from endoscope_core.signals import UnknownCalibrationError, calibration_sinusoid
 
 
 @pytest.fixture(scope='module')
@@ -73,6 +73,26 @@ def test_tensions_begin_at_pretension_and_carry_sensor_noise(small):
     assert np.all(np.std(np.diff(start, axis=1), axis=1) > 0.01)
 
 
+def test_tubes_differ_in_how_their_curvature_is_spread(small):
+    evenness = [entry['curvature_evenness'] for entry in small.manifest['recordings']]
+    assert len(set(evenness)) == 7
+    assert 0.0 <= min(evenness) < max(evenness) <= 1.0
+
+
+def test_spread_curvature_changes_the_tensions_of_a_tube_of_the_same_size():
+    rig = random_rig(np.random.default_rng(4))
+    ends, along = (configuration_of_size(rig, 1.2, evenness) for evenness in (0.0, 1.0))
+    first, second = (record_calibration(tube.plant, 1).tension for tube in (ends, along))
+    assert np.sqrt(np.mean((first - second) ** 2)) > 0.02
+
+
+def test_a_brief_calibration_is_of_the_same_tubes(small):
+    brief = make_dataset(seed=3, per_class=1, motion='brief')
+    assert brief.tension.shape == (7, 3140, 4)
+    np.testing.assert_array_equal(brief.joint_size, small.joint_size)
+    assert brief.motion == 'brief'
+
+
 def test_another_seed_of_noise_changes_only_noise():
     plant = random_rig(np.random.default_rng(1))
     first, second = record_calibration(plant, 1), record_calibration(plant, 2)
@@ -107,3 +127,5 @@ def test_what_is_no_data_set_is_refused(tmp_path):
         load_dataset(tmp_path)
     with pytest.raises(DatasetError, match='per_class'):
         make_dataset(seed=1, per_class=0)
+    with pytest.raises(UnknownCalibrationError, match='nearest is'):
+        make_dataset(seed=1, per_class=1, motion='breif')

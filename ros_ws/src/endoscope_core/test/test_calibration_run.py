@@ -1,7 +1,12 @@
 import numpy as np
 
 from endoscope_core.calibration import BendingRecord, CalibrationRun, CalibrationStep
-from endoscope_core.signals import CALIBRATION_SAMPLES, calibration_sinusoid
+from endoscope_core.signals import (
+    BRIEF,
+    CALIBRATION_SAMPLES,
+    calibration_motion,
+    calibration_sinusoid,
+)
 
 MS = 1_000_000
 
@@ -51,6 +56,18 @@ def test_missed_ticks_do_not_stretch_the_motion():
     run = CalibrationRun((0.0, 0.0), 4, MS, 1.0, 0.0)
     table, _ = commands_of(run, periods=3)
     assert abs(table[-1, 0] - table[0, 0] - 10.2) < 0.01
+
+
+def test_a_brief_calibration_from_rest_ends_within_five_seconds():
+    motion = calibration_motion(BRIEF)
+    run = CalibrationRun((0.0, 0.0), 4, MS, return_speed=1.0, rest=0.5, motion=motion)
+    table, _ = commands_of(run)
+    assert table[-1, 0] - table[0, 0] < 5.0
+    np.testing.assert_allclose(table[-1, 1:], 0.0, atol=1e-6)
+    for k in range(motion.samples):
+        run.add_tension(run.record.start_ns + k * MS, (1.0, 2.0, 3.0, 4.0))
+    assert run.record.complete
+    assert run.record.resampled().shape == (motion.samples, 4)
 
 
 def test_homing_ends_at_zero():

@@ -6,6 +6,7 @@ from endoscope_core.signals import (
     CALIBRATION_RECORD_DURATION,
     CALIBRATION_SAMPLES,
     MOTIONS,
+    calibration_motion,
     calibration_sinusoid,
     hold,
     motion_by_name,
@@ -57,6 +58,21 @@ def test_calibration_is_the_papers_sinusoid_once_begun():
     assert signal.steady[1] - signal.steady[0] == pytest.approx(2.0 * np.pi)
     assert round(CALIBRATION_RATE * CALIBRATION_RECORD_DURATION) == CALIBRATION_SAMPLES
     assert signal.duration < 11.0
+
+
+def test_brief_calibration_holds_a_whole_loop_and_comes_back():
+    motion = calibration_motion('brief')
+    time = np.linspace(0.0, motion.signal.duration, 4000)
+    angle, velocity = motion.signal(time)
+    assert np.max(np.abs(angle)) <= np.deg2rad(90.01)
+    assert np.max(np.abs(velocity)) < 7.0
+    begin, end = motion.signal.steady
+    np.testing.assert_allclose(np.rad2deg(motion.signal([begin, end])[0]), 90.0, atol=0.01)
+    assert np.rad2deg(np.min(motion.signal(np.linspace(begin, end, 500))[0])) < -89.9
+    assert motion.samples == round(1000 * end)
+    assert motion.signal.duration < 4.0
+    assert abs(angle[-1]) < 1e-6
+    assert abs(velocity[-1]) < 1e-6
 
 
 def test_papers_signals_have_their_form_while_steady():

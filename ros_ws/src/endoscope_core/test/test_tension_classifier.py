@@ -5,16 +5,23 @@ import numpy as np
 import pytest
 import torch
 
+from endoscope_core.classifier.grouped_folds import CrossValidation
 from endoscope_core.classifier.inference import ClassifierError, TensionClassifier
+from endoscope_core.classifier.recurrence_plot_cnn import (
+    PIXELS,
+    RecurrencePlotCnn,
+    recurrence_plots,
+)
 from endoscope_core.classifier.tension_cnn import TensionCnn
 from endoscope_core.classifier.training import (
+    NETWORKS,
     TrainingSettings,
     cross_validate,
     predict,
     train_network,
     use_one_thread,
 )
-from endoscope_core.classifier.weights_file import WeightsFileError, save_classifier
+from endoscope_core.classifier.weights_file import WeightsFileError, save_network
 from endoscope_core.dataset import (
     CLASSES_DEG,
     CalibrationDataset,
@@ -23,7 +30,7 @@ from endoscope_core.dataset import (
     record_calibration,
 )
 
-SHORT = TrainingSettings(batch_size=14, epochs=30, learning_rate=3e-3)
+SHORT = TrainingSettings(batch_size=14, epochs=60, learning_rate=3e-3, decay=0.97)
 
 
 @pytest.fixture(scope='module', autouse=True)
@@ -51,9 +58,9 @@ def easy():
         desired_velocity=np.cos(time),
         actual_angle=np.zeros((classes.size, 9000, 2), np.float32),
         class_deg=classes,
-        backlash_size=np.deg2rad(classes),
+        joint_size=np.deg2rad(np.stack([classes, classes], axis=1)),
         configuration=np.arange(classes.size) // 2,
-        manifest={'seed': 0, 'per_class': 4},
+        manifest={'seed': 0, 'per_class': 4, 'motion': 'sinusoid'},
     )
 
 
@@ -73,6 +80,27 @@ def test_table_2_reduces_a_recording_to_one_feature_vector():
     convolutions = [m for m in network.modules() if isinstance(m, torch.nn.Conv1d)]
     assert [(c.kernel_size, c.stride) for c in convolutions] == [((3,), (3,))] * 8
     assert network.features(torch.zeros(1, 4, 9000)).shape == (1, 64, 1)
+    names = [type(m).__name__ for m in network.features]
+    assert names == ['Conv1d', 'BatchNorm1d', 'ReLU'] * 8
+    assert isinstance(network.dense, torch.nn.Linear)
+
+
+@pytest.mark.parametrize('kind', ['mlp', 'recurrence_plot_cnn'])
+def test_the_networks_compared_with_learn_too(easy, kind):
+    settings = TrainingSettings(batch_size=14, epochs=50, learning_rate=1e-3, decay=0.98)
+    network = train_network(easy.tension, easy.class_deg, 1, settings, kind)
+    likeliest = np.array(CLASSES_DEG)[np.argmax(predict(network, easy.tension), axis=1)]
+    assert np.mean(np.abs(likeliest - easy.class_deg)) < 6.0
+    assert type(network) is NETWORKS[kind]
+
+
+def test_a_recurrence_plot_is_the_distance_of_every_two_states():
+    tension = torch.from_numpy(np.linspace(2.0, 8.0, 9000)).float().expand(1, 4, 9000)
+    plots = recurrence_plots(tension)
+    states = tension[0, 0].reshape(PIXELS, -1).mean(dim=1)
+    assert plots.shape == (1, 4, PIXELS, PIXELS)
+    assert plots[0, 2, 7, 30] == pytest.approx(float(states[30] - states[7]), abs=1e-5)
+    assert torch.equal(plots, plots.transpose(2, 3))
 
 
 @pytest.mark.parametrize('tension', [np.zeros((8999, 4)), np.zeros((9000, 2)), np.zeros((4, 9000))])
@@ -102,7 +130,7 @@ def test_folds_never_split_a_configuration(easy, monkeypatch):
 
     trained_with = []
 
-    def remember(tension, class_deg, seed, settings=None):
+    def remember(tension, class_deg, seed, settings, kind):
         trained_with.append(tension)
         return TensionCnn(len(CLASSES_DEG)).eval()
 
@@ -119,7 +147,7 @@ def test_saved_weights_give_the_same_answer(easy, tmp_path):
     network = train_network(easy.tension, easy.class_deg, 1, dataclasses.replace(SHORT, epochs=2))
     validation = cross_validate(easy, 1, 2, settings=dataclasses.replace(SHORT, epochs=1))
     path = tmp_path / 'weights.pt'
-    save_classifier(path, network, easy, validation, 'endoscope train', 1)
+    save_network(path, network, easy, validation, 'endoscope train', 1)
     described = json.loads(path.with_suffix('.json').read_text())
     assert described['dataset']['manifest_sha256'] == easy.manifest_hash
     assert described['held_out']['mean_accuracy'] == validation.mean_accuracy
@@ -132,7 +160,7 @@ def test_missing_or_foreign_weights_are_one_clear_error(tmp_path):
     with pytest.raises(ClassifierError, match='endoscope train'):
         TensionClassifier.load(tmp_path / 'none.pt')
     torch.save({'dense.weight': torch.zeros(1)}, tmp_path / 'odd.pt')
-    (tmp_path / 'odd.json').write_text('{"classes_deg": [40], "channels": [8]}')
+    (tmp_path / 'odd.json').write_text('{"schema": 2, "classes_deg": [40], "channels": [8]}')
     with pytest.raises(ClassifierError, match='no classifier weights'):
         TensionClassifier.load(tmp_path / 'odd.pt')
     (tmp_path / 'odd.pt').write_bytes(b'not weights')
@@ -141,5 +169,9 @@ def test_missing_or_foreign_weights_are_one_clear_error(tmp_path):
 
 
 def test_weights_do_not_go_where_their_description_goes(easy, tmp_path):
+    nothing = CrossValidation((1.0,), np.eye(7, dtype=np.int64))
+    with pytest.raises(WeightsFileError, match='RecurrencePlotCnn are not kept'):
+        save_network(tmp_path / 'x.pt', RecurrencePlotCnn(7), easy, nothing, '', 0)
+    assert list(tmp_path.iterdir()) == []
     with pytest.raises(WeightsFileError, match=r'suffix \.pt'):
-        save_classifier(tmp_path / 'x.json', TensionCnn(7), easy, None, '', 0)
+        save_network(tmp_path / 'x.json', TensionCnn(7), easy, nothing, '', 0)

@@ -1,5 +1,6 @@
 """Finds the tube's hysteresis class: moves the slave as calibration asks, judges its wires."""
 
+import contextlib
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -15,14 +16,20 @@ from endoscope_core.calibration import (
     CalibrationStep,
     TensionGapError,
 )
-from endoscope_core.classifier.inference import (
+from endoscope_core.classifier.classification import (
     ClassificationResult,
+    Classifier,
     ClassifierError,
-    TensionClassifier,
+    UnseenTensionError,
 )
+from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.safety import OperatingState, StateCommand, TensionGuard
-from endoscope_core.signals import CALIBRATION_SAMPLES
-from endoscope_nodes.calibration_result import aborted_result, successful_result
+from endoscope_core.signals import CALIBRATION_MOTIONS, SINUSOID, calibration_motion
+from endoscope_nodes.calibration_result import (
+    aborted_result,
+    refused_result,
+    successful_result,
+)
 from endoscope_nodes.diagnostics import ERROR, OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import (
@@ -60,11 +67,16 @@ class CalibrationParameters:
         'classifier weights as `endoscope train` writes them; empty for those that come with '
         'the project',
     )
+    motion: str = parameter(
+        SINUSOID,
+        "motion by which the tube is judged: the first paper's sinusoid of 9 s, or one of 3 s",
+        choices=CALIBRATION_MOTIONS,
+    )
     gear: float = parameter(0.5, 'shaft angle for one radian at the joint', low=0.01, high=100.0)
     return_speed: float = parameter(
         1.0, 'largest speed on the way to zero', unit='rad/s', low=0.01, high=10.0
     )
-    rest: float = parameter(0.5, 'rest at zero before the sinusoid', unit='s', low=0.0, high=60.0)
+    rest: float = parameter(0.5, 'rest at zero before the motion', unit='s', low=0.0, high=60.0)
     tension_ceiling: float = parameter(
         55.0, 'tension of a wire at which calibration is aborted', unit='N', low=0.1, high=500.0
     )
@@ -82,7 +94,8 @@ class CalibrationNode(EndoscopeNode):
 
     The service answers at once, with the reason if it refuses; the result follows on its topic.
     Whatever makes the recording worthless or motion doubtful aborts: the commands stop, the slave
-    holds or goes back to the console by a ramp, and the result says why.
+    holds or goes back to the console by a ramp, and the result says why. Tensions unlike any known
+    are refused: the result names no class, and nothing is compensated.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -90,6 +103,7 @@ class CalibrationNode(EndoscopeNode):
         p = self.parameters(CalibrationParameters)
         self._settings = p
         self._timeout_ns = round(p.stream_timeout * 1e9)
+        self._motion = calibration_motion(p.motion)
         self._classifier, self._no_classifier = self._load_classifier(p.weights)
         self._thread = None if self.ticker.simulated else ThreadPoolExecutor(1)
         self._run: CalibrationRun | None = None
@@ -99,6 +113,7 @@ class CalibrationNode(EndoscopeNode):
         self._judging: Future[ClassificationResult] | None = None
         self._runs = 0
         self._aborts = 0
+        self._refused = 0
         self._last = ''
         self._guard = TensionGuard(WIRES, p.tension_ceiling)
         self._commands = JointPublisher(
@@ -123,17 +138,16 @@ class CalibrationNode(EndoscopeNode):
         """Whether the slave is being moved for a calibration or home."""
         return self._run is not None
 
-    @staticmethod
-    def _load_classifier(weights: str) -> tuple[TensionClassifier | None, str]:
+    def _load_classifier(self, weights: str) -> tuple[Classifier | None, str]:
         torch.set_num_threads(1)
         try:
-            classifier = (
-                TensionClassifier.load(weights) if weights else TensionClassifier.load_default()
-            )
+            classifier = load_classifier(weights or None, self._motion.name)
         except ClassifierError as error:
             return None, str(error)
-        # The first inference sets up the network's memory, which takes longer than a tick.
-        classifier.classify(np.zeros((CALIBRATION_SAMPLES, len(WIRES))))
+        # The first judgement sets up memory, which takes longer than a tick. What it says of no
+        # tension at all does not matter.
+        with contextlib.suppress(UnseenTensionError):
+            classifier.classify(np.zeros((self._motion.samples, len(WIRES))))
         return classifier, ''
 
     def _on_run(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -167,6 +181,7 @@ class CalibrationNode(EndoscopeNode):
             self._settings.return_speed,
             self._settings.rest,
             homing,
+            self._motion,
         )
         self._homing = homing
         self._began_ns = self.ticker.now_ns()
@@ -225,9 +240,12 @@ class CalibrationNode(EndoscopeNode):
             return
         if self._thread is not None:
             self._judging = self._thread.submit(self._classifier.classify, tension)
-        else:
-            self._judging = Future()
+            return
+        self._judging = Future()
+        try:
             self._judging.set_result(self._classifier.classify(tension))
+        except ClassifierError as error:
+            self._judging.set_exception(error)
 
     def _finish(self, run: CalibrationRun) -> None:
         if self._homing:
@@ -240,9 +258,17 @@ class CalibrationNode(EndoscopeNode):
             return
         if not self._judging.done():
             return
+        trouble = self._judging.exception()
+        if isinstance(trouble, UnseenTensionError):
+            self._refuse(str(trouble))
+            return
+        if isinstance(trouble, ClassifierError):
+            self._abort(str(trouble))
+            return
         verdict = self._judging.result()
         backlash = None
-        if run.record is not None:
+        # Backlash size is that under the sinusoid: faster motion has a wider loop.
+        if run.record is not None and self._motion.name == SINUSOID:
             backlash = self._bending.backlash_size(run.record.start_ns)
         now = self.ticker.now_ns()
         self._results.publish(
@@ -252,6 +278,14 @@ class CalibrationNode(EndoscopeNode):
         self._runs += 1
         self._last = f'class {verdict.class_deg} deg'
         self.get_logger().info(f'{self._last}, probability {verdict.probability:.3f}')
+
+    def _refuse(self, reason: str) -> None:
+        self._run = None
+        self._refused += 1
+        self._last = reason
+        self.get_logger().error(f'{reason}; the motion is not compensated')
+        now = self.ticker.now_ns()
+        self._results.publish(refused_result(now, reason, (now - self._began_ns) * 1e-9))
 
     def _abort(self, reason: str) -> None:
         run, self._run = self._run, None
@@ -270,6 +304,7 @@ class CalibrationNode(EndoscopeNode):
         values: dict[str, object] = {
             'completed': self._runs,
             'aborted': self._aborts,
+            'refused': self._refused,
             'last': self._last,
             'peak tension [N]': self._guard.peak,
         }

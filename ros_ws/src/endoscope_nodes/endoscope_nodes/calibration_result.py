@@ -10,9 +10,10 @@ from endoscope_nodes.diagnostics import ERROR, OK, status
 
 if TYPE_CHECKING:
     # Those who only read results need no torch.
-    from endoscope_core.classifier.inference import ClassificationResult
+    from endoscope_core.classifier.classification import ClassificationResult
 
 NAME = 'calibration: hysteresis class'
+NONE_OF_THEM = 'none'
 
 
 def successful_result(
@@ -38,8 +39,14 @@ def successful_result(
         'backlash_size': size,
         'backlash_size_deg': math.degrees(size),
         'backlash_size_from': 'classifier' if backlash is None else 'tracker',
-        'duration': duration,
     }
+    if verdict.size is not None and verdict.interval is not None:
+        values |= {
+            'regressed_size': verdict.size,
+            'regressed_size_low': verdict.interval[0],
+            'regressed_size_high': verdict.interval[1],
+        }
+    values['duration'] = duration
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
     return _array(stamp_ns, OK, message, values)
 
@@ -51,6 +58,26 @@ def aborted_result(stamp_ns: int, reason: str, step: str, duration: float) -> Di
         ERROR,
         f'aborted: {reason}',
         {'reason': reason, 'step': step, 'duration': duration},
+    )
+
+
+def refused_result(stamp_ns: int, reason: str, duration: float) -> DiagnosticArray:
+    """Say that the tube is of no class that is known, and why; ``duration`` in s."""
+    values = {
+        'class_deg': NONE_OF_THEM,
+        'reason': reason,
+        'step': 'judging',
+        'duration': duration,
+    }
+    return _array(stamp_ns, ERROR, reason, values)
+
+
+def is_of_no_class(message: DiagnosticArray) -> bool:
+    """Whether a result says that the tube is of no known class: what was known of it is void."""
+    return any(
+        item.name == NAME
+        and any(v.key == 'class_deg' and v.value == NONE_OF_THEM for v in item.values)
+        for item in message.status
     )
 
 

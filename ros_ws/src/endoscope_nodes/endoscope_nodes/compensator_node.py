@@ -18,7 +18,7 @@ from endoscope_core.identification.class_parameters import (
     parameters_for_class,
 )
 from endoscope_core.safety import CommandGate, CommandLimits, Refusal
-from endoscope_nodes.calibration_result import class_of
+from endoscope_nodes.calibration_result import class_of, is_of_no_class
 from endoscope_nodes.clutch_watch import ClutchWatch
 from endoscope_nodes.command_report import CommandReport
 from endoscope_nodes.compensator_parameters import CompensatorParameters
@@ -125,7 +125,7 @@ class CompensatorNode(EndoscopeNode):
 
     def _on_result(self, message: DiagnosticArray) -> None:
         found = class_of(message)
-        if found is not None:
+        if found is not None or is_of_no_class(message):
             self._class_deg = found
             self._select_law()
 

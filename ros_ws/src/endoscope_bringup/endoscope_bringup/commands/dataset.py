@@ -19,6 +19,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--per-class', type=int, default=30, metavar='N', help='recordings of each class (30)'
     )
+    parser.add_argument(
+        '--motion',
+        default='sinusoid',
+        help="calibration motion: the first paper's sinusoid of 9 s, or brief (sinusoid)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -27,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.dataset import make_dataset, save_dataset
 
     require_free_directory(args.out)
-    dataset = make_dataset(args.seed, args.per_class, _print_progress)
+    dataset = make_dataset(args.seed, args.per_class, _print_progress, args.motion)
     save_dataset(dataset, args.out)
     print(
         f'{args.out}: {len(dataset.class_deg)} recordings, manifest SHA-256 {dataset.manifest_hash}'

@@ -1,7 +1,11 @@
-"""`endoscope train`: the tension classifier of the first paper from a data set."""
+"""`endoscope train`: a classifier of wire tensions from a data set."""
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from endoscope_core.dataset import CalibrationDataset
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -9,7 +13,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'train',
         help='train the tension classifier',
-        description='Cross-validates the 1D-CNN with held-out tube configurations, trains it on '
+        description='Cross-validates a classifier with held-out tube configurations, trains it on '
         'all of DIR, and writes FILE and a JSON file of the same name that says how.',
     )
     parser.add_argument(
@@ -22,6 +26,13 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         metavar='FILE',
         help='weights to write, by custom with suffix .pt',
     )
+    parser.add_argument(
+        '--model',
+        choices=('size', 'cnn'),
+        default='size',
+        help='size: regresses the backlash size with an interval, and refuses what it does not '
+        "know; cnn: the first paper's 1D-CNN, for the sinusoid only (size)",
+    )
     parser.add_argument('--seed', type=int, default=0, help='of weights, batches and folds (0)')
     parser.add_argument(
         '--folds', type=int, default=5, metavar='K', help='of the cross-validation (5)'
@@ -30,24 +41,55 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Validate, train and write; return 0."""
-    from endoscope_core.classifier.training import cross_validate, train_network, use_one_thread
-    from endoscope_core.classifier.weights_file import save_classifier, weights_path
+    from endoscope_core.classifier.training import use_one_thread
+    from endoscope_core.classifier.weights_file import weights_path
     from endoscope_core.dataset import load_dataset
 
     out = weights_path(args.out)
     dataset = load_dataset(args.data)
     use_one_thread()
-    validation = cross_validate(dataset, args.seed, args.folds, _print_line)
-    network = train_network(dataset.tension, dataset.class_deg, args.seed)
     made = dataset.manifest
     command = (
         f'endoscope dataset --seed {made["seed"]} --per-class {made["per_class"]} '
-        f'--out DATA && endoscope train --seed {args.seed} --folds {args.folds} '
-        f'--data DATA --out {out.name}'
+        f'--motion {dataset.motion} --out DATA && endoscope train --model {args.model} '
+        f'--seed {args.seed} --folds {args.folds} --data DATA --out {out.name}'
     )
-    save_classifier(out, network, dataset, validation, command, args.seed)
-    print(f'{out}: {100.0 * validation.mean_accuracy:.2f} % right on held-out tube configurations')
+    if args.model == 'cnn':
+        line = _train_cnn(args, dataset, out, command)
+    else:
+        line = _train_size(args, dataset, out, command)
+    print(f'{out}: {line} on held-out tube configurations')
     return 0
+
+
+def _train_cnn(
+    args: argparse.Namespace, dataset: 'CalibrationDataset', out: Path, command: str
+) -> str:
+    from endoscope_core.classifier.training import cross_validate, train_network
+    from endoscope_core.classifier.weights_file import save_network
+
+    validation = cross_validate(dataset, args.seed, args.folds, _print_line)
+    network = train_network(dataset.tension, dataset.class_deg, args.seed)
+    save_network(out, network, dataset, validation, command, args.seed)
+    return f'{100.0 * validation.mean_accuracy:.2f} % right'
+
+
+def _train_size(
+    args: argparse.Namespace, dataset: 'CalibrationDataset', out: Path, command: str
+) -> str:
+    import math
+
+    from endoscope_core.classifier.size_training import validated_size_classifier
+    from endoscope_core.classifier.weights_file import save_size_classifier
+
+    classifier, validation = validated_size_classifier(dataset, args.seed, args.folds, _print_line)
+    save_size_classifier(out, classifier, dataset, validation, command, args.seed)
+    coverage = 100.0 * sum(validation.coverage) / len(validation.coverage)
+    rmse = math.sqrt(sum(x * x for x in validation.rmse) / len(validation.rmse))
+    return (
+        f'{100.0 * validation.classes.mean_accuracy:.2f} % right, {math.degrees(rmse):.2f} deg rms '
+        f'with {coverage:.0f} % of sizes in their interval,'
+    )
 
 
 def _print_line(line: str) -> None:

@@ -8,12 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.calibration.tension_record import TensionRecord
-from endoscope_core.signals import (
-    CALIBRATION_SAMPLES,
-    both_joints,
-    calibration_sinusoid,
-    move,
-)
+from endoscope_core.signals import CalibrationMotion, both_joints, calibration_motion, move
 
 Array = NDArray[np.float64]
 
@@ -42,7 +37,7 @@ class CalibrationRun:
     """Commands a calibration tick by tick and collects the tensions that belong to it.
 
     The motors return to zero first, so that every calibration starts from pretension (first paper,
-    section 2.2), and rest there a moment; then all joints follow the calibration sinusoid.
+    section 2.2), and rest there a moment; then all joints follow the calibration motion.
 
     Parameters
     ----------
@@ -55,9 +50,11 @@ class CalibrationRun:
     return_speed
         Largest speed on the way to zero in rad/s.
     rest
-        Rest at zero before the sinusoid in s.
+        Rest at zero before the motion in s.
     homing
         Whether to end after the return to zero.
+    motion
+        The calibration motion; the first paper's sinusoid if not given.
     """
 
     def __init__(
@@ -68,7 +65,10 @@ class CalibrationRun:
         return_speed: float,
         rest: float,
         homing: bool = False,
+        motion: CalibrationMotion | None = None,
     ) -> None:
+        motion = motion or calibration_motion()
+        self._samples = motion.samples
         self._tick_ns = tick_ns
         self._wires = wires
         tick = tick_ns * 1e-9
@@ -80,9 +80,8 @@ class CalibrationRun:
         still = np.zeros((round(rest / tick), 2 * len(start)))
         parts = [back, still]
         if not homing:
-            motion = both_joints(calibration_sinusoid())
-            time = np.arange(round(motion.duration / tick) + 1) * tick
-            parts.append(np.hstack(motion.sample(time)))
+            time = np.arange(round(motion.signal.duration / tick) + 1) * tick
+            parts.append(np.hstack(both_joints(motion.signal).sample(time)))
         self._rows = np.vstack(parts)
         self._joints = len(start)
         self._returned = len(back)
@@ -112,9 +111,7 @@ class CalibrationRun:
             return None
         if self._next >= self._moving_from and self.record is None:
             into = (self._next - self._moving_from) * self._tick_ns
-            self.record = TensionRecord(
-                self._wires, stamp_ns - into, self._tick_ns, CALIBRATION_SAMPLES
-            )
+            self.record = TensionRecord(self._wires, stamp_ns - into, self._tick_ns, self._samples)
         row = self._rows[self._next].tolist()
         self._next += periods
         return CalibrationCommand(tuple(row[: self._joints]), tuple(row[self._joints :]))

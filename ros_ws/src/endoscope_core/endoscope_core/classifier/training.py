@@ -1,4 +1,4 @@
-"""Training of the tension classifier as the first paper does it (section 3.2)."""
+"""Training of the networks of Table 3 as the first paper does it (section 3.2)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,13 +6,23 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from sklearn.model_selection import StratifiedGroupKFold
 from torch import Tensor, nn
 
+from endoscope_core.classifier.grouped_folds import CrossValidation, grouped_folds
+from endoscope_core.classifier.recurrence_plot_cnn import RecurrencePlotCnn
 from endoscope_core.classifier.tension_cnn import TensionCnn
+from endoscope_core.classifier.tension_mlp import TensionMlp
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 
 Progress = Callable[[str], None]
+Network = TensionCnn | TensionMlp | RecurrencePlotCnn
+
+NETWORKS: dict[str, Callable[[int], Network]] = {
+    'mlp': TensionMlp,
+    'recurrence_plot_cnn': RecurrencePlotCnn,
+    'cnn': TensionCnn,
+}
+"""Networks for a number of classes, in the order of Table 3 of the first paper."""
 
 
 @dataclass(frozen=True)
@@ -25,27 +35,6 @@ class TrainingSettings:
     decay: float = 0.96
 
 
-@dataclass(frozen=True)
-class CrossValidation:
-    """Accuracy on recordings whose tube configuration was not trained with.
-
-    Parameters
-    ----------
-    accuracy : tuple of float
-        Share of right classes of each fold.
-    confusion : ndarray of int, shape (7, 7)
-        Rows are true classes, columns named ones, over all folds.
-    """
-
-    accuracy: tuple[float, ...]
-    confusion: NDArray[np.int64]
-
-    @property
-    def mean_accuracy(self) -> float:
-        """Share of right classes over all recordings."""
-        return float(np.trace(self.confusion) / np.sum(self.confusion))
-
-
 def as_input(tension: NDArray[np.float32]) -> Tensor:
     """Tensor (R, 4, N) of tensions (R, N, 4)."""
     return torch.from_numpy(np.ascontiguousarray(np.swapaxes(tension, 1, 2), dtype=np.float32))
@@ -56,7 +45,8 @@ def train_network(
     class_deg: NDArray[np.int64],
     seed: int,
     settings: TrainingSettings | None = None,
-) -> TensionCnn:
+    kind: str = 'cnn',
+) -> Network:
     """Train a network; the same seed on the same machine gives the same weights.
 
     Parameters
@@ -67,10 +57,12 @@ def train_network(
     seed : int
         Of the first weights and of the order of the batches.
     settings : TrainingSettings, optional
+    kind : str
+        One of `NETWORKS`.
 
     Returns
     -------
-    TensionCnn
+    Network
         In evaluation mode.
     """
     settings = settings or TrainingSettings()
@@ -78,7 +70,7 @@ def train_network(
     torch.use_deterministic_algorithms(True)
     inputs = as_input(tension)
     targets = torch.from_numpy(np.searchsorted(CLASSES_DEG, class_deg))
-    network = TensionCnn(len(CLASSES_DEG))
+    network = NETWORKS[kind](len(CLASSES_DEG))
     network.standardise_by(inputs)
     optimiser = torch.optim.Adam(network.parameters(), lr=settings.learning_rate)
     schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, settings.decay)
@@ -97,7 +89,7 @@ def train_network(
     return network
 
 
-def predict(network: TensionCnn, tension: NDArray[np.float32]) -> NDArray[np.float64]:
+def predict(network: Network, tension: NDArray[np.float32]) -> NDArray[np.float64]:
     """Probabilities (R, classes) of tensions (R, 9000, 4)."""
     with torch.inference_mode():
         return torch.softmax(network(as_input(tension)), dim=1).numpy().astype(np.float64)
@@ -109,6 +101,7 @@ def cross_validate(
     folds: int = 5,
     progress: Progress | None = None,
     settings: TrainingSettings | None = None,
+    kind: str = 'cnn',
 ) -> CrossValidation:
     """Stratified k-fold cross-validation that keeps each tube configuration on one side.
 
@@ -117,21 +110,18 @@ def cross_validate(
     ValueError
         If a class has fewer configurations than there are folds.
     """
-    accuracy = []
-    confusion = np.zeros((len(CLASSES_DEG), len(CLASSES_DEG)), dtype=np.int64)
-    splitter = StratifiedGroupKFold(folds, shuffle=True, random_state=seed)
-    split = splitter.split(dataset.tension, dataset.class_deg, dataset.configuration)
+    named = np.zeros_like(dataset.class_deg)
+    split = grouped_folds(dataset, seed, folds)
     for k, (train, test) in enumerate(split):
         network = train_network(
-            dataset.tension[train], dataset.class_deg[train], seed + k, settings
+            dataset.tension[train], dataset.class_deg[train], seed + k, settings, kind
         )
-        named = np.argmax(predict(network, dataset.tension[test]), axis=1)
-        true = np.searchsorted(CLASSES_DEG, dataset.class_deg[test])
-        np.add.at(confusion, (true, named), 1)
-        accuracy.append(float(np.mean(named == true)))
+        likeliest = np.argmax(predict(network, dataset.tension[test]), axis=1)
+        named[test] = np.array(CLASSES_DEG)[likeliest]
         if progress is not None:
-            progress(f'fold {k + 1} of {folds}: {100.0 * accuracy[-1]:.1f} % right')
-    return CrossValidation(tuple(accuracy), confusion)
+            right = np.mean(named[test] == dataset.class_deg[test])
+            progress(f'fold {k + 1} of {folds}: {100.0 * right:.1f} % right')
+    return CrossValidation.of(dataset.class_deg, named, split)
 
 
 def use_one_thread() -> None:

@@ -18,6 +18,7 @@ from endoscope_core.dataset.rig_variation import (
     random_rig,
 )
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.signals import SINUSOID, calibration_motion
 
 CLASSES_DEG = (40, 50, 60, 70, 80, 90, 100)
 PER_CLASS = 30
@@ -33,7 +34,9 @@ class DatasetError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class CalibrationDataset:
-    """R recordings of calibrations, N = 9000 samples at 1 kHz, J = 2 joints.
+    """R recordings of calibrations, N samples at 1 kHz, J = 2 joints.
+
+    N = 9000 for the first paper's sinusoid, less for a brief calibration.
 
     Parameters
     ----------
@@ -45,8 +48,8 @@ class CalibrationDataset:
         rad, from the tracker.
     class_deg : ndarray of int, shape (R,)
         Class of the backlash size.
-    backlash_size : ndarray, shape (R,)
-        True size in rad, mean of both joints.
+    joint_size : ndarray, shape (R, J)
+        True backlash size in rad of each joint under the sinusoid.
     configuration : ndarray of int, shape (R,)
         Number of the tube configuration, by which folds are grouped.
     manifest : dict
@@ -58,9 +61,19 @@ class CalibrationDataset:
     desired_velocity: NDArray[np.float64]
     actual_angle: NDArray[np.float32]
     class_deg: NDArray[np.int64]
-    backlash_size: NDArray[np.float64]
+    joint_size: NDArray[np.float64]
     configuration: NDArray[np.int64]
     manifest: dict[str, Any]
+
+    @property
+    def backlash_size(self) -> NDArray[np.float64]:
+        """True backlash size in rad of each recording, mean of both joints (R,)."""
+        return np.mean(self.joint_size, axis=1)
+
+    @property
+    def motion(self) -> str:
+        """Name of the calibration motion that was recorded."""
+        return str(self.manifest['motion'])
 
     @property
     def manifest_hash(self) -> str:
@@ -70,7 +83,10 @@ class CalibrationDataset:
 
 
 def make_dataset(
-    seed: int, per_class: int = PER_CLASS, progress: Callable[[int, int], None] | None = None
+    seed: int,
+    per_class: int = PER_CLASS,
+    progress: Callable[[int, int], None] | None = None,
+    motion: str = SINUSOID,
 ) -> CalibrationDataset:
     """Simulate the data set; each recording is another rig in another tube.
 
@@ -82,12 +98,18 @@ def make_dataset(
         Recordings of each class.
     progress : callable, optional
         Called with the number of recordings done and to be done.
+    motion : str
+        Calibration motion that is recorded. Rigs, tubes and sizes do not depend on it: the size
+        is always that under the sinusoid.
 
     Raises
     ------
     DatasetError
         If `per_class` is not positive or `seed` is negative.
+    UnknownCalibrationError
+        If there is no motion of that name.
     """
+    calibration = calibration_motion(motion)
     if per_class < 1 or seed < 0:
         raise DatasetError(
             f'per_class = {per_class} must be positive and seed = {seed} not negative'
@@ -101,7 +123,7 @@ def make_dataset(
             generator = np.random.default_rng([seed, class_deg, k])
             configuration = _draw(generator, class_deg)
             noise_seed = int(generator.integers(2**31))
-            recordings.append(record_calibration(configuration.plant, noise_seed))
+            recordings.append(record_calibration(configuration.plant, noise_seed, calibration))
             configurations.append(configuration)
             classes.append(class_deg)
             if progress is not None:
@@ -112,11 +134,12 @@ def make_dataset(
         'desired_velocity': recordings[0].desired_velocity,
         'actual_angle': np.stack([r.actual_angle for r in recordings]).astype(np.float32),
         'class_deg': np.array(classes, dtype=np.int64),
-        'backlash_size': np.array([c.backlash_size for c in configurations]),
+        'joint_size': np.array([c.joint_sizes for c in configurations]),
         'configuration': np.arange(total, dtype=np.int64),
     }
     manifest = {
-        'schema': 1,
+        'schema': 2,
+        'motion': motion,
         'seed': seed,
         'per_class': per_class,
         'classes_deg': list(CLASSES_DEG),
@@ -128,6 +151,7 @@ def make_dataset(
                 'class_deg': classes[k],
                 'backlash_size': configuration.backlash_size,
                 'capstan_exponent': configuration.exponent,
+                'curvature_evenness': configuration.evenness,
                 'joints': {
                     name: asdict(joint) for name, joint in configuration.plant.joints.items()
                 },
@@ -187,8 +211,9 @@ def load_dataset(folder: str | Path) -> CalibrationDataset:
 
 def _draw(generator: np.random.Generator, class_deg: int) -> TubeConfiguration:
     size = np.deg2rad(class_deg + SIZE_SPREAD_DEG * generator.uniform(-1.0, 1.0))
+    evenness = float(generator.uniform(0.0, 1.0))
     for _ in range(_MOST_RIGS):
-        configuration = configuration_of_size(random_rig(generator), float(size))
+        configuration = configuration_of_size(random_rig(generator), float(size), evenness)
         if configuration is not None:
             return configuration
     raise DatasetError(f'no rig of {_MOST_RIGS} reaches a backlash size of {class_deg} deg')

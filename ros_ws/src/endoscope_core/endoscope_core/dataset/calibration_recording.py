@@ -7,12 +7,14 @@ from numpy.typing import NDArray
 
 from endoscope_core.dataset.rig_variation import calibration_command
 from endoscope_core.plant import PlantDescription, SensorModel, simulate
-from endoscope_core.signals import CALIBRATION_RATE, calibration_sinusoid
+from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
 
 
 @dataclass(frozen=True)
 class CalibrationRecording:
-    """What equation 2 of the first paper collects, at 1 kHz for 9 s (N = 9000), J = 2 joints.
+    """What equation 2 of the first paper collects, N samples at 1 kHz, J = 2 joints.
+
+    N = 9000 for the first paper's sinusoid.
 
     Parameters
     ----------
@@ -30,7 +32,9 @@ class CalibrationRecording:
     actual_angle: NDArray[np.float64]
 
 
-def record_calibration(plant: PlantDescription, seed: int) -> CalibrationRecording:
+def record_calibration(
+    plant: PlantDescription, seed: int, motion: CalibrationMotion | None = None
+) -> CalibrationRecording:
     """Simulate the calibration of both joints and read it through noisy sensors.
 
     Both joints move at once: the four tensions of the tube then come within one 9 s recording, as
@@ -43,10 +47,13 @@ def record_calibration(plant: PlantDescription, seed: int) -> CalibrationRecordi
         With two joints.
     seed : int
         Of the sensor noise.
+    motion : CalibrationMotion, optional
+        The first paper's sinusoid if not given.
     """
-    trajectory = simulate(plant, calibration_command(plant))
+    motion = motion or calibration_motion()
+    trajectory = simulate(plant, calibration_command(plant, motion))
     sensors = SensorModel(plant.sensors, seed)
-    angle, velocity = calibration_sinusoid()(trajectory.time)
+    angle, velocity = motion.signal(trajectory.time)
     wires = trajectory.tension.reshape(len(trajectory.time), -1)
     every = round(CALIBRATION_RATE / plant.sensors.tracker_rate)
     readings = sensors.bending(trajectory.bending[::every])

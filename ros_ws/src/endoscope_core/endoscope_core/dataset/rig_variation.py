@@ -6,13 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from endoscope_core.effects import distributed_friction
 from endoscope_core.metrics import width_at_mid_height
-from endoscope_core.plant import JointParameters, PlantDescription, simulate
-from endoscope_core.signals import CALIBRATION_RATE, CALIBRATION_SAMPLES, calibration_sinusoid
+from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription, simulate
+from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
 
 JOINTS = ('bend_x', 'bend_y')
 SMALLEST_EXPONENT = 0.02
-GREATEST_EXPONENT = 4.0
+# Gives over 110 deg. From about 3 on the sinusoid no longer drags the joint round a closed loop.
+GREATEST_EXPONENT = 2.5
 
 # Half-widths of uniform relative spreads from instrument to instrument, by manufacture and wear.
 RELATIVE_SPREAD = {
@@ -42,13 +44,21 @@ class TubeConfiguration:
         Both joints, with the capstan exponent that the shape gives.
     exponent : float
         Capstan exponent of the tube; each joint's own lies within 2 % of it.
-    backlash_size : float
-        Mean of the joints' backlash sizes in rad under the calibration sinusoid.
+    evenness : float
+        How evenly the curvature is spread over the tube's segments, see `in_tube`.
+    joint_sizes : tuple of float
+        Backlash size of each joint in rad under the calibration sinusoid.
     """
 
     plant: PlantDescription
     exponent: float
-    backlash_size: float
+    evenness: float
+    joint_sizes: tuple[float, ...]
+
+    @property
+    def backlash_size(self) -> float:
+        """Mean of the joints' backlash sizes in rad."""
+        return float(np.mean(self.joint_sizes))
 
 
 def random_rig(generator: np.random.Generator) -> PlantDescription:
@@ -80,34 +90,55 @@ def random_rig(generator: np.random.Generator) -> PlantDescription:
     return PlantDescription(joints=joints)
 
 
-def in_tube(rig: PlantDescription, exponent: float) -> PlantDescription:
-    """A rig of `random_rig` in a tube of the given capstan exponent."""
+def in_tube(rig: PlantDescription, exponent: float, evenness: float = 0.0) -> PlantDescription:
+    """A rig of `random_rig` in a tube.
+
+    Parameters
+    ----------
+    rig : PlantDescription
+    exponent : float
+        Capstan exponent, the friction coefficient times the sum of all bends of the tube.
+    evenness : float
+        Share of the bends that is spread evenly over eight segments of the tube; the rest is at
+        its two ends. 0 is the nominal plant's transmission.
+    """
     joints = {
         name: replace(joint, capstan_exponent=exponent * joint.capstan_exponent)
         for name, joint in rig.joints.items()
     }
-    return replace(rig, joints=joints)
+    along: tuple[EffectSpec, ...] = ()
+    if evenness > 0.0:
+        identity = distributed_friction.DEFINITION.id
+        along = tuple(EffectSpec(identity, name, {'share': evenness}) for name in joints)
+    return replace(rig, joints=joints, effects=(*rig.effects, *along))
 
 
-def calibration_command(plant: PlantDescription) -> NDArray[np.float64]:
-    """Shaft command (9000, J) in rad of the uncompensated calibration sinusoid on all joints."""
-    time = np.arange(CALIBRATION_SAMPLES) / CALIBRATION_RATE
-    angle, _ = calibration_sinusoid()(time)
+def calibration_command(
+    plant: PlantDescription, motion: CalibrationMotion | None = None
+) -> NDArray[np.float64]:
+    """Shaft command (N, J) in rad of an uncompensated calibration motion on all joints.
+
+    N are the samples of the motion's record; the motion is the sinusoid if not given.
+    """
+    motion = motion or calibration_motion()
+    angle, _ = motion.signal(np.arange(motion.samples) / CALIBRATION_RATE)
     gears = np.array([joint.gear for joint in plant.joints.values()])
     return angle[:, None] * gears
 
 
 def backlash_sizes(plant: PlantDescription) -> NDArray[np.float64]:
-    """Backlash size in rad of each joint (J,) in the last whole period of the calibration."""
-    signal = calibration_sinusoid()
-    trajectory = simulate(plant, calibration_command(plant))
-    settled = trajectory.time >= signal.steady[0]
-    desired, _ = signal(trajectory.time[settled])
+    """Backlash size in rad of each joint (J,) in the last whole period of the sinusoid."""
+    motion = calibration_motion()
+    trajectory = simulate(plant, calibration_command(plant, motion))
+    settled = trajectory.time >= motion.signal.steady[0]
+    desired, _ = motion.signal(trajectory.time[settled])
     bending = trajectory.bending_true[settled]
     return np.array([width_at_mid_height(desired, column) for column in bending.T])
 
 
-def configuration_of_size(rig: PlantDescription, size: float) -> TubeConfiguration | None:
+def configuration_of_size(
+    rig: PlantDescription, size: float, evenness: float = 0.0
+) -> TubeConfiguration | None:
     """Bend the tube until the mean backlash size of both joints is `size` (rad).
 
     Returns
@@ -117,9 +148,10 @@ def configuration_of_size(rig: PlantDescription, size: float) -> TubeConfigurati
     """
 
     def excess(exponent: float) -> float:
-        return float(np.mean(backlash_sizes(in_tube(rig, exponent)))) - size
+        return float(np.mean(backlash_sizes(in_tube(rig, exponent, evenness)))) - size
 
     if excess(SMALLEST_EXPONENT) > 0.0 or excess(GREATEST_EXPONENT) < 0.0:
         return None
     exponent = float(brentq(excess, SMALLEST_EXPONENT, GREATEST_EXPONENT, xtol=1e-4, rtol=1e-4))
-    return TubeConfiguration(in_tube(rig, exponent), exponent, size + excess(exponent))
+    plant = in_tube(rig, exponent, evenness)
+    return TubeConfiguration(plant, exponent, evenness, tuple(backlash_sizes(plant).tolist()))

@@ -1,5 +1,14 @@
 """Motions as functions of time: calibration, the papers' signals, commissioning."""
 
+from endoscope_core.signals.brief_calibration import brief_calibration
+from endoscope_core.signals.calibration_motion import (
+    BRIEF,
+    CALIBRATION_MOTIONS,
+    SINUSOID,
+    CalibrationMotion,
+    UnknownCalibrationError,
+    calibration_motion,
+)
 from endoscope_core.signals.calibration_sinusoid import (
     CALIBRATION_AMPLITUDE,
     CALIBRATION_RATE,
@@ -18,14 +27,21 @@ from endoscope_core.signals.tracking_signals import (
 )
 
 __all__ = [
+    'BRIEF',
     'CALIBRATION_AMPLITUDE',
+    'CALIBRATION_MOTIONS',
     'CALIBRATION_RATE',
     'CALIBRATION_RECORD_DURATION',
     'CALIBRATION_SAMPLES',
     'MOTIONS',
+    'SINUSOID',
+    'CalibrationMotion',
     'Motion',
     'Signal',
+    'UnknownCalibrationError',
     'both_joints',
+    'brief_calibration',
+    'calibration_motion',
     'calibration_sinusoid',
     'come_to_rest',
     'commissioning_motion',

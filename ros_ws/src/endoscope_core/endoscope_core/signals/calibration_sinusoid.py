@@ -32,19 +32,50 @@ def calibration_sinusoid() -> Signal:
     Signal
         Its `steady` interval is the last whole period before 9 s.
     """
-    omega = CALIBRATION_FREQUENCY
+    end = CALIBRATION_RECORD_DURATION
+    return begun_sinusoid(
+        'calibration',
+        CALIBRATION_AMPLITUDE,
+        CALIBRATION_FREQUENCY,
+        START_RAMP,
+        (end - 2.0 * np.pi / CALIBRATION_FREQUENCY, end),
+        RETURN_DURATION,
+    )
+
+
+def begun_sinusoid(
+    name: str,
+    amplitude: float,
+    omega: float,
+    ramp: float,
+    steady: tuple[float, float],
+    way_back: float,
+) -> Signal:
+    """Sine from rest, whose amplitude rises smoothly, brought back to rest at zero at last.
+
+    Parameters
+    ----------
+    name : str
+    amplitude, omega : float
+        rad and rad/s.
+    ramp : float
+        Time in s within which the amplitude rises.
+    steady : tuple of float
+        Interval in s of the result; the way back begins where it ends.
+    way_back : float
+        Length of the way back in s.
+    """
 
     def rising(time: FloatArray) -> tuple[FloatArray, FloatArray]:
-        gain, slope = smooth_step(time / START_RAMP)
-        sine = CALIBRATION_AMPLITUDE * np.sin(omega * time)
-        cosine = CALIBRATION_AMPLITUDE * omega * np.cos(omega * time)
-        return gain * sine, gain * cosine + slope / START_RAMP * sine
+        gain, slope = smooth_step(time / ramp)
+        sine = amplitude * np.sin(omega * time)
+        cosine = amplitude * omega * np.cos(omega * time)
+        return gain * sine, gain * cosine + slope / ramp * sine
 
-    end = CALIBRATION_RECORD_DURATION
-    body = Signal('sinusoid', end, rising, (end - 2.0 * np.pi / omega, end))
-    angle = float(CALIBRATION_AMPLITUDE * np.sin(omega * end))
-    velocity = float(CALIBRATION_AMPLITUDE * omega * np.cos(omega * end))
-    whole = sequence(
-        'calibration', [body, come_to_rest(angle, velocity, -(omega**2) * angle, RETURN_DURATION)]
-    )
-    return Signal(whole.name, whole.duration, whole.evaluate, body.steady)
+    end = steady[1]
+    body = Signal('sinusoid', end, rising, steady)
+    angle = float(amplitude * np.sin(omega * end))
+    velocity = float(amplitude * omega * np.cos(omega * end))
+    back = come_to_rest(angle, velocity, -(omega**2) * angle, way_back)
+    whole = sequence(name, [body, back])
+    return Signal(whole.name, whole.duration, whole.evaluate, steady)

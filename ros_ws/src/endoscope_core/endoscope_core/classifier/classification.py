@@ -1,0 +1,100 @@
+"""What a classifier says of one calibration, and how it refuses."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
+
+from endoscope_core.errors import EndoscopeError
+
+LEVEL = 0.9
+"""Share of intervals that are to hold the true size."""
+
+
+class ClassifierError(EndoscopeError, ValueError):
+    """Weights that cannot be used, or tensions that are no calibration recording."""
+
+
+class UnseenTensionError(ClassifierError):
+    """Tensions unlike any that the classifier knows: none of its classes."""
+
+
+@dataclass(frozen=True)
+class ClassificationResult:
+    """What the classifier says of one calibration.
+
+    Parameters
+    ----------
+    class_deg : int
+        The likeliest class: backlash size in deg.
+    probability : float
+        Of that class.
+    probabilities : dict of int to float
+        Of each class, by its size in deg; they add up to one.
+    size : float, optional
+        Backlash size in rad, where the classifier regresses it.
+    interval : tuple of float, optional
+        Lower and upper end in rad of the interval that holds the size nine times in ten.
+    """
+
+    class_deg: int
+    probability: float
+    probabilities: dict[int, float]
+    size: float | None = None
+    interval: tuple[float, float] | None = None
+
+    @property
+    def expected_size(self) -> float:
+        """Backlash size in rad: as regressed, else the mean over the classes."""
+        if self.size is not None:
+            return self.size
+        return float(np.deg2rad(sum(size * p for size, p in self.probabilities.items())))
+
+    def holds(self, size: float) -> bool:
+        """Whether a size in rad lies in the interval."""
+        return self.interval is not None and self.interval[0] <= size <= self.interval[1]
+
+
+class Classifier(Protocol):
+    """Names the class of a tube from the tensions of one calibration."""
+
+    motion: str
+    """Name of the calibration motion whose tensions it reads."""
+
+    def classify(self, tension: ArrayLike) -> ClassificationResult:
+        """Class of the tensions (N, 4) in N, recorded at 1 kHz from the start of the motion.
+
+        Raises
+        ------
+        UnseenTensionError
+            If they are like nothing that the classifier knows.
+        ClassifierError
+            If they are no recording of the motion.
+        """
+        ...
+
+
+def checked_tension(
+    tension: ArrayLike, shape: tuple[int, int], dtype: DTypeLike = np.float64
+) -> np.ndarray:
+    """Tensions as an array of the shape that a calibration has.
+
+    Raises
+    ------
+    ClassifierError
+        If the shape is another or a value is not finite.
+    """
+    array: np.ndarray = np.asarray(tension, dtype=dtype)
+    if array.shape != shape:
+        raise ClassifierError(f'tensions of a calibration have shape {shape}, not {array.shape}')
+    if not np.all(np.isfinite(array)):
+        raise ClassifierError('the tensions hold values that are not finite')
+    return array
+
+
+def result_of(classes_deg: tuple[int, ...], weights: list[float]) -> ClassificationResult:
+    """Result with a probability for each class."""
+    probabilities = dict(zip(classes_deg, weights, strict=True))
+    likeliest = max(probabilities, key=lambda size: probabilities[size])
+    return ClassificationResult(likeliest, probabilities[likeliest], probabilities)

@@ -1,0 +1,63 @@
+"""Cross-validation on tube configurations that were not trained with."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.model_selection import StratifiedGroupKFold
+
+from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """Accuracy on recordings whose tube configuration was not trained with.
+
+    Parameters
+    ----------
+    accuracy : tuple of float
+        Share of right classes of each fold.
+    confusion : ndarray of int, shape (7, 7)
+        Rows are true classes, columns named ones, over all folds.
+    """
+
+    accuracy: tuple[float, ...]
+    confusion: NDArray[np.int64]
+
+    @property
+    def mean_accuracy(self) -> float:
+        """Share of right classes over all recordings."""
+        return float(np.trace(self.confusion) / np.sum(self.confusion))
+
+    @classmethod
+    def of(
+        cls,
+        true_deg: NDArray[np.int64],
+        named_deg: NDArray[np.int64],
+        folds: Sequence[tuple[Rows, Rows]],
+    ) -> 'CrossValidation':
+        """Compare true and named classes (R,) in deg over folds of (train, test) rows."""
+        confusion = np.zeros((len(CLASSES_DEG), len(CLASSES_DEG)), dtype=np.int64)
+        true, named = (np.searchsorted(CLASSES_DEG, x) for x in (true_deg, named_deg))
+        np.add.at(confusion, (true, named), 1)
+        accuracy = tuple(float(np.mean(true[test] == named[test])) for _, test in folds)
+        return cls(accuracy, confusion)
+
+
+def grouped_folds(
+    dataset: CalibrationDataset, seed: int, folds: int = 5
+) -> list[tuple[Rows, Rows]]:
+    """Rows to train with and rows to test with, of each fold.
+
+    Classes are as frequent in every fold, and each tube configuration is on one side only.
+
+    Raises
+    ------
+    ValueError
+        If a class has fewer configurations than there are folds.
+    """
+    splitter = StratifiedGroupKFold(folds, shuffle=True, random_state=seed)
+    return list(splitter.split(dataset.tension, dataset.class_deg, dataset.configuration))

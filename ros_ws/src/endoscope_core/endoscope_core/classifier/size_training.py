@@ -1,0 +1,133 @@
+"""Fits the size model and measures, on tubes held out from it, how far it is to be trusted."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from endoscope_core.classifier.classification import LEVEL, ClassificationResult
+from endoscope_core.classifier.grouped_folds import CrossValidation, Rows, grouped_folds
+from endoscope_core.classifier.size_classifier import HeldOutCalibration, SizeClassifier
+from endoscope_core.classifier.size_model import SizeEstimate, fitted_size_model
+from endoscope_core.classifier.training import Progress
+from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
+from endoscope_core.signals import calibration_motion
+
+TAIL_DEVIATIONS = 5.0
+LEAST_MARGIN = math.log(1.5)
+
+
+@dataclass(frozen=True)
+class SizeValidation:
+    """How a size classifier does on tube configurations that it was not fitted with.
+
+    Parameters
+    ----------
+    classes : CrossValidation
+    rmse : tuple of float
+        Error of the regressed size in rad of each fold.
+    coverage : tuple of float
+        Share of intervals of each fold that hold the true size. The intervals of a fold are
+        calibrated on the others.
+    refused : int
+        Recordings held out that would have been refused; the classes count them nevertheless.
+    """
+
+    classes: CrossValidation
+    rmse: tuple[float, ...]
+    coverage: tuple[float, ...]
+    refused: int
+
+
+def train_size_classifier(dataset: CalibrationDataset, seed: int, folds: int = 5) -> SizeClassifier:
+    """Classifier fitted to the whole data set and calibrated on its folds.
+
+    Raises
+    ------
+    ValueError
+        If a class has fewer configurations than there are folds.
+    """
+    return _train(dataset, seed, folds)[0]
+
+
+def validated_size_classifier(
+    dataset: CalibrationDataset, seed: int, folds: int = 5, progress: Progress | None = None
+) -> tuple[SizeClassifier, SizeValidation]:
+    """Classifier of `train_size_classifier`, and what its folds say of it."""
+    classifier, split, held_out = _train(dataset, seed, folds)
+    true = torch.from_numpy(dataset.backlash_size)
+    named = np.zeros_like(dataset.class_deg)
+    rmse, coverage, refused = [], [], 0
+    for k, (train, test) in enumerate(split):
+        others = _rows(held_out, train)
+        judge = SizeClassifier(
+            classifier.model, calibration_of(others, true[train]), CLASSES_DEG, dataset.motion
+        )
+        estimate = _rows(held_out, test)
+        results = judge.results(estimate)
+        named[test] = [result.class_deg for result in results]
+        refused += sum(bool(reasons) for reasons in judge.reasons_to_refuse(estimate))
+        rmse.append(float((estimate.size - true[test]).square().mean().sqrt()))
+        coverage.append(share_covered(results, dataset.backlash_size[test]))
+        if progress is not None:
+            right = np.mean(named[test] == dataset.class_deg[test])
+            progress(
+                f'fold {k + 1} of {folds}: {100.0 * right:.1f} % right, '
+                f'{math.degrees(rmse[-1]):.2f} deg rms'
+            )
+    classes = CrossValidation.of(dataset.class_deg, named, split)
+    return classifier, SizeValidation(classes, tuple(rmse), tuple(coverage), refused)
+
+
+def share_covered(results: list[ClassificationResult], size: NDArray[np.float64]) -> float:
+    """Share of true sizes (R,) in rad that lie in the intervals of the results."""
+    return float(np.mean([r.holds(x) for r, x in zip(results, size.tolist(), strict=True)]))
+
+
+def calibration_of(held_out: SizeEstimate, true: Tensor) -> HeldOutCalibration:
+    """Calibration on estimates of R recordings held out, whose true sizes (R,) in rad are known.
+
+    Intervals: split conformal prediction with errors in units of the model's own deviation
+    (Lei et al., J. Am. Stat. Assoc. 113(523), 2018, sections 2.2 and 5.2). Ceilings: logarithms of
+    distances are close to normal; tensions are refused from five standard deviations over the mean
+    on, and never below one and a half times the mean distance.
+    """
+    scores = ((held_out.size - true).abs() / held_out.deviation).sort().values
+    rank = min(len(scores), math.ceil((len(scores) + 1) * LEVEL))
+    strange = held_out.strangeness
+    margin = (TAIL_DEVIATIONS * strange.std(dim=0)).clamp(min=LEAST_MARGIN)
+    return HeldOutCalibration(
+        float(scores[rank - 1]), tuple((strange.mean(dim=0) + margin).tolist())
+    )
+
+
+def _train(
+    dataset: CalibrationDataset, seed: int, folds: int
+) -> tuple[SizeClassifier, list[tuple[Rows, Rows]], SizeEstimate]:
+    settled = calibration_motion(dataset.motion).settled
+    tension = torch.from_numpy(dataset.tension[:, settled:])
+    size = torch.from_numpy(dataset.joint_size)
+    split = grouped_folds(dataset, seed, folds)
+    parts = []
+    for train, test in split:
+        model = fitted_size_model(tension[train], size[train])
+        with torch.no_grad():
+            parts.append(model(tension[test]))
+    order = torch.from_numpy(np.argsort(np.concatenate([test for _, test in split])))
+    held_out = SizeEstimate(
+        *(torch.cat([getattr(part, name) for part in parts])[order] for name in _FIELDS)
+    )
+    calibration = calibration_of(held_out, torch.from_numpy(dataset.backlash_size))
+    model = fitted_size_model(tension, size)
+    return SizeClassifier(model, calibration, CLASSES_DEG, dataset.motion), split, held_out
+
+
+_FIELDS = ('size', 'deviation', 'strangeness')
+
+
+def _rows(estimate: SizeEstimate, rows: Rows) -> SizeEstimate:
+    chosen = torch.from_numpy(rows)
+    return SizeEstimate(*(getattr(estimate, name)[chosen] for name in _FIELDS))

@@ -1,0 +1,199 @@
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from endoscope_core.classifier.classification import ClassifierError, UnseenTensionError
+from endoscope_core.classifier.grouped_folds import grouped_folds
+from endoscope_core.classifier.shipped import load_classifier
+from endoscope_core.classifier.size_classifier import HeldOutCalibration, SizeClassifier
+from endoscope_core.classifier.size_model import SizeEstimate, fitted_size_model
+from endoscope_core.classifier.size_training import (
+    calibration_of,
+    train_size_classifier,
+    validated_size_classifier,
+)
+from endoscope_core.classifier.tension_features import log_courses, roughness
+from endoscope_core.classifier.training import use_one_thread
+from endoscope_core.classifier.weights_file import save_size_classifier
+from endoscope_core.dataset import (
+    CLASSES_DEG,
+    CalibrationDataset,
+    configuration_of_size,
+    random_rig,
+    record_calibration,
+)
+from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
+from endoscope_core.trials.unusual_recordings import UNUSUAL
+
+
+@pytest.fixture(scope='module', autouse=True)
+def one_thread():
+    use_one_thread()
+
+
+@pytest.fixture(scope='module', params=CALIBRATION_MOTIONS)
+def shipped(request):
+    return load_classifier(motion=request.param)
+
+
+@pytest.fixture(scope='module')
+def easy():
+    """Recordings whose sizes lie anywhere, and whose tensions follow them plainly."""
+    generator = np.random.default_rng(0)
+    classes = np.repeat(CLASSES_DEG, 6)
+    size = classes + generator.uniform(-1.0, 1.0, classes.size)
+    time = np.arange(3140) * 1e-3
+    stiffness = generator.uniform(0.9, 1.1, classes.size)
+    swing = np.sin(2.5 * time - 0.01 * size[:, None]) * stiffness[:, None] * 3.0
+    wires = 5.0 + np.stack([swing, -swing, swing, -swing], axis=2)
+    tension = (wires + generator.normal(0.0, 0.02, wires.shape)).astype(np.float32)
+    return CalibrationDataset(
+        tension=tension,
+        desired_angle=time,
+        desired_velocity=time,
+        actual_angle=np.zeros((classes.size, 3140, 2), np.float32),
+        class_deg=classes,
+        joint_size=np.deg2rad(np.stack([size, size], axis=1)),
+        configuration=np.arange(classes.size),
+        manifest={'seed': 0, 'per_class': 6, 'motion': 'brief'},
+    )
+
+
+def tube(size_deg, evenness=0.5, seed=0):
+    rig = random_rig(np.random.default_rng(int(10 * size_deg) + 700_000 + seed))
+    return configuration_of_size(rig, np.deg2rad(size_deg), evenness)
+
+
+@pytest.mark.parametrize('size_deg', [42.0, 57.0, 73.5, 88.0, 101.0])
+def test_it_regresses_the_size_of_a_tube_it_has_not_seen(shipped, size_deg):
+    configuration = tube(size_deg)
+    tension = record_calibration(configuration.plant, 5, calibration_motion(shipped.motion)).tension
+    result = shipped.classify(tension)
+    assert np.rad2deg(result.size) == pytest.approx(size_deg, abs=3.0)
+    low, high = result.interval
+    assert low < result.size < high
+    assert np.rad2deg(high - low) < 10.0
+    assert abs(result.class_deg - size_deg) < 8.0
+    assert result.probability == max(result.probabilities.values())
+    assert sum(result.probabilities.values()) == pytest.approx(1.0)
+    assert result.expected_size == result.size
+
+
+@pytest.mark.parametrize('kind', [k for k in UNUSUAL if k != 'other motion'])
+def test_unusual_tensions_are_refused_with_a_reason(shipped, kind):
+    generator = np.random.default_rng(3)
+    motion = calibration_motion(shipped.motion)
+    tension = UNUSUAL[kind](generator, tube(70.0).plant, motion)
+    with pytest.raises(UnseenTensionError, match='none of the classes: '):
+        shipped.classify(tension)
+
+
+def test_the_tensions_of_standing_motors_are_refused(shipped):
+    samples = calibration_motion(shipped.motion).samples
+    still = np.random.default_rng(0).normal(5.0, 0.02, (samples, 4))
+    with pytest.raises(UnseenTensionError):
+        shipped.classify(still)
+
+
+def test_sizes_beyond_the_classes_are_refused():
+    classifier = SizeClassifier(
+        fitted_size_model(torch.rand(6, 100, 4), torch.rand(6, 2), steps=1),
+        HeldOutCalibration(1.0, (9.0, 9.0, 9.0)),
+        CLASSES_DEG,
+        'brief',
+    )
+    sizes = torch.tensor(np.deg2rad([20.0, 36.0, 70.0, 104.0, 120.0]))
+    estimate = SizeEstimate(sizes, torch.full((5,), 0.01), torch.zeros(5, 3))
+    refused = classifier.reasons_to_refuse(estimate)
+    assert [bool(reasons) for reasons in refused] == [True, False, False, False, True]
+    assert 'outside the 35 to 105 deg' in refused[0][0]
+    named = [result.class_deg for result in classifier.results(estimate)]
+    assert named == [40, 40, 70, 100, 100]
+
+
+def test_a_recording_of_another_motion_or_with_gaps_is_refused(shipped):
+    with pytest.raises(ClassifierError, match='have shape'):
+        shipped.classify(np.zeros((17, 4)))
+    broken = np.full((calibration_motion(shipped.motion).samples, 4), 5.0)
+    broken[3, 1] = np.inf
+    with pytest.raises(ClassifierError, match='not finite'):
+        shipped.classify(broken)
+
+
+def test_courses_are_means_of_fifty_samples_of_each_joints_wires():
+    tension = torch.rand(3, 120, 4) * 5.0
+    courses = log_courses(tension)
+    assert courses.shape == (3, 2, 4)
+    expected = torch.log(tension[2, 50:100, 3].mean() + 0.5)
+    assert courses[2, 1, 3] == pytest.approx(float(expected), abs=1e-5)
+
+
+def test_roughness_is_the_noise_and_not_the_motion():
+    time = np.arange(9000) * 1e-3
+    noise = np.random.default_rng(0).normal(0.0, 0.02, (1, 9000, 4))
+    tension = torch.from_numpy(5.0 + 4.0 * np.sin(2.0 * time)[None, :, None] + noise)
+    np.testing.assert_allclose(roughness(tension).numpy(), 0.02, rtol=0.05)
+
+
+def test_intervals_hold_the_share_that_they_promise():
+    generator = torch.Generator().manual_seed(0)
+    true = torch.rand(4000, generator=generator, dtype=torch.float64)
+    deviation = 0.1 + torch.rand(4000, generator=generator, dtype=torch.float64)
+    error = 3.0 * deviation * torch.randn(4000, generator=generator, dtype=torch.float64)
+    strange = torch.randn(4000, 3, generator=generator, dtype=torch.float64)
+    estimate = SizeEstimate(true + error, deviation, strange)
+    half = SizeEstimate(*(x[:2000] for x in vars(estimate).values()))
+    calibration = calibration_of(half, true[:2000])
+    assert calibration.inflation == pytest.approx(3.0 * 1.645, rel=0.08)
+    covered = error[2000:].abs() <= calibration.inflation * deviation[2000:]
+    assert 0.87 < float(covered.double().mean()) < 0.93
+    assert all(4.0 < ceiling < 6.0 for ceiling in calibration.ceilings)
+
+
+def test_folds_keep_a_configuration_on_one_side(easy):
+    shared = dataclasses.replace(easy, configuration=easy.configuration // 2)
+    for train, test in grouped_folds(shared, 0, 3):
+        inside = set(shared.configuration[train]) & set(shared.configuration[test])
+        assert not inside
+        assert len(train) + len(test) == len(easy.class_deg)
+
+
+def test_validation_is_of_recordings_held_out_and_training_repeats(easy):
+    classifier, validation = validated_size_classifier(easy, 0, 3)
+    assert validation.classes.mean_accuracy > 0.9
+    assert max(validation.rmse) < np.deg2rad(3.0)
+    assert validation.classes.confusion.sum() == len(easy.class_deg)
+    again = train_size_classifier(easy, 0, 3)
+    assert again.calibration == classifier.calibration
+    np.testing.assert_array_equal(again.model.target, classifier.model.target)
+
+
+def test_what_is_saved_gives_the_same_answer(easy, tmp_path):
+    classifier, validation = validated_size_classifier(easy, 0, 3)
+    path = tmp_path / 'size.pt'
+    save_size_classifier(path, classifier, easy, validation, 'endoscope train', 0)
+    loaded = load_classifier(path, 'brief')
+    first, second = (c.classify(easy.tension[10]) for c in (classifier, loaded))
+    assert first.size == pytest.approx(second.size, abs=1e-9)
+    assert first.interval == pytest.approx(second.interval, abs=1e-9)
+    described = json.loads(path.with_suffix('.json').read_text())
+    assert described['held_out']['confusion'] == validation.classes.confusion.tolist()
+    with pytest.raises(ClassifierError, match='trained on the brief calibration'):
+        load_classifier(path, 'sinusoid')
+
+
+def test_weights_that_do_not_fit_are_one_clear_error(easy, tmp_path):
+    classifier, validation = validated_size_classifier(easy, 0, 3)
+    path = tmp_path / 'size.pt'
+    save_size_classifier(path, classifier, easy, validation, 'endoscope train', 0)
+    described = json.loads(path.with_suffix('.json').read_text())
+    del described['inflation']
+    path.with_suffix('.json').write_text(json.dumps(described))
+    with pytest.raises(ClassifierError, match='no classifier weights'):
+        load_classifier(path, 'brief')
+    path.with_suffix('.json').write_text('{"schema": 1}')
+    with pytest.raises(ClassifierError, match='schema'):
+        load_classifier(path, 'brief')
