@@ -4,4 +4,4 @@ A module here has ``TITLE: str`` and ``rows(settings: PapersBench) -> list[Row]`
 them in the order of printing. Heavy imports belong into `rows`.
 """
 
-TABLES: tuple[str, ...] = ()
+TABLES: tuple[str, ...] = ('classifiers', 'real_sizes')
