@@ -70,7 +70,7 @@ def test_joint_stop_is_a_spring_beyond_its_angle_on_both_sides(stiffness):
 @pytest.mark.parametrize('side', [1.0, -1.0])
 @pytest.mark.parametrize('exponent', [1.0, 1.5])
 def test_contact_is_one_sided_and_compliant(side, exponent):
-    touch = ('contact', {'angle_rad': 0.3, 'stiffness': 0.02, 'exponent': exponent, 'side': side})
+    touch = ('contact', {'angle_rad': side * 0.3, 'stiffness': 0.02, 'exponent': exponent})
     towards = side * still(touch, ('external_load', {'moment_nm': side * 0.005, 'time_s': 0.0}))
     away = side * still(touch, ('external_load', {'moment_nm': -side * 0.002, 'time_s': 0.0}))
     assert away[-1] == pytest.approx(-0.002 / 0.003, rel=1e-3)

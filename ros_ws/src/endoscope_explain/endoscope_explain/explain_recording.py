@@ -64,6 +64,7 @@ def explain_recording(
     plant: PlantDescription,
     *,
     baseline: Recording | None = None,
+    band: float = BAND,
     jobs: int = 2,
     progress: Progress | None = None,
 ) -> Explanation:
@@ -77,6 +78,8 @@ def explain_recording(
         The simulation that the engineer has.
     baseline : Recording, optional
         Of the same rig when it was well; only what is new since is explained.
+    band : float
+        Relative tolerance by which a healthy rig's parameters may differ from the plant's.
     jobs : int
         Processes side by side.
     progress : callable, optional
@@ -102,9 +105,8 @@ def explain_recording(
         )
     tell('refitting the nominal plant')
     packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
-    band = BAND
     if baseline is not None:
-        observations, packed = _healthy(observations, baseline, plant, jobs)
+        observations, packed = _healthy(observations, baseline, plant, band, jobs)
         band = SAME_RIG
     anchors = all_anchors(observations, packed, jobs, band)
     searches, decisions = [], []
@@ -144,13 +146,14 @@ def _healthy(
     observations: tuple[JointObservation, ...],
     baseline: Recording,
     plant: PlantDescription,
+    band: float,
     jobs: int,
 ) -> tuple[tuple[JointObservation, ...], dict[str, tuple[Array, Flags]]]:
     before = with_held_noise(observe(baseline, plant))
     packed = {o.joint: packed_joint(plant, o.joint) for o in before}
     fits = {
         o.joint: refitted
-        for o, (refitted, _) in zip(before, all_anchors(before, packed, jobs), strict=True)
+        for o, (refitted, _) in zip(before, all_anchors(before, packed, jobs, band), strict=True)
     }
     seen = []
     for observation in observations:

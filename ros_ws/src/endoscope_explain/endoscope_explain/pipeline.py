@@ -11,6 +11,7 @@ from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import ExplainedCase, NextExperiment, Place
 from endoscope_explain.combine import combined_effects, combined_verdict, improved_plant
 from endoscope_explain.explanation import Explanation, Verdict
+from endoscope_explain.free_parameters import BAND
 from endoscope_explain.ladder import ladders
 from endoscope_explain.locate.chain_cut import cut_at_motor
 from endoscope_explain.locate.locating import (
@@ -44,6 +45,8 @@ class Sources:
         Topics that may be missing.
     quick : bool
         Whether to leave out the black boxes and the next experiment.
+    band : float
+        Relative tolerance of the plant's parameters.
     """
 
     bag: Path
@@ -52,6 +55,7 @@ class Sources:
     validate: Path | None = None
     without: Collection[str] = ()
     quick: bool = False
+    band: float = BAND
 
 
 @dataclass(frozen=True)
@@ -65,12 +69,15 @@ class Inputs:
     audit : AuditReport
     baseline, validation : Recording or None
         As audited.
+    band : float
+        Relative tolerance of the plant's parameters.
     """
 
     plant: PlantDescription
     audit: AuditReport
     baseline: Recording | None
     validation: Recording | None
+    band: float = BAND
 
 
 class JointsDifferError(BagError):
@@ -108,7 +115,11 @@ def read_inputs(sources: Sources) -> Inputs:
         return audit_recording(other, plant).recording
 
     return Inputs(
-        plant, audit_recording(raw, plant), second(sources.baseline), second(sources.validate)
+        plant,
+        audit_recording(raw, plant),
+        second(sources.baseline),
+        second(sources.validate),
+        sources.band,
     )
 
 
@@ -144,7 +155,12 @@ def explain_case(
     for finding in audit.findings:
         tell(f'audit: {finding.text}; {finding.remedy}')
     explanation = engine(
-        audit.recording, inputs.plant, baseline=inputs.baseline, jobs=jobs, progress=progress
+        audit.recording,
+        inputs.plant,
+        baseline=inputs.baseline,
+        band=inputs.band,
+        jobs=jobs,
+        progress=progress,
     )
     tell('locating')
     plant = improved_plant(explanation, audit)

@@ -45,6 +45,14 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='a topic that may be missing',
     )
     parser.add_argument(
+        '--band',
+        type=_positive_share,
+        default=0.15,
+        metavar='SHARE',
+        help="by which share the plant's parameters may differ from the rig's: 3 for a rig that was "
+        'never identified (default 0.15)',
+    )
+    parser.add_argument(
         '--jobs', type=_positive, default=2, metavar='N', help='processes side by side (default 2)'
     )
     parser.add_argument(
@@ -65,11 +73,20 @@ def run(args: argparse.Namespace) -> int:
 
     plant = load_plant(args.plant)
     sources = [
-        Sources(bag, plant, args.baseline, args.validate, tuple(args.without), args.quick)
+        Sources(
+            bag, plant, args.baseline, args.validate, tuple(args.without), args.quick, args.band
+        )
         for bag in args.bags
     ]
     explain_bags(sources, args.out, jobs=args.jobs, dask_address=args.dask)
     return 0
+
+
+def _positive_share(text: str) -> float:
+    share = float(text)
+    if not 0.0 < share <= 100.0:
+        raise argparse.ArgumentTypeError(f'{text} is not between 0 and 100')
+    return share
 
 
 def _positive(text: str) -> int:

@@ -7,30 +7,36 @@ DEFINITION = define(
     'contact',
     Stage.JOINT,
     physics='Compliant, one-sided contact (tissue) beyond an angle.',
-    equation='tau = -side stiffness d (d / 0.2 rad)^(exponent - 1), d = side q - angle_rad > 0',
+    equation='tau = -s stiffness d (d / 0.2 rad)^(exponent - 1), d = s (q - angle_rad) > 0, '
+    's = sgn(angle_rad)',
     source='Hunt, Crossley, J. Appl. Mech. 42, 1975, without damping',
     parameters=(
         EffectParameter(
-            'angle_rad', 'rad', 0.0, 2.5, 0.5, off=2.5, starts=(0.25, 0.5, 0.8), comparable=True
+            'angle_rad',
+            'rad',
+            -2.5,
+            2.5,
+            0.5,
+            off=2.5,
+            starts=(0.25, 0.5, 0.8, -0.25, -0.5, -0.8),
+            comparable=True,
         ),
         EffectParameter('stiffness', 'N m/rad', 0.0, 1.0, 0.02, off=0.0, starts=(0.015,)),
         EffectParameter('exponent', '-', 1.0, 2.5, 1.0),
-        EffectParameter('side', '-', -1.0, 1.0, 1.0, choices=(1.0, -1.0)),
     ),
 )
 ON = DEFINITION.flag
 ANGLE = DEFINITION.first_parameter
 STIFFNESS = ANGLE + 1
 EXPONENT = ANGLE + 2
-SIDE = ANGLE + 3
 DEPTH = 0.2
 
 
 @compiled
 def moment_and_slope(parameters: Array, angle: float) -> tuple[float, float]:
     """Moment in N m on the joint, and minus its derivative by the angle in N m/rad."""
-    side = 1.0 if parameters[SIDE] > 0.0 else -1.0
-    deep = side * angle - parameters[ANGLE]
+    side = 1.0 if parameters[ANGLE] > 0.0 else -1.0
+    deep = side * (angle - parameters[ANGLE])
     if deep <= 0.0:
         return 0.0, 0.0
     stiffness = parameters[STIFFNESS]
