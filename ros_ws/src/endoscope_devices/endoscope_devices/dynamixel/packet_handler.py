@@ -81,9 +81,6 @@ class PacketHandler:
         Open.
     margin
         Time in s granted to an answer beyond its time on the wire.
-
-    Attributes
-    ----------
     counts
         Counts requests and answers.
     return_delay

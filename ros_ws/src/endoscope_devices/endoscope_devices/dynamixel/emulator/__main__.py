@@ -6,6 +6,7 @@ The first line of its output is the port.  Each line of its input is a JSON list
 
 import argparse
 import json
+import os
 import sys
 from pathlib import Path
 
@@ -23,6 +24,7 @@ _SHOWN = {
     'current_limit': table.CURRENT_LIMIT,
 }
 _ACTIONS = ('plug_in', 'hang_up', 'restart', 'supply', 'overload')
+_NICENESS = -10
 _FAULTS = ('damage_rate', 'bits', 'delay_s', 'delayed', 'repeated')
 
 
@@ -39,11 +41,20 @@ def main() -> int:
         EmulatedServo(device, code, shaft=FirstOrderShaft(stiffness=args.stiffness))
         for device in args.ids
     ]
+    _go_before_other_processes()
     with EmulatedBus(servos, args.link) as bus:
         print(bus.port, flush=True)
         for line in sys.stdin:
             print(json.dumps(_answer(bus, *json.loads(line))), flush=True)
     return 0
+
+
+def _go_before_other_processes() -> None:
+    """Hardware does not wait for a busy processor; only some users may say so."""
+    try:
+        os.nice(_NICENESS)
+    except PermissionError:
+        return
 
 
 def _answer(bus: EmulatedBus, action: str, *arguments: float) -> object:
