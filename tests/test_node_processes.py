@@ -9,12 +9,11 @@ import time
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from endoscope_nodes.qos import EVENT, SENSOR_ASKED
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-
-from endoscope_nodes.qos import EVENT, SENSOR_ASKED
 
 DOMAIN = 231
 NODES = (
@@ -140,6 +139,7 @@ def test_the_whole_graph_in_motion_stops_cleanly(operator, tmp_path, number):
         ('console', 'scale:=.nan', "'scale' is nan; give a finite number, from 0.01 to 10"),
         ('console', 'source:=motin', 'did you mean motion?'),
         ('motor_driver', 'plant_file:=nowhere.yaml', 'nowhere.yaml'),
+        ('motor_driver', 'device:=dynamixel', '/dev/ttyUSB0: there is no such port'),
         ('graph', 'moed:=none', "unknown parameter 'moed'"),
     ],
 )
