@@ -27,7 +27,7 @@ from endoscope_bags.rosbag2_metadata import (
     write_metadata,
 )
 
-CHUNK_SECONDS = 0.1
+CHUNK_SECONDS = 0.25
 CHUNK_BYTES = 1 << 20
 METADATA_RECORD = 'endoscope_bags'
 
@@ -35,7 +35,7 @@ METADATA_RECORD = 'endoscope_bags'
 class BagWriter:
     """Writes one recording: a rosbag2 folder, or a bare file where the name ends in ``.mcap``.
 
-    A chunk spans at most a tenth of a second of receipt, so that a killed writer loses little and
+    A chunk spans at most a quarter of a second of receipt: a killed writer loses little, and
     a threaded one keeps its process waiting for the interpreter for less than a millisecond. Use it
     as a context manager: on an exception an atomic writer leaves nothing behind, another finishes
     what it has.

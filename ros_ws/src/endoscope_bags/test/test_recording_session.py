@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from endoscope_bags import open_bag
+from endoscope_bags.bag_writer import CHUNK_SECONDS
 from endoscope_bags.cdr_encoding import encode_joint_states, encode_string
 from endoscope_bags.errors import BagExistsError
 from endoscope_bags.information import bag_information
@@ -57,10 +58,10 @@ def test_a_batch_is_sorted_over_its_topics(tmp_path):
 def test_what_waits_too_long_is_handed_over(tmp_path):
     session = RecordingSession(tmp_path / 'bag', threaded=False)
     session.accept(arrivals(session.add_topic('/a', STRING), [0]))
-    session.flush_stale(100 * MS)
+    session.flush_stale(round(CHUNK_SECONDS * 1e9))
     file = tmp_path / 'bag' / 'bag_0.mcap'
     empty = file.stat().st_size
-    session.flush_stale(150 * MS)
+    session.flush_stale(round(1.5e9 * CHUNK_SECONDS))
     assert file.stat().st_size > empty
     assert open_bag(tmp_path / 'bag', salvage=True).message_count == 1
     session.close()
