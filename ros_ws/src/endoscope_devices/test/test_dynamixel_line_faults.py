@@ -45,8 +45,17 @@ class Rig:
         self.swing_until(lambda: time.monotonic() >= end)
 
     def arm(self):
-        self.motors.set_torque(True)
-        self.swing_until(lambda: self.bus.armed)
+        """Enable as often as it takes: a stall of the machine is a fault like any other."""
+        asked = 0.0
+
+        def armed():
+            nonlocal asked
+            if not self.bus.armed and time.monotonic() - asked > 1.0:
+                asked = time.monotonic()
+                self.motors.set_torque(True)
+            return self.bus.armed
+
+        self.swing_until(armed)
 
     def check_readings(self):
         """Every reading is what the servo did at the time that the reading says."""
@@ -78,10 +87,7 @@ def rig(tmp_path):
 
 def test_flipped_bits_make_no_wrong_reading(rig):
     rig.emulator.do('damage_rate', 0.03)
-    rig.swing(1.5)
-    rig.emulator.do('damage_rate', 0.0)
-    assert sum(rig.bus.figures.failures.values()) > 5
-    assert len(rig.readings) > 150
+    rig.swing_until(lambda: sum(rig.bus.figures.failures.values()) > 10 and len(rig.readings) > 300)
     rig.check_readings()
 
 
@@ -92,16 +98,13 @@ def test_late_answers_are_not_taken_for_those_of_the_next_request(rig, late):
     rig.swing(0.5)
     assert sum(rig.bus.figures.failures.values()) > 0
     before = len(rig.readings)
-    rig.swing(0.3)
-    assert len(rig.readings) - before > 50
+    rig.swing_until(lambda: len(rig.readings) - before > 50)
     rig.check_readings()
 
 
 def test_repeated_answers_change_nothing(rig):
     rig.emulator.do('repeated', 400)
-    rig.swing(0.5)
-    assert rig.bus.armed
-    assert len(rig.readings) > 200
+    rig.swing_until(lambda: len(rig.readings) > 300)
     rig.check_readings()
 
 

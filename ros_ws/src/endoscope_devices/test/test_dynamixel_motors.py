@@ -148,7 +148,6 @@ def test_four_and_a_half_megabaud_and_fast_sync_read(fast):
             drive(motors, (0.0, 0.0), lambda: motors.bus.figures.readings > 50)
         finally:
             motors.close()
-        assert motors.bus.figures.failures == {}
 
 
 @pytest.fixture

@@ -17,6 +17,7 @@ from endoscope_devices.dynamixel.bring_up import bring_up, enable
 from endoscope_devices.dynamixel.control_table import (
     ALERT,
     COUNT,
+    CURRENT_UNIT,
     GOAL_POSITION,
     HARDWARE_ERROR_STATUS,
     PRESENT_INPUT_VOLTAGE,
@@ -48,7 +49,7 @@ _TROUBLE_SHOWN_S = 1.5
 _DRAIN_S = 4e-3
 # A shaft that is driven by its wires may be faster than the motor without load.
 _SPEED_MARGIN = 1.5
-_CURRENT_MARGIN_A = 0.3
+_LARGEST_CURRENT_A = 1193 * CURRENT_UNIT
 
 
 @dataclass(frozen=True)
@@ -145,6 +146,8 @@ class BusThread:
         self._ids = [mount.device for mount in self.mounts]
         self._bus: PacketHandler | None = None
         self._judges: list[BlockJudge] = []
+        self._unpublished = [False for _ in self.mounts]
+        self._patient_from_ns = 0
         self._goal: tuple[tuple[float, ...], int] | None = None
         self._held: tuple[float, ...] | None = None
         self._torque = False
@@ -238,14 +241,11 @@ class BusThread:
             self._orders.get()
         self._torque_constants = [model.torque_constant for model in models]
         self._judges = [
-            BlockJudge(
-                _SPEED_MARGIN * model.no_load_speed,
-                self.settings.current_limit + _CURRENT_MARGIN_A,
-            )
-            for model in models
+            BlockJudge(_SPEED_MARGIN * model.no_load_speed, _LARGEST_CURRENT_A) for model in models
         ]
         self.health = [ServoHealth(model.name) for model in models]
         self._torque = False
+        self._unpublished = [False for _ in self.mounts]
         self._bus = bus
         self.figures.last_ns = time.monotonic_ns()
 
@@ -261,8 +261,8 @@ class BusThread:
         period = 1.0 / self.settings.rate if self.settings.rate else 0.0
         due = time.monotonic()
         while not self._stopping.is_set():
-            self._carry_out_orders(bus)
             self._cycle(bus)
+            self._carry_out_orders(bus)
             self._look_after(bus)
             if period:
                 due = max(due + period, time.monotonic() - period)
@@ -276,7 +276,9 @@ class BusThread:
             if order is None:
                 self._restart(bus)
             elif order and not (self.armed and self._torque):
+                self._refuse_without_reading()
                 enable(bus, self._ids, self.settings)
+                self._patient_from_ns = time.monotonic_ns()
                 self._held = None if self.newest is None else self.newest.reading.position
                 self._torque = True
                 self._goal = None
@@ -284,6 +286,10 @@ class BusThread:
                 self._trouble_ns = 0
             elif not order:
                 self._switch_off(bus)
+
+    def _refuse_without_reading(self) -> None:
+        if self.newest is None or self.age() > self.settings.fault_after:
+            raise BusError('not enabled: there is no valid reading of the shafts')
 
     def _switch_off(self, bus: PacketHandler) -> None:
         self.armed = False
@@ -311,7 +317,8 @@ class BusThread:
         self.figures.failures[reason] += 1
         self.figures.last_failure = failure
         bus.drain(_DRAIN_S)
-        silence_s = (time.monotonic_ns() - self.figures.last_ns) * 1e-9
+        since_ns = max(self.figures.last_ns, self._patient_from_ns)
+        silence_s = (time.monotonic_ns() - since_ns) * 1e-9
         if silence_s > self.settings.fault_after:
             self._fail(f'no valid reading for {silence_s * 1e3:.0f} ms: {failure}')
         if reason == 'restarted' or silence_s > _RETRY_S:
@@ -339,8 +346,9 @@ class BusThread:
     def _take(self, replies: dict[int, Reply], asked_ns: int, received_ns: int) -> tuple[str, str]:
         """Take the answers of a cycle; a failure in words and in short."""
         blocks: list[ServoBlock] = []
-        news = True
-        for mount, judge, health in zip(self.mounts, self._judges, self.health, strict=True):
+        for k, (mount, judge, health) in enumerate(
+            zip(self.mounts, self._judges, self.health, strict=True)
+        ):
             reply = replies.get(mount.device)
             if reply is None:
                 return f'servo {mount.device} does not answer', 'no answer'
@@ -354,10 +362,11 @@ class BusThread:
             if freshness is None:
                 short = 'restarted' if 'restarted' in why else 'not credible'
                 return f'servo {mount.device} {why}', short
-            news = news and freshness is Freshness.NEW
+            # The servos' milliseconds do not begin at the same time.
+            self._unpublished[k] |= freshness is Freshness.NEW
             blocks.append(block)
         self.figures.last_ns = received_ns
-        if news:
+        if all(self._unpublished):
             self._publish(blocks)
         self._notice(blocks)
         return '', ''
@@ -376,6 +385,7 @@ class BusThread:
             judge.clock.taken_ns(block.tick)
             for judge, block in zip(self._judges, blocks, strict=True)
         )
+        self._unpublished = [False for _ in mounts]
         self.newest = TimedReading(reading, taken)
         self.figures.readings += 1
 

@@ -30,6 +30,8 @@ from endoscope_devices.motor_device import DeviceError
 
 REPLY_MARGIN_S = 3e-3
 QUIET_S = 0.03
+# Nobody moves while a single servo is asked: patience costs nothing there.
+SINGLE_MARGIN_S = 0.02
 _ATTEMPTS = 3
 _PING_SIZE = 3
 _PING_PAUSE_S = 3e-3
@@ -229,7 +231,7 @@ class PacketHandler:
         request = encode(device, instruction, parameters)
         what = f'servo {device} on {self.port.port_name}'
         for _ in range(attempts):
-            reply = self.transact(request, [device], size).get(device)
+            reply = self.transact(request, [device], size, margin=SINGLE_MARGIN_S).get(device)
             if reply is None:
                 self.drain(QUIET_S)
                 continue
@@ -245,7 +247,12 @@ class PacketHandler:
         )
 
     def transact(
-        self, request: bytes, devices: Sequence[int], size: int, fast: bool = False
+        self,
+        request: bytes,
+        devices: Sequence[int],
+        size: int,
+        fast: bool = False,
+        margin: float = 0.0,
     ) -> dict[int, Reply]:
         """Send bytes and collect the answers of some servos.
 
@@ -259,6 +266,8 @@ class PacketHandler:
             Data bytes of each answer.
         fast
             Whether all answer in one packet (fast sync read).
+        margin
+            Time in s granted in addition.
 
         Returns
         -------
@@ -269,7 +278,7 @@ class PacketHandler:
         port = self.port
         port.clearPort()
         port.send(request)
-        deadline = time.monotonic() + self.time_out(len(request), [size] * len(devices))
+        deadline = time.monotonic() + self.time_out(len(request), [size] * len(devices)) + margin
         self.counts.requests += len(devices)
         collector = AnswerCollector(devices, size, fast)
         in_time = True
