@@ -33,11 +33,16 @@ class Cells:
 
     def __init__(self) -> None:
         self.tension = dict.fromkeys(WIRES, 5.0)
+        self.extra = {}
         self.count = {}
+        self.once = {}
         self.freeze = set()
         self.busy = False
         self._noise = np.random.default_rng(3)
         self._last = dict.fromkeys(WIRES, 0)
+
+    def follow(self, sample) -> None:
+        self.tension = dict(zip(WIRES, sample.effort, strict=True))
 
     def __call__(self, _time):
         if self.busy:
@@ -45,9 +50,11 @@ class Cells:
         words = []
         for wire in WIRES:
             if wire not in self.freeze:
-                pulled = round(self.tension[wire] / NEWTON_PER_COUNT) + ZERO
+                tension = self.tension[wire] + self.extra.get(wire, 0.0)
+                pulled = round(tension / NEWTON_PER_COUNT) + ZERO
                 self._last[wire] = pulled + int(self._noise.integers(-2, 3))
-            words += struct.unpack('>HH', struct.pack('>i', self.count.get(wire, self._last[wire])))
+            count = self.count.get(wire, self._last[wire])
+            words += struct.unpack('>HH', struct.pack('>i', self.once.pop(wire, count)))
         return words
 
 

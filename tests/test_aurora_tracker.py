@@ -7,6 +7,7 @@ import time
 import ndicapy
 import numpy as np
 import pytest
+from aurora_rig import Instrument
 
 from endoscope_core.kinematics import bending_from_orientation
 from endoscope_devices.em_tracker import (
@@ -16,28 +17,13 @@ from endoscope_devices.em_tracker import (
     load_registration,
     save_registration,
 )
-from endoscope_devices.em_tracker.aurora_emulator import AuroraEmulator, InstrumentInField
+from endoscope_devices.em_tracker.aurora_emulator import AuroraEmulator
 from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
 from endoscope_devices.em_tracker.aurora_unit import SensorView
 from endoscope_devices.em_tracker.tx_reply import MalformedReplyError, parse_tx
 
 PATIENCE_S = 20.0
 LATENCY = 0.03
-
-
-class Instrument:
-    """Bends, hides and breaks as a test says."""
-
-    def __init__(self):
-        self.bending = (0.0, 0.0)
-        self.hidden = False
-        self.broken = False
-        self._bent = InstrumentInField(lambda _: self.bending, roll=0.4)
-
-    def __call__(self, seconds):
-        if self.hidden:
-            return None
-        return SensorView(broken=True) if self.broken else self._bent(seconds)
 
 
 @pytest.fixture

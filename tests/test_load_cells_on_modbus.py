@@ -241,7 +241,8 @@ def test_a_busy_transmitter_is_refused_and_said(on_tcp, cells):
 def test_after_a_tare_the_tension_at_rest_is_nothing(on_serial, cells):
     cells.tension = dict.fromkeys(WIRES, 0.75)
     collect(on_serial, 220)
-    tared = on_serial.tare()
+    tared = on_serial.tared()
+    on_serial.use(tared)
     assert tared.wires['wire_x_pos'].zero == pytest.approx(ZERO + 750, abs=1)
     on_serial.take()
     assert collect(on_serial, 5)[-1].tension == pytest.approx((0.0,) * 4, abs=0.004)

@@ -1,18 +1,35 @@
 """Reads the pose of the instrument's tip, and from it the bending angles."""
 
+import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
+from std_srvs.srv import Trigger
 
-from endoscope_core.kinematics import bending_from_orientation, tip_pose
+from endoscope_core.kinematics import (
+    RegistrationError,
+    StraightRegistration,
+    bending_from_orientation,
+    tip_pose,
+)
 from endoscope_core.plant import SensorModel
-from endoscope_nodes.diagnostics import OK, STALE, Report
+from endoscope_devices.em_tracker import (
+    AuroraTracker,
+    RegistrationWindow,
+    TrackerReading,
+    TrackerSettings,
+    load_registration,
+    save_registration,
+)
+from endoscope_devices.strict_yaml import DeviceFileError
+from endoscope_nodes.diagnostics import ERROR, OK, STALE, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import JOINTS, SIMULATED_BENDING, SLAVE_MEASURED, TRACKER_POSE
-from endoscope_nodes.parameters import parameter
+from endoscope_nodes.parameters import ParameterError, parameter
 from endoscope_nodes.plant_parameter import load_plant_parameter
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
@@ -23,7 +40,28 @@ from endoscope_nodes.sampling import SampleClock
 class EmTrackerParameters:
     """Parameters of the EM tracker."""
 
-    device: str = parameter('simulated', 'what is read', choices=('simulated',))
+    device: str = parameter('simulated', 'what is read', choices=('simulated', 'aurora'))
+    port: str = parameter('', 'serial port of an aurora')
+    tool: int = parameter(
+        1, 'which of the sensors that are plugged in, in the order of their ports', low=1, high=32
+    )
+    latency: float = parameter(
+        0.0,
+        'time from measuring to having a frame, taken off its stamp',
+        unit='s',
+        low=0.0,
+        high=0.5,
+    )
+    sensor_roll: float = parameter(
+        0.0,
+        "angle about the instrument's axis from its x axis to the sensor's, as it is mounted",
+        unit='rad',
+        low=-math.pi,
+        high=math.pi,
+    )
+    registration_file: str = parameter(
+        '', 'where the pose of the straight instrument is kept; empty to forget it'
+    )
     plant_file: str = parameter(
         '', 'plant.yaml with the noise and rate of the simulated tracker; empty for the nominal one'
     )
@@ -40,26 +78,57 @@ class EmTrackerParameters:
 
 
 class EmTrackerNode(EndoscopeNode):
-    """Publishes ``tracker/measured_cp`` and the bending angles ``slave/measured_js``."""
+    """Publishes ``tracker/measured_cp`` and the bending angles ``slave/measured_js``.
+
+    A real tracker knows nothing of the instrument: ``~/register_straight`` takes the mean pose of
+    the last second for that of the straight instrument; until then nothing is published.
+    """
 
     def __init__(self, runtime: Runtime) -> None:
         super().__init__('em_tracker', runtime)
         self._settings = self.parameters(EmTrackerParameters, self._on_parameters)
         p = self._settings
-        sensors = load_plant_parameter('em_tracker', p.plant_file).sensors
-        self._sensors = SensorModel(sensors, p.seed)
-        self._sampling = SampleClock(sensors.tracker_rate)
         self._last_ns = 0
         self._out_of_reach = 0
+        self._tracker: AuroraTracker | None = None
+        self._window = RegistrationWindow()
+        self._registration: StraightRegistration | None = None
         self._pose = PoseStamped()
         self._pose.header.frame_id = p.base_frame
         self._poses = self.create_publisher(PoseStamped, TRACKER_POSE, SENSOR_OFFERED)
         self._measured = JointPublisher(self, SLAVE_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
-        JointSubscription(self, SIMULATED_BENDING, JOINTS, self._on_bending, LOCK_STEP)
+        if p.device == 'simulated':
+            sensors = load_plant_parameter('em_tracker', p.plant_file).sensors
+            self._sensors = SensorModel(sensors, p.seed)
+            self._sampling = SampleClock(sensors.tracker_rate)
+            JointSubscription(self, SIMULATED_BENDING, JOINTS, self._on_bending, LOCK_STEP)
+        else:
+            self._tracker = self._connect(p)
+            self.ticker.add(self._on_tick)
+        self.create_service(Trigger, '~/register_straight', self._on_register)
         self.diagnostics.add('tracker', self._report, p.device)
 
     def _on_parameters(self, parameters: EmTrackerParameters) -> None:
         self._settings = parameters
+
+    def _connect(self, p: EmTrackerParameters) -> AuroraTracker:
+        if self.ticker.simulated:
+            raise ParameterError(
+                f"em_tracker: parameter 'device' is {p.device!r}, which needs real time; "
+                "give 'simulated', or leave 'use_sim_time' out"
+            )
+        if not p.port:
+            raise ParameterError(f"em_tracker: parameter 'port' is empty: {p.device} needs it")
+        if p.registration_file and Path(p.registration_file).exists():
+            try:
+                self._registration = load_registration(p.registration_file)
+            except (DeviceFileError, ValueError) as error:
+                raise ParameterError(
+                    f"em_tracker: parameter 'registration_file': {error}"
+                ) from error
+        tracker = AuroraTracker(p.port, TrackerSettings(p.tool, p.latency))
+        tracker.open()
+        return tracker
 
     def _on_bending(self, sample: JointSample) -> None:
         if not self._sampling.due(sample.stamp_ns) or not self._settings.in_volume:
@@ -68,10 +137,59 @@ class EmTrackerNode(EndoscopeNode):
         if np.hypot(*reading) >= np.pi:
             self._out_of_reach += 1
             return
-        position, orientation = tip_pose(reading, self._settings.section_length)
-        self._publish_pose(sample.stamp_ns, position, orientation)
-        self._measured.publish(sample.stamp_ns, *bending_from_orientation(orientation).tolist())
+        self._publish(sample.stamp_ns, *tip_pose(reading, self._settings.section_length))
+
+    def _on_tick(self, _stamp_ns: int, _periods: int) -> None:
+        if self._tracker is None:
+            return
+        to_stamp_ns = self.ticker.now_ns() - self.ticker.monotonic_ns()
+        for reading in self._tracker.take():
+            self._window.add(reading)
+            if self._registration is not None:
+                self._publish_in_base(self._registration, reading, to_stamp_ns)
+
+    def _publish_in_base(
+        self, registration: StraightRegistration, reading: TrackerReading, to_stamp_ns: int
+    ) -> None:
+        position, orientation = registration.in_base(
+            reading.position,
+            reading.orientation,
+            roll=self._settings.sensor_roll,
+            length=self._settings.section_length,
+        )
+        self._publish(reading.time_ns + to_stamp_ns, position, orientation)
+
+    def _publish(self, stamp_ns: int, position: np.ndarray, orientation: np.ndarray) -> None:
+        try:
+            bending = bending_from_orientation(orientation)
+        except ValueError:
+            self._out_of_reach += 1
+            return
+        self._publish_pose(stamp_ns, position, orientation)
+        self._measured.publish(stamp_ns, *bending.tolist())
         self._last_ns = self.ticker.monotonic_ns()
+
+    def _on_register(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = False
+        if self._tracker is None:
+            response.message = 'the simulated tracker knows the straight instrument'
+            return response
+        try:
+            registration = self._window.register(self.ticker.monotonic_ns())
+            if self._settings.registration_file:
+                save_registration(self._settings.registration_file, registration)
+        except (RegistrationError, OSError) as error:
+            response.message = f'not registered: {error}'
+            self.get_logger().warning(response.message)
+            return response
+        self._registration = registration
+        response.success = True
+        response.message = 'straight instrument registered at ' + ', '.join(
+            f'{1e3 * v:.1f}' for v in registration.position
+        )
+        response.message += ' mm'
+        self.get_logger().info(response.message)
+        return response
 
     def _publish_pose(self, stamp_ns: int, position: np.ndarray, orientation: np.ndarray) -> None:
         pose = self._pose.pose
@@ -83,11 +201,26 @@ class EmTrackerNode(EndoscopeNode):
         self._poses.publish(self._pose)
 
     def _report(self) -> Report:
-        values = {'published': self._measured.count, 'out of reach': self._out_of_reach}
+        values: dict[str, object] = {
+            'published': self._measured.count,
+            'out of reach': self._out_of_reach,
+        }
+        if self._tracker is not None:
+            trouble, figures = self._tracker.health()
+            values |= figures
+            if trouble:
+                return ERROR, trouble, values
+            if self._registration is None:
+                return WARN, 'hold the instrument straight and call ~/register_straight', values
         age = self.ticker.monotonic_ns() - self._last_ns
         if self._measured.count == 0 or age > 500_000_000:
             return STALE, 'no poses', values
         return OK, 'tracking', values
+
+    def close(self) -> None:
+        """Let go of the tracker."""
+        if self._tracker is not None:
+            self._tracker.close()
 
 
 def main() -> int:

@@ -98,13 +98,8 @@ class ModbusLoadCells:
         with self._lock:
             self._window.note_shafts(time.monotonic_ns(), velocity)
 
-    def tare(self) -> LoadCellCalibration:
-        """Take the mean tension of the last second for zero from now on.
-
-        Returns
-        -------
-        LoadCellCalibration
-            With the new zeros.
+    def tared(self) -> LoadCellCalibration:
+        """The calibration in which the mean tension of the last second is zero.
 
         Raises
         ------
@@ -113,11 +108,15 @@ class ModbusLoadCells:
         """
         with self._lock:
             mean = self._window.mean(time.monotonic_ns())
-            self.calibration = with_zero(self.calibration, zero_after_tare(self.calibration, mean))
-            for check, cell in zip(self._checks, self.calibration.wires.values(), strict=True):
+            return with_zero(self.calibration, zero_after_tare(self.calibration, mean))
+
+    def use(self, calibration: LoadCellCalibration) -> None:
+        """Go on with other zeros."""
+        with self._lock:
+            self.calibration = calibration
+            for check, cell in zip(self._checks, calibration.wires.values(), strict=True):
                 check.cell = cell
-            self._window = TareWindow(tuple(self.calibration.wires), self.calibration.tare)
-            return self.calibration
+            self._window = TareWindow(tuple(calibration.wires), calibration.tare)
 
     def health(self) -> tuple[str, dict[str, object]]:
         """What is wrong (empty if nothing), and figures for diagnostics."""
