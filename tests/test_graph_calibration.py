@@ -8,6 +8,7 @@ import pytest
 from simulated_graph import SimulatedGraph
 from tubes import NODES_WITH_A_PLANT, tube_of_size
 
+from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.plant import EffectSpec, PlantDescription, save_plant
 
 
@@ -27,7 +28,7 @@ def test_finds_the_class_of_a_known_tube(tmp_path, size_deg, seed):
         assert low < float(values['regressed_size']) < high
         assert math.degrees(float(values['regressed_size'])) == pytest.approx(size_deg, abs=3.0)
         state = graph.nodes['compensator']
-        assert state._class_deg == size_deg
+        assert state.findings.class_deg == size_deg
 
 
 def test_a_brief_calibration_takes_less_than_five_seconds_to_compensated_motion(tmp_path):
@@ -43,7 +44,7 @@ def test_a_brief_calibration_takes_less_than_five_seconds_to_compensated_motion(
         assert values['class_deg'] == '70'
         assert values['backlash_size_from'] == 'classifier'
         assert float(values['backlash_size_deg']) == pytest.approx(70.0, abs=3.0)
-        assert graph.nodes['compensator']._class_deg == 70
+        assert graph.nodes['compensator'].findings.class_deg == 70
 
 
 def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_path):
@@ -53,7 +54,7 @@ def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_pa
     overrides = {node: {'plant_file': str(tmp_path / 'slack.yaml')} for node in NODES_WITH_A_PLANT}
     overrides['calibration'] = {'motion': 'brief'}
     with SimulatedGraph(overrides=overrides) as graph:
-        graph.nodes['compensator']._class_deg = 60
+        graph.nodes['compensator'].findings = CalibrationFindings(60)
         graph.enable()
         assert graph.call_calibration().success
         graph.advance(5.0)
@@ -62,7 +63,7 @@ def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_pa
         values = {v.key: v.value for v in status.values}
         assert values['class_deg'] == 'none'
         assert values['reason'].startswith('none of the classes: the tensions')
-        assert graph.nodes['compensator']._class_deg is None
+        assert graph.nodes['compensator'].findings is None
         assert graph.states[-1] == 'ENABLED'
 
 
@@ -120,7 +121,7 @@ def test_stale_load_cells_abort_and_the_slave_stands_still():
         positions = np.array([s.position for s in shafts])
         assert np.ptp(positions[-500:], axis=0).max() < 0.003
         assert graph.states[-1] == 'ENABLED'
-        assert graph.nodes['compensator']._class_deg is None
+        assert graph.nodes['compensator'].findings is None
 
 
 def test_leaving_enabled_aborts():

@@ -105,14 +105,26 @@ def test_a_class_without_parameters_is_refused():
         'no json',
         '[]',
         '{}',
-        '{"classes": {"40": {"feedforward": {"alpha": 1.0}}}}',
-        json.dumps({'classes': {'40': {'feedforward': {**TRUE.to_dict(), 'alpha': -1.0}}}}),
+        '{"model": "bouc_wen", "classes": {"40": {"feedforward": {"alpha": 1.0}}}}',
+        json.dumps(
+            {
+                'model': 'bouc_wen',
+                'classes': {'40': {'feedforward': {**TRUE.to_dict(), 'alpha': -1.0}}},
+            }
+        ),
     ],
 )
 def test_a_file_without_safe_parameters_is_refused(tmp_path, content):
     path = tmp_path / 'classes.json'
     path.write_text(content)
-    with pytest.raises(ClassParameterError, match='holds no Bouc-Wen'):
+    with pytest.raises(ClassParameterError, match='holds no bouc_wen'):
         load_class_parameters(path)
     with pytest.raises(ClassParameterError, match='is missing'):
         load_class_parameters(tmp_path / 'none.json')
+
+
+def test_parameters_of_another_model_are_refused(tmp_path):
+    path = tmp_path / 'classes.json'
+    path.write_text('{"model": "play", "classes": {}}')
+    with pytest.raises(ClassParameterError, match='of play, not of bouc_wen'):
+        load_class_parameters(path)

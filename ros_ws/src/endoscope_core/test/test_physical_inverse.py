@@ -10,6 +10,7 @@ from endoscope_core.control import (
     FeedforwardLaw,
     PhysicalInverse,
     PhysicalInverseSettings,
+    PhysicalParameters,
     PlantLearning,
 )
 from endoscope_core.control.physical_inverse import InternalModel
@@ -24,7 +25,7 @@ from endoscope_core.signals import non_periodic_signal, periodic_signal
 from endoscope_core.trials.tracking_trial import run_tracking_trial
 
 TICK = 1e-3
-JOINT = JointParameters(capstan_exponent=1.3)
+JOINT = PhysicalParameters(JointParameters(capstan_exponent=1.3))
 
 
 def follow(share, signal, joint=JOINT):
@@ -44,16 +45,16 @@ def follow(share, signal, joint=JOINT):
     return np.rad2deg(tips - angle)[inside]
 
 
-@pytest.mark.parametrize('exponent', [0.3, 0.9, 1.8])
+@pytest.mark.parametrize(('exponent', 'evenness'), [(0.3, 0.0), (1.5, 0.0), (0.8, 0.6), (1.5, 1.0)])
 @pytest.mark.parametrize('sense', [1.0, -1.0])
-def test_the_plant_slowly_driven_is_in_the_balance_that_the_law_computes(exponent, sense):
-    joint = replace(JointParameters(), capstan_exponent=exponent)
+def test_the_plant_slowly_driven_is_in_the_balance_that_the_law_computes(exponent, evenness, sense):
+    joint = PhysicalParameters(JointParameters(capstan_exponent=exponent), evenness)
     model = InternalModel(joint, 0.0, 0.0, 0.0)
     for k in range(4000):
         model.advance(sense * 1.6 * k / 4000.0, TICK)
     stretch = equilibrium_stretch(model.packed, model.tip, sense * 0.4, sense, sense)
     lag = 0.4 * 2.0 * 0.9 / 60.0
-    assert sense * 1.6 - sense * lag - model.tip == pytest.approx(stretch, abs=0.002)
+    assert sense * 1.6 - sense * lag - model.tip == pytest.approx(stretch, abs=0.01)
 
 
 def test_letting_the_friction_release_before_the_turning_point_shrinks_the_kick():
@@ -135,7 +136,7 @@ def test_a_random_rig_whose_plant_is_known_is_followed():
     plant = in_tube(random_rig(np.random.default_rng(5)), 0.7)
     signal = non_periodic_signal(12.0)
     none = run_tracking_trial(plant, signal, FeedforwardLaw(), False, 0).rmse
-    law = FeedforwardLaw('physical', tuple(plant.joints.values()))
+    law = FeedforwardLaw('physical', tuple(map(PhysicalParameters, plant.joints.values())))
     assert run_tracking_trial(plant, signal, law, False, 0).rmse < 0.06 * none
 
 
@@ -149,7 +150,7 @@ def test_after_the_tube_was_bent_it_follows_again_within_a_cycle():
         ),
     )
     signal = periodic_signal(4.0 + 4.2 * np.pi)
-    nominal = (JointParameters(capstan_exponent=0.6),) * 2
+    nominal = (PhysicalParameters(JointParameters(capstan_exponent=0.6)),) * 2
     none = run_tracking_trial(bent, signal, FeedforwardLaw(), False, 0)
     fixed = run_tracking_trial(bent, signal, FeedforwardLaw('physical', nominal), False, 0)
     learnt = run_tracking_trial(bent, signal, FeedforwardLaw('adaptive_physical', nominal), True, 0)
@@ -170,9 +171,9 @@ def test_estimates_stay_in_their_bounds_whatever_the_tracker_says(readings):
     for k, reading in enumerate(readings):
         model.advance(np.sin(0.1 * k), 0.004)
         learning.sent(np.sin(0.1 * k), 0.004)
-        found = learning.measured(0.001, reading)
+        found = learning.measured(0.001, reading).joint
         assert 0.019 < found.capstan_exponent < 4.51
-        assert 0.6 < found.wire_stiffness / JOINT.wire_stiffness < 1.65
+        assert 0.6 < found.wire_stiffness / JOINT.joint.wire_stiffness < 1.65
     assert np.all(np.linalg.eigvalsh(learning.covariance) > 0.0)
 
 

@@ -23,6 +23,8 @@ from endoscope_core.classifier.classification import (
     UnseenTensionError,
 )
 from endoscope_core.classifier.shipped import load_classifier
+from endoscope_core.control import PhysicalParameters
+from endoscope_core.identification.plant_fit import PlantFitError, plants_of_calibration
 from endoscope_core.safety import OperatingState, StateCommand, TensionGuard
 from endoscope_core.signals import CALIBRATION_MOTIONS, SINUSOID, calibration_motion
 from endoscope_nodes.calibration_result import (
@@ -57,6 +59,8 @@ from endoscope_nodes.state_watch import StateWatch
 from endoscope_nodes.stream_watch import StreamWatch
 from endoscope_nodes.ticker import TICK_NS
 
+_Judgement = tuple[ClassificationResult, tuple[PhysicalParameters, ...]]
+
 
 @dataclass(frozen=True)
 class CalibrationParameters:
@@ -71,6 +75,11 @@ class CalibrationParameters:
         SINUSOID,
         "motion by which the tube is judged: the first paper's sinusoid of 9 s, or one of 3 s",
         choices=CALIBRATION_MOTIONS,
+    )
+    identify_plant: bool = parameter(
+        False,
+        'whether to identify the plant of each joint from the tensions too, which the physical '
+        'modes of the compensator can be selected by; takes some seconds more of computing',
     )
     gear: float = parameter(0.5, 'shaft angle for one radian at the joint', low=0.01, high=100.0)
     return_speed: float = parameter(
@@ -110,7 +119,7 @@ class CalibrationNode(EndoscopeNode):
         self._homing = False
         self._began_ns = 0
         self._bending = BendingRecord(len(JOINTS))
-        self._judging: Future[ClassificationResult] | None = None
+        self._judging: Future[_Judgement] | None = None
         self._runs = 0
         self._aborts = 0
         self._refused = 0
@@ -239,13 +248,22 @@ class CalibrationNode(EndoscopeNode):
             self._abort(str(error))
             return
         if self._thread is not None:
-            self._judging = self._thread.submit(self._classifier.classify, tension)
+            self._judging = self._thread.submit(self._judgement, self._classifier, tension)
             return
         self._judging = Future()
         try:
-            self._judging.set_result(self._classifier.classify(tension))
-        except ClassifierError as error:
+            self._judging.set_result(self._judgement(self._classifier, tension))
+        except (ClassifierError, PlantFitError) as error:
             self._judging.set_exception(error)
+
+    def _judgement(self, classifier: Classifier, tension: np.ndarray) -> _Judgement:
+        """What the tensions (N, 4) say; the plant is not looked for in a tube that is refused."""
+        verdict = classifier.classify(tension)
+        if not self._settings.identify_plant:
+            return verdict, ()
+        time = np.arange(len(tension)) * TICK_NS * 1e-9
+        command, _ = self._motion.signal(time)
+        return verdict, plants_of_calibration(command, tension)
 
     def _finish(self, run: CalibrationRun) -> None:
         if self._homing:
@@ -262,17 +280,17 @@ class CalibrationNode(EndoscopeNode):
         if isinstance(trouble, UnseenTensionError):
             self._refuse(str(trouble))
             return
-        if isinstance(trouble, ClassifierError):
+        if isinstance(trouble, ClassifierError | PlantFitError):
             self._abort(str(trouble))
             return
-        verdict = self._judging.result()
+        verdict, plants = self._judging.result()
         backlash = None
         # Backlash size is that under the sinusoid: faster motion has a wider loop.
         if run.record is not None and self._motion.name == SINUSOID:
             backlash = self._bending.backlash_size(run.record.start_ns)
         now = self.ticker.now_ns()
         self._results.publish(
-            successful_result(now, verdict, backlash, (now - self._began_ns) * 1e-9)
+            successful_result(now, verdict, backlash, (now - self._began_ns) * 1e-9, plants)
         )
         self._run = None
         self._runs += 1

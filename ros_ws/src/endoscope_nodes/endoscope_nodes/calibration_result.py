@@ -1,12 +1,16 @@
 """The message ``calibration/result``: how it is written, and how it is read."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
 
+from endoscope_core.control import PhysicalParameters
+from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_nodes.diagnostics import ERROR, OK, status
+from endoscope_nodes.names import JOINTS
 
 if TYPE_CHECKING:
     # Those who only read results need no torch.
@@ -17,7 +21,11 @@ NONE_OF_THEM = 'none'
 
 
 def successful_result(
-    stamp_ns: int, verdict: 'ClassificationResult', backlash: float | None, duration: float
+    stamp_ns: int,
+    verdict: 'ClassificationResult',
+    backlash: float | None,
+    duration: float,
+    plants: Sequence[PhysicalParameters] = (),
 ) -> DiagnosticArray:
     """Say which class was found.
 
@@ -31,6 +39,8 @@ def successful_result(
         Size in rad as the tracker measured it; None where it could not.
     duration
         Of the whole calibration, in s.
+    plants
+        Identified parameters of each joint; empty where they were not asked for.
     """
     values: dict[str, object] = {'class_deg': verdict.class_deg, 'probability': verdict.probability}
     values |= {f'probability_{size}_deg': p for size, p in verdict.probabilities.items()}
@@ -47,6 +57,8 @@ def successful_result(
             'regressed_size_high': verdict.interval[1],
         }
     values['duration'] = duration
+    if plants:
+        values |= plant_values(plants)
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
     return _array(stamp_ns, OK, message, values)
 
@@ -91,6 +103,43 @@ def class_of(message: DiagnosticArray) -> int | None:
             except (KeyError, ValueError):
                 return None
     return None
+
+
+def findings_of(message: DiagnosticArray) -> CalibrationFindings | None:
+    """Read all that a compensator can use out of a result; None where it tells of no success."""
+    for item in message.status:
+        if item.name != NAME or item.level != OK:
+            continue
+        values = {v.key: v.value for v in item.values}
+        try:
+            size = values.get('regressed_size', values.get('backlash_size'))
+            return CalibrationFindings(
+                int(values['class_deg']),
+                None if size is None else float(size),
+                _plants_of(values),
+            )
+        except (KeyError, ValueError):
+            return None
+    return None
+
+
+def plant_values(plants: Sequence[PhysicalParameters]) -> dict[str, object]:
+    """Keys and values by which a result tells of identified plants, one for each joint."""
+    return {
+        f'{joint}.{name}': value
+        for joint, plant in zip(JOINTS, plants, strict=True)
+        for name, value in plant.to_dict().items()
+    }
+
+
+def _plants_of(values: Mapping[str, str]) -> tuple[PhysicalParameters, ...]:
+    plants = []
+    for joint in JOINTS:
+        prefix = f'{joint}.'
+        own = {key.removeprefix(prefix): v for key, v in values.items() if key.startswith(prefix)}
+        if own:
+            plants.append(PhysicalParameters.from_dict(own))
+    return tuple(plants)
 
 
 def _array(stamp_ns: int, level: bytes, text: str, values: dict[str, object]) -> DiagnosticArray:

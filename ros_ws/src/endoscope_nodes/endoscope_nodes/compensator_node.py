@@ -1,24 +1,20 @@
 """Turns desired bending into motor commands that make up for the hysteresis."""
 
-from dataclasses import asdict
-
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
 
 from endoscope_core.control import (
+    ADAPTIVE_PHYSICAL,
+    MODES,
     Feedforward,
     FeedforwardLaw,
     FeedforwardSettings,
 )
-from endoscope_core.hysteresis import BoucWenParameters
-from endoscope_core.identification.class_parameters import (
-    ClassParameterError,
-    load_class_parameters,
-    parameters_for_class,
-)
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.identification.law_choice import BY_CLASS, CalibrationFindings, LawChoice
 from endoscope_core.safety import CommandGate, CommandLimits, Refusal
-from endoscope_nodes.calibration_result import class_of, is_of_no_class
+from endoscope_nodes.calibration_result import findings_of, is_of_no_class
 from endoscope_nodes.clutch_watch import ClutchWatch
 from endoscope_nodes.command_report import CommandReport
 from endoscope_nodes.compensator_parameters import CompensatorParameters
@@ -40,6 +36,7 @@ from endoscope_nodes.names import (
     MOTOR_MEASURED,
     MOTORS,
     SLAVE_COMMAND,
+    SLAVE_MEASURED,
 )
 from endoscope_nodes.qos import COMMAND, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
@@ -50,6 +47,7 @@ CALIBRATION = 'calibration'
 NOBODY = 'nobody'
 
 _NOTHING = np.zeros(len(JOINTS))
+_ANY_CLASS = CalibrationFindings(class_deg=70)
 
 
 class CompensatorNode(EndoscopeNode):
@@ -68,10 +66,10 @@ class CompensatorNode(EndoscopeNode):
         self.calibration_gate = CommandGate(self._limits(p.calibration_timeout))
         self._feedforward = Feedforward(len(JOINTS), FeedforwardSettings(lead=p.lead))
         self._passing = Feedforward(len(JOINTS))
-        # Loads what is compiled now: the first command must not wait for it.
-        Feedforward(len(JOINTS)).step(_NOTHING, _NOTHING, 1e-3)
-        self._sets, self._trouble = self._load_sets(p.parameter_sets)
-        self._class_deg: int | None = None
+        self._choice = LawChoice(len(JOINTS), p.parameter_sets, p.table)
+        self._trouble = self._load()
+        self.findings: CalibrationFindings | None = None
+        self._measurement: JointSample | None = None
         self._source = NOBODY
         self._last_stamp_ns = 0
         self._drive_before = _NOTHING
@@ -103,6 +101,7 @@ class CompensatorNode(EndoscopeNode):
             on_malformed=self._on_malformed,
         )
         JointSubscription(self, CORRECTION, JOINTS, self._on_correction, COMMAND)
+        JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_measured, SENSOR_ASKED)
         self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
         self.diagnostics.add('commands', CommandReport(self.gate))
         self.diagnostics.add('calibration commands', CommandReport(self.calibration_gate))
@@ -124,29 +123,38 @@ class CompensatorNode(EndoscopeNode):
         self._select_law()
 
     def _on_result(self, message: DiagnosticArray) -> None:
-        found = class_of(message)
+        found = findings_of(message)
         if found is not None or is_of_no_class(message):
-            self._class_deg = found
+            self.findings = found
             self._select_law()
 
-    @staticmethod
-    def _load_sets(path: str) -> tuple[dict[int, BoucWenParameters], str]:
-        try:
-            return load_class_parameters(path or None), ''
-        except ClassParameterError as error:
-            return {}, str(error)
+    def _load(self) -> str:
+        """Read what the mode needs and load what is compiled: the first command must not wait.
+
+        Returns why the mode cannot be had, empty if it can.
+        """
+        trouble = ''
+        for mode in dict.fromkeys((*MODES, self._settings.mode)):
+            trial = Feedforward(len(JOINTS))
+            try:
+                trial.select(self._choice.law(mode, BY_CLASS, _ANY_CLASS))
+            except EndoscopeError as error:
+                trouble = str(error) if mode == self._settings.mode else trouble
+                continue
+            trial.step(_NOTHING, _NOTHING, 1e-3)
+            trial.measure(0.0, _NOTHING)
+        return trouble
 
     def _select_law(self) -> None:
-        """Put mode and class in force; without a class nothing is compensated."""
-        law = FeedforwardLaw()
-        if self._class_deg is not None and self._sets:
+        """Put mode and findings in force; without findings nothing is compensated."""
+        law, self._trouble = FeedforwardLaw(), ''
+        if self.findings is not None:
             try:
-                chosen = parameters_for_class(self._sets, self._class_deg)
-            except ClassParameterError as error:
+                law = self._choice.law(
+                    self._settings.mode, self._settings.selected_by, self.findings
+                )
+            except EndoscopeError as error:
                 self._trouble = str(error)
-            else:
-                self._trouble = ''
-                law = FeedforwardLaw(self._settings.mode, (chosen,) * len(JOINTS))
         if law != self._feedforward.law:
             self._feedforward.select(law)
         self._state_is_news = True
@@ -158,6 +166,19 @@ class CompensatorNode(EndoscopeNode):
 
     def _on_malformed(self, reason: str) -> None:
         self.gate.refuse(Refusal.MALFORMED, reason)
+
+    def _on_measured(self, sample: JointSample) -> None:
+        if len(sample.position) == len(JOINTS):
+            self._measurement = sample
+
+    def _learn(self, stamp_ns: int) -> None:
+        """Give a measurement from before this command to the law, once."""
+        sample = self._measurement
+        if sample is None or sample.stamp_ns >= stamp_ns:
+            return
+        self._measurement = None
+        if np.isfinite(sample.position).all():
+            self._feedforward.measure((stamp_ns - sample.stamp_ns) * 1e-9, sample.position)
 
     def _on_correction(self, sample: JointSample) -> None:
         self._corrections = (self._corrections[1], sample)
@@ -181,6 +202,7 @@ class CompensatorNode(EndoscopeNode):
             self._feedforward.rebase(
                 self._drive_before - (_NOTHING if correction is None else correction)
             )
+        self._learn(sample.stamp_ns)
         velocity = sample.velocity or (0.0,) * len(JOINTS)
         drive = self._feedforward.step(sample.position, velocity, dt or 1e-3)
         if correction is not None:
@@ -219,7 +241,12 @@ class CompensatorNode(EndoscopeNode):
         return None
 
     def _correction(self, stamp_ns: int) -> np.ndarray | None:
-        """Newest correction from before this command: which one must not depend on chance."""
+        """Newest correction from before this command: which one must not depend on chance.
+
+        None in the mode that learns from the tracker itself.
+        """
+        if self._feedforward.law.mode == ADAPTIVE_PHYSICAL:
+            return None
         for sample in reversed(self._corrections):
             if sample is not None and sample.stamp_ns < stamp_ns:
                 age = (stamp_ns - sample.stamp_ns) * 1e-9
@@ -247,13 +274,14 @@ class CompensatorNode(EndoscopeNode):
         values: dict[str, object] = {
             'mode': law.mode,
             'wanted_mode': self._settings.mode,
+            'selected_by': self._settings.selected_by,
             'lead': self._settings.lead,
             'gear': self._settings.gear,
         }
-        if self._class_deg is not None:
-            values['class_deg'] = self._class_deg
+        if self.findings is not None and self.findings.class_deg is not None:
+            values['class_deg'] = self.findings.class_deg
         for joint, parameters in zip(JOINTS, law.parameters, strict=False):
-            values |= {f'{joint}.{key}': value for key, value in asdict(parameters).items()}
+            values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
         message = DiagnosticArray()
         message.header.stamp = Time(nanoseconds=now).to_msg()
         message.status = [status('compensator: model', OK, self._model_in_words(), values)]
@@ -264,12 +292,12 @@ class CompensatorNode(EndoscopeNode):
             return 'no feed-forward'
         if self._trouble:
             return f'no feed-forward: {self._trouble}'
-        if self._class_deg is None:
+        if self.findings is None:
             return f'no feed-forward: {self._settings.mode} waits for {CALIBRATION_RESULT}'
-        return f'{self._settings.mode}, class {self._class_deg} deg'
+        return f'{self._settings.mode} by {self._settings.selected_by}: {_in_words(self.findings)}'
 
     def _report(self) -> Report:
-        waiting = self._settings.mode != 'none' and self._class_deg is None
+        waiting = self._settings.mode != 'none' and self.findings is None
         level = ERROR if self._trouble else WARN if waiting else OK
         return (
             level,
@@ -279,8 +307,18 @@ class CompensatorNode(EndoscopeNode):
                 'published': self._motors.count,
                 'corrected': self._corrected,
                 'saturated': self._saturated,
+                'learnt': ' '.join(
+                    f'{learnt.joint.capstan_exponent:.3f}' for learnt in self._feedforward.learnt
+                ),
             },
         )
+
+
+def _in_words(findings: CalibrationFindings) -> str:
+    parts = [] if findings.class_deg is None else [f'class {findings.class_deg} deg']
+    if findings.size is not None:
+        parts.append(f'size {np.degrees(findings.size):.1f} deg')
+    return ', '.join([*parts, *(['plant identified'] if findings.plants else [])])
 
 
 def main() -> int:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from endoscope_core.control import MODES
+from endoscope_core.identification.law_choice import BY_CLASS, SELECTIONS
 from endoscope_nodes.parameters import parameter
 
 
@@ -15,6 +16,18 @@ class CompensatorParameters:
         'feed-forward model in force once its parameters are known',
         choices=MODES,
         dynamic=True,
+    )
+    selected_by: str = parameter(
+        BY_CLASS,
+        'what of a calibration selects the parameters: the hysteresis class, the backlash size in '
+        'the updated table, or (physical modes) the plant that it identified',
+        choices=SELECTIONS,
+        dynamic=True,
+    )
+    table: str = parameter(
+        '',
+        'updated table as `endoscope identify --table` extends it; empty for one made of the '
+        'class parameters',
     )
     parameter_sets: str = parameter(
         '',

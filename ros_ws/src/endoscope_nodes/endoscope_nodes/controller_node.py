@@ -6,7 +6,11 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
-from endoscope_core.control import AdaptiveBacklashController, TrackerMeasurement
+from endoscope_core.control import (
+    AdaptiveBacklashController,
+    RecursiveHysteresisController,
+    TrackerMeasurement,
+)
 from endoscope_core.safety import CommandGate, CommandLimits, OperatingState, Refusal
 from endoscope_nodes.calibration_result import class_of
 from endoscope_nodes.command_report import CommandReport
@@ -27,6 +31,12 @@ from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.state_watch import StateWatch
 from endoscope_nodes.stream_watch import StreamWatch
 
+Controller = AdaptiveBacklashController | RecursiveHysteresisController
+LAWS: dict[str, type[Controller]] = {
+    'adaptive': AdaptiveBacklashController,
+    'recursive_least_squares': RecursiveHysteresisController,
+}
+
 _NOTHING = np.zeros(len(JOINTS))
 
 
@@ -36,6 +46,13 @@ class ControllerParameters:
 
     active: bool = parameter(
         True, 'whether to learn and correct while the tracker is fresh', dynamic=True
+    )
+    law: str = parameter(
+        'adaptive',
+        "how to learn: the second paper's adaptive law, or recursive least squares; a change "
+        'takes place once the correction has faded out',
+        choices=tuple(LAWS),
+        dynamic=True,
     )
     tracker_timeout: float = parameter(
         0.15,
@@ -70,9 +87,8 @@ class ControllerNode(EndoscopeNode):
         super().__init__('controller', runtime)
         p = self.parameters(ControllerParameters, self._on_parameters)
         self._settings = p
-        self.controller = AdaptiveBacklashController(
-            len(JOINTS), stale_after=p.tracker_timeout, fade_time=p.fade_time
-        )
+        self._law = p.law
+        self.controller = self._new_controller()
         # Loads what is compiled now: the first command must not wait for it.
         AdaptiveBacklashController(len(JOINTS)).step(0.0, _NOTHING, _NOTHING)
         reach = (p.joint_limit,) * len(JOINTS)
@@ -107,6 +123,13 @@ class ControllerNode(EndoscopeNode):
         self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
         self.diagnostics.add('commands', CommandReport(self._gate))
         self.diagnostics.add('feedback', self._report)
+
+    def _new_controller(self) -> Controller:
+        return LAWS[self._law](
+            len(JOINTS),
+            stale_after=self._settings.tracker_timeout,
+            fade_time=self._settings.fade_time,
+        )
 
     def _on_parameters(self, parameters: ControllerParameters) -> None:
         self._settings = parameters
@@ -146,7 +169,11 @@ class ControllerNode(EndoscopeNode):
     def _choose_whether_to_act(self) -> None:
         timeout = round(self._settings.calibration_timeout * 1e9)
         calibrating = not self._calibration.trouble(timeout)
-        if self._settings.active and not calibrating:
+        changing = self._settings.law != self._law
+        if changing and self.controller.weight == 0.0:
+            self._law, changing = self._settings.law, False
+            self.controller = self._new_controller()
+        if self._settings.active and not calibrating and not changing:
             self.controller.activate()
         else:
             self.controller.deactivate()
@@ -167,10 +194,11 @@ class ControllerNode(EndoscopeNode):
         values: dict[str, object] = {
             'published': self._corrections.count,
             'weight': controller.weight,
+            'law': self._law,
             'measurements refused': controller.refused,
         }
-        for joint, estimate in zip(JOINTS, controller.estimates, strict=True):
-            values |= {f'{joint}.gain': estimate.gain, f'{joint}.backlash': estimate.backlash}
+        for joint, (gain, backlash) in zip(JOINTS, controller.learnt, strict=True):
+            values |= {f'{joint}.gain': gain, f'{joint}.backlash': backlash}
         if not self._settings.active:
             return OK, 'not active', values
         if not controller.tracker_fresh(self._last_stamp_ns * 1e-9):

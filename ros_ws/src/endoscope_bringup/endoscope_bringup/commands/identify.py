@@ -3,8 +3,20 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-MODELS = ('bouc_wen',)
+if TYPE_CHECKING:
+    from endoscope_core.hysteresis.inverse import HysteresisParameters
+    from endoscope_core.identification import Recording
+
+MODELS = (
+    'bouc_wen',
+    'asymmetric_bouc_wen',
+    'dahl',
+    'play',
+    'prandtl_ishlinskii',
+    'physical',
+)
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -22,6 +34,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='rosbag2 folder, .mcap, or data set of `endoscope dataset`',
     )
     parser.add_argument('--model', choices=MODELS, required=True, help='the model')
+    parser.add_argument(
+        '--table',
+        type=Path,
+        metavar='FILE',
+        help='updated table to which the calibration in BAG is added; made if it is not there',
+    )
     parser.add_argument('--out', type=Path, metavar='FILE', help='JSON file to write')
     parser.add_argument('--seed', type=int, default=0, help='of the search (0)')
     parser.add_argument(
@@ -45,7 +63,10 @@ def run(args: argparse.Namespace) -> int:
 
     from endoscope_core.atomic_output import write_text
     from endoscope_core.dataset import is_dataset
+    from endoscope_core.errors import EndoscopeError
 
+    if args.table is not None and (is_dataset(args.source) or args.model == 'physical'):
+        raise EndoscopeError('--table takes a bag and the name of a hysteresis model')
     content = _of_dataset(args) if is_dataset(args.source) else _of_bag(args)
     text = json.dumps(content, indent=1) + '\n'
     if args.out is None:
@@ -63,14 +84,14 @@ def _of_dataset(args: argparse.Namespace) -> dict[str, object]:
 
     dataset = load_dataset(args.source)
     lead = FeedforwardSettings().lead
-    found = identify_classes(dataset, lead, args.seed, args.per_class, _report)
+    found = identify_classes(dataset, lead, args.seed, args.per_class, _report, args.model)
     made = dataset.manifest
     command = (
         f'endoscope dataset --seed {made["seed"]} --per-class {made["per_class"]} '
         f'--out DATA && endoscope identify DATA --model {args.model} --seed {args.seed} '
         f'--per-class {args.per_class}'
     )
-    return class_parameter_sets(found, command, dataset.manifest_hash, lead)
+    return class_parameter_sets(found, command, dataset.manifest_hash, lead, args.model)
 
 
 def _of_bag(args: argparse.Namespace) -> dict[str, object]:
@@ -79,10 +100,12 @@ def _of_bag(args: argparse.Namespace) -> dict[str, object]:
     from endoscope_core.control import FeedforwardSettings
     from endoscope_core.identification import Servo, fit_feedforward, fit_model
 
+    if args.model == 'physical':
+        return _plant_of_bag(args)
     lead = FeedforwardSettings().lead
     joints: dict[str, object] = {}
     for joint, recording in hysteresis_of_bag(open_bag(args.source), args.gear).items():
-        model = fit_model([recording], args.seed)
+        model = fit_model([recording], args.seed, args.model)
         feedforward = fit_feedforward(model.parameters, Servo(), lead, args.seed)
         _report(f'{joint}: {model}')
         joints[joint] = {
@@ -90,7 +113,54 @@ def _of_bag(args: argparse.Namespace) -> dict[str, object]:
             'model': model.parameters.to_dict(),
             'model_rmse': model.rmse,
         }
+        if args.table is not None:
+            _extend(args, recording, feedforward.parameters, f'{args.source.name} {joint}')
     return {'schema': 1, 'model': args.model, 'lead': lead, 'seed': args.seed, 'joints': joints}
+
+
+def _plant_of_bag(args: argparse.Namespace) -> dict[str, object]:
+    from endoscope_bags import open_bag
+    from endoscope_bringup.learning.plant_of_bag import plant_recordings_of_bag
+    from endoscope_core.identification import fit_plant
+
+    joints: dict[str, object] = {}
+    for joint, recording in plant_recordings_of_bag(open_bag(args.source), args.gear).items():
+        fit = fit_plant(recording.command, recording.tension, recording.bending)
+        _report(
+            f'{joint}: capstan exponent {fit.parameters.joint.capstan_exponent:.3f}, '
+            f'{fit.tension_rmse:.3f} N rms'
+        )
+        joints[joint] = {
+            'model': fit.parameters.to_dict(),
+            'tension_rmse': fit.tension_rmse,
+            'bending_rmse': fit.bending_rmse,
+        }
+    return {'schema': 1, 'model': 'physical', 'joints': joints}
+
+
+def _extend(
+    args: argparse.Namespace,
+    recording: 'Recording',
+    parameters: 'HysteresisParameters',
+    source: str,
+) -> None:
+    """Add one joint's calibration to the table, under the backlash size that it shows."""
+    import math
+
+    from endoscope_core.identification import TableEntry, UpdatedTable, UpdatedTableError
+    from endoscope_core.metrics import width_at_mid_height
+
+    size = width_at_mid_height(recording.driver, recording.actual)
+    entry = TableEntry(size, parameters, source)
+    if args.table.is_file():
+        table = UpdatedTable.load(args.table)
+        if table.model != args.model:
+            raise UpdatedTableError(f'{args.table} is a table of {table.model}, not {args.model}')
+        table = table.extended(entry)
+    else:
+        table = UpdatedTable.of(args.model, [entry])
+    table.save(args.table)
+    _report(f'{args.table}: {len(table.entries)} entries, {math.degrees(size):.1f} deg added')
 
 
 def _report(line: str) -> None:

@@ -12,6 +12,7 @@ from endoscope_core.control.feedforward import (
     FeedforwardSettings,
 )
 from endoscope_core.control.physical_inverse import PhysicalInverse, PhysicalInverseSettings
+from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
 from endoscope_core.control.recursive_hysteresis import (
     RecursiveHysteresisController,
@@ -31,6 +32,7 @@ __all__ = [
     'FeedforwardSettings',
     'PhysicalInverse',
     'PhysicalInverseSettings',
+    'PhysicalParameters',
     'PlantLearning',
     'PlantLearningSettings',
     'RecursiveHysteresisController',

@@ -66,3 +66,8 @@ class AdaptiveBacklashController(TrackerFeedback[AdaptiveBacklashJoint]):
     def estimates(self) -> tuple[AdaptationState, ...]:
         """What has been learnt, for each joint."""
         return tuple(law.state for law in self.laws)
+
+    @property
+    def learnt(self) -> tuple[tuple[float, float], ...]:
+        """Gain and backlash (rad) that the correction adds, for each joint."""
+        return tuple((law.state.gain, law.state.backlash) for law in self.laws)

@@ -1,8 +1,8 @@
 """Physical inverse and tracker together: the plant is learnt while it is inverted."""
 
 from endoscope_core.control.physical_inverse import PhysicalInverse, PhysicalInverseSettings
+from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
-from endoscope_core.plant import JointParameters
 
 
 class AdaptivePhysicalInverse(PhysicalInverse):
@@ -14,7 +14,7 @@ class AdaptivePhysicalInverse(PhysicalInverse):
 
     Parameters
     ----------
-    parameters : JointParameters
+    parameters : PhysicalParameters
         To begin with.
     settings : PhysicalInverseSettings, optional
     learning : PlantLearningSettings, optional
@@ -22,7 +22,7 @@ class AdaptivePhysicalInverse(PhysicalInverse):
 
     def __init__(
         self,
-        parameters: JointParameters,
+        parameters: PhysicalParameters,
         settings: PhysicalInverseSettings | None = None,
         learning: PlantLearningSettings | None = None,
     ) -> None:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from endoscope_core.control.adaptive_physical_inverse import AdaptivePhysicalInverse
 from endoscope_core.control.joint_inverse import HysteresisInverse, JointInverse, Passing
 from endoscope_core.control.physical_inverse import PhysicalInverse
+from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.hysteresis.inverse import MODELS, HysteresisParameters
-from endoscope_core.plant import JointParameters
 
 Vector = Sequence[float] | NDArray[np.float64]
-LawParameters = HysteresisParameters | JointParameters
+LawParameters = HysteresisParameters | PhysicalParameters
 
 PHYSICAL = 'physical'
 ADAPTIVE_PHYSICAL = 'adaptive_physical'
@@ -25,7 +25,7 @@ MODES = ('none', *MODELS, PHYSICAL, ADAPTIVE_PHYSICAL)
 
 def parameters_of(mode: str) -> type[LawParameters]:
     """Kind of parameters that a mode other than 'none' works with."""
-    return JointParameters if mode in (PHYSICAL, ADAPTIVE_PHYSICAL) else MODELS[mode]
+    return PhysicalParameters if mode in (PHYSICAL, ADAPTIVE_PHYSICAL) else MODELS[mode]
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class Feedforward:
         return np.array([joint.offset for joint in self._joints] or [0.0] * self._count)
 
     @property
-    def learnt(self) -> tuple[JointParameters, ...]:
+    def learnt(self) -> tuple[PhysicalParameters, ...]:
         """Parameters as learnt so far, for each joint that learns."""
         return tuple(
             joint.inverse.parameters
@@ -263,7 +263,7 @@ class Feedforward:
         if self.law.mode == 'none':
             return Passing(self.settings.resting_travel)
         parameters = self.law.parameters[number]
-        if not isinstance(parameters, JointParameters):
+        if not isinstance(parameters, PhysicalParameters):
             return HysteresisInverse(parameters, self.settings.lead)
         if self.law.mode == PHYSICAL:
             return PhysicalInverse(parameters)

@@ -16,6 +16,9 @@ from endoscope_core.control.physical_inverse_law import (
     TARGET,
     law_step,
 )
+from endoscope_core.control.physical_parameters import PhysicalParameters
+from endoscope_core.effects import distributed_friction
+from endoscope_core.effects.distributed_friction import NODES
 from endoscope_core.effects.slots import (
     JOINT,
     JOINT_SLIDE,
@@ -23,7 +26,7 @@ from endoscope_core.effects.slots import (
     SLIDE_B,
     WIRE_END,
 )
-from endoscope_core.plant import JointParameters, PlantDescription
+from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.plant.inputs import IN_MOTOR, INPUTS
 from endoscope_core.plant.kernel import advance_tick
 from endoscope_core.plant.packing import pack, rest_state
@@ -63,33 +66,47 @@ class InternalModel:
 
     Parameters
     ----------
-    parameters : JointParameters
+    parameters : PhysicalParameters
     motor, joint, slide : float
         Where it begins: motor and tip angle (rad), sliding state of wires and joint in [-1, 1].
     """
 
     def __init__(
-        self, parameters: JointParameters, motor: float, joint: float, slide: float
+        self, parameters: PhysicalParameters, motor: float, joint: float, slide: float
     ) -> None:
-        plant = PlantDescription(joints={_JOINT_NAME: parameters})
-        packed, flags = pack(plant)
+        along = EffectSpec(
+            distributed_friction.DEFINITION.id, _JOINT_NAME, {'share': parameters.evenness}
+        )
+        effects = (along,) if parameters.evenness > 0.0 else ()
+        packed, flags = pack(
+            PlantDescription(joints={_JOINT_NAME: parameters.joint}, effects=effects)
+        )
         self.packed: Array = packed[0]
         self._flags = flags[0]
+        self._evenness = parameters.evenness
+        # Where friction is not spread, the law must not find the effect's typical share.
+        self.packed[distributed_friction.SHARE] = parameters.evenness
         states, histories = rest_state(self.packed[None], np.array([motor]))
         self.state: Array = states[0]
         self._history: Array = histories[0]
         self.state[JOINT] = self.state[WIRE_END] = joint
         self.state[SLIDE_A], self.state[SLIDE_B] = slide, -slide
         self.state[JOINT_SLIDE] = slide
+        stretch = parameters.joint.joint_radius * (motor - joint) * distributed_friction.LENGTHS
+        for wire, sign in ((distributed_friction.WIRE_A, 1.0), (distributed_friction.WIRE_B, -1.0)):
+            first = wire + distributed_friction.STRETCH
+            self.state[first : first + NODES + 1] = sign * stretch
+            first = wire + distributed_friction.SLIDE
+            self.state[first : first + NODES] = sign * slide
         self._input = np.zeros(INPUTS)
         self._input[IN_MOTOR] = np.nan
 
-    def change_nominal(self, parameters: JointParameters) -> None:
-        """Go on as another joint, from where this one is."""
-        values = astuple(parameters)
+    def change_joint(self, joint: JointParameters) -> None:
+        """Go on as another joint behind a tube as even, from where this one is."""
+        values = astuple(joint)
         self.packed[: len(values)] = values
 
-    def copy_as(self, parameters: JointParameters) -> InternalModel:
+    def copy_as(self, parameters: PhysicalParameters) -> InternalModel:
         """Another joint in the state of this one."""
         other = InternalModel(parameters, 0.0, 0.0, 0.0)
         other.state[:] = self.state
@@ -103,8 +120,13 @@ class InternalModel:
 
     @property
     def slide(self) -> float:
-        """State of the positive wire."""
-        return float(self.state[SLIDE_A])
+        """State of the positive wire, mean along the sheath."""
+        ends = float(self.state[SLIDE_A])
+        if self._evenness == 0.0:
+            return ends
+        first = distributed_friction.WIRE_A + distributed_friction.SLIDE
+        along = float(np.mean(self.state[first : first + NODES]))
+        return ends + self._evenness * (along - ends)
 
     def advance(self, command: float, dt: float) -> None:
         """Hold a command (rad, joint-equivalent) for `dt` s."""
@@ -127,13 +149,13 @@ class PhysicalInverse:
 
     Parameters
     ----------
-    parameters : JointParameters
+    parameters : PhysicalParameters
         Of the plant, identified or of the tube's class.
     settings : PhysicalInverseSettings, optional
     """
 
     def __init__(
-        self, parameters: JointParameters, settings: PhysicalInverseSettings | None = None
+        self, parameters: PhysicalParameters, settings: PhysicalInverseSettings | None = None
     ) -> None:
         self.parameters = parameters
         self.settings = settings or PhysicalInverseSettings()
@@ -147,8 +169,10 @@ class PhysicalInverse:
 
     @property
     def servo_lag(self) -> float:
-        """S by which the servo follows a steady motion late, ``2 zeta / w``."""
-        return 2.0 * self.parameters.motor_damping_ratio / self.parameters.motor_bandwidth
+        """Time in s by which the servo follows a steady motion late, ``2 zeta / w``."""
+        return (
+            2.0 * self.parameters.joint.motor_damping_ratio / self.parameters.joint.motor_bandwidth
+        )
 
     def begin(self, direction: float, desired: float, velocity: float, command: float) -> float:
         """Start from an estimate of where things are; return the command wanted now (rad).
@@ -178,11 +202,6 @@ class PhysicalInverse:
     def sent(self, command: float, dt: float) -> None:
         """What went out in the end, in force for `dt` s."""
         self.model.advance(command, dt)
-
-    def change_parameters(self, parameters: JointParameters) -> None:
-        """Go on with other parameters of the plant, from where everything is."""
-        self.parameters = parameters
-        self.model.change_nominal(parameters)
 
     def _law(self, desired: float, velocity: float, dt: float, memory: Array) -> float:
         return float(

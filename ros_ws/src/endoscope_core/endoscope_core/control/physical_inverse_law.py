@@ -7,6 +7,11 @@ state of the joint's friction, ``h = phi z / 2``. Where wires and joint are in b
     r (Ta exp(-h) - Tb exp(h)) = K q + tau_f zj + c q'   =:  r P
     m - q = (P + 2 T0 sinh h) / (2 k r cosh h)           =:  X(z, q, zj)
 
+Where a share `e` of the friction is spread over eight nodes along the sheath, ``exp(h)`` becomes
+``S(z) = sum_i L_i exp(phi z ((1 - e) / 2 + e n_i / 8))`` over the springs of relative lengths `L_i`
+with `n_i` nodes between them and the tip, ``exp(-h)`` becomes ``S(-z)``, and ``X = (P - T0 (1/S(z)
+- 1/S(-z))) / (k r (1/S(z) + 1/S(-z)))``.
+
 While it slides one way, ``z = s`` (the direction), and ``m = q_d + X(s, q_d, zj_d)`` is the
 inverse.
 
@@ -30,6 +35,8 @@ from __future__ import annotations
 import math
 
 from endoscope_core.compiled import Array, compiled
+from endoscope_core.effects import distributed_friction
+from endoscope_core.effects.distributed_friction import NODES
 from endoscope_core.effects.slots import (
     CAPSTAN_EXPONENT,
     JOINT_DAMPING,
@@ -72,12 +79,27 @@ _STILL = 1.0e-3
 
 @compiled
 def equilibrium_stretch(p: Array, q: float, speed: float, z: float, zj: float) -> float:
-    """``X``: motor less tip angle in rad at which the joint is in balance."""
+    """``X``: motor less tip angle in rad at which the joint is in balance.
+
+    `p` holds 0 as the share of spread friction where there is none.
+    """
     load = p[JOINT_STIFFNESS] * q + p[JOINT_FRICTION] * zj + p[JOINT_DAMPING] * speed
     r = p[JOINT_RADIUS]
-    h = 0.5 * p[CAPSTAN_EXPONENT] * z
-    return (load / r + 2.0 * p[PRETENSION] * math.sinh(h)) / (
-        2.0 * p[WIRE_STIFFNESS] * r * math.cosh(h)
+    along = p[CAPSTAN_EXPONENT] * z
+    spread = p[distributed_friction.SHARE]
+    loose = tight = math.exp(0.5 * (1.0 - spread) * along)
+    loose = 1.0 / loose
+    if spread > 0.0:
+        more = less = 0.0
+        for spring in range(NODES + 1):
+            length = 0.5 if spring in (0, NODES) else 1.0
+            exponent = spread * along * (NODES - spring) / NODES
+            more += length * math.exp(exponent) / NODES
+            less += length * math.exp(-exponent) / NODES
+        tight *= more
+        loose *= less
+    return (load / r - p[PRETENSION] * (1.0 / tight - 1.0 / loose)) / (
+        p[WIRE_STIFFNESS] * r * (1.0 / tight + 1.0 / loose)
     )
 
 

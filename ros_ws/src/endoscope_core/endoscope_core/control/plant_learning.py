@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.control.physical_inverse import InternalModel
-from endoscope_core.plant import JointParameters
+from endoscope_core.control.physical_parameters import PhysicalParameters
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class PlantLearning:
 
     Parameters
     ----------
-    parameters : JointParameters
+    parameters : PhysicalParameters
         To begin with.
     model : InternalModel
         Of these parameters, in its present state; goes on as the predictor.
@@ -75,7 +75,7 @@ class PlantLearning:
 
     def __init__(
         self,
-        parameters: JointParameters,
+        parameters: PhysicalParameters,
         model: InternalModel,
         settings: PlantLearningSettings | None = None,
     ) -> None:
@@ -106,7 +106,7 @@ class PlantLearning:
         while self._history[0][0] < self._time - self._HISTORY:
             self._history.popleft()
 
-    def measured(self, age: float, angle: float) -> JointParameters:
+    def measured(self, age: float, angle: float) -> PhysicalParameters:
         """Learn from a bending angle (rad) that held `age` s ago; return the parameters now.
 
         A measurement older than half a second or than the last one is left out.
@@ -159,7 +159,7 @@ class PlantLearning:
         return None
 
     def _bound(self) -> None:
-        first = self._first.capstan_exponent
+        first = self._first.joint.capstan_exponent
         low = np.full(len(self._names), -self._FARTHEST)
         high = -low
         low[0], high[0] = math.log(_STRAIGHTEST / first), math.log(_MOST_BENT / first)
@@ -167,20 +167,19 @@ class PlantLearning:
 
     def _take(self) -> None:
         self.parameters = self._scaled(self._logs)
-        self._model.change_nominal(self.parameters)
+        self._model.change_joint(self.parameters.joint)
         for i, shifted in enumerate(self._shifted):
-            shifted.change_nominal(self._scaled(self._logs + self._step_of(i)))
+            shifted.change_joint(self._scaled(self._logs + self._step_of(i)).joint)
 
     def _step_of(self, number: int) -> Array:
         step = np.zeros(len(self._names))
         step[number] = self._STEP
         return step
 
-    def _scaled(self, logs: Array) -> JointParameters:
-        return replace(
-            self._first,
-            **{
-                name: getattr(self._first, name) * math.exp(log)
-                for name, log in zip(self._names, logs.tolist(), strict=True)
-            },
-        )
+    def _scaled(self, logs: Array) -> PhysicalParameters:
+        first = self._first.joint
+        changes = {
+            name: getattr(first, name) * math.exp(log)
+            for name, log in zip(self._names, logs.tolist(), strict=True)
+        }
+        return replace(self._first, joint=replace(first, **changes))

@@ -142,3 +142,8 @@ class RecursiveHysteresisController(TrackerFeedback[RecursiveHysteresisJoint]):
         super().__init__(
             joints, chosen, lambda: RecursiveHysteresisJoint(chosen), stale_after, fade_time
         )
+
+    @property
+    def learnt(self) -> tuple[tuple[float, float], ...]:
+        """Gain and backlash (rad) that the correction adds, for each joint."""
+        return tuple((float(law.estimates[0]), float(law.estimates[1])) for law in self.laws)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -179,7 +181,7 @@ class BoucWenParameters:
         return asdict(self)
 
     @classmethod
-    def from_dict(cls, values: dict[str, float]) -> BoucWenParameters:
+    def from_dict(cls, values: Mapping[str, Any]) -> BoucWenParameters:
         """Parameters from a mapping of exactly the six names.
 
         Raises

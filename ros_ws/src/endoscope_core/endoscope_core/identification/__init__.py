@@ -15,19 +15,35 @@ from endoscope_core.identification.hysteresis_fit import (
     closed_cycle,
     fit_model,
 )
+from endoscope_core.identification.parameter_blend import KINDS, LawParameters, blend
+from endoscope_core.identification.plant_fit import PlantFit, PlantFitError, fit_plant
 from endoscope_core.identification.servo_lag import Servo
+from endoscope_core.identification.updated_table import (
+    TableEntry,
+    UpdatedTable,
+    UpdatedTableError,
+)
 
 __all__ = [
+    'KINDS',
     'ClassParameterError',
     'FeedforwardFit',
     'IdentificationError',
+    'LawParameters',
     'ModelFit',
+    'PlantFit',
+    'PlantFitError',
     'Recording',
     'Servo',
+    'TableEntry',
+    'UpdatedTable',
+    'UpdatedTableError',
+    'blend',
     'class_parameter_sets',
     'closed_cycle',
     'fit_feedforward',
     'fit_model',
+    'fit_plant',
     'identify_classes',
     'load_class_parameters',
     'parameters_for_class',

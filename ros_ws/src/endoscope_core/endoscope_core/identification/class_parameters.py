@@ -1,23 +1,31 @@
-"""One Bouc-Wen parameter set for each hysteresis class: made from a data set, shipped, chosen."""
+"""One parameter set for each hysteresis class: made from a data set, shipped, chosen."""
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from importlib.resources import files
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.dataset import CalibrationDataset
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.hysteresis import BoucWenParameters
 from endoscope_core.identification.feedforward_fit import FeedforwardFit, fit_feedforward
 from endoscope_core.identification.hysteresis_fit import ModelFit, Recording, fit_model
+from endoscope_core.identification.parameter_blend import KINDS, PHYSICAL, LawParameters
+from endoscope_core.identification.plant_fit import fit_plant
 from endoscope_core.identification.servo_lag import Servo
+from endoscope_core.identification.updated_table import (
+    parameters_from_dict,
+    parameters_to_dict,
+    shipped_table_path,
+)
+from endoscope_core.plant import JointParameters
 from endoscope_core.signals import CALIBRATION_RATE
 
-DEFAULT_FILE = 'bouc_wen_classes.json'
+PLANT_SAMPLES = 3500
 _SAMPLE_STEP = 10
 
 
@@ -27,11 +35,23 @@ class ClassParameterError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class ClassIdentification:
-    """What has been identified for one class."""
+    """What has been identified for one class.
+
+    Parameters
+    ----------
+    class_deg : int
+    feedforward : LawParameters
+        What the compensator works with.
+    model : LawParameters
+        What was fitted; the same for the plant.
+    rmse : float
+        rad, or N for the plant, that the model leaves of the recordings.
+    """
 
     class_deg: int
-    model: ModelFit
-    feedforward: FeedforwardFit
+    feedforward: LawParameters
+    model: LawParameters
+    rmse: float
 
 
 def identify_classes(
@@ -40,6 +60,7 @@ def identify_classes(
     seed: int = 0,
     recordings_per_class: int = 30,
     progress: Callable[[str], None] | None = None,
+    model: str = 'bouc_wen',
 ) -> list[ClassIdentification]:
     """Model and feed-forward of every class, from all its recordings and both joints at once.
 
@@ -54,84 +75,141 @@ def identify_classes(
         Use no more than this many of each class.
     progress : callable, optional
         Called with a line for each class.
+    model : str
+        One of `KINDS`.
+
+    Raises
+    ------
+    ClassParameterError
+        If the model is unknown.
     """
-    servo = Servo()
-    motor = servo.answer(dataset.desired_angle, 1.0 / CALIBRATION_RATE)[::_SAMPLE_STEP]
+    if model not in KINDS:
+        raise ClassParameterError(f'unknown model {model!r}: choose one of {", ".join(KINDS)}')
     found = []
     for class_deg in sorted({int(c) for c in dataset.class_deg}):
         chosen = np.flatnonzero(dataset.class_deg == class_deg)[:recordings_per_class]
-        actual = dataset.actual_angle[chosen, ::_SAMPLE_STEP].astype(float)
-        recordings = [
-            Recording(motor, actual[k, :, j])
-            for k in range(len(chosen))
-            for j in range(actual.shape[2])
-        ]
-        model = fit_model(recordings, seed)
-        feedforward = fit_feedforward(model.parameters, servo, lead, seed)
-        found.append(ClassIdentification(class_deg, model, feedforward))
+        if model == PHYSICAL:
+            item, line = _plant_of_class(dataset, class_deg, chosen)
+        else:
+            item, line = _model_of_class(dataset, class_deg, chosen, lead, seed, model)
+        found.append(item)
         if progress is not None:
-            left = 100.0 * feedforward.rmse / feedforward.uncompensated_rmse
-            progress(
-                f'class {class_deg}: model {np.rad2deg(model.rmse):.2f} deg rms, '
-                f'feed-forward leaves {left:.0f} % on it'
-            )
+            progress(line)
     return found
 
 
+def _model_of_class(
+    dataset: CalibrationDataset,
+    class_deg: int,
+    chosen: NDArray[np.intp],
+    lead: float,
+    seed: int,
+    model: str,
+) -> tuple[ClassIdentification, str]:
+    servo = Servo()
+    motor = servo.answer(dataset.desired_angle, 1.0 / CALIBRATION_RATE)[::_SAMPLE_STEP]
+    actual = dataset.actual_angle[chosen, ::_SAMPLE_STEP].astype(float)
+    recordings = [
+        Recording(motor, actual[k, :, j])
+        for k in range(len(chosen))
+        for j in range(actual.shape[2])
+    ]
+    fit: ModelFit = fit_model(recordings, seed, model)
+    feedforward: FeedforwardFit = fit_feedforward(fit.parameters, servo, lead, seed)
+    left = 100.0 * feedforward.rmse / feedforward.uncompensated_rmse
+    line = (
+        f'class {class_deg}: {model} {np.rad2deg(fit.rmse):.2f} deg rms, feed-forward leaves '
+        f'{left:.0f} % on it'
+    )
+    return ClassIdentification(class_deg, feedforward.parameters, fit.parameters, fit.rmse), line
+
+
+def _plant_of_class(
+    dataset: CalibrationDataset, class_deg: int, chosen: NDArray[np.intp]
+) -> tuple[ClassIdentification, str]:
+    """Geometric mean of the plants of a class's recordings, each fitted to its tensions."""
+    samples = min(PLANT_SAMPLES, len(dataset.desired_angle))
+    command = dataset.desired_angle[:samples]
+    fits = [
+        fit_plant(command, dataset.tension[k, :samples, 2 * j : 2 * j + 2])
+        for k in chosen.tolist()
+        for j in range(dataset.tension.shape[2] // 2)
+    ]
+    logs = np.mean([np.log(astuple(fit.parameters.joint)) for fit in fits], axis=0)
+    evenness = float(np.mean([fit.parameters.evenness for fit in fits]))
+    mean = PhysicalParameters(JointParameters(*np.exp(logs).tolist()), evenness)
+    rmse = float(np.mean([fit.tension_rmse for fit in fits]))
+    line = (
+        f'class {class_deg}: plant, {rmse:.3f} N rms of its own recordings, capstan exponent '
+        f'{mean.joint.capstan_exponent:.3f}'
+    )
+    return ClassIdentification(class_deg, mean, mean, rmse), line
+
+
 def class_parameter_sets(
-    identified: list[ClassIdentification], command: str, dataset_hash: str, lead: float
+    identified: list[ClassIdentification],
+    command: str,
+    dataset_hash: str,
+    lead: float,
+    model: str = 'bouc_wen',
 ) -> dict[str, object]:
     """The content of a parameter file, with the command that made it."""
     return {
         'schema': 1,
-        'model': 'bouc_wen',
+        'model': model,
         'command': command,
         'dataset_manifest_sha256': dataset_hash,
         'lead': lead,
         'classes': {
             str(item.class_deg): {
-                'feedforward': _rounded(item.feedforward.parameters),
-                'model': _rounded(item.model.parameters),
-                'model_rmse': round(item.model.rmse, 6),
+                'feedforward': _rounded(item.feedforward),
+                'model': _rounded(item.model),
+                'model_rmse': round(item.rmse, 6),
             }
             for item in identified
         },
     }
 
 
-def load_class_parameters(path: str | Path | None = None) -> dict[int, BoucWenParameters]:
+def load_class_parameters(
+    path: str | Path | None = None, model: str = 'bouc_wen'
+) -> dict[int, LawParameters]:
     """Feed-forward parameters by class (backlash size in deg).
 
     Parameters
     ----------
     path : path, optional
         A file of `endoscope identify DATASET`; the sets that come with this package if not given.
+    model : str
+        Which model's sets are wanted.
 
     Raises
     ------
     ClassParameterError
-        If the file is missing, holds something else, or holds unsafe parameters.
+        If the file is missing, holds something else or another model, or unsafe parameters.
     """
-    if path is None:
-        path = Path(str(files('endoscope_core.identification') / 'parameters' / DEFAULT_FILE))
-    path = Path(path)
+    path = shipped_table_path(model) if path is None else Path(path)
     if not path.is_file():
         raise ClassParameterError(
-            f'{path} is missing: make parameter sets with `endoscope identify`'
+            f'{path} is missing: make parameter sets with `endoscope identify DATASET --model '
+            f'{model}`'
         )
     try:
         content: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
+        held = str(content['model'])
+        if held != model:
+            raise ClassParameterError(f'{path} holds parameters of {held}, not of {model}')
         return {
-            int(class_deg): BoucWenParameters.from_dict(entry['feedforward'])
+            int(class_deg): parameters_from_dict(model, entry['feedforward'])
             for class_deg, entry in content['classes'].items()
         }
+    except ClassParameterError:
+        raise
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ClassParameterError(f'{path} holds no Bouc-Wen parameter sets: {error}') from error
+        raise ClassParameterError(f'{path} holds no {model} parameter sets: {error}') from error
 
 
-def parameters_for_class(
-    sets: Mapping[int, BoucWenParameters], class_deg: int
-) -> BoucWenParameters:
+def parameters_for_class(sets: Mapping[int, LawParameters], class_deg: int) -> LawParameters:
     """The set of a class.
 
     Raises
@@ -145,5 +223,12 @@ def parameters_for_class(
     return sets[class_deg]
 
 
-def _rounded(parameters: BoucWenParameters) -> dict[str, float]:
-    return {name: float(f'{value:.7g}') for name, value in parameters.to_dict().items()}
+def _rounded(parameters: LawParameters) -> dict[str, object]:
+    return {
+        name: [_short(v) for v in value] if isinstance(value, list) else _short(value)
+        for name, value in parameters_to_dict(parameters).items()
+    }
+
+
+def _short(value: float) -> float:
+    return float(f'{value:.7g}')

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
+from endoscope_core.control.physical_parameters import PhysicalParameters
+from endoscope_core.effects import distributed_friction
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.plant import JointParameters, PlantDescription, simulate
+from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription, simulate
 
 Array = NDArray[np.float64]
 
@@ -28,6 +31,8 @@ FITTED = {
 TENSION_SCALE = 0.05
 BENDING_SCALE = float(np.deg2rad(0.5))
 EXPONENT_BOUNDS = (0.02, 4.5)
+EVENNESS_PRIOR = (0.4, 0.4)
+CALIBRATION_SAMPLES_NEEDED = 3500
 _STARTS = (0.25, 0.6, 1.0, 1.5, 2.1)
 _SCORED_EVERY = 10
 _TICK = 1.0e-3
@@ -47,7 +52,7 @@ class PlantFit:
 
     Parameters
     ----------
-    parameters : JointParameters
+    parameters : PhysicalParameters
     tension_rmse : float
         N, of both wires.
     bending_rmse : float or None
@@ -56,7 +61,7 @@ class PlantFit:
         Simulations that it took.
     """
 
-    parameters: JointParameters
+    parameters: PhysicalParameters
     tension_rmse: float
     bending_rmse: float | None
     evaluations: int
@@ -72,7 +77,7 @@ def fit_plant(
 
     The tensions at the motor hold the friction and, through it, the tip: ``Ta exp(phi z / 2)`` and
     ``Tb exp(-phi z / 2)`` with ``Ta + Tb = 2 T0`` give `phi`, and then ``Ta - T0 = k r (m - q)``
-    the tip angle. All eight parameters enter through the simulation: bounded trust-region least
+    the tip angle. All nine parameters enter through the simulation: bounded trust-region least
     squares (Branch, Coleman and Li 1999) on their logarithms, with priors of the width that
     `FITTED` says, from the best of five capstan exponents. It is deterministic; the optimum is
     smooth and single once the exponent is near, which a genetic algorithm would find a hundred
@@ -102,44 +107,75 @@ def fit_plant(
     rows = slice(None, None, _SCORED_EVERY)
     seen = np.isfinite(angle[rows])
 
-    def joint(logs: Array) -> JointParameters:
-        factors = np.exp(logs).tolist()
-        return replace(
-            first,
-            **{n: getattr(first, n) * f for n, f in zip(names, factors, strict=True)},
-        )
+    def physical(x: Array) -> PhysicalParameters:
+        factors = np.exp(x[:-1]).tolist()
+        scaled = {n: getattr(first, n) * f for n, f in zip(names, factors, strict=True)}
+        return PhysicalParameters(replace(first, **scaled), float(x[-1]))
 
-    def misfits(logs: Array) -> tuple[Array, Array]:
-        plant = PlantDescription(joints={_JOINT: joint(logs)})
+    def misfits(x: Array) -> tuple[Array, Array]:
+        parameters = physical(x)
+        along = EffectSpec(
+            distributed_friction.DEFINITION.id, _JOINT, {'share': parameters.evenness}
+        )
+        effects = (along,) if parameters.evenness > 0.0 else ()
+        plant = PlantDescription(joints={_JOINT: parameters.joint}, effects=effects)
         made = simulate(plant, (u * first.gear)[:, None], _TICK, _SUBSTEPS)
         wires_off = (made.tension[rows, 0] - wires[rows]).ravel()
         return wires_off, (made.bending_true[rows, 0] - angle[rows])[seen]
 
-    def residuals(logs: Array) -> Array:
-        wires_off, angle_off = misfits(logs)
-        return np.concatenate(
-            [wires_off / TENSION_SCALE, angle_off / BENDING_SCALE, logs / spreads]
-        )
+    def residuals(x: Array) -> Array:
+        wires_off, angle_off = misfits(x)
+        unlikely = np.append(x[:-1] / spreads, (x[-1] - EVENNESS_PRIOR[0]) / EVENNESS_PRIOR[1])
+        return np.concatenate([wires_off / TENSION_SCALE, angle_off / BENDING_SCALE, unlikely])
 
     tried = []
     for exponent in _STARTS:
-        logs = np.zeros(len(names))
-        logs[0] = np.log(exponent / max(first.capstan_exponent, 1e-3))
-        tried.append(logs)
-    begin = min(tried, key=lambda logs: float(np.sum(residuals(logs)[: -len(names)] ** 2)))
+        x = np.zeros(len(names) + 1)
+        x[0] = np.log(exponent / max(first.capstan_exponent, 1e-3))
+        tried.append(x)
+    begin = min(tried, key=lambda x: float(np.sum(residuals(x)[: -len(x)] ** 2)))
+    begin[-1] = EVENNESS_PRIOR[0]
     reach = np.log(np.array(EXPONENT_BOUNDS) / max(first.capstan_exponent, 1e-3))
-    low = np.concatenate(([reach[0]], -3.0 * spreads[1:]))
-    high = np.concatenate(([reach[1]], 3.0 * spreads[1:]))
+    low = np.concatenate(([reach[0]], -3.0 * spreads[1:], [0.0]))
+    high = np.concatenate(([reach[1]], 3.0 * spreads[1:], [1.0]))
     found = least_squares(
-        residuals, begin, bounds=(low, high), diff_step=1e-3, xtol=1e-4, ftol=1e-5, max_nfev=20
+        residuals, begin, bounds=(low, high), diff_step=1e-3, xtol=1e-4, ftol=1e-4, max_nfev=15
     )
     wires_off, angle_off = misfits(found.x)
     return PlantFit(
-        joint(found.x),
+        physical(found.x),
         float(np.sqrt(np.mean(wires_off**2))),
         float(np.sqrt(np.mean(angle_off**2))) if angle_off.size else None,
-        len(tried) + int(found.nfev) * (1 + len(names)),
+        len(tried) + int(found.nfev) * (2 + len(names)),
     )
+
+
+def plants_of_calibration(
+    command: ArrayLike, tension: ArrayLike, samples: int = CALIBRATION_SAMPLES_NEEDED
+) -> tuple[PhysicalParameters, ...]:
+    """Plants of all joints from the beginning of a calibration, the joints side by side.
+
+    Parameters
+    ----------
+    command : array_like, shape (N,)
+        Joint-equivalent motor command of every joint at 1 kHz, rad.
+    tension : array_like, shape (N, 2 J)
+        Positive and negative wire of each joint in turn, N.
+    samples : int
+        How many of the samples to use: the way to one side and back shows all that there is.
+
+    Raises
+    ------
+    PlantFitError
+        If the recording shows no plant.
+    """
+    u = np.asarray(command, dtype=float)[:samples]
+    wires = np.asarray(tension, dtype=float)[:samples]
+    pairs = [wires[:, j : j + 2] for j in range(0, wires.shape[1], 2)]
+    # The simulation lets go of the interpreter: two joints take two cores.
+    with ThreadPoolExecutor(len(pairs)) as pool:
+        fits = list(pool.map(lambda pair: fit_plant(u, pair), pairs))
+    return tuple(fit.parameters for fit in fits)
 
 
 def _checked(

@@ -9,8 +9,7 @@ from endoscope_core.classifier.inference import TensionClassifier
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.dataset import random_rig, record_calibration
 from endoscope_core.dataset.rig_variation import backlash_sizes, in_tube
-from endoscope_core.hysteresis import BoucWenParameters
-from endoscope_core.identification import parameters_for_class
+from endoscope_core.identification import LawParameters, parameters_for_class
 from endoscope_core.signals import Signal
 from endoscope_core.trials.tracking_trial import run_tracking_trial
 
@@ -55,7 +54,7 @@ def run_unseen_tube_trial(
     number: int,
     signals: Sequence[Signal],
     classifier: TensionClassifier,
-    sets: Mapping[int, BoucWenParameters],
+    sets: Mapping[int, LawParameters],
 ) -> UnseenTubeTrial:
     """Calibrate, classify, choose parameters and track, on a random rig in a random tube.
 

@@ -4,4 +4,14 @@ A module here has ``TITLE: str`` and ``rows(settings: PapersBench) -> list[Row]`
 them in the order of printing. Heavy imports belong into `rows`.
 """
 
-TABLES: tuple[str, ...] = ('classifiers', 'real_sizes')
+TABLES: tuple[str, ...] = (
+    'tension_by_shape',
+    'classifiers',
+    'nearest_class',
+    'colon_shapes',
+    'compensators',
+    'changing_tube',
+    'calibration_time',
+    'real_sizes',
+    'real_recordings',
+)

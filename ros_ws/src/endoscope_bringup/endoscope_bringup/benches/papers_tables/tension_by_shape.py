@@ -1,0 +1,49 @@
+"""Table 1 of the first paper: tensions of tubes with like backlash, and with unlike."""
+
+from itertools import combinations, product
+
+from endoscope_bringup.benches.papers_tables.row import PapersBench, Row
+
+TITLE = 'Table 1: RMSE of wire tension among shapes of like and of unlike hysteresis, N'
+_CASES = ((54.0, '0.21 ± 0.02'), (85.5, '0.16 to 0.22'), (105.0, '0.18 to 0.25'))
+
+
+def rows(settings: PapersBench) -> list[Row]:
+    """Simulate `tubes` shapes of each case: one rig, its bends spread otherwise, of equal size."""
+    import numpy as np
+
+    from endoscope_core.dataset import configuration_of_size, random_rig, record_calibration
+
+    tensions = []
+    for size_deg, _ in _CASES:
+        rig = random_rig(np.random.default_rng([settings.seed, 1]))
+        shapes = []
+        for k in range(settings.tubes):
+            evenness = k / max(1, settings.tubes - 1)
+            shape = configuration_of_size(rig, float(np.deg2rad(size_deg)), evenness)
+            if shape is None:
+                raise RuntimeError(f'no tube of evenness {evenness} gives {size_deg} deg')
+            shapes.append(record_calibration(shape.plant, settings.seed + k).tension)
+        tensions.append(shapes)
+        settings.report(f'table 1: {size_deg:g} deg simulated')
+
+    def rmse(first: np.ndarray, second: np.ndarray) -> float:
+        return float(np.sqrt(np.mean((first - second) ** 2)))
+
+    found = [
+        Row(
+            f'{size_deg:g} deg, among like shapes',
+            [rmse(a, b) for a, b in combinations(shapes, 2)],
+            paper,
+            note='The same instrument in tubes whose bends are spread otherwise, simulated.',
+        )
+        for (size_deg, paper), shapes in zip(_CASES, tensions, strict=True)
+    ]
+    for first, second in combinations(range(len(_CASES)), 2):
+        found.append(
+            Row(
+                f'{_CASES[first][0]:g} against {_CASES[second][0]:g} deg, unlike',
+                [rmse(a, b) for a, b in product(tensions[first], tensions[second])],
+            )
+        )
+    return found

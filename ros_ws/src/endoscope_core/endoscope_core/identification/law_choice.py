@@ -1,0 +1,125 @@
+"""Which feed-forward law follows from a calibration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from endoscope_core.control import ADAPTIVE_PHYSICAL, FeedforwardLaw, PhysicalParameters
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.identification.class_parameters import (
+    load_class_parameters,
+    parameters_for_class,
+)
+from endoscope_core.identification.parameter_blend import PHYSICAL, LawParameters
+from endoscope_core.identification.updated_table import UpdatedTable
+
+BY_CLASS = 'class'
+BY_SIZE = 'size'
+BY_PLANT = 'plant'
+SELECTIONS = (BY_CLASS, BY_SIZE, BY_PLANT)
+
+
+class LawChoiceError(EndoscopeError, ValueError):
+    """A calibration that does not say what the chosen compensation needs."""
+
+
+@dataclass(frozen=True)
+class CalibrationFindings:
+    """What a calibration found out about the tube.
+
+    Parameters
+    ----------
+    class_deg : int, optional
+        Hysteresis class, backlash size in deg.
+    size : float, optional
+        Backlash size in rad.
+    plants : tuple of PhysicalParameters
+        Of each joint; empty where the plant was not identified.
+    """
+
+    class_deg: int | None = None
+    size: float | None = None
+    plants: tuple[PhysicalParameters, ...] = ()
+
+
+class LawChoice:
+    """Finds the parameters of a mode, and keeps the files that it has read.
+
+    Parameters
+    ----------
+    joints : int
+        Number of joints.
+    parameter_sets : str
+        File with a parameter set for each class; empty for those that come with the project.
+    table : str
+        Updated table; empty for one made of the class parameters.
+    """
+
+    def __init__(self, joints: int, parameter_sets: str = '', table: str = '') -> None:
+        self._joints = joints
+        self._parameter_sets = parameter_sets
+        self._table = table
+        self._sets: dict[str, dict[int, LawParameters]] = {}
+        self._tables: dict[str, UpdatedTable] = {}
+
+    def law(self, mode: str, selected_by: str, findings: CalibrationFindings) -> FeedforwardLaw:
+        """The law of a mode after a calibration.
+
+        Parameters
+        ----------
+        mode : str
+            One of `endoscope_core.control.MODES`.
+        selected_by : str
+            'class' takes the class's set (first paper), 'size' blends the updated table at the
+            regressed backlash size, 'plant' takes the plant that the calibration identified.
+        findings : CalibrationFindings
+
+        Raises
+        ------
+        LawChoiceError
+            If the calibration does not say what is needed: nothing is guessed.
+        ClassParameterError, UpdatedTableError
+            If a file cannot be used, or has nothing for this class or size.
+        """
+        if mode == 'none':
+            return FeedforwardLaw()
+        model = PHYSICAL if mode == ADAPTIVE_PHYSICAL else mode
+        if selected_by == BY_PLANT:
+            if model != PHYSICAL:
+                raise LawChoiceError(f'mode {mode} is not selected by plant: take class or size')
+            if len(findings.plants) != self._joints:
+                raise LawChoiceError('the calibration did not identify the plant')
+            return FeedforwardLaw(mode, findings.plants)
+        if selected_by == BY_SIZE:
+            if findings.size is None or not math.isfinite(findings.size):
+                raise LawChoiceError('the calibration did not find a backlash size')
+            parameters = self._table_of(model).parameters_for(findings.size)
+        elif selected_by == BY_CLASS:
+            if findings.class_deg is None:
+                raise LawChoiceError('the calibration did not find a class')
+            parameters = parameters_for_class(self._sets_of(model), findings.class_deg)
+        else:
+            raise LawChoiceError(
+                f'unknown selection {selected_by!r}: choose one of {", ".join(SELECTIONS)}'
+            )
+        return FeedforwardLaw(mode, (parameters,) * self._joints)
+
+    def _sets_of(self, model: str) -> dict[int, LawParameters]:
+        if model not in self._sets:
+            path = Path(self._parameter_sets) if self._parameter_sets else None
+            self._sets[model] = load_class_parameters(path, model)
+        return self._sets[model]
+
+    def _table_of(self, model: str) -> UpdatedTable:
+        if model in self._tables:
+            return self._tables[model]
+        if self._table:
+            table = UpdatedTable.load(self._table)
+            if table.model != model:
+                raise LawChoiceError(f'{self._table} is a table of {table.model}, not of {model}')
+        else:
+            table = UpdatedTable.of_classes(model, self._sets_of(model))
+        self._tables[model] = table
+        return table

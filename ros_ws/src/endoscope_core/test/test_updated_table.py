@@ -1,0 +1,141 @@
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from endoscope_core.control import PhysicalParameters
+from endoscope_core.hysteresis import (
+    AsymmetricBoucWenParameters,
+    BoucWenParameters,
+    DahlParameters,
+    PlayParameters,
+    PrandtlIshlinskiiParameters,
+)
+from endoscope_core.hysteresis.inverse_safety import GREATEST_INVERSE_SLOPE
+from endoscope_core.identification import (
+    KINDS,
+    TableEntry,
+    UpdatedTable,
+    UpdatedTableError,
+    blend,
+    load_class_parameters,
+)
+from endoscope_core.plant import JointParameters
+
+OTHER = {
+    'bouc_wen': BoucWenParameters.from_shape(0.8, 0.8, 0.06, 0.4, 3.5),
+    'asymmetric_bouc_wen': AsymmetricBoucWenParameters(
+        1.1, 0.9, -0.2, -0.1, 0.06, 0.5, 4.0, 0.04, -0.9, 1.0
+    ),
+    'dahl': DahlParameters(1.2, 0.9, 0.08, 0.7, 0.1),
+    'play': PlayParameters(0.7, 0.9, 0.04, -0.1),
+    'prandtl_ishlinskii': PrandtlIshlinskiiParameters(
+        (0.0, 0.3, 0.6, 1.2), (0.026, 0.2, 0.4, 0.6), 0.0
+    ),
+    'physical': PhysicalParameters(JointParameters(capstan_exponent=1.8), 0.2),
+}
+FIRST = {
+    'bouc_wen': BoucWenParameters.from_shape(0.9, 0.5, 0.06, -0.9, 2.0),
+    'asymmetric_bouc_wen': AsymmetricBoucWenParameters(
+        0.9, 0.5, 0.1, 0.05, 0.08, -0.5, 2.0, 0.1, 0.3, 1.5
+    ),
+    'dahl': DahlParameters(0.9, 0.5, 0.1, 1.6, -0.03),
+    'play': PlayParameters(0.9, 0.5, 0.05, 0.02),
+    'prandtl_ishlinskii': PrandtlIshlinskiiParameters(
+        (0.0, 0.2, 0.5, 0.8), (0.1, 0.3, 0.4, 0.2), 0.04
+    ),
+    'physical': PhysicalParameters(JointParameters(capstan_exponent=0.4), 0.8),
+}
+
+
+@pytest.mark.parametrize('model', KINDS)
+@given(st.floats(0.0, 1.0))
+def test_between_safe_parameters_all_are_safe(model, weight):
+    between = blend(FIRST[model], OTHER[model], weight)
+    assert isinstance(between, KINDS[model])
+    if model != 'physical':
+        steepest = max(FIRST[model].inverse_slope, OTHER[model].inverse_slope)
+        assert between.inverse_slope <= min(steepest, GREATEST_INVERSE_SLOPE) * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize('model', KINDS)
+def test_a_table_gives_its_entries_survives_a_file_and_grows(model, tmp_path):
+    path = tmp_path / 'table.json'
+    table = UpdatedTable.of(
+        model, [TableEntry(1.4, OTHER[model], 'second'), TableEntry(0.7, FIRST[model], 'first')]
+    )
+    assert table.sizes == (0.7, 1.4)
+    assert table.parameters_for(0.7) == FIRST[model]
+    assert table.parameters_for(1.4) == OTHER[model]
+    middle = table.parameters_for(1.05)
+    assert middle not in (FIRST[model], OTHER[model])
+    grown = table.extended(TableEntry(1.05, OTHER[model], 'new calibration'))
+    assert grown.sizes == (0.7, 1.05, 1.4)
+    assert grown.parameters_for(1.05) == OTHER[model]
+    again = grown.extended(TableEntry(1.05 + math.radians(0.3), FIRST[model], 'once more'))
+    assert len(again.entries) == 3
+    again.save(path)
+    assert UpdatedTable.load(path) == again
+
+
+@pytest.mark.parametrize('size', [0.69, 1.41, math.nan, math.inf, -1.0])
+def test_outside_its_range_a_table_refuses(size):
+    table = UpdatedTable.of(
+        'play', [TableEntry(0.7, FIRST['play']), TableEntry(1.4, OTHER['play'])]
+    )
+    with pytest.raises(UpdatedTableError, match='outside the table'):
+        table.parameters_for(size)
+
+
+@pytest.mark.parametrize(
+    ('make', 'complaint'),
+    [
+        (lambda: UpdatedTable.of('preisach', []), 'unknown model'),
+        (lambda: UpdatedTable.of('play', []), 'at least one'),
+        (lambda: UpdatedTable.of('play', [TableEntry(1.0, FIRST['dahl'])]), 'holds Dahl'),
+        (lambda: UpdatedTable.of('play', [TableEntry(math.nan, FIRST['play'])]), 'finite'),
+        (lambda: UpdatedTable.of('play', [TableEntry(1.0, FIRST['play'])] * 2), 'increase'),
+    ],
+)
+def test_tables_that_make_no_sense_are_refused(make, complaint):
+    with pytest.raises(UpdatedTableError, match=complaint):
+        make()
+
+
+@pytest.mark.parametrize(
+    'content', ['', '[]', '{"model": "play"}', '{"model": "play", "entries": [{"size": 1}]}']
+)
+def test_a_file_that_holds_no_table_is_refused(content, tmp_path):
+    path = tmp_path / 'table.json'
+    path.write_text(content)
+    with pytest.raises(UpdatedTableError, match='no updated table'):
+        UpdatedTable.load(path)
+    with pytest.raises(UpdatedTableError, match='missing'):
+        UpdatedTable.load(tmp_path / 'nowhere.json')
+
+
+def test_unsafe_parameters_in_a_file_are_refused(tmp_path):
+    path = tmp_path / 'table.json'
+    UpdatedTable.of('play', [TableEntry(1.0, FIRST['play'])]).save(path)
+    content = json.loads(path.read_text())
+    content['entries'][0]['parameters']['travel'] = 1e-5
+    path.write_text(json.dumps(content))
+    with pytest.raises(UpdatedTableError, match='too steep'):
+        UpdatedTable.load(path)
+
+
+def test_kinds_that_differ_are_not_blended():
+    with pytest.raises(ValueError, match='cannot be blended'):
+        blend(FIRST['play'], FIRST['dahl'], 0.5)
+    with pytest.raises(ValueError, match='weight'):
+        blend(FIRST['play'], FIRST['play'], 1.5)
+
+
+@pytest.mark.parametrize('model', KINDS)
+def test_shipped_sets_of_every_model_make_a_table_over_the_classes(model):
+    table = UpdatedTable.of_classes(model, load_class_parameters(model=model))
+    assert len(table.entries) == 7
+    for size_deg in (41.0, 66.6, 99.0):
+        assert isinstance(table.parameters_for(math.radians(size_deg)), KINDS[model])

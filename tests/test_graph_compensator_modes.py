@@ -1,0 +1,46 @@
+"""Every compensator as a mode of the running nodes, changed while the slave moves."""
+
+import numpy as np
+from simulated_graph import SimulatedGraph
+from tubes import tube_of_size
+
+from endoscope_core.control import MODES
+
+
+def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
+    """The physical modes by the plant that the calibration identified, the others by size."""
+    overrides = tube_of_size(tmp_path, 72, 11)
+    overrides['calibration'] = {'identify_plant': True}
+    with SimulatedGraph(overrides=overrides) as graph:
+        drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
+        graph.enable()
+        graph.calibrate()
+        node = graph.nodes['compensator']
+        assert len(node.findings.plants) == 2
+        graph.set('console', source='motion')
+        graph.advance(2.0)
+        for mode in (*MODES[1:], 'none', 'bouc_wen'):
+            graph.set('compensator', selected_by='plant' if 'physical' in mode else 'size')
+            graph.advance(0.1)
+            drives.clear()
+            graph.set('compensator', mode=mode)
+            graph.advance(0.02)
+            assert node._feedforward.law.mode == mode
+            steps = np.abs(np.diff([s.position for s in drives], axis=0))
+            assert len(drives) >= 20
+            # 20 rad/s at the joint is what the feed-forward allows itself; a jump would be 0.1 rad.
+            assert steps.max() <= 0.5 * 20.0 * 1e-3 + 1e-9
+        assert graph.reported('compensator: output')['saturated'] == '0'
+
+
+def test_what_the_calibration_did_not_find_is_not_guessed():
+    with SimulatedGraph() as graph:
+        graph.enable()
+        graph.calibrate()
+        graph.set('compensator', mode='physical', selected_by='plant')
+        graph.advance(0.3)
+        assert graph.nodes['compensator']._feedforward.law.mode == 'none'
+        graph.set('controller', law='recursive_least_squares')
+        graph.set('console', source='motion')
+        graph.advance(3.0)
+        assert graph.reported('controller: feedback')['law'] == 'recursive_least_squares'
