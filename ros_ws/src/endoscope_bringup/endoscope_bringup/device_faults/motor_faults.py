@@ -96,6 +96,12 @@ def _late(rig: MotorRig) -> None:
     rig.emulator.do('delayed', 4)
 
 
+def _disturb(rig: MotorRig) -> None:
+    rig.emulator.do('damage_rate', 0.01)
+    rig.emulator.do('repeated', 400)
+    _late(rig)
+
+
 def _overpull(rig: MotorRig) -> None:
     rig.tension = 80.0
 
@@ -120,6 +126,7 @@ MOTOR_FAULTS: dict[str, MotorFault] = {
     ),
     'late': MotorFault('4 answers late by 6 ms', _late, 'ENABLED', stops=False),
     'twice': MotorFault('400 answers sent twice', _set('repeated', 400), 'ENABLED', stops=False),
+    'disturbed': MotorFault('the three at once', _disturb, 'ENABLED', stops=False),
     'overload': MotorFault('a servo shuts down', _set('overload', 1), cause='overload'),
     'brown-out': MotorFault('supply falls to 9 V', _set('supply', 1, 9.0), cause='input voltage'),
     'restart': MotorFault('a servo restarts', _set('restart', 2), cause='servo 2'),

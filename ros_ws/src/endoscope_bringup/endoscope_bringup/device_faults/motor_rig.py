@@ -38,7 +38,7 @@ from endoscope_nodes.supervisor_node import SupervisorNode
 
 PATIENCE_S = 60.0
 RATE_HZ = 250
-MOVING_RAD = 0.1
+MOVING_RAD = 0.05
 TENSION_N = 5.0
 _LOOK_S = 0.005
 _NODES: dict[str, type] = {
@@ -179,7 +179,7 @@ class MotorRig:
 
         def moving() -> bool:
             now = time.monotonic()
-            if self.state != 'ENABLED' and now - tried[0] > 0.5:
+            if self.state != 'ENABLED' and now - tried[0] > 0.1:
                 tried[0] = now
                 self.order('enable')
             swung = bool(self.shafts) and abs(self.shafts[-1][1].position[0]) > MOVING_RAD

@@ -151,7 +151,8 @@ class BusThread:
         self._goal: tuple[tuple[float, ...], int] | None = None
         self._held: tuple[float, ...] | None = None
         self._torque = False
-        self._orders: queue.SimpleQueue[bool | None] = queue.SimpleQueue()
+        self._orders: queue.SimpleQueue[bool] = queue.SimpleQueue()
+        self._reboot_wanted = threading.Event()
         self._trouble = ''
         self._trouble_ns = 0
         self._next_health_s = 0.0
@@ -195,9 +196,9 @@ class BusThread:
         self._orders.put(on)
 
     def reboot(self) -> None:
-        """Order a restart of all servos, with torque off; carried out in the next cycle."""
+        """Order a restart of all servos, with torque off, as soon as they can be reached."""
         self.armed = False
-        self._orders.put(None)
+        self._reboot_wanted.set()
 
     def trouble(self) -> str:
         """What is wrong; a trouble that has passed is still told for a while."""
@@ -231,6 +232,8 @@ class BusThread:
         port.open()
         try:
             bus = PacketHandler(port)
+            if self._reboot_wanted.is_set():
+                self._restart(bus)
             models = [bring_up(bus, device, self.settings) for device in self._ids]
         except (OSError, BusError):
             port.close()
@@ -271,11 +274,11 @@ class BusThread:
             self._switch_off(bus)
 
     def _carry_out_orders(self, bus: PacketHandler) -> None:
+        if self._reboot_wanted.is_set():
+            self._restart(bus)
         while not self._orders.empty():
             order = self._orders.get()
-            if order is None:
-                self._restart(bus)
-            elif order and not (self.armed and self._torque):
+            if order and not (self.armed and self._torque):
                 self._refuse_without_reading()
                 enable(bus, self._ids, self.settings)
                 self._patient_from_ns = time.monotonic_ns()
@@ -300,6 +303,7 @@ class BusThread:
     def _restart(self, bus: PacketHandler) -> None:
         for device in self._ids:
             bus.reboot(device)
+        self._reboot_wanted.clear()
         raise BusError('the servos restart as asked')
 
     def _cycle(self, bus: PacketHandler) -> None:
