@@ -5,12 +5,25 @@ import time
 import pytest
 
 from endoscope_devices.dynamixel.bring_up import SetUpError
-from endoscope_devices.dynamixel.control_table import CURRENT_UNIT
+from endoscope_devices.dynamixel.control_table import (
+    ALERT,
+    BAUD_RATE,
+    CURRENT_UNIT,
+    GOAL_CURRENT,
+    GOAL_VELOCITY,
+    OPERATING_MODE,
+    RETURN_DELAY_TIME,
+)
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
 from endoscope_devices.dynamixel.emulator.bus import EmulatedBus
 from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
 from endoscope_devices.dynamixel.emulator.servo import EmulatedServo
-from endoscope_devices.dynamixel.packet_handler import NoReplyError, PacketHandler, RefusedError
+from endoscope_devices.dynamixel.packet_handler import (
+    NoReplyError,
+    PacketHandler,
+    RefusedError,
+    sync_write_request,
+)
 from endoscope_devices.dynamixel.serial_port import BusPort
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_devices.motor_device import DeviceError
@@ -160,12 +173,17 @@ def test_four_and_a_half_megabaud_and_fast_sync_read(fast):
 
 
 @pytest.fixture
-def handler():
-    with EmulatedBus([EmulatedServo(1)]) as bus:
-        port = BusPort(bus.port, 1_000_000)
-        port.open()
-        yield PacketHandler(port)
-        port.close()
+def line():
+    with EmulatedBus([EmulatedServo(1)]) as line:
+        yield line
+
+
+@pytest.fixture
+def handler(line):
+    port = BusPort(line.port, 1_000_000)
+    port.open()
+    yield PacketHandler(port)
+    port.close()
 
 
 def test_the_time_out_is_the_time_on_the_wire_and_a_margin(handler):
@@ -181,3 +199,30 @@ def test_a_refusal_is_an_error_with_its_reason(handler):
     with pytest.raises(RefusedError, match='out of range'):
         handler.write(1, 8, b'\x09')
     assert handler.read(1, 132, 4).data == (2048).to_bytes(4, 'little')
+
+
+def test_data_that_look_like_a_header_arrive(handler):
+    with pytest.raises(RefusedError, match='out of range'):
+        handler.write(1, 116, (0x00FDFFFF).to_bytes(4, 'little'))
+    data = GOAL_CURRENT.encode(-1) + GOAL_VELOCITY.encode(253)
+    handler.port.send(sync_write_request(GOAL_CURRENT.address, 6, {1: data}))
+    assert handler.read_register(1, GOAL_CURRENT) == -1
+    assert handler.read_register(1, GOAL_VELOCITY) == 253
+
+
+@pytest.mark.parametrize('fault', [{'delay_s': 0.04, 'delayed': 2}, {'repeated': 4}])
+def test_an_answer_of_another_time_is_not_the_value_of_another_register(line, handler, fault):
+    with line.paused() as faults:
+        for name, value in fault.items():
+            setattr(faults, name, value)
+    for _ in range(3):
+        assert handler.read_register(1, RETURN_DELAY_TIME) == 250
+        assert handler.read_register(1, OPERATING_MODE) == 3
+        assert handler.read_register(1, BAUD_RATE) == 3
+
+
+def test_the_alert_bit_is_kept_with_the_value(line, handler):
+    line.overload(1)
+    reply = handler.read(1, 132, 4)
+    assert reply.error == ALERT
+    assert reply.data == (2048).to_bytes(4, 'little')
