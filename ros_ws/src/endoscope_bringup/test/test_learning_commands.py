@@ -66,8 +66,13 @@ def test_a_data_set_does_not_replace_what_is_there(data, capsys):
 
 
 def test_training_leaves_weights_that_tell_sizes(data, tmp_path):
-    out = tmp_path / 'weights.pt'
-    assert main(['train', '--data', str(data), '--out', str(out), '--folds', '2']) == 0
+    out, plots = tmp_path / 'weights.pt', tmp_path / 'plots'
+    options = ['--folds', '2', '--plots', str(plots)]
+    assert main(['train', '--data', str(data), '--out', str(out), *options]) == 0
+    for name, words in (('confusion', 'true class'), ('intervals', 'within their interval')):
+        svg = (plots / f'{name}.svg').read_text()
+        assert svg.startswith('<svg')
+        assert words in svg
     described = json.loads(out.with_suffix('.json').read_text())
     assert '--motion sinusoid' in described['command']
     assert '--model size' in described['command']

@@ -14,7 +14,7 @@ from endoscope_core.dataset import (
     save_dataset,
 )
 from endoscope_core.dataset.calibration_dataset import ARRAYS_FILE, MANIFEST_FILE
-from endoscope_core.dataset.rig_variation import backlash_sizes
+from endoscope_core.dataset.rig_variation import GREATEST_EVENNESS, backlash_sizes
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.plant import JointParameters
 from endoscope_core.signals import UnknownCalibrationError, calibration_sinusoid
@@ -76,7 +76,7 @@ def test_tensions_begin_at_pretension_and_carry_sensor_noise(small):
 def test_tubes_differ_in_how_their_curvature_is_spread(small):
     evenness = [entry['curvature_evenness'] for entry in small.manifest['recordings']]
     assert len(set(evenness)) == 7
-    assert 0.0 <= min(evenness) < max(evenness) <= 1.0
+    assert 0.0 <= min(evenness) < max(evenness) <= GREATEST_EVENNESS
 
 
 def test_spread_curvature_changes_the_tensions_of_a_tube_of_the_same_size():

@@ -62,7 +62,7 @@ def easy():
     )
 
 
-def tube(size_deg, evenness=0.5, seed=0):
+def tube(size_deg, evenness=0.15, seed=0):
     rig = random_rig(np.random.default_rng(int(10 * size_deg) + 700_000 + seed))
     return configuration_of_size(rig, np.deg2rad(size_deg), evenness)
 
@@ -165,6 +165,9 @@ def test_validation_is_of_recordings_held_out_and_training_repeats(easy):
     classifier, validation = validated_size_classifier(easy, 0, 3)
     assert validation.classes.mean_accuracy > 0.9
     assert max(validation.rmse) < np.deg2rad(3.0)
+    assert validation.share_within(0.9) == pytest.approx(np.mean(validation.coverage), abs=0.02)
+    shares = [validation.share_within(level) for level in (0.1, 0.5, 0.99)]
+    assert shares == sorted(shares)
     assert validation.classes.confusion.sum() == len(easy.class_deg)
     again = train_size_classifier(easy, 0, 3)
     assert again.calibration == classifier.calibration

@@ -37,15 +37,25 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--folds', type=int, default=5, metavar='K', help='of the cross-validation (5)'
     )
+    parser.add_argument(
+        '--plots',
+        type=Path,
+        metavar='DIR',
+        help='new folder for SVG plots of what held-out tubes say: classes confused, and with '
+        'size the calibration of its intervals',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Validate, train and write; return 0."""
+    from endoscope_core.atomic_output import require_free_directory
     from endoscope_core.classifier.training import use_one_thread
     from endoscope_core.classifier.weights_file import weights_path
     from endoscope_core.dataset import load_dataset
 
     out = weights_path(args.out)
+    if args.plots is not None:
+        require_free_directory(args.plots)
     dataset = load_dataset(args.data)
     use_one_thread()
     made = dataset.manifest
@@ -71,6 +81,10 @@ def _train_cnn(
     validation = cross_validate(dataset, args.seed, args.folds, _print_line)
     network = train_network(dataset.tension, dataset.class_deg, args.seed)
     save_network(out, network, dataset, validation, command, args.seed)
+    if args.plots is not None:
+        from endoscope_bringup.learning.classifier_figures import confusion_figure, save_figures
+
+        save_figures(args.plots, {'confusion': confusion_figure(validation, '1D-CNN')})
     return f'{100.0 * validation.mean_accuracy:.2f} % right'
 
 
@@ -84,6 +98,18 @@ def _train_size(
 
     classifier, validation = validated_size_classifier(dataset, args.seed, args.folds, _print_line)
     save_size_classifier(out, classifier, dataset, validation, command, args.seed)
+    if args.plots is not None:
+        from endoscope_bringup.learning.classifier_figures import (
+            confusion_figure,
+            intervals_figure,
+            save_figures,
+        )
+
+        figures = {
+            'confusion': confusion_figure(validation.classes, 'by backlash size'),
+            'intervals': intervals_figure(validation, dataset.backlash_size),
+        }
+        save_figures(args.plots, figures)
     coverage = 100.0 * sum(validation.coverage) / len(validation.coverage)
     rmse = math.sqrt(sum(x * x for x in validation.rmse) / len(validation.rmse))
     return (

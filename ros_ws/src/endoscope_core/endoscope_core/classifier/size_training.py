@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 import torch
@@ -34,12 +35,21 @@ class SizeValidation:
         calibrated on the others.
     refused : int
         Recordings held out that would have been refused; the classes count them nevertheless.
+    error, half_width : ndarray, shape (R,)
+        Of the regressed size of each recording held out, and of its interval, in rad.
     """
 
     classes: CrossValidation
     rmse: tuple[float, ...]
     coverage: tuple[float, ...]
     refused: int
+    error: NDArray[np.float64]
+    half_width: NDArray[np.float64]
+
+    def share_within(self, level: float) -> float:
+        """Share of errors inside the intervals that are to hold a share `level` of them."""
+        widening = NormalDist().inv_cdf(0.5 + 0.5 * level) / NormalDist().inv_cdf(0.5 + 0.5 * LEVEL)
+        return float(np.mean(np.abs(self.error) <= widening * self.half_width))
 
 
 def train_size_classifier(dataset: CalibrationDataset, seed: int, folds: int = 5) -> SizeClassifier:
@@ -60,6 +70,7 @@ def validated_size_classifier(
     classifier, split, held_out = _train(dataset, seed, folds)
     true = torch.from_numpy(dataset.backlash_size)
     named = np.zeros_like(dataset.class_deg)
+    error, half_width = np.zeros(len(true)), np.zeros(len(true))
     rmse, coverage, refused = [], [], 0
     for k, (train, test) in enumerate(split):
         others = _rows(held_out, train)
@@ -70,7 +81,9 @@ def validated_size_classifier(
         results = judge.results(estimate)
         named[test] = [result.class_deg for result in results]
         refused += sum(bool(reasons) for reasons in judge.reasons_to_refuse(estimate))
-        rmse.append(float((estimate.size - true[test]).square().mean().sqrt()))
+        error[test] = (estimate.size - true[test]).numpy()
+        half_width[test] = judge.calibration.inflation * estimate.deviation.numpy()
+        rmse.append(float(np.sqrt(np.mean(error[test] ** 2))))
         coverage.append(share_covered(results, dataset.backlash_size[test]))
         if progress is not None:
             right = np.mean(named[test] == dataset.class_deg[test])
@@ -79,7 +92,8 @@ def validated_size_classifier(
                 f'{math.degrees(rmse[-1]):.2f} deg rms'
             )
     classes = CrossValidation.of(dataset.class_deg, named, split)
-    return classifier, SizeValidation(classes, tuple(rmse), tuple(coverage), refused)
+    validation = SizeValidation(classes, tuple(rmse), tuple(coverage), refused, error, half_width)
+    return classifier, validation
 
 
 def share_covered(results: list[ClassificationResult], size: NDArray[np.float64]) -> float:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from endoscope_core.atomic_output import atomic_directory
 from endoscope_core.dataset.calibration_recording import record_calibration
 from endoscope_core.dataset.rig_variation import (
+    GREATEST_EVENNESS,
     TubeConfiguration,
     configuration_of_size,
     random_rig,
@@ -211,7 +212,7 @@ def load_dataset(folder: str | Path) -> CalibrationDataset:
 
 def _draw(generator: np.random.Generator, class_deg: int) -> TubeConfiguration:
     size = np.deg2rad(class_deg + SIZE_SPREAD_DEG * generator.uniform(-1.0, 1.0))
-    evenness = float(generator.uniform(0.0, 1.0))
+    evenness = float(generator.uniform(0.0, GREATEST_EVENNESS))
     for _ in range(_MOST_RIGS):
         configuration = configuration_of_size(random_rig(generator), float(size), evenness)
         if configuration is not None:

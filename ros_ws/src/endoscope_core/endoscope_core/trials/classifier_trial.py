@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from endoscope_core.classifier.classification import ClassificationResult, UnseenTensionError
 from endoscope_core.classifier.size_classifier import SizeClassifier
 from endoscope_core.dataset import random_rig, record_calibration
-from endoscope_core.dataset.rig_variation import backlash_sizes, in_tube
+from endoscope_core.dataset.rig_variation import GREATEST_EVENNESS, backlash_sizes, in_tube
 from endoscope_core.plant import PlantDescription
 from endoscope_core.signals import calibration_motion
 from endoscope_core.trials.unusual_recordings import UNUSUAL
@@ -37,7 +37,7 @@ class SizeTrial:
 def random_tube(generator: np.random.Generator) -> PlantDescription:
     """A random rig in a random tube, as data sets hold them, but of any size."""
     rig = random_rig(generator)
-    return in_tube(rig, generator.uniform(*EXPONENTS), generator.uniform(0.0, 1.0))
+    return in_tube(rig, generator.uniform(*EXPONENTS), generator.uniform(0.0, GREATEST_EVENNESS))
 
 
 def judge_unseen_tubes(classifier: SizeClassifier, seed: int, tubes: int) -> list[SizeTrial]:
