@@ -95,7 +95,7 @@ def test_is_described(effect_id):
     assert definition.physics.endswith('.')
     assert definition.equation
     assert re.search(r'\d{4}', definition.source), 'a source has a year or a standard a number'
-    assert 1 <= len(definition.parameters) <= 4
+    assert 1 <= len(definition.parameters) <= 5
     assert any(math.isfinite(p.off) for p in definition.parameters)
     for parameter in definition.parameters:
         for value in (parameter.typical, *parameter.starts, *parameter.choices):
@@ -160,11 +160,16 @@ def test_faults_of_the_recording_leave_the_rig_alone(effect_id, nominal):
 
 
 def slopes(effect_id, parameter, step):
-    """Readings' slopes, in sensors' noise, by a parameter of an effect at its typical value."""
+    """Readings' slopes, in sensors' noise, by a parameter where a fit of the effect begins."""
+    start = {
+        p.name: p.starts[0]
+        for p in CATALOGUE[effect_id].parameters
+        if p.typical == 0.0 and p.starts and p is not parameter
+    }
     unit = abs(parameter.typical) or 0.1 * (parameter.high - parameter.low)
     sign = 1.0 if parameter.typical + step * unit <= parameter.high else -1.0
     here, there = (
-        with_effect(effect_id, {parameter.name: parameter.typical + shift})
+        with_effect(effect_id, start | {parameter.name: parameter.typical + shift})
         for shift in (0.0, sign * step * unit)
     )
     return (
