@@ -68,6 +68,7 @@ class LoadCellsNode(EndoscopeNode):
         self._settings = self.parameters(LoadCellsParameters, self._on_parameters)
         p = self._settings
         self._last_ns = 0
+        self._told = ''
         self._cells: ModbusLoadCells | None = None
         self._measured = JointPublisher(self, WIRES_MEASURED, WIRES, ('effort',), SENSOR_OFFERED)
         if p.device == 'simulated':
@@ -119,6 +120,10 @@ class LoadCellsNode(EndoscopeNode):
         to_stamp_ns = self.ticker.now_ns() - self.ticker.monotonic_ns()
         for reading in self._cells.take():
             self._publish(reading.time_ns + to_stamp_ns, reading.tension)
+        trouble = self._cells.trouble
+        if bool(trouble) != bool(self._told):
+            self._told = trouble
+            self.diagnostics.publish()
 
     def _publish(self, stamp_ns: int, tension: tuple[float, ...]) -> None:
         self._measured.publish(stamp_ns, *tension)

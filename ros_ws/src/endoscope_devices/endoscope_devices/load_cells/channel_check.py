@@ -1,11 +1,14 @@
 """Tells a broken, saturated, frozen or spiking load cell from a real tension."""
 
 import math
+from collections import deque
 
 from endoscope_devices.load_cells.calibration_file import FaultLimits, WireCell
 
 # So many good readings in a row end a fault, and so many of one mind make a step a new level.
 CONFIRMATIONS = 3
+_SPIKES = 5
+_SPIKES_WITHIN_NS = 1_000_000_000
 
 
 class ChannelCheck:
@@ -15,7 +18,7 @@ class ChannelCheck:
     an open bridge drives the amplifier.  Saturated: beyond ``saturated_*``.  Frozen: not one count
     of change for ``frozen_after`` seconds; the noise of a living cell changes its last digit.
     Spiking: a change faster than ``spike_rate``; three readings in a row that agree with each other
-    are a new level.
+    are a new level.  With five spikes in a second the whole channel is not believed.
 
     Parameters
     ----------
@@ -41,6 +44,7 @@ class ChannelCheck:
         self.fault = ''
         self.spikes = 0
         self._good = 0
+        self._spiked_ns: deque[int] = deque(maxlen=_SPIKES)
         self._count = math.nan
         self._changed_ns = 0
         self._level = math.nan
@@ -88,13 +92,18 @@ class ChannelCheck:
         still = (time_ns - self._changed_ns) * 1e-9
         if 0.0 < limits.frozen_after <= still:
             return f'frozen ({count:.6g} counts for {still:.1f} s)'
-        return self._jump(time_ns, self.cell.tension(count))
+        jump = self._jump(time_ns, self.cell.tension(count))
+        many = len(self._spiked_ns) == _SPIKES and (
+            time_ns - self._spiked_ns[0] < _SPIKES_WITHIN_NS
+        )
+        return f'spiking ({_SPIKES} times within a second)' if many else jump
 
     def _jump(self, time_ns: int, tension: float) -> str:
         if math.isnan(self._level) or self._near(self._level, self._level_ns, tension, time_ns):
             self._take(time_ns, tension)
             return ''
         self.spikes += 1
+        self._spiked_ns.append(time_ns)
         agrees = self._near(self._candidate, self._candidate_ns, tension, time_ns)
         self._agreeing = self._agreeing + 1 if agrees else 1
         self._candidate, self._candidate_ns = tension, time_ns

@@ -22,6 +22,8 @@ from endoscope_devices.load_cells.tare import TareWindow, with_zero, zero_after_
 
 _REOPEN_S = 0.2
 _SILENT_NS = 250_000_000
+# So many readings in a row that cannot be believed are a fault; a single spike is none.
+_FAULTY_READINGS = 10
 _KEPT = 2000
 
 
@@ -72,7 +74,9 @@ class ModbusLoadCells:
         self._readings: deque[WireReading] = deque(maxlen=_KEPT)
         self._counts: Counter[str] = Counter()
         self._good_ns: int | None = None
+        self._unbelieved = 0
         self._link_trouble = 'not connected yet'
+        self._line_lost = True
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name='load cells', daemon=True)
 
@@ -118,14 +122,24 @@ class ModbusLoadCells:
                 check.cell = cell
             self._window = TareWindow(tuple(calibration.wires), calibration.tare)
 
+    @property
+    def trouble(self) -> str:
+        """What is wrong; empty if nothing."""
+        good = self._good_ns
+        age = None if good is None else time.monotonic_ns() - good
+        if self._line_lost:
+            return self._link_trouble
+        faults = [check.fault for check in self._checks if check.fault]
+        if faults and self._unbelieved >= _FAULTY_READINGS:
+            return '; '.join(faults)
+        if age is None or age > _SILENT_NS:
+            return self._link_trouble or 'no believable reading yet'
+        return ''
+
     def health(self) -> tuple[str, dict[str, object]]:
         """What is wrong (empty if nothing), and figures for diagnostics."""
         good = self._good_ns
         age = None if good is None else time.monotonic_ns() - good
-        faults = [check.fault for check in self._checks if check.fault]
-        trouble = '; '.join(faults)
-        if not trouble and (age is None or age > _SILENT_NS):
-            trouble = self._link_trouble or 'no believable reading yet'
         figures: dict[str, object] = {
             'age of the last reading [ms]': 'never' if age is None else round(age * 1e-6, 1),
             'readings': self._counts['readings'],
@@ -137,7 +151,7 @@ class ModbusLoadCells:
         for name, check in zip(self.calibration.wires, self._checks, strict=True):
             figures[f'{name}: zero [counts]'] = check.cell.zero
             figures[f'{name}: spikes'] = check.spikes
-        return trouble, figures
+        return self.trouble, figures
 
     def close(self) -> None:
         """Stop reading and let go of the line."""
@@ -151,9 +165,11 @@ class ModbusLoadCells:
                 self._line.open()
                 self._counts['connections'] += 1
                 self._link_trouble = ''
+                self._line_lost = False
                 self._read_on()
             except LineLostError as error:
                 self._link_trouble = str(error)
+                self._line_lost = True
             finally:
                 self._line.close()
             self._stop.wait(_REOPEN_S)
@@ -183,7 +199,9 @@ class ModbusLoadCells:
         believed = tuple(value for value in tension if value is not None)
         if len(believed) < len(tension):
             self._counts['not believed'] += 1
+            self._unbelieved += 1
             return
+        self._unbelieved = 0
         self._counts['readings'] += 1
         self._good_ns = time_ns
         self._window.add(time_ns, believed)

@@ -1,0 +1,366 @@
+"""Sensors that fail while the slave moves: what it does, and what the bag shows.
+
+Real nodes in real time, real drivers over a pseudo-terminal and TCP.  Each fault prints how long
+the slave took, which `ros_ws/doc/device_faults_sensors.md` tabulates; nothing is asserted of it.
+"""
+
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from aurora_rig import Instrument
+from load_cell_rig import BROKEN, SATURATED, Cells, transmitter, write_calibration
+from rclpy.context import Context
+from recorded_session import private_domain
+from sensor_graph import SensorGraph
+
+from endoscope_bags import open_bag
+from endoscope_devices.em_tracker.aurora_emulator import AuroraEmulator
+from endoscope_devices.emulation.serial_cable import SerialCable
+from endoscope_nodes.load_cells_node import LoadCellsNode
+from endoscope_nodes.parameters import ParameterError
+from endoscope_nodes.runtime import Runtime
+
+CELLS = 'load_cells: cells'
+TRACKER = 'em_tracker: tracker'
+LATENCY = 0.03
+# Causes of the faults so far, in order, for whoever reads the bag.
+FAULTS = []
+
+
+def figures(name, **measured):
+    print(f'\n{name}: ' + ', '.join(f'{k} {v:.0f} ms' for k, v in measured.items()))
+
+
+class Rig:
+    """Both sensors of a slave that moves, with handles on everything that may fail."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.cells = Cells()
+        self.instrument = Instrument()
+        self.cable = SerialCable(folder / 'ttyCells')
+        self.transmitter = transmitter(self.cells, serial_port=self.cable.device)
+        self.aurora = AuroraEmulator([self.instrument], folder / 'ttyAurora', latency=LATENCY)
+        self.graph = SensorGraph(
+            folder / 'bag',
+            cells=self.cells,
+            follow_bending=self.instrument.follow_for(self.aurora.unit),
+            load_cells={
+                'device': 'modbus_rtu',
+                'port': str(folder / 'ttyCells'),
+                'calibration_file': str(write_calibration(folder)),
+            },
+            em_tracker={
+                'device': 'aurora',
+                'port': str(folder / 'ttyAurora'),
+                'latency': LATENCY,
+                'sensor_roll': self.instrument.roll,
+                'registration_file': str(folder / 'straight.yaml'),
+            },
+        )
+
+    def close(self):
+        try:
+            self.graph.__exit__(None, None, None)
+        finally:
+            self.aurora.close()
+            self.transmitter.close()
+            self.cable.close()
+
+
+@pytest.fixture(scope='module')
+def rig(tmp_path_factory):
+    rig = Rig(tmp_path_factory.mktemp('faults'))
+    try:
+        register(rig)
+        rig.graph.enable()
+        rig.graph.play()
+        yield rig
+    finally:
+        rig.close()
+
+
+def register(rig):
+    """Until then nothing is published; it needs a second of readings."""
+    graph = rig.graph
+    assert graph.bendings == []
+    for _ in range(50):
+        answer = graph.call('em_tracker', 'register_straight')
+        if answer.success:
+            break
+        graph.serve(0.1)
+    assert answer.success, answer.message
+    graph.wait(lambda: len(graph.bendings) > 3)
+    assert (rig.folder / 'straight.yaml').exists()
+
+
+def moving(rig):
+    """Enabled, and the shafts at speed."""
+    graph = rig.graph
+    graph.enable()
+    graph.wait(lambda: max(abs(v) for v in graph.shafts[-1][1].velocity) > 0.1)
+
+
+def held(rig):
+    """Whether the shafts have stood still for 50 ms."""
+    recent = [s.position for at, s in rig.graph.shafts if at > time.monotonic() - 0.05]
+    return len(recent) > 10 and np.ptp(recent, axis=0).max() < 0.004
+
+
+def fault(rig, name, causes, begin, end):
+    """Break something in motion: FAULT, no way back before it is whole, none without a command."""
+    graph = rig.graph
+    moving(rig)
+    last_good = graph.tensions[-1][0]
+    begun = time.monotonic()
+    begin()
+    found = graph.wait(lambda: graph.state == 'FAULT')
+    cause = graph.nodes['supervisor'].machine.cause
+    assert any(words in cause for words in causes), cause
+    FAULTS.append(cause)
+    stopped = graph.wait(lambda: held(rig))
+    graph.says('supervisor: operating state', cause)
+    answer = graph.refused('enable')
+    assert any(words in answer for words in causes), answer
+    figures(
+        name,
+        fault=1e3 * (found - begun),
+        held=1e3 * (stopped - begun),
+        last_reading=1e3 * (max(at for at, _ in graph.tensions if at < found) - begun),
+        before=1e3 * (begun - last_good),
+    )
+    end()
+    count = len(graph.tensions)
+    graph.wait(lambda: len(graph.tensions) > count + 20)
+    graph.serve(0.1)
+    assert graph.state == 'FAULT'
+    graph.enable()
+
+
+SILENT = 'wires/measured_js has been silent'
+
+
+def test_a_cell_that_breaks(rig):
+    fault(
+        rig,
+        'broken cell',
+        ['wire_x_pos: broken wire of the cell'],
+        lambda: rig.cells.count.update(wire_x_pos=BROKEN),
+        rig.cells.count.clear,
+    )
+
+
+def test_a_cell_that_saturates(rig):
+    fault(
+        rig,
+        'saturated cell',
+        ['wire_y_neg: saturated'],
+        lambda: rig.cells.count.update(wire_y_neg=SATURATED),
+        rig.cells.count.clear,
+    )
+
+
+def test_a_cell_that_freezes(rig):
+    fault(
+        rig,
+        'frozen cell',
+        ['wire_x_neg: frozen'],
+        lambda: rig.cells.freeze.add('wire_x_neg'),
+        rig.cells.freeze.clear,
+    )
+
+
+def test_a_wire_that_is_pulled_too_hard(rig):
+    fault(
+        rig,
+        'tension ceiling',
+        ['over the ceiling of 60.0 N'],
+        lambda: rig.cells.extra.update(wire_x_pos=58.0),
+        rig.cells.extra.clear,
+    )
+
+
+def test_load_cells_that_are_unplugged(rig):
+    fault(rig, 'unplugged load cells', ['ttyCells'], rig.cable.unplug, rig.cable.plug_in)
+
+
+def test_replies_that_all_come_late(rig):
+    def late(data):
+        return [(0.07, data)]
+
+    def begin():
+        rig.cable.to_host = late
+
+    def end():
+        rig.cable.to_host = lambda data: [(0.0, data)]
+
+    fault(rig, 'late replies', [SILENT, 'no reply', 'malformed'], begin, end)
+
+
+def test_flipped_bits_stop_nothing_and_become_no_number(rig):
+    graph = rig.graph
+    moving(rig)
+    number = [0]
+
+    def flip(data):
+        number[0] += 1
+        spoilt = bytearray(data)
+        if number[0] % 10 == 0:
+            spoilt[number[0] // 10 % len(spoilt)] ^= 1 << number[0] % 8
+        return [(0.0, bytes(spoilt))]
+
+    before = int(graph.figure(CELLS, 'wrong CRC'))
+    since = len(graph.tensions)
+    rig.cable.to_host = flip
+    while int(graph.figure(CELLS, 'wrong CRC')) < before + 6:
+        graph.serve(0.05)
+    rig.cable.to_host = lambda data: [(0.0, data)]
+    assert graph.state == 'ENABLED', graph.nodes['supervisor'].machine.cause
+    tensions = np.array([s.effort for _, s in graph.tensions[since:]])
+    assert np.abs(tensions).max() < 59.0
+    gaps = np.diff([at for at, _ in graph.tensions[since:]])
+    figures('flipped bits', longest_gap=1e3 * gaps.max())
+
+
+def test_a_spike_is_left_out(rig):
+    graph = rig.graph
+    moving(rig)
+    before = int(graph.figure(CELLS, 'wire_y_pos: spikes'))
+    since = len(graph.tensions)
+    rig.cells.once['wire_y_pos'] = 85_000
+    while int(graph.figure(CELLS, 'wire_y_pos: spikes')) == before:
+        graph.serve(0.05)
+    assert graph.state == 'ENABLED', graph.nodes['supervisor'].machine.cause
+    assert max(s.effort[2] for _, s in graph.tensions[since:]) < 59.0
+
+
+def blind(rig, name, begin, diagnosis, end):
+    """A tracker that shows nothing: nothing is published, and the slave goes on without it."""
+    graph = rig.graph
+    moving(rig)
+    begun = time.monotonic()
+    begin()
+    graph.says(TRACKER, diagnosis)
+    last = graph.bendings[-1][0]
+    count = len(graph.bendings)
+    graph.serve(0.3)
+    assert len(graph.bendings) == count
+    assert graph.state == 'ENABLED', graph.nodes['supervisor'].machine.cause
+    ended = time.monotonic()
+    end()
+    back = graph.wait(lambda: len(graph.bendings) > count)
+    figures(name, last_pose=1e3 * (last - begun), back_after=1e3 * (back - ended))
+    assert graph.state == 'ENABLED', graph.nodes['supervisor'].machine.cause
+
+
+def test_a_tracker_that_goes_blind(rig):
+    def hide():
+        rig.instrument.hidden = True
+
+    def show():
+        rig.instrument.hidden = False
+
+    blind(rig, 'out of volume', hide, 'out of the measurement volume', show)
+
+
+def test_a_tracker_that_is_unplugged(rig):
+    blind(rig, 'unplugged tracker', rig.aurora.unplug, 'ttyAurora', rig.aurora.plug_in)
+
+
+def test_a_coil_that_breaks(rig):
+    def tear():
+        rig.instrument.broken = True
+
+    def mend():
+        rig.instrument.broken = False
+
+    blind(rig, 'broken coil', tear, 'coil of the sensor is broken', mend)
+
+
+def test_what_the_tracker_says_is_where_the_slave_was(rig):
+    graph = rig.graph
+    moving(rig)
+    since = len(graph.bendings)
+    true = graph.listen('simulation/bending', ('bend_x', 'bend_y'))
+    graph.serve(1.5)
+    stamps = np.array([s.stamp_ns for _, s in true])
+    angles = np.array([s.position for _, s in true])
+    seen = [s for _, s in graph.bendings[since:] if stamps[0] < s.stamp_ns < stamps[-1]]
+    assert len(seen) > 20
+    error = [
+        s.position[k] - np.interp(s.stamp_ns, stamps, angles[:, k]) for s in seen for k in (0, 1)
+    ]
+    print(f'\ntracker against the slave: rms {np.degrees(np.std(error)):.2f} deg')
+    # The joints turn at up to 60 deg/s: a degree is 17 ms.
+    assert np.degrees(np.sqrt(np.mean(np.square(error)))) < 2.0
+
+
+def test_moving_wires_are_not_tared_and_a_bent_tip_is_not_registered(rig):
+    moving(rig)
+    rig.graph.serve(0.2)
+    answer = rig.graph.call('load_cells', 'tare')
+    assert not answer.success
+    assert 'the wires move' in answer.message
+    answer = rig.graph.call('em_tracker', 'register_straight')
+    assert not answer.success
+    assert 'kept turning' in answer.message or 'turned by' in answer.message
+
+
+@pytest.mark.parametrize(
+    ('overrides', 'words'),
+    [
+        ({'device': 'modbus_rtu'}, "'port' is empty"),
+        ({'device': 'modbus_rtu', 'port': '/dev/null'}, "'calibration_file' is empty"),
+        (
+            {'device': 'modbus_tcp', 'port': 'h:x', 'calibration_file': 'CELLS'},
+            "'h:x' is no address",
+        ),
+        ({'device': 'modbus_rtu', 'port': 'p', 'calibration_file': 'nowhere'}, 'nowhere'),
+        ({'device': 'modbus'}, 'did you mean modbus_'),
+    ],
+)
+def test_parameters_of_real_cells_are_checked(tmp_path, overrides, words):
+    if overrides.get('calibration_file') == 'CELLS':
+        overrides = overrides | {'calibration_file': str(write_calibration(tmp_path))}
+    with pytest.raises(ParameterError, match=words):
+        start(['--ros-args', '--log-level', 'fatal'], LoadCellsNode, overrides)
+
+
+def test_real_devices_need_real_time(tmp_path):
+    overrides = {
+        'device': 'modbus_tcp',
+        'port': 'localhost:1',
+        'calibration_file': str(write_calibration(tmp_path)),
+    }
+    with pytest.raises(ParameterError, match='needs real time'):
+        start(['--ros-args', '-p', 'use_sim_time:=true'], LoadCellsNode, overrides)
+
+
+def start(arguments, factory, overrides):
+    with Runtime(arguments, Context(), private_domain(), {'load_cells': overrides}) as runtime:
+        runtime.add(factory)
+
+
+def test_the_bag_shows_it_all(rig):
+    """Comes last: it ends the recording."""
+    rig.graph.nodes['recorder'].stop()
+    bag = open_bag(rig.folder / 'bag')
+    wires = bag.joint_state('wires/measured_js')
+    assert np.isfinite(wires.effort).all()
+    assert (np.diff(wires.stamp_ns) > 0).all()
+    poses = bag.joint_state('slave/measured_js')
+    assert (np.diff(poses.stamp_ns) > 0).all()
+    states = [(raw.log_ns, m.data) for raw, m in bag.decoded('/endoscope/slave/operating_state')]
+    changes = [b for a, b in pairwise(states) if a[1] != b[1]]
+    faults = [at for at, name in changes if name == 'FAULT']
+    assert len(faults) == len(FAULTS)
+    assert {name for _, name in changes} == {'ENABLED', 'FAULT'}
+    gaps = np.flatnonzero(np.diff(wires.stamp_ns) > 45_000_000)
+    silences = [(wires.stamp_ns[k], wires.stamp_ns[k + 1]) for k in gaps]
+    within = [any(a < at < b for a, b in silences) for at in faults]
+    assert within == ['ceiling' not in cause for cause in FAULTS]
+    said = ' '.join(status.message for _, m in bag.decoded('/diagnostics') for status in m.status)
+    for words in FAULTS:
+        assert words in said
