@@ -147,10 +147,15 @@ def _extend(
     """Add one joint's calibration to the table, under the backlash size that it shows."""
     import math
 
-    from endoscope_core.identification import TableEntry, UpdatedTable, UpdatedTableError
+    import numpy as np
+
+    from endoscope_bringup.learning.hysteresis_of_bag import GRID_STEP
+    from endoscope_core.identification import Servo, TableEntry, UpdatedTable, UpdatedTableError
     from endoscope_core.metrics import width_at_mid_height
 
-    size = width_at_mid_height(recording.driver, recording.actual)
+    # The motor follows its command late; the backlash size is that over the command.
+    commanded = recording.driver + Servo().lag * np.gradient(recording.driver, GRID_STEP)
+    size = width_at_mid_height(commanded, recording.actual)
     entry = TableEntry(size, parameters, source)
     if args.table.is_file():
         table = UpdatedTable.load(args.table)

@@ -13,7 +13,7 @@ MOTOR = 'motor/measured_js'
 MOTOR_COMMAND = 'motor/servo_jp'
 DESIRED = 'slave/servo_jp'
 
-_GRID_STEP = 0.005
+GRID_STEP = 0.005
 _COMMAND_STEP = 0.001
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecord
         start, end = max(driven[0][0], bent[0][0]), min(driven[0][-1], bent[0][-1])
         if end - start < 1.0:
             continue
-        grid = np.arange(start, end, _GRID_STEP)
+        grid = np.arange(start, end, GRID_STEP)
         angle = driven[1] / scale
         found[joint] = HysteresisRecording(
             np.interp(grid, driven[0], angle) if measured else _servo(driven[0], angle, grid),

@@ -15,6 +15,11 @@ class Servo:
     bandwidth: float = 60.0
     damping_ratio: float = 0.9
 
+    @property
+    def lag(self) -> float:
+        """Time in s by which it follows a steady motion late."""
+        return 2.0 * self.damping_ratio / self.bandwidth
+
     def answer(self, command: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
         """Motor angle (N,) for a command (N,) held for `dt` s each, beginning at rest on it."""
         numerator, denominator = _filter(self.bandwidth, self.damping_ratio, dt)

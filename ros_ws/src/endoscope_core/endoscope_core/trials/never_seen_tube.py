@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.classifier.classification import Classifier, UnseenTensionError
 from endoscope_core.dataset import configuration_of_size, random_rig, record_calibration
+from endoscope_core.dataset.rig_variation import GREATEST_EVENNESS
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.identification.plant_fit import plants_of_calibration
 from endoscope_core.metrics import width_at_mid_height
@@ -58,7 +59,7 @@ def never_seen_tube(seed: int, number: int, size_deg: float | None = None) -> Ne
     generator = np.random.default_rng([_UNSEEN, seed, number])
     drawn = float(generator.uniform(SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG))
     size = np.deg2rad(drawn if size_deg is None else size_deg)
-    evenness = float(generator.uniform(0.0, 1.0))
+    evenness = float(generator.uniform(0.0, GREATEST_EVENNESS))
     for _ in range(_MOST_RIGS):
         found = configuration_of_size(random_rig(generator), float(size), evenness)
         if found is not None:

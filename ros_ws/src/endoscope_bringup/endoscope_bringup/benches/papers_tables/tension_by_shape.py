@@ -13,13 +13,14 @@ def rows(settings: PapersBench) -> list[Row]:
     import numpy as np
 
     from endoscope_core.dataset import configuration_of_size, random_rig, record_calibration
+    from endoscope_core.dataset.rig_variation import GREATEST_EVENNESS
 
     tensions = []
     for size_deg, _ in _CASES:
         rig = random_rig(np.random.default_rng([settings.seed, 1]))
         shapes = []
         for k in range(settings.tubes):
-            evenness = k / max(1, settings.tubes - 1)
+            evenness = GREATEST_EVENNESS * k / (settings.tubes - 1)
             shape = configuration_of_size(rig, float(np.deg2rad(size_deg)), evenness)
             if shape is None:
                 raise RuntimeError(f'no tube of evenness {evenness} gives {size_deg} deg')
