@@ -364,3 +364,39 @@ def test_the_bag_shows_it_all(rig):
     said = ' '.join(status.message for _, m in bag.decoded('/diagnostics') for status in m.status)
     for words in FAULTS:
         assert words in said
+
+
+class NetworkRig:
+    """Load cells at a Modbus TCP server that can be switched off."""
+
+    def __init__(self, folder):
+        self.cells = Cells()
+        self.server = transmitter(self.cells)
+        self.graph = SensorGraph(
+            folder / 'bag',
+            cells=self.cells,
+            load_cells={
+                'device': 'modbus_tcp',
+                'port': f'127.0.0.1:{self.server.tcp_port}',
+                'calibration_file': str(write_calibration(folder)),
+            },
+        )
+
+    def switch_on(self):
+        self.server = transmitter(self.cells, tcp_port=self.server.tcp_port)
+
+    def close(self):
+        try:
+            self.graph.__exit__(None, None, None)
+        finally:
+            self.server.close()
+
+
+def test_a_modbus_server_that_dies(tmp_path):
+    rig = NetworkRig(tmp_path)
+    try:
+        rig.graph.enable()
+        rig.graph.play()
+        fault(rig, 'dead Modbus server', ['127.0.0.1'], rig.server.close, rig.switch_on)
+    finally:
+        rig.close()
