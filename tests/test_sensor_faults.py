@@ -18,6 +18,7 @@ from sensor_graph import SensorGraph
 from endoscope_bags import open_bag
 from endoscope_devices.em_tracker.aurora_emulator import AuroraEmulator
 from endoscope_devices.emulation.serial_cable import SerialCable
+from endoscope_nodes.em_tracker_node import EmTrackerNode
 from endoscope_nodes.load_cells_node import LoadCellsNode
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.runtime import Runtime
@@ -328,18 +329,33 @@ def test_parameters_of_real_cells_are_checked(tmp_path, overrides, words):
         start(['--ros-args', '--log-level', 'fatal'], LoadCellsNode, overrides)
 
 
-def test_real_devices_need_real_time(tmp_path):
-    overrides = {
-        'device': 'modbus_tcp',
-        'port': 'localhost:1',
-        'calibration_file': str(write_calibration(tmp_path)),
-    }
+@pytest.mark.parametrize(
+    ('overrides', 'words'),
+    [
+        ({'device': 'aurora'}, "'port' is empty"),
+        ({'device': 'aurora', 'port': 'p', 'registration_file': 'BAD'}, 'orientation is missing'),
+        ({'device': 'polaris'}, 'aurora'),
+    ],
+)
+def test_parameters_of_a_real_tracker_are_checked(tmp_path, overrides, words):
+    if 'registration_file' in overrides:
+        (tmp_path / 'bad.yaml').write_text('position: [0, 0, 0]')
+        overrides = overrides | {'registration_file': str(tmp_path / 'bad.yaml')}
+    with pytest.raises(ParameterError, match=words):
+        start(['--ros-args', '--log-level', 'fatal'], EmTrackerNode, overrides)
+
+
+@pytest.mark.parametrize(
+    ('factory', 'device'), [(LoadCellsNode, 'modbus_tcp'), (EmTrackerNode, 'aurora')]
+)
+def test_real_devices_need_real_time(factory, device):
     with pytest.raises(ParameterError, match='needs real time'):
-        start(['--ros-args', '-p', 'use_sim_time:=true'], LoadCellsNode, overrides)
+        start(['--ros-args', '-p', 'use_sim_time:=true'], factory, {'device': device})
 
 
 def start(arguments, factory, overrides):
-    with Runtime(arguments, Context(), private_domain(), {'load_cells': overrides}) as runtime:
+    name = 'load_cells' if factory is LoadCellsNode else 'em_tracker'
+    with Runtime(arguments, Context(), private_domain(), {name: overrides}) as runtime:
         runtime.add(factory)
 
 
