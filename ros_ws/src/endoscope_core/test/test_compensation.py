@@ -2,7 +2,7 @@
 
 import pytest
 
-from endoscope_core.classifier.inference import TensionClassifier
+from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.identification import load_class_parameters
 from endoscope_core.signals import periodic_signal
 from endoscope_core.trials.unseen_tube_trial import run_unseen_tube_trial
@@ -11,7 +11,7 @@ from endoscope_core.trials.unseen_tube_trial import run_unseen_tube_trial
 @pytest.mark.parametrize('number', [100, 101])
 def test_the_whole_chain_reduces_the_error_as_required(number):
     trial = run_unseen_tube_trial(
-        3, number, [periodic_signal()], TensionClassifier.load_default(), load_class_parameters()
+        3, number, [periodic_signal()], load_classifier(), load_class_parameters()
     )
     assert trial.uncompensated['periodic'] > 0.2
     assert trial.feedforward['periodic'] <= 0.30

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from endoscope_core.classifier.inference import TensionClassifier
+    from endoscope_core.classifier.classification import Classifier
     from endoscope_core.trials.unseen_tube_trial import UnseenTubeTrial
 
 FEEDFORWARD_LIMIT = 0.30
@@ -29,7 +29,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run and print; return 0 if the limits are kept on every tube, else 1."""
-    from endoscope_core.classifier.inference import TensionClassifier
+    from endoscope_core.classifier.shipped import load_classifier
     from endoscope_core.classifier.training import use_one_thread
     from endoscope_core.identification import load_class_parameters
     from endoscope_core.signals import non_periodic_signal, periodic_signal
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
 
     use_one_thread()
     signals = [periodic_signal(), non_periodic_signal()]
-    classifier, sets = TensionClassifier.load_default(), load_class_parameters()
+    classifier, sets = load_classifier(), load_class_parameters()
     trials = []
     print('tube  exponent  size  class  signal        none     feed-forward  with feedback')
     for number in range(args.tubes):
@@ -62,7 +62,7 @@ def _lines(number: int, trial: 'UnseenTubeTrial') -> list[str]:
 
     return [
         f'{number:4d}  {trial.exponent:8.2f}  {math.degrees(trial.size):4.0f}  '
-        f'{trial.class_deg:5d}  {name:12s}  {math.degrees(alone):4.1f} deg  '
+        f'{trial.class_deg or "none":>5}  {name:12s}  {math.degrees(alone):4.1f} deg  '
         f'{100.0 * trial.feedforward[name]:11.1f}%  {100.0 * trial.feedback[name]:12.1f}%'
         for name, alone in trial.uncompensated.items()
     ]
@@ -81,10 +81,13 @@ def _summary(signal: str, trials: 'Sequence[UnseenTubeTrial]') -> str:
     return f'{signal}: {", ".join(parts)} of the uncompensated RMSE'
 
 
-def _inference_time(classifier: 'TensionClassifier') -> float:
+def _inference_time(classifier: 'Classifier') -> float:
     import numpy as np
 
-    tension = np.random.default_rng(0).normal(5.0, 1.0, (9000, 4))
+    from endoscope_core.dataset import record_calibration
+    from endoscope_core.plant import PlantDescription
+
+    tension = record_calibration(PlantDescription(), 0).tension
     spent = []
     for _ in range(_INFERENCES):
         start = time.perf_counter()

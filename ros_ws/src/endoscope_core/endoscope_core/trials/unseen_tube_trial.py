@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from endoscope_core.classifier.inference import TensionClassifier
+from endoscope_core.classifier.classification import Classifier, UnseenTensionError
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.dataset import random_rig, record_calibration
 from endoscope_core.dataset.rig_variation import backlash_sizes, in_tube
@@ -28,8 +28,8 @@ class UnseenTubeTrial:
         Capstan exponent of the tube.
     size : float
         True backlash size, mean of the joints, in rad.
-    class_deg : int
-        Class that the classifier named.
+    class_deg : int or None
+        Class that the classifier named; None where it refused, and nothing was compensated.
     uncompensated : dict of str to float
         RMSE in rad by signal.
     feedforward, feedback : dict of str to float
@@ -38,7 +38,7 @@ class UnseenTubeTrial:
 
     exponent: float
     size: float
-    class_deg: int
+    class_deg: int | None
     uncompensated: dict[str, float]
     feedforward: dict[str, float]
     feedback: dict[str, float]
@@ -46,6 +46,8 @@ class UnseenTubeTrial:
     @property
     def nearest_class(self) -> bool:
         """Whether no other class is nearer to the true size."""
+        if self.class_deg is None:
+            return False
         return abs(np.rad2deg(self.size) - self.class_deg) <= 5.0
 
 
@@ -53,7 +55,7 @@ def run_unseen_tube_trial(
     seed: int,
     number: int,
     signals: Sequence[Signal],
-    classifier: TensionClassifier,
+    classifier: Classifier,
     sets: Mapping[int, LawParameters],
 ) -> UnseenTubeTrial:
     """Calibrate, classify, choose parameters and track, on a random rig in a random tube.
@@ -63,7 +65,8 @@ def run_unseen_tube_trial(
     seed, number : int
         Together they choose rig, tube and noise.
     signals : sequence of Signal
-    classifier : TensionClassifier
+    classifier : Classifier
+        Of the sinusoid.
     sets : mapping of int to BoucWenParameters
         By class.
     """
@@ -71,9 +74,16 @@ def run_unseen_tube_trial(
     exponent = float(generator.uniform(*EXPONENTS))
     plant = in_tube(random_rig(generator), exponent)
     noise = int(generator.integers(2**31))
-    class_deg = classifier.classify(record_calibration(plant, noise).tension).class_deg
-    parameters = parameters_for_class(sets, class_deg)
-    law = FeedforwardLaw('bouc_wen', (parameters,) * len(plant.joints))
+    law = FeedforwardLaw()
+    class_deg = None
+    try:
+        class_deg = classifier.classify(record_calibration(plant, noise).tension).class_deg
+    except UnseenTensionError:
+        # As the nodes have it: a tube of no known class is not compensated.
+        pass
+    else:
+        parameters = parameters_for_class(sets, class_deg)
+        law = FeedforwardLaw('bouc_wen', (parameters,) * len(plant.joints))
     alone, helped, corrected = {}, {}, {}
     for signal in signals:
         name = signal.name
