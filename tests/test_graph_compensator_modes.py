@@ -5,6 +5,7 @@ from simulated_graph import SimulatedGraph
 from tubes import tube_of_size
 
 from endoscope_core.control import MODES
+from endoscope_core.identification.law_choice import CalibrationFindings
 
 
 def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
@@ -36,11 +37,11 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
 def test_what_the_calibration_did_not_find_is_not_guessed():
     with SimulatedGraph() as graph:
         graph.enable()
-        graph.calibrate()
+        graph.nodes['compensator'].findings = CalibrationFindings(70)
         graph.set('compensator', mode='physical', selected_by='plant')
         graph.advance(0.3)
         assert graph.nodes['compensator']._feedforward.law.mode == 'none'
         graph.set('controller', law='recursive_least_squares')
         graph.set('console', source='motion')
-        graph.advance(3.0)
+        graph.advance(1.2)
         assert graph.reported('controller: feedback')['law'] == 'recursive_least_squares'

@@ -23,9 +23,9 @@ def test_the_straight_tube_is_modelled_as_well_as_is_known_to_be_possible(model,
     assert np.rad2deg(second) <= at_most_deg
 
 
-def test_every_model_explains_most_of_the_second_cycle_of_every_tube():
+def test_every_model_explains_most_of_the_second_cycle_of_the_most_bent_tube():
     for model in MODELS:
-        for bend, (_, second) in models_on_real_recordings(RECORDINGS, model, 0).items():
+        for bend, (_, second) in models_on_real_recordings(RECORDINGS[-1:], model, 0).items():
             assert np.rad2deg(second) < 3.0, (model, bend)
 
 

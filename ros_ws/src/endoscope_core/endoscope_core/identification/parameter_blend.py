@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import astuple
 
+from endoscope_core.control.feedforward import PHYSICAL, LawParameters
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.hysteresis import (
     AsymmetricBoucWenParameters,
@@ -13,11 +14,9 @@ from endoscope_core.hysteresis import (
     PlayParameters,
     PrandtlIshlinskiiParameters,
 )
-from endoscope_core.hysteresis.inverse import MODELS, HysteresisParameters
+from endoscope_core.hysteresis.inverse import MODELS
 from endoscope_core.plant import JointParameters
 
-LawParameters = HysteresisParameters | PhysicalParameters
-PHYSICAL = 'physical'
 KINDS: dict[str, type[LawParameters]] = {**MODELS, PHYSICAL: PhysicalParameters}
 """Kind of parameters by the name of the model; 'physical' is the plant itself."""
 
@@ -71,13 +70,12 @@ def blend(first: LawParameters, second: LawParameters, weight: float) -> LawPara
             _between((first.offset,), (second.offset,), weight)[0],
         )
     if isinstance(first, PhysicalParameters) and isinstance(second, PhysicalParameters):
-        logs = _between(
-            tuple(math.log(value) for value in astuple(first.joint)),
-            tuple(math.log(value) for value in astuple(second.joint)),
-            weight,
-        )
+        numbers = [
+            _geometric(a, b, weight)
+            for a, b in zip(astuple(first.joint), astuple(second.joint), strict=True)
+        ]
         evenness = _between((first.evenness,), (second.evenness,), weight)[0]
-        return PhysicalParameters(JointParameters(*(math.exp(log) for log in logs)), evenness)
+        return PhysicalParameters(JointParameters(*numbers), evenness)
     raise ValueError(f'{type(first).__name__} and {type(second).__name__} cannot be blended')
 
 
@@ -86,6 +84,13 @@ Point = tuple[float, ...]
 
 def _between(first: Point, second: Point, weight: float) -> list[float]:
     return [a + weight * (b - a) for a, b in zip(first, second, strict=True)]
+
+
+def _geometric(first: float, second: float, weight: float) -> float:
+    """Between two numbers by their logarithms, or straight where one of them is zero."""
+    if first > 0.0 and second > 0.0:
+        return math.exp(math.log(first) + weight * (math.log(second) - math.log(first)))
+    return first + weight * (second - first)
 
 
 def _travel(lag: float, steepest: float, steepness: float) -> float:
