@@ -63,7 +63,7 @@ def figure(tracker, name):
 
 
 def test_each_frame_comes_once_with_the_time_at_which_it_was_measured(tracker, emulator):
-    readings = collect(tracker, 40)
+    readings = collect(tracker, 25)
     frames = [reading.frame for reading in readings]
     assert frames == sorted(set(frames))
     lost = frames[-1] - frames[0] + 1 - len(frames)
@@ -144,7 +144,7 @@ def test_a_late_reply_keeps_its_frame_and_is_left_out(tracker, emulator):
 
     emulator.tap = late
     until(lambda: figure(tracker, 'late') + figure(tracker, 'silences') >= 2)
-    readings = collect(tracker, 30)
+    readings = collect(tracker, 10)
     zero = emulator.unit.frame_zero
     for reading in readings:
         assert abs(reading.time_ns * 1e-9 - zero - reading.frame / 40.0) < 0.03
