@@ -9,11 +9,12 @@ import time
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from endoscope_nodes.qos import EVENT, SENSOR_ASKED
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+
+from endoscope_nodes.qos import EVENT, SENSOR_ASKED
 
 DOMAIN = 231
 NODES = (

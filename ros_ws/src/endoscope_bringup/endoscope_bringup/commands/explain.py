@@ -49,8 +49,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         type=_positive_share,
         default=0.15,
         metavar='SHARE',
-        help="by which share the plant's parameters may differ from the rig's: 3 for a rig that was "
-        'never identified (default 0.15)',
+        help="by which share the plant's parameters may differ from the rig's: 3 for a rig that "
+        'was never identified (default 0.15)',
     )
     parser.add_argument(
         '--jobs', type=_positive, default=2, metavar='N', help='processes side by side (default 2)'
