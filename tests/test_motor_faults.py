@@ -8,14 +8,12 @@ from endoscope_bringup.device_faults.motor_rig import MotorRig
 
 # The bench tries the others too.
 FAULTS = (
-    'servo cable out',
     'adapter out',
     'disturbed',
     'overload',
     'restart',
     'node hangs',
     'over-tension',
-    'load cells silent',
     'console killed',
     'motor driver killed',
 )
