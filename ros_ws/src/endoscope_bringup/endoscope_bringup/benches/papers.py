@@ -3,6 +3,7 @@
 import argparse
 import importlib
 import sys
+from pathlib import Path
 
 from endoscope_bringup.benches.papers_tables import TABLES
 
@@ -27,6 +28,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         metavar='TABLE',
         help=f'print these only (of {", ".join(TABLES)})',
     )
+    parser.add_argument(
+        '--plot',
+        type=Path,
+        metavar='FILE',
+        help='only draw loops and tracking before and after compensation, as SVG',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -38,6 +45,12 @@ def run(args: argparse.Namespace) -> int:
     except ValueError as error:
         print(f'endoscope bench papers: {error}', file=sys.stderr)
         return 2
+    if args.plot is not None:
+        from endoscope_bringup.benches.papers_plot import tracking_plot
+        from endoscope_core.atomic_output import write_text
+
+        write_text(args.plot, tracking_plot(args.seed))
+        return 0
     missed = 0
     print(f'seed {settings.seed}, {settings.tubes} tube configurations a row', flush=True)
     for name in args.only:
