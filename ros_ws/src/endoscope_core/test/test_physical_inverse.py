@@ -182,3 +182,17 @@ def test_settings_out_of_range_are_refused():
         PhysicalInverseSettings(turn_lead=1.0)
     with pytest.raises(ValueError, match='share'):
         PhysicalInverseSettings(share=-0.1)
+
+
+def test_physics_that_the_model_lacks_does_not_lead_the_learning_astray():
+    plant = in_tube(random_rig(np.random.default_rng(8)), 0.8)
+    coupled = replace(
+        plant, effects=tuple(EffectSpec('cross_coupling', joint) for joint in plant.joints)
+    )
+    signal = periodic_signal(3.2 * np.pi)
+    known = tuple(map(PhysicalParameters, plant.joints.values()))
+    fixed = run_tracking_trial(coupled, signal, FeedforwardLaw('physical', known), False, 0)
+    learnt = run_tracking_trial(
+        coupled, signal, FeedforwardLaw('adaptive_physical', known), True, 0
+    )
+    assert learnt.rmse < fixed.rmse

@@ -42,6 +42,10 @@ class PlantLearningSettings:
         Innovation, in its standard deviations, that counts as surprising.
     surprises : int
         Surprising measurements in a row after which the tube is taken to have changed.
+    reset_pause : float
+        s from one such moment to the next: tubes are not bent all the time.
+    doubt_time : float
+        s over which misfit is averaged; what stays unexplained makes the tracker count for less.
     """
 
     tracker_noise: float = 0.01
@@ -49,6 +53,8 @@ class PlantLearningSettings:
     drift: float = 0.03
     surprise: float = 3.5
     surprises: int = 3
+    reset_pause: float = 12.0
+    doubt_time: float = 2.0
 
 
 class PlantLearning:
@@ -95,6 +101,8 @@ class PlantLearning:
         self._last = -math.inf
         self._history: deque[tuple[float, Array]] = deque()
         self._surprises = 0
+        self._last_reset = -math.inf
+        self._unexplained = 1.0
 
     def sent(self, command: float, dt: float) -> None:
         """Advance the copies by a command (rad) in force for `dt` s, after the predictor itself."""
@@ -121,8 +129,9 @@ class PlantLearning:
         sensitivity = (tips[1:] - tips[0]) / self._STEP
         self.covariance[0, 0] += self.settings.drift**2 * elapsed
         noise = self.settings.tracker_noise**2 + (self.settings.timing * speed) ** 2
+        noise *= self._unexplained
         innovation = angle - tips[0]
-        self._watch(innovation, sensitivity, noise)
+        self._watch(innovation, sensitivity, noise, elapsed)
         gain_side = self.covariance @ sensitivity
         spread = noise + float(sensitivity @ gain_side)
         # A single reading may not move the estimates by more than three deviations (Huber).
@@ -135,15 +144,19 @@ class PlantLearning:
         self._take()
         return self.parameters
 
-    def _watch(self, innovation: float, sensitivity: Array, noise: float) -> None:
+    def _watch(self, innovation: float, sensitivity: Array, noise: float, elapsed: float) -> None:
         spread = noise + float(sensitivity @ self.covariance @ sensitivity)
-        if innovation**2 > self.settings.surprise**2 * spread:
-            self._surprises += 1
-        else:
-            self._surprises = 0
-        if self._surprises >= self.settings.surprises:
+        c = self.settings
+        # Misfit that stays is physics that the model lacks, not a parameter: believe less.
+        grown = self._unexplained * innovation**2 / spread
+        weight = min(1.0, elapsed / c.doubt_time)
+        self._unexplained = max(1.0, self._unexplained + weight * (grown - self._unexplained))
+        self._surprises = self._surprises + 1 if innovation**2 > c.surprise**2 * spread else 0
+        if self._surprises >= c.surprises and self._time - self._last_reset > c.reset_pause:
             self._surprises = 0
             self.resets += 1
+            self._last_reset = self._time
+            self._unexplained = 1.0
             self.covariance[0, :] = self.covariance[:, 0] = 0.0
             self.covariance[0, 0] = self._prior[0]
 
