@@ -43,9 +43,9 @@ def tracking_plot(seed: int) -> str:
     }
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 6.6), layout='constrained')
-        top, bottom = figure.subfigures(2, 1, height_ratios=(1.1, 1.0))
-        loops = top.subplots(1, 3, sharex=True, sharey=True)
-        above, below = bottom.subplots(2, 1, sharex=True)
+        halves = figure.add_gridspec(2, 1, height_ratios=(1.1, 1.0))
+        loops = figure.add_subfigure(halves[0]).subplots(1, 3, sharex=True, sharey=True)
+        above, below = figure.add_subfigure(halves[1]).subplots(2, 1, sharex=True)
         for axis, (name, trial) in zip(loops, trials.items(), strict=True):
             inside = trial.time >= signal.steady[0]
             desired = np.rad2deg(trial.desired[inside])
