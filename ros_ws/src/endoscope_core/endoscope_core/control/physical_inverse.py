@@ -82,13 +82,13 @@ class InternalModel:
             PlantDescription(joints={_JOINT_NAME: parameters.joint}, effects=effects)
         )
         self.packed: Array = packed[0]
-        self._flags = flags[0]
+        self.flags = flags[0]
         self._evenness = parameters.evenness
         # Where friction is not spread, the law must not find the effect's typical share.
         self.packed[distributed_friction.SHARE] = parameters.evenness
         states, histories = rest_state(self.packed[None], np.array([motor]))
         self.state: Array = states[0]
-        self._history: Array = histories[0]
+        self.history: Array = histories[0]
         self.state[JOINT] = self.state[WIRE_END] = joint
         self.state[SLIDE_A], self.state[SLIDE_B] = slide, -slide
         self.state[JOINT_SLIDE] = slide
@@ -110,7 +110,7 @@ class InternalModel:
         """Another joint in the state of this one."""
         other = InternalModel(parameters, 0.0, 0.0, 0.0)
         other.state[:] = self.state
-        other._history[:] = self._history
+        other.history[:] = self.history
         return other
 
     @property
@@ -134,9 +134,9 @@ class InternalModel:
         for _ in range(pieces):
             advance_tick(
                 self.state,
-                self._history,
+                self.history,
                 self.packed,
-                self._flags,
+                self.flags,
                 command,
                 self._input,
                 dt / pieces,

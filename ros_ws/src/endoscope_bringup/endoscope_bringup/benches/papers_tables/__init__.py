@@ -11,6 +11,7 @@ TABLES: tuple[str, ...] = (
     'colon_shapes',
     'compensators',
     'changing_tube',
+    'crossing',
     'calibration_time',
     'real_sizes',
     'real_recordings',
