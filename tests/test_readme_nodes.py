@@ -1,0 +1,113 @@
+"""The README's tables of nodes, topics and parameters are those of the nodes."""
+
+import re
+from pathlib import Path
+
+import parameter_table
+import pytest
+from rclpy.context import Context
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from recorded_session import private_domain
+
+from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
+from endoscope_nodes.recorded_topics import type_name
+from endoscope_nodes.runtime import Runtime
+
+README = (Path(__file__).parents[1] / 'README.md').read_text(encoding='utf-8')
+NAMESPACE = '/endoscope/'
+OF_EVERY_NODE = {'/rosout', '/parameter_events', '/clock'}
+
+
+def _table(heading: str) -> dict[str, list[str]]:
+    """Cells of the table under a heading, by each name in the first column."""
+    section = re.split(r'^#+ ', README.split(f'{heading}\n', 1)[1], maxsplit=1, flags=re.M)[0]
+    rows = [line.strip('|').split('|') for line in section.splitlines() if line.startswith('| `')]
+    return {name: cells[1:] for cells in rows for name in re.findall(r'`([^`]+)`', cells[0])}
+
+
+NODES = _table('## Nodes and topics')
+TOPICS = _table('### Topics')
+
+
+@pytest.fixture(scope='module')
+def nodes():
+    """Every node of the simulated graph but the recorder, which takes what there is."""
+    runtime = Runtime(
+        args=['--ros-args', '--log-level', 'fatal'],
+        context=Context(),
+        domain_id=private_domain(),
+    )
+    for factory in (*SLAVE_NODES, *CONTROL_NODES):
+        runtime.add(factory)
+    yield {node.get_name(): node for node in runtime.nodes}
+    runtime.close()
+
+
+def _short(name: str) -> str:
+    return name.removeprefix(NAMESPACE)
+
+
+def _listed(cell: str) -> set[str]:
+    """Names in a cell, without what only a real device has."""
+    return set(re.findall(r'`([\w/]+/\w+|/\w+)`', cell.split('real:', maxsplit=1)[0]))
+
+
+def _services(node: EndoscopeNode) -> set[str]:
+    return {
+        _short(service.service_name)
+        for service in node.services
+        if 'parameter' not in service.service_name.rpartition('/')[2]
+        and not service.service_name.endswith('get_type_description')
+    }
+
+
+def _qos(profile: QoSProfile) -> str:
+    words = ['reliable' if profile.reliability == ReliabilityPolicy.RELIABLE else 'best effort']
+    if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+        words.append('transient local')
+    return ', '.join((*words, str(profile.depth)))
+
+
+def test_every_node_is_listed_with_what_it_hears_says_and_serves(nodes):
+    for name, node in nodes.items():
+        heard, said, served = NODES[name][:3]
+        assert _listed(heard) == {
+            _short(s.topic_name) for s in node.subscriptions if s.topic_name not in OF_EVERY_NODE
+        }, name
+        publishers = {_short(p.topic_name) for p in node.publishers} - OF_EVERY_NODE
+        assert _listed(said) | {'/diagnostics'} == publishers, name
+        assert _listed(served) == _services(node), name
+
+
+def test_every_topic_is_listed_with_its_type_and_qos(nodes):
+    for name, node in nodes.items():
+        for publisher in node.publishers:
+            if publisher.topic_name in OF_EVERY_NODE:
+                continue
+            kind, _, offered = TOPICS[_short(publisher.topic_name)][:3]
+            assert kind.strip(' `') == type_name(publisher.msg_type).replace('/msg/', '/'), name
+            assert offered.strip() == _qos(publisher.qos_profile), publisher.topic_name
+        for subscription in node.subscriptions:
+            if subscription.topic_name in OF_EVERY_NODE:
+                continue
+            _, _, offered, asked = TOPICS[_short(subscription.topic_name)][:4]
+            wanted = offered if asked.strip() == 'same' else asked
+            assert wanted.strip() == _qos(subscription.qos_profile), (
+                name,
+                subscription.topic_name,
+            )
+
+
+def test_every_parameter_is_listed():
+    section = README.split('### Parameters\n', 1)[1].split('\n## ', 1)[0]
+    listed = [line for line in section.splitlines() if line.startswith('| `')]
+    assert listed == parameter_table.rows(), 'python tests/parameter_table.py prints the table'
+
+
+def test_the_parameters_are_those_that_the_nodes_declare(nodes):
+    rows = [line.split('`') for line in parameter_table.rows()]
+    of_process = {'use_sim_time', 'tick_rate', 'start_type_description_service'}
+    for name, node in nodes.items():
+        declared = {p for p in node._parameters if not p.startswith('qos_overrides')} - of_process
+        assert declared == {row[3] for row in rows if row[1] == name}, name
