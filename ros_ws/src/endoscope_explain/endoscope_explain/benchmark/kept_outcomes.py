@@ -1,5 +1,6 @@
 """Run a bench's cases, and keep their outcomes so that a long run can go on where it stopped."""
 
+import random
 from pathlib import Path
 
 from endoscope_core.errors import EndoscopeError
@@ -50,6 +51,8 @@ def run_and_keep(
         for r in requests
         if r.seed not in done
     ]
+    # In a mixed order, so that what an interrupted run has kept says something about every kind.
+    random.Random(seed).shuffle(tasks)
 
     def tell(count: int, outcome: Outcome) -> None:
         print(progress_line(count + len(done), len(requests), outcome), flush=True)
