@@ -1,16 +1,19 @@
-"""The compose file is valid and runs the nodes that there are, each once."""
+"""The compose files are valid and run the nodes that there are, each once."""
 
 import ast
+import os
 import re
 import shutil
 import subprocess
 from pathlib import Path
 
+import parameter_table
 import pytest
 import yaml
 
 ROOT = Path(__file__).parents[1]
 COMPOSE_FILE = ROOT / 'docker' / 'compose.yaml'
+HARDWARE_FILE = ROOT / 'docker' / 'hardware.yaml'
 
 # All nodes in one process, the clock of simulated time, and the player of bags.
 STARTED_BY_HAND = {'graph', 'conductor', 'replay'}
@@ -54,6 +57,39 @@ def test_compose_accepts_the_file() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert set(done.stdout.split()) == set(yaml.safe_load(COMPOSE_FILE.read_text())['services'])
+
+
+def test_hardware_changes_how_nodes_are_started_and_only_by_parameters_that_they_have() -> None:
+    services = yaml.safe_load(COMPOSE_FILE.read_text())['services']
+    declared = {tuple(row.split('`')[1:4:2]) for row in parameter_table.rows()}
+    for name, service in yaml.safe_load(HARDWARE_FILE.read_text())['services'].items():
+        assert name in services
+        node, *arguments = service['command'].split()
+        assert node == name
+        given = re.findall(r'-p (\w+):=', ' '.join(arguments))
+        assert 'device' in given
+        assert {(name, parameter) for parameter in given} <= declared
+
+
+def test_compose_accepts_the_hardware() -> None:
+    command = [*_compose_command(), '--file', str(COMPOSE_FILE), '--file', str(HARDWARE_FILE)]
+    ports = {'MOTOR_PORT': '/dev/ttyUSB0', 'LOAD_CELL_PORT': '/dev/ttyUSB1'}
+    rig = {'TRACKER_PORT': '/dev/ttyUSB2', 'RIG': '/srv/rig'}
+    done = subprocess.run(
+        [*command, 'config'],
+        env=os.environ | ports | rig,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    motors = yaml.safe_load(done.stdout)['services']['motor_driver']
+    assert 'device:=dynamixel' in motors['command']
+    without_ports = subprocess.run(
+        [*command, 'config'], capture_output=True, text=True, check=False
+    )
+    assert without_ports.returncode != 0
+    assert '_PORT' in without_ports.stderr or 'RIG' in without_ports.stderr
 
 
 def test_files_that_the_image_names_exist() -> None:

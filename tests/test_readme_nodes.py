@@ -1,4 +1,4 @@
-"""The README's tables of nodes, topics and parameters are those of the nodes."""
+"""The README's tables and picture of nodes, topics and parameters are those of the nodes."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,8 @@ from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.recorded_topics import type_name
 from endoscope_nodes.runtime import Runtime
 
-README = (Path(__file__).parents[1] / 'README.md').read_text(encoding='utf-8')
+ROOT = Path(__file__).parents[1]
+README = (ROOT / 'README.md').read_text(encoding='utf-8')
 NAMESPACE = '/endoscope/'
 OF_EVERY_NODE = {'/rosout', '/parameter_events', '/clock'}
 
@@ -111,3 +112,43 @@ def test_the_parameters_are_those_that_the_nodes_declare(nodes):
     for name, node in nodes.items():
         declared = {p for p in node._parameters if not p.startswith('qos_overrides')} - of_process
         assert declared == {row[3] for row in rows if row[1] == name}, name
+
+
+def test_the_picture_shows_who_speaks_to_whom(nodes):
+    drawn = {
+        (speaker, listener, topic)
+        for speaker, listener, label in re.findall(
+            r'(\w+) -> (\w+) \[.*?label="([^"]*)"', (ROOT / 'ros_ws/doc/node_graph.dot').read_text()
+        )
+        for topic in re.findall(r'\w+/\w+', label.replace('\\n', ' '))
+        if speaker in nodes
+    }
+    # The state goes to every node that moves: the picture has one arrow and says so.
+    state = 'slave/operating_state'
+    spoken = {
+        (speaker, listener, _short(publisher.topic_name))
+        for speaker, node in nodes.items()
+        for publisher in node.publishers
+        for listener, other in nodes.items()
+        if listener != speaker
+        and publisher.topic_name in {s.topic_name for s in other.subscriptions}
+        and publisher.topic_name not in OF_EVERY_NODE | {'/diagnostics', NAMESPACE + state}
+        # The clutch is the handle's, for which a console that plays a motion stands in.
+        and not publisher.topic_name.startswith(NAMESPACE + 'master/')
+    }
+    assert drawn == spoken | {('supervisor', 'motor_driver', state)}
+
+
+def test_the_picture_is_that_of_its_source():
+    source = (ROOT / 'ros_ws/doc/node_graph.dot').read_text()
+    picture = (ROOT / 'ros_ws/doc/node_graph.svg').read_text()
+    arrows = re.findall(r'(\w+) -> (\w+) \[', source)
+    assert arrows
+    assert sorted(arrows) == sorted(re.findall(r'<title>(\w+)&#45;&gt;(\w+)</title>', picture))
+    labels = [
+        line for label in re.findall(r'label="([^"]*)"', source) for line in label.split('\\n')
+    ]
+    shown = re.findall(r'<text[^>]*>([^<]*)</text>', picture.replace('&#45;', '-'))
+    assert {line for label in labels for line in label.split('\\n')} <= {
+        text.replace('&gt;', '>') for text in shown
+    }
