@@ -15,6 +15,7 @@ from endoscope_core.plant import (
     PlantSimulator,
     simulate,
 )
+from endoscope_core.plant.simulator import SUBSTEPS
 
 TIME = 1e-3 * np.arange(8000)
 SMOOTH = np.column_stack(
@@ -64,7 +65,7 @@ def compared(joint, steps, substeps):
     return [(np.abs(d).max(), np.sqrt(np.mean(np.square(d)))) for d in (tension, angle)]
 
 
-@pytest.mark.parametrize('substeps', [3, 10])
+@pytest.mark.parametrize('substeps', [3, SUBSTEPS, 10])
 @pytest.mark.parametrize(
     'changed',
     [
@@ -76,13 +77,12 @@ def compared(joint, steps, substeps):
 )
 def test_agrees_with_explicit_steps_of_10_us_to_a_tenth_of_the_sensors_noise(changed, substeps):
     tension, angle = compared(replace(JointParameters(), **changed), 100, substeps)
-    assert tension[0] < 0.002 * (1 if substeps == 10 else 4)
-    assert tension[1] < 0.002
+    assert tension[0] < 0.002
     assert angle[0] < 0.025
 
 
 def test_agrees_with_explicit_steps_of_100_us():
-    tension, angle = compared(JointParameters(), 10, 10)
+    tension, angle = compared(JointParameters(), 10, SUBSTEPS)
     assert tension[1] < 0.002
     assert angle[0] < 0.025
 
