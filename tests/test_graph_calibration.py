@@ -142,6 +142,8 @@ def test_over_tension_aborts_and_is_a_fault():
         graph.advance(4.0)
         assert 'over the ceiling of 8.0 N' in abort_reason(graph)
         assert 'wire_' in abort_reason(graph)
+        assert graph.states[-1] == 'FAULT'
+        assert not graph.nodes['calibration'].active
 
 
 def test_home_returns_to_zero():
