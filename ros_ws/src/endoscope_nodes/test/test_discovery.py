@@ -1,4 +1,4 @@
-"""Nodes are found on this machine alone unless the operator says otherwise."""
+"""Nodes are reached from this machine alone unless the operator says otherwise."""
 
 import os
 import subprocess
@@ -6,21 +6,55 @@ import sys
 
 import pytest
 
-SHOW = """
+DOMAIN = 227
+# DDSI-RTPS 9.6.1.1: ports of a domain begin at 7400 + 250 * domain.
+SHOW = f"""
 import os
+from pathlib import Path
 from rclpy.context import Context
+from rclpy.node import Node
 from endoscope_nodes.runtime import Runtime
-with Runtime(['--ros-args'], Context(), 227):
+with Runtime(['--ros-args'], Context(), {DOMAIN}) as runtime:
+    node = Node('listening', context=runtime.context)
     print(os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'])
+    own = {{os.readlink(f) for f in Path('/proc/self/fd').iterdir() if f.is_symlink()}}
+    for line in Path('/proc/self/net/udp').read_text().splitlines()[1:]:
+        fields = line.split()
+        address, port = fields[1].split(':')
+        if f'socket:[{{fields[9]}}]' in own and 0 <= int(port, 16) - 7400 - 250 * {DOMAIN} < 250:
+            print(address)
+    node.destroy_node()
 """
+NAMES = ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS', 'FASTRTPS_DEFAULT_PROFILES_FILE')
+LOOPBACK = '0100007F'
+ANY_ADDRESS = '00000000'
 
 
-@pytest.mark.parametrize(('given', 'used'), [(None, 'LOCALHOST'), ('OFF', 'OFF')])
-def test_the_range_of_discovery(given, used):
-    environment = {k: v for k, v in os.environ.items() if k != 'ROS_AUTOMATIC_DISCOVERY_RANGE'}
-    if given:
-        environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] = given
-    shown = subprocess.run(
+def shown(**given):
+    environment = {k: v for k, v in os.environ.items() if k not in NAMES} | given
+    done = subprocess.run(
         [sys.executable, '-c', SHOW], env=environment, capture_output=True, text=True, check=True
     )
-    assert shown.stdout.split() == [used]
+    found, *addresses = done.stdout.split()
+    return found, set(addresses)
+
+
+@pytest.mark.parametrize(
+    'given',
+    [{}, {'ROS_AUTOMATIC_DISCOVERY_RANGE': ''}, {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}],
+)
+def test_by_default_no_other_machine_can_reach_the_ports(given):
+    assert shown(**given) == ('LOCALHOST', {LOOPBACK})
+
+
+@pytest.mark.parametrize(
+    ('given', 'used'),
+    [
+        ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}, 'SUBNET'),
+        ({'ROS_STATIC_PEERS': '192.0.2.77'}, 'LOCALHOST'),
+    ],
+)
+def test_the_operator_may_let_others_in(given, used):
+    found, addresses = shown(**given)
+    assert found == used
+    assert ANY_ADDRESS in addresses
