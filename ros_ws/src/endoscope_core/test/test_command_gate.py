@@ -69,6 +69,13 @@ def test_a_slowly_drifting_clock_is_not_lateness():
         assert gate.check(k * MS, (0.0, 0.0), (), drifted) is None
 
 
+def test_a_stream_that_is_late_stays_late_however_often_it_is_refused():
+    gate = gate_after(100)
+    for k in range(101, 60_001):
+        assert gate.check(k * MS, (0.0, 0.0), (), 1500 * MS + k * MS) is Refusal.LATE
+    assert gate.check(60_001 * MS, (0.0, 0.0), (), 500 * MS + 60_001 * MS) is None
+
+
 def test_first_command_must_be_near_the_held_position():
     gate = CommandGate(LIMITS)
     assert gate.check(MS, (0.3, 0.0), (), MS, held=(0.0, 0.0)) is Refusal.STEP

@@ -51,8 +51,8 @@ class CommandGate:
     """Obeys a stream of commands while it is complete, finite, in order, in time and in limits.
 
     Age is measured by the receiver's monotonic clock.  The sender's clock may have any offset:
-    the smallest difference between receipt and stamp so far is taken for it (with 0.1 % for
-    drift), and a command that took longer than that by ``max_age_ns`` is late.
+    the smallest difference between receipt and stamp so far is taken for it (with 0.1 % of the
+    receiver's time for drift), and a command that took longer than that by ``max_age_ns`` is late.
 
     Parameters
     ----------
@@ -78,6 +78,7 @@ class CommandGate:
         self._position: tuple[float, ...] = ()
         self._stamp_ns = 0
         self._offset_ns: int | None = None
+        self._offset_at_ns = 0
         self._received_ns: int | None = None
 
     def reset(self) -> None:
@@ -159,11 +160,12 @@ class CommandGate:
 
     def _lateness_ns(self, stamp_ns: int, received_ns: int) -> int:
         difference = received_ns - stamp_ns
-        if self._offset_ns is None or difference < self._offset_ns:
+        if self._offset_ns is None:
             self._offset_ns = difference
-        elif self._stamp_ns:
-            drift = (stamp_ns - self._stamp_ns) // 1000
+        else:
+            drift = max(0, received_ns - self._offset_at_ns) // 1000
             self._offset_ns = min(self._offset_ns + drift, difference)
+        self._offset_at_ns = received_ns
         return difference - self._offset_ns
 
     def _check_rate(
