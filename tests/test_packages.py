@@ -67,6 +67,30 @@ def _entry_points(package: str) -> dict[str, str]:
     return {match.group(1): match.group(2) for match in scripts if match}
 
 
+def test_the_top_level_is_what_it_is_meant_to_be() -> None:
+    listed = subprocess.run(
+        ['git', 'ls-files'], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if listed.returncode:
+        pytest.skip('not a git checkout')
+    top = {line.split('/')[0] for line in listed.stdout.splitlines()}
+    assert {name for name in top if not name.startswith('.')} == {
+        *('ros_ws', 'docker', 'bags', 'tests', 'README.md', 'colcon.meta')
+    }
+
+
+def test_lock_files_pin_hashes_and_name_no_download_host() -> None:
+    for path in WORKSPACE.glob('requirements*.lock'):
+        lock = path.read_text()
+        pinned = re.findall(r'^[\w.\[\]-]+==\S+', lock, flags=re.M)
+        assert pinned
+        assert len(pinned) == len(re.findall(r'^[\w.\[\]-]+.*\\\n +--hash=sha256:', lock, re.M)), (
+            path
+        )
+        assert '://' not in lock
+        assert '-url' not in lock
+
+
 def test_colcon_takes_all_packages_as_ament_python() -> None:
     listed = subprocess.run(
         [sys.executable, '-m', 'colcon', '--log-base', '/dev/null', 'list', '--base-paths', 'src'],

@@ -9,7 +9,9 @@ import time
 
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
 from recorded_session import private_domain
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
@@ -19,7 +21,7 @@ from endoscope_bags.cdr_encoding import encode_joint_state
 from endoscope_bags.errors import TruncatedBagError
 from endoscope_bags.information import bag_information
 from endoscope_bags.recovery import recover
-from endoscope_nodes.qos import SENSOR_OFFERED
+from endoscope_nodes.qos import EVENT, SENSOR_OFFERED
 
 TOPIC = '/endoscope/motor/measured_js'
 
@@ -54,6 +56,21 @@ class RecorderProcess:
             self.sent += 1
             time.sleep(period_s)
         return stamp
+
+    def diagnosed(self, level):
+        """Wait until the recorder reports at a level; the values of that report."""
+        reports = []
+        self.node.create_subscription(DiagnosticArray, '/diagnostics', reports.append, EVENT)
+        executor = SingleThreadedExecutor(context=self.context)
+        executor.add_node(self.node)
+        deadline = time.monotonic() + 60
+        while True:
+            assert time.monotonic() < deadline, 'the recorder does not say so'
+            executor.spin_once(timeout_sec=0.1)
+            for status in (status for report in reports for status in report.status):
+                if status.name == 'recorder: recording' and status.level == level:
+                    executor.remove_node(self.node)
+                    return {value.key: value.value for value in status.values}
 
     def end(self, number):
         self.process.send_signal(number)
@@ -164,6 +181,7 @@ def test_losses_are_counted_exactly_and_exit_1(tmp_path):
         time.sleep(1.0)
         recorder.send(200)
         time.sleep(0.5)
+        diagnosed = recorder.diagnosed(DiagnosticStatus.ERROR)
         code, errors = recorder.end(signal.SIGTERM)
     bag = open_bag(tmp_path / 'bag')
     topic = next(t for t in bag_information(bag).topics if t.name == TOPIC)
@@ -171,6 +189,8 @@ def test_losses_are_counted_exactly_and_exit_1(tmp_path):
     assert topic.message_count + topic.lost == recorder.sent
     assert code == 1
     assert f'{topic.lost} lost ({TOPIC} {topic.lost})' in errors
+    assert diagnosed['lost'] == str(topic.lost)
+    assert diagnosed[TOPIC] == f'{topic.message_count} recorded, {topic.lost} lost'
 
 
 def test_an_existing_bag_is_one_line_and_exit_2(tmp_path):
