@@ -2,6 +2,10 @@
 
 import numpy as np
 from simulated_graph import SimulatedGraph
+from std_msgs.msg import String
+
+from endoscope_nodes.names import OPERATING_STATE
+from endoscope_nodes.qos import RESULT
 
 MOTORS = ('motor_x', 'motor_y')
 
@@ -77,3 +81,26 @@ def test_a_silent_supervisor_stops_the_motion():
         drives = graph.listen('motor/servo_jp', MOTORS)
         graph.advance(5.0)
         assert 2000 < len(drives) < 4000
+
+
+def test_a_supervisor_that_comes_back_does_not_re_enable():
+    with SimulatedGraph() as graph:
+        graph.enable()
+        graph.set('console', source='motion')
+        graph.advance(0.5)
+        graph.kill('supervisor')
+        graph.advance(4.0)
+        supervisor = graph.speak(String, OPERATING_STATE, RESULT)
+        shafts = graph.listen('motor/measured_js', MOTORS)
+
+        def moved_after(*states):
+            shafts.clear()
+            for state in states:
+                supervisor.publish(String(data=state))
+                graph.advance(1.0)
+            return np.ptp([s.position for s in shafts], axis=0).max() > 0.05
+
+        assert not moved_after('ENABLED', 'ENABLED')
+        assert graph.diagnostics['motor_driver: device'][-1].level == b'\x02'
+        assert moved_after('DISABLED', 'ENABLED')
+        assert graph.diagnostics['motor_driver: device'][-1].level == b'\x00'

@@ -20,6 +20,7 @@ from endoscope_nodes.names import (
     MOTOR_MEASURED,
     MOTOR_REBOOT,
     MOTORS,
+    OPERATING_STATE,
     SIMULATED_BENDING,
     SIMULATED_WIRES,
     WIRES,
@@ -157,8 +158,12 @@ class MotorDriverNode(EndoscopeNode):
     def _on_malformed(self, reason: str) -> None:
         self.gate.refuse(Refusal.MALFORMED, reason)
 
+    @property
+    def _may_move(self) -> bool:
+        return self._state.enabled and not self._state.interrupted
+
     def _on_command(self, sample: JointSample) -> None:
-        if not self._state.enabled:
+        if not self._may_move:
             self.gate.refuse(Refusal.NOT_ENABLED)
             return
         held = self._goal if self._reading is None else self._reading.position
@@ -176,7 +181,7 @@ class MotorDriverNode(EndoscopeNode):
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         self._notice_trouble()
         if not self._holding and not (
-            self.gate.is_fresh(self.ticker.monotonic_ns()) and self._state.enabled
+            self.gate.is_fresh(self.ticker.monotonic_ns()) and self._may_move
         ):
             self._hold()
         reading = self._device.exchange(self._goal, periods)
@@ -192,7 +197,7 @@ class MotorDriverNode(EndoscopeNode):
 
     def _notice_trouble(self) -> None:
         """Tell a trouble of the device in the tick in which it comes or goes."""
-        trouble = self._device.trouble()
+        trouble = self._trouble_now()
         if bool(trouble) != bool(self._trouble):
             self._trouble = trouble
             if trouble:
@@ -200,8 +205,13 @@ class MotorDriverNode(EndoscopeNode):
                 self._hold()
             self.diagnostics.publish()
 
+    def _trouble_now(self) -> str:
+        if self._state.interrupted:
+            return f'{OPERATING_STATE} had been silent: give enable anew'
+        return self._device.trouble()
+
     def _report_device(self) -> Report:
-        trouble = self._device.trouble()
+        trouble = self._trouble_now()
         values = self._device.health()
         values |= {
             'ticks': self.ticker.ticks,

@@ -21,6 +21,12 @@ class StateWatch:
     ----------
     on_change
         Called with the new state after each change.
+
+    Attributes
+    ----------
+    interrupted
+        Whether a supervisor that had fallen silent came back with ``ENABLED``, which nobody has
+        asked for since: true until it says another state.
     """
 
     def __init__(
@@ -31,6 +37,7 @@ class StateWatch:
         self._on_change = on_change
         self._heard_ns = 0
         self.state = OperatingState.DISABLED
+        self.interrupted = False
         node.create_subscription(String, OPERATING_STATE, self._receive, RESULT)
 
     def _receive(self, message: String) -> None:
@@ -41,7 +48,11 @@ class StateWatch:
                 f"'{message.data}' on {OPERATING_STATE} is no operating state: taken as FAULT"
             )
             state = OperatingState.FAULT
+        silent = not self.enabled
         self._heard_ns = self._ticker.monotonic_ns()
+        self.interrupted = state is self.state is OperatingState.ENABLED and (
+            self.interrupted or silent
+        )
         if state != self.state:
             self.state = state
             if self._on_change is not None:
