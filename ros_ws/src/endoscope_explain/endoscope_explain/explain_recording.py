@@ -25,6 +25,7 @@ from endoscope_explain.free_parameters import BAND
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.intervals import effect_estimates, nominal_estimates
+from endoscope_explain.isolated_samples import without_isolated
 from endoscope_explain.latent import unknown_term
 from endoscope_explain.observation import JointObservation, observe
 from endoscope_explain.probability import probability
@@ -109,6 +110,10 @@ def explain_recording(
         observations, packed = _healthy(observations, baseline, plant, band, jobs)
         band = SAME_RIG
     anchors = all_anchors(observations, packed, jobs, band)
+    cleaned = without_isolated(recording, observations, tuple(fitted for fitted, _ in anchors))
+    if any(a is not b for a, b in zip(cleaned, observations, strict=True)):
+        observations = cleaned
+        anchors = all_anchors(observations, packed, jobs, band)
     searches, decisions = [], []
     for observation, pair in zip(observations, anchors, strict=True):
         tell(f'searching what {observation.joint} lacks')

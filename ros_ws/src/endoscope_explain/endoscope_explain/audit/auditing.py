@@ -176,4 +176,5 @@ def _audited_bending(
         isolated[:, j] = spikes
     if isolated.any():
         findings.append(outlier_finding(recording.joints, series, isolated))
-    return series.without(wrong | isolated)
+    # All angles come from one pose.
+    return series.without(wrong | isolated.any(axis=1, keepdims=True))

@@ -1,0 +1,70 @@
+"""Wrong tracker samples that show only against a simulation: the joint moves around them."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from endoscope_explain.audit.outliers import spike_heights
+from endoscope_explain.fit import Fit
+from endoscope_explain.observation import Channel, JointObservation
+from endoscope_explain.recording import Recording
+
+SPIKE = 8.0
+"""Height in noise units of a residual that stands alone."""
+ALONE = 5.0
+"""Factor by which it is above the usual residual nearby."""
+NEARBY = 15
+"""Samples whose median size is the usual one."""
+
+
+def without_isolated(
+    recording: Recording, observations: tuple[JointObservation, ...], fits: tuple[Fit, ...]
+) -> tuple[JointObservation, ...]:
+    """Leave out tracker samples that stick out of the residual, where some were wrong already.
+
+    Parameters
+    ----------
+    recording : Recording
+        As audited. Where the audit found no wrong sample, none is left out here: a spike may be
+        physics.
+    observations : tuple of JointObservation
+    fits : tuple of Fit
+        Of the nominal plant to each of them.
+
+    Returns
+    -------
+    tuple of JointObservation
+        The same objects where nothing was left out.
+    """
+    if recording.bending.valid.all():
+        return observations
+    cleaned = []
+    for observation, fit in zip(observations, fits, strict=True):
+        channels = tuple(
+            _kept(channel, fit.residuals[part]) if channel.quantity == 'bending' else channel
+            for channel, part in zip(observation.channels, observation.slices(), strict=True)
+        )
+        same = all(a is b for a, b in zip(channels, observation.channels, strict=True))
+        cleaned.append(observation if same else replace(observation, channels=channels))
+    return tuple(cleaned)
+
+
+def _kept(channel: Channel, residual: NDArray[np.float64]) -> Channel:
+    usual = median_filter(np.abs(residual), NEARBY, mode='nearest')
+    wrong = np.abs(spike_heights(residual)) > np.maximum(SPIKE, ALONE * usual)
+    if not wrong.any():
+        return channel
+    keep = ~wrong
+    # A tracker sample is one raw sample.
+    return replace(
+        channel,
+        tick=channel.tick[keep],
+        share=channel.share[keep],
+        first=np.arange(int(keep.sum())),
+        count=channel.count[keep],
+        time=channel.time[keep],
+        value=channel.value[keep],
+        noise=channel.noise[keep],
+    )

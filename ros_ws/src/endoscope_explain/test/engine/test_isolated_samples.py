@@ -1,0 +1,43 @@
+"""Wrong tracker samples that only a simulation shows."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from endoscope_core.plant import PlantDescription
+from endoscope_explain.evaluate import packed_joint
+from endoscope_explain.isolated_samples import without_isolated
+from endoscope_explain.observation import observe
+from endoscope_explain.search import all_anchors
+
+PLANT = PlantDescription()
+
+
+def spiked(recording, known):
+    """Two samples off by 10 deg in motion; the audit found one elsewhere, or none."""
+    bending = recording.bending
+    values = bending.values.copy()
+    values[[40, 44], 0] += np.deg2rad(10.0)
+    valid = bending.valid.copy()
+    valid[80, :] = not known
+    return recording.with_series({'bending': replace(bending, values=values, valid=valid)})
+
+
+def cleaned(recording, plant):
+    observations = observe(recording, PLANT)
+    packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
+    fits = tuple(fitted for fitted, _ in all_anchors(observations, packed, 1))
+    return observations, without_isolated(recording, observations, fits)
+
+
+def test_spikes_are_left_out_where_some_samples_were_wrong_already(record):
+    recording = spiked(record(duration=4.0), known=True)
+    before, after = cleaned(recording, PLANT)
+    lost = np.setdiff1d(before[0].channels[-1].time, after[0].channels[-1].time)
+    stamps = recording.bending.time - recording.command.time[0]
+    np.testing.assert_allclose(lost, stamps[[40, 44]], atol=1e-9)
+
+
+def test_without_a_known_wrong_sample_a_spike_may_be_physics(record):
+    before, after = cleaned(spiked(record(duration=4.0), known=False), PLANT)
+    assert after is before
