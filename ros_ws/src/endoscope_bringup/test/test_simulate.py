@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from endoscope_bags import BagWriter, MessageStream, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_states
-from endoscope_bags.message_types import JOINT_STATE
+from endoscope_bags.cdr_encoding import encode_joint_states, encode_poses
+from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED
 from endoscope_bringup.cli import main
+from endoscope_core.kinematics import bending_from_orientation, tip_pose
 from endoscope_core.plant import PlantDescription, SensorModel, save_plant, simulate
 
 TICKS = 1200
@@ -73,6 +74,45 @@ def test_the_answer_has_the_topics_and_stamps_of_the_recording(recorded, plant_f
     wires = answer.joint_state('wires/measured_js')
     assert wires.names == ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg')
     np.testing.assert_allclose(wires.effort, expected.tension.reshape(TICKS, 4), atol=1e-9)
+
+
+@pytest.mark.parametrize('motors', [['motor_x', 'motor_y'], ['motor_y']])
+def test_recorded_poses_are_answered_by_those_of_the_answered_angles(plant_file, tmp_path, motors):
+    tracked = STAMPS[::25]
+    poses = [tip_pose((0.5, 0.001 * n), 0.03) for n in range(len(tracked))]
+    columns = [['motor_x', 'motor_y'].index(motor) for motor in motors]
+    with BagWriter(tmp_path / 'poses') as writer:
+        writer.write_streams(
+            [
+                stream('/a/motor/servo_jp', motors, STAMPS, position=SHAFT[:, columns]),
+                stream(
+                    '/a/slave/measured_js',
+                    ['bend_y'],
+                    tracked,
+                    position=np.zeros((len(tracked), 1)),
+                ),
+                MessageStream(
+                    '/a/tracker/measured_cp',
+                    POSE_STAMPED,
+                    encode_poses(
+                        tracked, *map(np.array, zip(*poses, strict=True)), frame_id='base'
+                    ),
+                    tracked + 9,
+                    tracked + 5,
+                ),
+            ]
+        )
+    assert run(plant_file, tmp_path / 'poses', tmp_path / 'answer', '--noise', '1') == 0
+    answer = open_bag(tmp_path / 'answer')
+    told, bending = answer.poses('tracker/measured_cp'), answer.joint_state('slave/measured_js')
+    assert told.topic == '/a/tracker/measured_cp'
+    assert told.frame_id == 'base'
+    np.testing.assert_array_equal(told.stamp_ns, tracked)
+    np.testing.assert_array_equal(told.log_ns, tracked + 9)
+    angles = np.array([bending_from_orientation(q) for q in told.orientation])
+    np.testing.assert_allclose(angles[:, columns], bending.position, atol=1e-9)
+    length_of_arc = [tip_pose(angle, 0.03)[0] for angle in angles]
+    np.testing.assert_allclose(told.position, length_of_arc, atol=1e-9)
 
 
 def test_desired_angles_times_the_gear_stand_in_for_shaft_commands(plant_file, tmp_path):

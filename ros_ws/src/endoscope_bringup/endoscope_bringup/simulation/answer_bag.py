@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from endoscope_bags import BagWriter, JointStateSeries, MessageStream, Recording
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
+from endoscope_bringup.simulation.answer_poses import answer_poses
 from endoscope_bringup.simulation.commands_of_bag import (
     ANGLE_TOPIC,
     SHAFT_TOPIC,
@@ -31,6 +32,7 @@ from endoscope_core.plant.simulator import TICK
 MOTOR_TOPIC = 'motor/measured_js'
 WIRES_TOPIC = 'wires/measured_js'
 BENDING_TOPIC = 'slave/measured_js'
+POSE_TOPIC = 'tracker/measured_cp'
 
 READ_DELAYS = (0.0, TICK)
 """Seconds from a stamp to its reading that a rig at 1 kHz may have."""
@@ -64,7 +66,8 @@ def write_answer(
     The new bag has the commands as they are, and `motor/measured_js`, `wires/measured_js` and
     `slave/measured_js` at the stamps, under the namespace and with the times of receipt of the
     recording; a topic that the recording lacks comes at its nominal rate. Only joints that are
-    commanded answer.
+    commanded answer. Where the recording has `tracker/measured_cp`, the answer has it too, at the
+    stamps that it shares with `slave/measured_js`.
 
     Parameters
     ----------
@@ -117,6 +120,10 @@ def write_answer(
             if recording.has(suffix)
         ]
         streams += _encoded(answer, times, commands.joints)
+        if recording.has(POSE_TOPIC):
+            bending_ns = times[BENDING_TOPIC].stamp_ns
+            poses = recording.poses(POSE_TOPIC)
+            streams.append(answer_poses(poses, bending_ns, answer.bending, commands.joints))
         writer.write_streams(streams)
         return writer.message_count
 
