@@ -23,9 +23,9 @@ BLOCK_S = 1.0
 NINETY_PERCENT = 1.645
 WIDENING = 2.0
 """Calibrated on concealed cases: what the sandwich misses when the form differs."""
-FORM = 0.01
+FORM = 0.002
 """Relative error of a parameter by form alone, where nothing but noise is left."""
-FORM_SEEN = 0.03
+FORM_SEEN = 0.012
 """The same where an error of form is seen."""
 
 
