@@ -1,6 +1,9 @@
 """Servos behind the motor driver's interface: set-up, motion, and what is refused."""
 
+import os
+import threading
 import time
+import tty
 
 import pytest
 
@@ -13,7 +16,9 @@ from endoscope_devices.dynamixel.control_table import (
     GOAL_VELOCITY,
     OPERATING_MODE,
     RETURN_DELAY_TIME,
+    TORQUE_ENABLE,
 )
+from endoscope_devices.dynamixel.doctor import examine
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
 from endoscope_devices.dynamixel.emulator.bus import EmulatedBus
 from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
@@ -161,6 +166,33 @@ def test_settings_that_no_servo_can_have_are_refused(changes, words):
         BusSettings('/dev/ttyNone', **changes)
 
 
+@pytest.fixture
+def port_that_goes_away():
+    """A terminal whose other end closes at the first request."""
+    far, near_end = os.openpty()
+    tty.setraw(near_end)
+
+    def go_away():
+        os.read(far, 1)
+        os.close(far)
+
+    thread = threading.Thread(target=go_away)
+    thread.start()
+    yield os.ttyname(near_end)
+    os.close(near_end)
+    thread.join()
+
+
+def test_an_adapter_that_goes_away_during_the_set_up_is_named(port_that_goes_away):
+    with pytest.raises(DeviceError, match='the adapter is gone'):
+        DynamixelMotors(BusSettings(port_that_goes_away), MOUNTS).open()
+
+
+def test_an_adapter_that_goes_away_under_the_doctor_is_named(port_that_goes_away):
+    (advice,) = examine(port_that_goes_away, [1_000_000]).advice
+    assert 'the adapter is gone' in advice
+
+
 @pytest.mark.parametrize('fast', [False, True])
 def test_four_and_a_half_megabaud_and_fast_sync_read(fast):
     with EmulatorProcess(baud=4_500_000) as emulator:
@@ -184,6 +216,22 @@ def handler(line):
     port.open()
     yield PacketHandler(port)
     port.close()
+
+
+def test_a_goal_that_is_not_where_the_shaft_is_is_refused(line):
+    motors = DynamixelMotors(BusSettings(line.port), MOUNTS[:1])
+    motors.open()
+    try:
+        with line.paused():
+            line.servos[1].shaft.position += 0.2
+            line.servos[1].stuck = {116}
+        drive(motors, (0.2,), near(motors, (0.2,)))
+        motors.set_torque(True)
+        drive(motors, (0.2,), lambda: 'Goal Position(116) reads 2048' in motors.trouble())
+        assert line.servos[1].value(TORQUE_ENABLE) == 0
+        assert not motors.bus.armed
+    finally:
+        motors.close()
 
 
 def test_the_time_out_is_the_time_on_the_wire_and_a_margin(handler):

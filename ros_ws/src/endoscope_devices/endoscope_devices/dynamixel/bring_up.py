@@ -1,9 +1,10 @@
 """Sets a servo up, and refuses it unless everything reads back as it was written."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from endoscope_devices.dynamixel.control_table import (
     BUS_WATCHDOG,
+    COUNT,
     CURRENT_BASED_POSITION,
     CURRENT_LIMIT,
     DRIVE_MODE,
@@ -12,7 +13,6 @@ from endoscope_devices.dynamixel.control_table import (
     HARDWARE_ERROR_STATUS,
     MODELS,
     OPERATING_MODE,
-    PRESENT_POSITION,
     PROFILE_ACCELERATION,
     PROFILE_VELOCITY,
     RETURN_DELAY_TIME,
@@ -24,7 +24,7 @@ from endoscope_devices.dynamixel.control_table import (
     hardware_errors_in_words,
 )
 from endoscope_devices.dynamixel.packet_handler import QUIET_S, BusError, PacketHandler
-from endoscope_devices.dynamixel.servo_block import MAP_ADDRESS, MAP_BYTES
+from endoscope_devices.dynamixel.servo_block import JITTER, MAP_ADDRESS, MAP_BYTES
 from endoscope_devices.dynamixel.settings import BusSettings
 
 # Overload, electrical shock and overheating let the shaft go, as the maker sets it.
@@ -160,15 +160,16 @@ def _refuse_hardware_errors(bus: PacketHandler, device: int) -> None:
         )
 
 
-def enable(bus: PacketHandler, devices: Sequence[int], settings: BusSettings) -> None:
+def enable(bus: PacketHandler, goals: Mapping[int, int], settings: BusSettings) -> None:
     """Let servos hold the positions where they are.
 
     Parameters
     ----------
     bus
         Where they are.
-    devices
-        Their ids.
+    goals
+        Where they are to stay, in counts, by id: positions that have passed every check of a
+        reading, which the answer to a single question has not.
     settings
         What they must hold.
 
@@ -177,14 +178,19 @@ def enable(bus: PacketHandler, devices: Sequence[int], settings: BusSettings) ->
     BusError
         Anything is not as it was set; no torque is switched on then.
     """
-    for device in devices:
+    for device, goal in goals.items():
         # Only 0 ends the error state of a watchdog that has tripped, and until then goals are
         # read-only.
         bus.write_register(device, BUS_WATCHDOG, 0)
-        here = bus.read_register(device, PRESENT_POSITION)
-        bus.write_register(device, GOAL_POSITION, here)
+        bus.write_register(device, GOAL_POSITION, goal)
         verify(bus, device, settings, but=BUS_WATCHDOG)
-    for device in devices:
+        kept = bus.read_register(device, GOAL_POSITION)
+        # The shaft may give way meanwhile, and firmware that follows it is no fault.
+        if abs(kept - goal) * COUNT > JITTER:
+            raise SetUpError(
+                f'servo {device} is not enabled: Goal Position(116) reads {kept} instead of {goal}'
+            )
+    for device in goals:
         bus.write_register(device, BUS_WATCHDOG, settings.watchdog_counts)
         bus.write_register(device, TORQUE_ENABLE, 1)
         found = _read_area(bus, device, (TORQUE_ENABLE, BUS_WATCHDOG))

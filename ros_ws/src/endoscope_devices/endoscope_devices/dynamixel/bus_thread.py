@@ -169,7 +169,10 @@ class BusThread:
         DeviceError
             The port cannot be opened, or a servo is not as it must be.
         """
-        self._connect()
+        try:
+            self._connect()
+        except OSError as error:
+            raise DeviceError(f'{self.settings.port}: the adapter is gone ({error})') from error
         self._thread.start()
 
     def stop(self) -> None:
@@ -249,6 +252,8 @@ class BusThread:
         self.health = [ServoHealth(model.name) for model in models]
         self._torque = False
         self._unpublished = [False for _ in self.mounts]
+        # The shafts may have been turned since: nothing may be held where they were.
+        self.newest = None
         self._bus = bus
         self.figures.last_ns = time.monotonic_ns()
 
@@ -279,10 +284,10 @@ class BusThread:
         while not self._orders.empty():
             order = self._orders.get()
             if order and not (self.armed and self._torque):
-                self._refuse_without_reading()
-                enable(bus, self._ids, self.settings)
+                held = self._position_now()
+                enable(bus, self._counts(held), self.settings)
                 self._patient_from_ns = time.monotonic_ns()
-                self._held = None if self.newest is None else self.newest.reading.position
+                self._held = held
                 self._torque = True
                 self._goal = None
                 self.armed = self._orders.empty()
@@ -290,9 +295,10 @@ class BusThread:
             elif not order:
                 self._switch_off(bus)
 
-    def _refuse_without_reading(self) -> None:
+    def _position_now(self) -> tuple[float, ...]:
         if self.newest is None or self.age() > self.settings.fault_after:
             raise BusError('not enabled: there is no valid reading of the shafts')
+        return self.newest.reading.position
 
     def _switch_off(self, bus: PacketHandler) -> None:
         self.armed = False
@@ -342,10 +348,15 @@ class BusThread:
 
     def _goal_request(self, goal: Sequence[float]) -> bytes:
         data = {
-            mount.device: GOAL_POSITION.encode(round(mount.servo(angle) / COUNT))
-            for mount, angle in zip(self.mounts, goal, strict=True)
+            device: GOAL_POSITION.encode(counts) for device, counts in self._counts(goal).items()
         }
         return sync_write_request(GOAL_POSITION.address, GOAL_POSITION.size, data)
+
+    def _counts(self, shafts: Sequence[float]) -> dict[int, int]:
+        return {
+            mount.device: round(mount.servo(angle) / COUNT)
+            for mount, angle in zip(self.mounts, shafts, strict=True)
+        }
 
     def _take(self, replies: dict[int, Reply], asked_ns: int, received_ns: int) -> tuple[str, str]:
         """Take the answers of a cycle; a failure in words and in short."""

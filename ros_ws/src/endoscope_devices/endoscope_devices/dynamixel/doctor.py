@@ -125,6 +125,8 @@ def examine(port: str, bauds: Sequence[int] = tuple(BAUD_CODES.values())) -> Por
             _listen(finding, baud)
     except DeviceError as error:
         finding.advice.append(_told(port, error))
+    except OSError as error:
+        finding.advice.append(f'{port}: the adapter is gone ({error}); plug it in again')
     else:
         finding.advice += advise(finding)
     return finding
