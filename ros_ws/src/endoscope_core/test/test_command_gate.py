@@ -128,3 +128,11 @@ def test_whatever_comes_nothing_unsafe_is_obeyed(stream):
         assert last is None or stamp > last
         last = stamp
     assert gate.accepted + sum(gate.refused.values()) == len(stream)
+
+
+def test_after_a_pause_a_stream_goes_on_near_where_it_was():
+    gate = gate_after()
+    assert gate.check(1000 * MS, (0.3, 0.0), (), 1500 * MS) is Refusal.STEP
+    assert gate.check(1001 * MS, (0.1, 0.0), (), 1501 * MS) is None
+    gate.reset()
+    assert gate.check(1002 * MS, (0.9, 0.0), (), 1502 * MS) is None

@@ -62,8 +62,11 @@ class CompensatorNode(EndoscopeNode):
         super().__init__('compensator', runtime)
         p = self.parameters(CompensatorParameters, self._on_parameters)
         self._settings = p
-        self.gate = CommandGate(self._limits(p.command_timeout))
-        self.calibration_gate = CommandGate(self._limits(p.calibration_timeout))
+        self.gate = CommandGate(self._limits(p.command_timeout, p.max_step))
+        # A calibration begins wherever the shafts are.
+        self.calibration_gate = CommandGate(
+            self._limits(p.calibration_timeout, 2.0 * p.joint_limit)
+        )
         self._feedforward = Feedforward(len(JOINTS), FeedforwardSettings(lead=p.lead))
         self._passing = Feedforward(len(JOINTS))
         self._choice = LawChoice(len(JOINTS), p.parameter_sets, p.table)
@@ -108,13 +111,13 @@ class CompensatorNode(EndoscopeNode):
         self.diagnostics.add('output', self._report)
         self.ticker.every(0.1, self._publish_state)
 
-    def _limits(self, timeout: float) -> CommandLimits:
+    def _limits(self, timeout: float, max_step: float) -> CommandLimits:
         reach = (self._settings.joint_limit,) * len(JOINTS)
         return CommandLimits(
             tuple(-x for x in reach),
             reach,
             self._settings.max_speed,
-            2.0 * self._settings.joint_limit,
+            max_step,
             round(timeout * 1e9),
         )
 

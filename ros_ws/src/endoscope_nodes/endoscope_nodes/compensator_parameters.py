@@ -53,6 +53,12 @@ class CompensatorParameters:
         high=10.0,
     )
     max_speed: float = parameter(30.0, 'largest speed between two commands', unit='rad/s', low=0.0)
+    max_step: float = parameter(
+        0.5,
+        'largest distance of the first command after a pause from the last one obeyed',
+        unit='rad',
+        low=0.0,
+    )
     command_timeout: float = parameter(
         0.1, 'a command or correction older than this is not obeyed', unit='s', low=0.001, high=1.0
     )

@@ -68,6 +68,12 @@ class ControllerParameters:
         1.75, 'largest desired bending followed, either way', unit='rad', low=0.1, high=3.1
     )
     max_speed: float = parameter(30.0, 'largest speed between two commands', unit='rad/s', low=0.0)
+    max_step: float = parameter(
+        0.5,
+        'largest distance of the first command after a pause from the last one followed',
+        unit='rad',
+        low=0.0,
+    )
     command_timeout: float = parameter(
         0.1, 'a command older than this is not followed', unit='s', low=0.001, high=1.0
     )
@@ -97,7 +103,7 @@ class ControllerNode(EndoscopeNode):
                 tuple(-x for x in reach),
                 reach,
                 p.max_speed,
-                2.0 * p.joint_limit,
+                p.max_step,
                 round(p.command_timeout * 1e9),
             )
         )

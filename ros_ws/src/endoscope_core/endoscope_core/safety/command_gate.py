@@ -35,7 +35,7 @@ class CommandLimits:
     max_speed
         Largest speed between two commands in rad/s.
     max_step
-        Largest distance in rad between the held position and the first command obeyed.
+        Largest distance in rad between the held position and the first command of a stream.
     max_age_ns
         A command that reached us later than this is refused; a stream that pauses longer is stale.
     """
@@ -114,7 +114,7 @@ class CommandGate:
             Local monotonic time of receipt in ns.
         held
             Position in rad that is held now, shape (J,); the first command of a stream is compared
-            with it.
+            with it. By default the last command obeyed, and none after a reset.
 
         Returns
         -------
@@ -143,7 +143,7 @@ class CommandGate:
         if streaming:
             refusal = self._check_rate(stamp_ns, position, received_ns)
         else:
-            refusal = self._check_step(position, held)
+            refusal = self._check_step(position, self._position if held is None else held)
         if refusal is not None:
             return refusal
         self._position = tuple(position)
@@ -179,12 +179,9 @@ class CommandGate:
                 return self.refuse(Refusal.RATE, f'{abs(value - before) / elapsed:.4g} rad/s')
         return None
 
-    def _check_step(
-        self, position: Sequence[float], held: Sequence[float] | None
-    ) -> Refusal | None:
-        if held is None:
-            return None
-        for value, here in zip(position, held, strict=True):
+    def _check_step(self, position: Sequence[float], held: Sequence[float]) -> Refusal | None:
+        # Nothing is held before the first command.
+        for value, here in zip(position, held, strict=False):
             if abs(value - here) > self.limits.max_step:
                 return self.refuse(Refusal.STEP, f'{abs(value - here):.4g} rad')
         return None
