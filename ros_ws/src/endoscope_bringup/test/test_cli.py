@@ -91,10 +91,14 @@ def test_signal_gives_its_status_and_leaves_no_output(
         return 0
 
     monkeypatch.setattr(cli, 'build_parser', _parser_running(write))
+    # A shell starts what runs in the background with SIGINT ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         result = cli.main([])
     except SystemExit as stop:
         result = stop.code
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert result == status
     assert list(tmp_path.iterdir()) == []
 
