@@ -95,7 +95,7 @@ def test_is_described(effect_id):
     assert definition.physics.endswith('.')
     assert definition.equation
     assert re.search(r'\d{4}', definition.source), 'a source has a year or a standard a number'
-    assert 1 <= len(definition.parameters) <= 5
+    assert 1 <= len(definition.parameters) <= 6
     assert any(math.isfinite(p.off) for p in definition.parameters)
     for parameter in definition.parameters:
         for value in (parameter.typical, *parameter.starts, *parameter.choices):
