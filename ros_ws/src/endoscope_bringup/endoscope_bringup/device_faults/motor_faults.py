@@ -152,7 +152,12 @@ MOTOR_FAULTS: dict[str, MotorFault] = {
 }
 
 
-def undergo(fault: MotorFault, folder: Path, aftermath: float = AFTERMATH_S) -> FaultOutcome:
+def undergo(
+    fault: MotorFault,
+    folder: Path,
+    aftermath: float = AFTERMATH_S,
+    patience: float | None = None,
+) -> FaultOutcome:
     """Make a fault happen in motion, and look at what follows.
 
     Parameters
@@ -163,8 +168,10 @@ def undergo(fault: MotorFault, folder: Path, aftermath: float = AFTERMATH_S) -> 
         For the bag.
     aftermath
         How long to look at least, in s.
+    patience
+        Silence of the servos in s that is a fault, instead of the usual.
     """
-    with MotorRig(folder, fault.apart) as rig:
+    with MotorRig(folder, fault.apart, patience) as rig:
         rig.enable_and_move()
         began, began_ns = time.monotonic(), time.time_ns()
         fault.inject(rig)

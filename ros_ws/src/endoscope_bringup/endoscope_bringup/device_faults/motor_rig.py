@@ -61,9 +61,13 @@ class MotorRig:
         For the terminal's link and the bag.
     apart
         Nodes that live in processes of their own, so that they can be killed.
+    patience
+        Silence of the servos in s that is a fault, instead of the usual.
     """
 
-    def __init__(self, folder: Path, apart: Sequence[str] = ()) -> None:
+    def __init__(
+        self, folder: Path, apart: Sequence[str] = (), patience: float | None = None
+    ) -> None:
         self.bag = folder / 'bag'
         self.emulator = EmulatorProcess(link=folder / 'servos')
         self.tension = TENSION_N
@@ -72,7 +76,7 @@ class MotorRig:
         self.shafts: list[tuple[float, JointSample]] = []
         self.messages: list[tuple[float, str, str]] = []
         domain = 100 + os.getpid() % 130
-        overrides = self._parameters(apart)
+        overrides = self._parameters(apart, patience)
         self.runtime = Runtime(
             args=['--ros-args', '--log-level', 'fatal'],
             context=Context(),
@@ -95,7 +99,9 @@ class MotorRig:
         JointSubscription(self.probe, MOTOR_MEASURED, MOTORS, self._on_shafts, SENSOR_ASKED)
         self.probe.create_timer(0.01, self._weigh, clock=self._steady)
 
-    def _parameters(self, apart: Sequence[str]) -> dict[str, dict[str, Any]]:
+    def _parameters(
+        self, apart: Sequence[str], patience: float | None
+    ) -> dict[str, dict[str, Any]]:
         driver = {'device': 'dynamixel', 'port': self.emulator.port, 'bus_rate': float(RATE_HZ)}
         parameters: dict[str, dict[str, Any]] = {
             'motor_driver': driver,
@@ -104,6 +110,9 @@ class MotorRig:
             'console': {'source': 'motion'},
             'recorder': {'bag': str(self.bag)},
         }
+        if patience is not None:
+            driver['fault_after'] = patience
+            parameters['supervisor']['stream_timeout'] = patience
         first = next(name for name in _NODES if name not in apart)
         for name in (first, *apart):
             parameters[name]['tick_rate'] = RATE_HZ
