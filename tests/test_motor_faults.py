@@ -8,26 +8,26 @@ from endoscope_bringup.device_faults.motor_rig import MotorRig
 
 # The bench tries the others too.
 FAULTS = (
-    "adapter out",
-    "disturbed",
-    "overload",
-    "restart",
-    "node hangs",
-    "over-tension",
-    "console killed",
-    "motor driver killed",
+    'adapter out',
+    'disturbed',
+    'overload',
+    'restart',
+    'node hangs',
+    'over-tension',
+    'console killed',
+    'motor driver killed',
 )
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize('name', FAULTS)
 def test_what_the_slave_makes_of(name, tmp_path):
     fault = MOTOR_FAULTS[name]
     # Where motion shall go on, a stall of this machine must not look like a dead bus.
-    patience = 1.0 if fault.ends_in == "ENABLED" else None
+    patience = 1.0 if fault.ends_in == 'ENABLED' else None
     outcome = undergo(fault, tmp_path, aftermath=0.4, patience=patience)
     assert outcome.state == fault.ends_in, outcome
     assert fault.cause in outcome.cause
-    assert (outcome.faults_in_bag > 0) == (fault.ends_in == "FAULT")
+    assert (outcome.faults_in_bag > 0) == (fault.ends_in == 'FAULT')
     assert (outcome.stopped_s is not None) == fault.stops
     assert outcome.largest_error < 0.03
 
@@ -47,20 +47,20 @@ def shafts_stand_still(rig):
 def test_after_a_fault_nothing_moves_before_enable_is_given(tmp_path):
     with MotorRig(tmp_path) as rig:
         rig.enable_and_move()
-        rig.emulator.do("silence", 1)
-        assert rig.wait(lambda: rig.state == "FAULT")
-        rig.order("enable")
-        assert rig.wait(lambda: "not enabled" in rig.node("supervisor")._last_refusal)
-        rig.emulator.do("silence")
+        rig.emulator.do('silence', 1)
+        assert rig.wait(lambda: rig.state == 'FAULT')
+        rig.order('enable')
+        assert rig.wait(lambda: 'not enabled' in rig.node('supervisor')._last_refusal)
+        rig.emulator.do('silence')
         assert shafts_stand_still(rig)
-        assert rig.state == "FAULT"
+        assert rig.state == 'FAULT'
         rig.enable_and_move()
         assert shafts_move(rig)
 
 
 def test_holding_letting_go_and_restarting(tmp_path):
     with MotorRig(tmp_path) as rig:
-        reboot = rig.probe.create_client(Trigger, "motor/reboot")
+        reboot = rig.probe.create_client(Trigger, 'motor/reboot')
 
         def asked():
             answer = reboot.call_async(Trigger.Request())
@@ -69,16 +69,16 @@ def test_holding_letting_go_and_restarting(tmp_path):
 
         rig.enable_and_move()
         assert not asked()
-        rig.order("pause")
-        assert rig.wait(lambda: rig.state == "PAUSED")
+        rig.order('pause')
+        assert rig.wait(lambda: rig.state == 'PAUSED')
         assert shafts_stand_still(rig)
-        assert rig.emulator.state(1)["torque"] == 1
-        rig.order("disable")
-        assert rig.wait(lambda: rig.emulator.state(1)["torque"] == 0)
+        assert rig.emulator.state(1)['torque'] == 1
+        rig.order('disable')
+        assert rig.wait(lambda: rig.emulator.state(1)['torque'] == 0)
         rig.enable_and_move()
-        rig.emulator.do("overload", 2)
-        assert rig.wait(lambda: rig.state == "FAULT")
+        rig.emulator.do('overload', 2)
+        assert rig.wait(lambda: rig.state == 'FAULT')
         assert asked()
-        assert rig.wait(lambda: rig.emulator.state(2)["hardware"] == 0)
+        assert rig.wait(lambda: rig.emulator.state(2)['hardware'] == 0)
         rig.enable_and_move()
         assert shafts_move(rig)
