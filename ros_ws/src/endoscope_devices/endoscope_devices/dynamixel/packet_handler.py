@@ -2,7 +2,9 @@
 
 What differs from the SDK's packet handler: requests are stuffed, an answer is taken by id, kind and
 length after the line was emptied, each servo's error byte is kept, and the time-out is the time on
-the wire plus a margin instead of 34 ms of busy waiting.
+the wire plus a margin instead of 34 ms of busy waiting. An answer does not say which register it
+holds, so no two reads of single servos in a row ask for the same number of bytes: what a line
+repeats of the first is then no answer to the second.
 """
 
 import time
@@ -93,6 +95,7 @@ class PacketHandler:
     margin: float = REPLY_MARGIN_S
     counts: BusCounts = field(default_factory=BusCounts)
     return_delay: float = _LONGEST_RETURN_DELAY_S
+    _size_before: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
         self.margin += latency_timer(self.port.port_name) or 0.0
@@ -158,7 +161,9 @@ class PacketHandler:
         NoReplyError, RefusedError
             It does not answer, or with an error.
         """
-        return self._ask(device, Instruction.READ, _words(address, size), size)
+        asked = size + 1 if size == self._size_before else size
+        reply = self._ask(device, Instruction.READ, _words(address, asked), asked)
+        return Reply(reply.error, reply.data[:size])
 
     def write(self, device: int, address: int, data: bytes) -> None:
         """Write bytes of a servo's control table.
@@ -230,6 +235,7 @@ class PacketHandler:
     ) -> Reply:
         request = encode(device, instruction, parameters)
         what = f'servo {device} on {self.port.port_name}'
+        self._size_before = size
         for _ in range(attempts):
             reply = self.transact(request, [device], size, margin=SINGLE_MARGIN_S).get(device)
             if reply is None:
