@@ -11,6 +11,9 @@ from tubes import NODES_WITH_A_PLANT, tube_of_size
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.plant import EffectSpec, PlantDescription, save_plant
 
+# In real time, on a machine that may stall for longer than a device may be silent.
+pytestmark = pytest.mark.flaky(reruns=2)
+
 
 @pytest.mark.parametrize(('size_deg', 'seed'), [(50, 901), (80, 902)])
 def test_finds_the_class_of_a_known_tube(tmp_path, size_deg, seed):

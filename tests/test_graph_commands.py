@@ -10,6 +10,9 @@ from simulated_graph import SimulatedGraph
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, SLAVE_COMMAND
 from endoscope_nodes.qos import COMMAND, EVENT
 
+# In real time, on a machine that may stall for longer than a device may be silent.
+pytestmark = pytest.mark.flaky(reruns=2)
+
 
 class ForeignConsole:
     """Publishes ``slave/servo_jp`` with ordinary messages, as somebody else's program does."""

@@ -16,6 +16,9 @@ from std_msgs.msg import String
 
 from endoscope_nodes.qos import EVENT, SENSOR_ASKED
 
+# In real time, on a machine that may stall for longer than a device may be silent.
+pytestmark = pytest.mark.flaky(reruns=2)
+
 DOMAIN = 231
 NODES = (
     'motor_driver',

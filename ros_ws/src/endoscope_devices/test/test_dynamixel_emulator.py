@@ -8,6 +8,9 @@ from endoscope_devices.dynamixel import control_table as table
 from endoscope_devices.dynamixel.emulator.bus import EmulatedBus
 from endoscope_devices.dynamixel.emulator.servo import EmulatedServo, ErrorNumber
 
+# In real time, on a machine that may stall for longer than a device may be silent.
+pytestmark = pytest.mark.flaky(reruns=2)
+
 ACCESS, RANGE, LENGTH, LIMIT = (
     ErrorNumber.ACCESS,
     ErrorNumber.DATA_RANGE,

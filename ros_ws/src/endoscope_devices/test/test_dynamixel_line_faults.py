@@ -8,6 +8,9 @@ from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
 from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 
+# In real time, on a machine that may stall for longer than a device may be silent.
+pytestmark = pytest.mark.flaky(reruns=2)
+
 MOUNTS = (ServoMount('motor_x', 1), ServoMount('motor_y', 2))
 PATIENCE_S = 20.0
 FASTEST = 4.9
