@@ -7,8 +7,6 @@ connection or both, and a test breaks what it likes on the way.
 import time
 from collections import defaultdict
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
@@ -20,6 +18,7 @@ from recorded_session import private_domain
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_nodes.compensator_node import CompensatorNode
 from endoscope_nodes.console_node import ConsoleNode
 from endoscope_nodes.em_tracker_node import EmTrackerNode
@@ -56,7 +55,7 @@ NODES = (
 )
 
 
-class SensorGraph:
+class SensorGraph(ClosedOnExit):
     """All that stands between a console and the sensors, and a test node beside it.
 
     Parameters
@@ -207,15 +206,7 @@ class SensorGraph:
         self.wait(lambda: len(self.diagnostics[name]) > before)
         return {v.key: v.value for v in self.diagnostics[name][-1].values}[key]
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         try:
             self.runtime.executor.remove_node(self.probe)
             self.probe.destroy_node()

@@ -3,8 +3,6 @@
 import itertools
 import os
 from collections import defaultdict
-from types import TracebackType
-from typing import Self
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
@@ -16,6 +14,7 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.joint_stream import JointSample, JointSubscription
@@ -36,7 +35,7 @@ _FIRST = os.getpid() % 130
 PATIENCE_S = 120.0
 
 
-class SimulatedGraph:
+class SimulatedGraph(ClosedOnExit):
     """The whole graph in lock-step, and a test node beside it.
 
     Parameters
@@ -170,15 +169,7 @@ class SimulatedGraph:
         """Values last reported in the diagnostics of a subcomponent."""
         return {v.key: v.value for v in self.diagnostics[name][-1].values}
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         try:
             self.runtime.executor.remove_node(self.probe)
             self.probe.destroy_node()

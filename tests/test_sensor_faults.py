@@ -67,7 +67,7 @@ class Rig:
 
     def close(self):
         try:
-            self.graph.__exit__(None, None, None)
+            self.graph.close()
         finally:
             self.aurora.close()
             self.transmitter.close()
@@ -406,7 +406,7 @@ class NetworkRig:
 
     def close(self):
         try:
-            self.graph.__exit__(None, None, None)
+            self.graph.close()
         finally:
             self.server.close()
 

@@ -4,8 +4,7 @@ import gc
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self, TypeVar
+from typing import TypeVar
 
 import rclpy
 from rclpy.context import Context
@@ -21,6 +20,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_nodes.discovery import stay_on_this_machine
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.matching import all_matched
@@ -54,7 +54,7 @@ class BeatParameters:
 N = TypeVar('N', bound=EndoscopeNode)
 
 
-class Runtime:
+class Runtime(ClosedOnExit):
     """Nodes composed in one process around one executor, one ticker and one context.
 
     Parameters
@@ -244,17 +244,6 @@ class Runtime:
                 self.remove(self.nodes[-1])
             finally:
                 self._close_nodes()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def run_nodes(

@@ -7,8 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
@@ -17,6 +16,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
 
+from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_devices.dynamixel.control_table import COUNT
 from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
 from endoscope_nodes.compensator_node import CompensatorNode
@@ -49,7 +49,7 @@ _NODES: dict[str, type] = {
 }
 
 
-class MotorRig:
+class MotorRig(ClosedOnExit):
     """Console, compensator, motor driver, supervisor and recorder, with two emulated servos.
 
     The console plays ``60 sin t``, which passes uncompensated.  The tension of the wires is the
@@ -241,17 +241,6 @@ class MotorRig:
                 process.kill()
                 process.wait()
             self.emulator.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _start(name: str, parameters: dict[str, Any], domain: int) -> subprocess.Popen:

@@ -21,9 +21,8 @@ import time
 import tty
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
+from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.kinematics import about_z, multiply, rotate, tip_pose
 from endoscope_devices.em_tracker.aurora_unit import AuroraUnit, SensorSource, SensorView
 
@@ -37,7 +36,7 @@ _CHUNK = 4096
 _STEP_S = 0.004
 
 
-class AuroraEmulator:
+class AuroraEmulator(ClosedOnExit):
     """Serves commands in a thread until it is closed.
 
     Parameters
@@ -154,17 +153,6 @@ class AuroraEmulator:
                 if self._line_speed:
                     time.sleep(_BITS_A_BYTE * len(part) / baud)
                 os.write(self._master, part)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 class InstrumentInField:

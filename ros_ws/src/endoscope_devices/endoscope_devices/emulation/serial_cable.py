@@ -3,13 +3,12 @@
 import os
 import tty
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
+from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_devices.emulation.byte_relay import ByteRelay, Tap, faithful
 
 
-class SerialCable:
+class SerialCable(ClosedOnExit):
     """Two serial ports that are connected; a driver opens one, an emulated device the other.
 
     A pseudo-terminal has no baud rate, parity or break: bytes arrive at once and whole.
@@ -68,14 +67,3 @@ class SerialCable:
         self.unplug()
         for end in self._far_ends:
             os.close(end)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

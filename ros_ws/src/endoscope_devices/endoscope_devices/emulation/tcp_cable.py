@@ -2,13 +2,12 @@
 
 import socket
 import threading
-from types import TracebackType
-from typing import Self
 
+from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_devices.emulation.byte_relay import ByteRelay, Tap, faithful
 
 
-class TcpCable:
+class TcpCable(ClosedOnExit):
     """Accepts connections on a port of its own and carries them to a server.
 
     Parameters
@@ -69,14 +68,3 @@ class TcpCable:
         self._listener.close()
         self._thread.join()
         self.cut()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

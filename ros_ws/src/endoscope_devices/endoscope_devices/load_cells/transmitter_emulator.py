@@ -4,18 +4,19 @@ import asyncio
 import threading
 import time
 from collections.abc import Callable, Sequence
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
+from endoscope_core.closed_on_exit import ClosedOnExit
+
 # Registers from 0 on at a time in s since the start; None while the device is busy.
 RegisterSource = Callable[[float], Sequence[int] | None]
 
 
-class TransmitterEmulator:
+class TransmitterEmulator(ClosedOnExit):
     """Serves registers by Modbus, each reading anew from ``source``.
 
     Protocol and server are pymodbus's; what a test chooses is the registers' content.
@@ -106,14 +107,3 @@ class TransmitterEmulator:
         self._thread.join()
         self._loop.run_until_complete(self._loop.shutdown_asyncgens())
         self._loop.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

@@ -5,11 +5,12 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
+
+from endoscope_core.closed_on_exit import ClosedOnExit
 
 
-class EmulatorProcess:
+class EmulatorProcess(ClosedOnExit):
     """Starts an emulated bus and commands it.
 
     Parameters
@@ -65,14 +66,3 @@ class EmulatorProcess:
 
     def _read(self) -> str:
         return '' if self._process.stdout is None else self._process.stdout.readline().strip()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
