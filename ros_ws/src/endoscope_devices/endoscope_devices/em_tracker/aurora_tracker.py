@@ -1,8 +1,6 @@
 """Frames of one sensor of an Aurora, read by a thread of their own."""
 
-import threading
 import time
-from collections import Counter, deque
 from dataclasses import dataclass
 
 from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
@@ -14,9 +12,9 @@ from endoscope_devices.em_tracker.tx_reply import (
     parse_tx,
 )
 from endoscope_devices.motor_device import DeviceError
+from endoscope_devices.reading_thread import ReadingThread
 
 _REOPEN_S = 0.3
-_SILENT_NS = 250_000_000
 _KEPT = 200
 _PAUSE_S = 0.002
 _GIVE_UP = 5
@@ -67,7 +65,7 @@ class TrackerReading:
     orientation: tuple[float, ...]
 
 
-class AuroraTracker:
+class AuroraTracker(ReadingThread[TrackerReading]):
     """Asks for the newest frame again and again, and keeps each that is new and shows the sensor.
 
     A tracker that goes away is opened again for as long as the device is open.
@@ -81,40 +79,21 @@ class AuroraTracker:
     """
 
     def __init__(self, port: str, settings: TrackerSettings) -> None:
+        super().__init__('aurora tracker', _KEPT)
         self._path = port
         self._settings = settings
         self._port = AuroraPort(port)
         self._start_clock()
         self._handle = -1
         self._frame: int | None = None
-        self._readings: deque[TrackerReading] = deque(maxlen=_KEPT)
-        self._counts: Counter[str] = Counter()
-        self._good_ns: int | None = None
         self._trouble = 'not connected yet'
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='aurora tracker', daemon=True)
-
-    def open(self) -> None:
-        """Start to read; a tracker that is not there yet is waited for."""
-        self._thread.start()
-
-    def take(self) -> list[TrackerReading]:
-        """Readings since the last call, oldest first; never waits for the tracker."""
-        taken = []
-        while self._readings:
-            taken.append(self._readings.popleft())
-        return taken
 
     def health(self) -> tuple[str, dict[str, object]]:
         """What is wrong (empty if nothing), and figures for diagnostics."""
-        good = self._good_ns
-        age = None if good is None else time.monotonic_ns() - good
         trouble = self._trouble
-        if not trouble and (age is None or age > _SILENT_NS):
+        if not trouble and self._silent():
             trouble = 'no frame'
-        figures: dict[str, object] = {
-            'age of the last reading [ms]': 'never' if age is None else round(age * 1e-6, 1)
-        }
+        figures = self._age_figure()
         for name in (
             'readings',
             'lost frames',
@@ -127,12 +106,6 @@ class AuroraTracker:
         ):
             figures[name] = self._counts[name]
         return trouble, figures
-
-    def close(self) -> None:
-        """Stop tracking and let go of the port."""
-        self._stop.set()
-        if self._thread.ident is not None:
-            self._thread.join()
 
     def _run(self) -> None:
         while not self._stop.is_set():
@@ -218,11 +191,10 @@ class AuroraTracker:
         else:
             self._trouble = ''
             self._late_in_a_row = 0
-            self._counts['readings'] += 1
-            self._good_ns = asked_ns
             latency_ns = round(self._settings.latency * 1e9)
-            self._readings.append(
-                TrackerReading(measured - latency_ns, tool.frame, tool.position, tool.orientation)
+            self._keep(
+                TrackerReading(measured - latency_ns, tool.frame, tool.position, tool.orientation),
+                asked_ns,
             )
 
 

@@ -2,7 +2,6 @@
 
 import threading
 import time
-from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -19,9 +18,9 @@ from endoscope_devices.load_cells.modbus_line import Line, LineLostError, Serial
 from endoscope_devices.load_cells.register_reader import RegisterReader
 from endoscope_devices.load_cells.registers import REGISTER_TYPES, decode_number
 from endoscope_devices.load_cells.tare import TareWindow, with_zero, zero_after_tare
+from endoscope_devices.reading_thread import ReadingThread
 
 _REOPEN_S = 0.2
-_SILENT_NS = 250_000_000
 # So many readings in a row that cannot be believed are a fault; a single spike is none.
 _FAULTY_READINGS = 10
 _KEPT = 2000
@@ -43,7 +42,7 @@ class WireReading:
     tension: tuple[float, ...]
 
 
-class ModbusLoadCells:
+class ModbusLoadCells(ReadingThread[WireReading]):
     """Reads all wires at the calibration's rate and keeps what can be believed.
 
     A reading in which one channel cannot be believed is no reading: the others would pass for a
@@ -58,6 +57,7 @@ class ModbusLoadCells:
     """
 
     def __init__(self, calibration: LoadCellCalibration, line: Line, framing: Framing) -> None:
+        super().__init__('load cells', _KEPT)
         self.calibration = calibration
         self._line = line
         self._reader = RegisterReader(line, framing, calibration.transmitter.reply_timeout)
@@ -71,25 +71,9 @@ class ModbusLoadCells:
         ]
         self._window = TareWindow(tuple(calibration.wires), calibration.tare)
         self._lock = threading.Lock()
-        self._readings: deque[WireReading] = deque(maxlen=_KEPT)
-        self._counts: Counter[str] = Counter()
-        self._good_ns: int | None = None
         self._unbelieved = 0
         self._link_trouble = 'not connected yet'
         self._line_lost = True
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='load cells', daemon=True)
-
-    def open(self) -> None:
-        """Start to read; a transmitter that is not there yet is waited for."""
-        self._thread.start()
-
-    def take(self) -> list[WireReading]:
-        """Readings since the last call, oldest first; never waits for the line."""
-        taken = []
-        while self._readings:
-            taken.append(self._readings.popleft())
-        return taken
 
     def note_shafts(self, velocity: Sequence[float]) -> None:
         """Say how fast the motor shafts turn, so that moving wires are not tared.
@@ -125,23 +109,18 @@ class ModbusLoadCells:
     @property
     def trouble(self) -> str:
         """What is wrong; empty if nothing."""
-        good = self._good_ns
-        age = None if good is None else time.monotonic_ns() - good
         if self._line_lost:
             return self._link_trouble
         faults = [check.fault for check in self._checks if check.fault]
         if faults and self._unbelieved >= _FAULTY_READINGS:
             return '; '.join(faults)
-        if age is None or age > _SILENT_NS:
+        if self._silent():
             return self._link_trouble or 'no believable reading yet'
         return ''
 
     def health(self) -> tuple[str, dict[str, object]]:
         """What is wrong (empty if nothing), and figures for diagnostics."""
-        good = self._good_ns
-        age = None if good is None else time.monotonic_ns() - good
-        figures: dict[str, object] = {
-            'age of the last reading [ms]': 'never' if age is None else round(age * 1e-6, 1),
+        figures = self._age_figure() | {
             'readings': self._counts['readings'],
             'not believed': self._counts['not believed'],
             'connections': self._counts['connections'],
@@ -152,12 +131,6 @@ class ModbusLoadCells:
             figures[f'{name}: zero [counts]'] = check.cell.zero
             figures[f'{name}: spikes'] = check.spikes
         return self.trouble, figures
-
-    def close(self) -> None:
-        """Stop reading and let go of the line."""
-        self._stop.set()
-        if self._thread.ident is not None:
-            self._thread.join()
 
     def _run(self) -> None:
         while not self._stop.is_set():
@@ -202,10 +175,8 @@ class ModbusLoadCells:
             self._unbelieved += 1
             return
         self._unbelieved = 0
-        self._counts['readings'] += 1
-        self._good_ns = time_ns
         self._window.add(time_ns, believed)
-        self._readings.append(WireReading(time_ns, believed))
+        self._keep(WireReading(time_ns, believed), time_ns)
 
 
 def modbus_rtu(port: str, calibration: LoadCellCalibration) -> ModbusLoadCells:
