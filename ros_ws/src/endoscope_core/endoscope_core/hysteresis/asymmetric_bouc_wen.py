@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +15,8 @@ from endoscope_core.hysteresis.inverse_safety import (
     check_inverse,
     check_numbers,
     check_range,
-    numbers_by_name,
 )
+from endoscope_core.hysteresis.named_numbers import NamedNumbers
 
 GREATEST_EXPONENT = 5.0
 GREATEST_SKEW = 0.5
@@ -25,7 +24,7 @@ GREATEST_ANGLE = 1.75
 
 
 @dataclass(frozen=True)
-class AsymmetricBoucWenParameters:
+class AsymmetricBoucWenParameters(NamedNumbers):
     """``theta_a = alpha theta + offset - (lag + skew theta) y`` with `y` built up by direction.
 
     The symmetric model (equations 3 and 4 of the first paper) in normalised form, `y` = h / h_max,
@@ -57,6 +56,8 @@ class AsymmetricBoucWenParameters:
         If a parameter is out of range or the inverse would be steeper than 40.
     """
 
+    MODEL: ClassVar[str] = 'asymmetric Bouc-Wen'
+
     alpha: float
     lag: float
     skew: float
@@ -69,7 +70,7 @@ class AsymmetricBoucWenParameters:
     n_down: float
 
     def __post_init__(self) -> None:
-        name = 'asymmetric Bouc-Wen'
+        name = self.MODEL
         check_numbers(name, asdict(self))
         for side in ('up', 'down'):
             check_range(name, f'travel_{side}', getattr(self, f'travel_{side}'), 1e-4, 100.0)
@@ -122,12 +123,3 @@ class AsymmetricBoucWenParameters:
         bounded = np.clip(angles, -GREATEST_ANGLE, GREATEST_ANGLE)
         lags: NDArray[np.float64] = np.maximum(0.0, self.lag + self.skew * bounded)
         return lags
-
-    def to_dict(self) -> dict[str, float]:
-        """The parameters by name."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> AsymmetricBoucWenParameters:
-        """Parameters from a mapping of exactly their names; ValueError otherwise."""
-        return cls(**numbers_by_name('asymmetric Bouc-Wen', cls, values))

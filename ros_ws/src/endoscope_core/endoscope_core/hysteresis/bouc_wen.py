@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,20 +14,21 @@ from endoscope_core.hysteresis.bouc_wen_kernel import (
     bouc_wen_normalised_path,
     bouc_wen_normalised_step,
 )
+from endoscope_core.hysteresis.constant_lag import ConstantLag
 from endoscope_core.hysteresis.inverse_safety import (
     GREATEST_ALPHA,
     GREATEST_INVERSE_SLOPE,
     GREATEST_LAG,
     SMALLEST_ALPHA,
     check_numbers,
-    numbers_by_name,
 )
+from endoscope_core.hysteresis.named_numbers import NamedNumbers
 
 GREATEST_EXPONENT = 5.0
 
 
 @dataclass(frozen=True)
-class BoucWenParameters:
+class BoucWenParameters(NamedNumbers, ConstantLag):
     """The six parameters of equations 3 to 5, refused unless their inverse is safe to drive with.
 
     ``theta_a = alpha theta + beta h`` and ``h' = A theta' - B |theta'| |h|^(n-1) h - C theta'
@@ -61,6 +61,8 @@ class BoucWenParameters:
     A = 1.
     """
 
+    MODEL: ClassVar[str] = 'Bouc-Wen'
+
     alpha: float
     beta: float
     A: float
@@ -69,7 +71,7 @@ class BoucWenParameters:
     n: float
 
     def __post_init__(self) -> None:
-        check_numbers('Bouc-Wen', asdict(self))
+        check_numbers(self.MODEL, asdict(self))
         checks = [
             (
                 SMALLEST_ALPHA <= self.alpha <= GREATEST_ALPHA,
@@ -139,14 +141,6 @@ class BoucWenParameters:
         )
         return states
 
-    def lag_at(self, angle: float) -> float:
-        """Half-width of a saturated loop, rad."""
-        return self.lag
-
-    def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same for many angles (N,)."""
-        return np.full(angles.shape, self.lag)
-
     @classmethod
     def from_shape(
         cls, alpha: float, lag: float, travel: float, rho: float, n: float
@@ -175,21 +169,6 @@ class BoucWenParameters:
             C=0.5 * (1.0 - rho) * total,
             n=n,
         )
-
-    def to_dict(self) -> dict[str, float]:
-        """The six parameters by name."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> BoucWenParameters:
-        """Parameters from a mapping of exactly the six names.
-
-        Raises
-        ------
-        ValueError
-            If a name is missing or unknown, or the parameters are unsafe.
-        """
-        return cls(**numbers_by_name('Bouc-Wen', cls, values))
 
 
 def bouc_wen_step(parameters: BoucWenParameters, h: float, delta: float) -> float:

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.hysteresis.constant_lag import ConstantLag
 from endoscope_core.hysteresis.dahl_kernel import dahl_path, dahl_step
 from endoscope_core.hysteresis.inverse_safety import (
     GREATEST_OFFSET,
     check_inverse,
     check_numbers,
     check_range,
-    numbers_by_name,
 )
+from endoscope_core.hysteresis.named_numbers import NamedNumbers
 
 LEAST_EXPONENT = 0.5
 GREATEST_EXPONENT = 4.0
 
 
 @dataclass(frozen=True)
-class DahlParameters:
+class DahlParameters(NamedNumbers, ConstantLag):
     """``theta_a = alpha theta + offset - lag y``, `y` in [-1, 1] by the Dahl equation.
 
     Second paper, section 2.3: a modification of the Dahl model with a direct inverse that needs no
@@ -49,6 +49,8 @@ class DahlParameters:
         g)**i <= 2**i`` its slope is at most ``(1 + 2**i lag / travel) / alpha``.
     """
 
+    MODEL: ClassVar[str] = 'Dahl'
+
     alpha: float
     lag: float
     travel: float
@@ -56,11 +58,11 @@ class DahlParameters:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        check_numbers('Dahl', asdict(self))
-        check_range('Dahl', 'exponent', self.exponent, LEAST_EXPONENT, GREATEST_EXPONENT)
-        check_range('Dahl', 'offset', self.offset, -GREATEST_OFFSET, GREATEST_OFFSET)
-        check_range('Dahl', 'travel', self.travel, 1e-4, 100.0)
-        check_inverse('Dahl', self.alpha, self.lag, self.inverse_slope)
+        check_numbers(self.MODEL, asdict(self))
+        check_range(self.MODEL, 'exponent', self.exponent, LEAST_EXPONENT, GREATEST_EXPONENT)
+        check_range(self.MODEL, 'offset', self.offset, -GREATEST_OFFSET, GREATEST_OFFSET)
+        check_range(self.MODEL, 'travel', self.travel, 1e-4, 100.0)
+        check_inverse(self.MODEL, self.alpha, self.lag, self.inverse_slope)
 
     @property
     def inverse_slope(self) -> float:
@@ -75,20 +77,3 @@ class DahlParameters:
         """States (N,) along a driving angle (N,) in rad."""
         states: NDArray[np.float64] = dahl_path(driver, y0, self.travel, self.exponent)
         return states
-
-    def lag_at(self, angle: float) -> float:
-        """Half-width of the loop, rad."""
-        return self.lag
-
-    def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same for many angles (N,)."""
-        return np.full(angles.shape, self.lag)
-
-    def to_dict(self) -> dict[str, float]:
-        """The parameters by name."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> DahlParameters:
-        """Parameters from a mapping of exactly their names; ValueError otherwise."""
-        return cls(**numbers_by_name('Dahl', cls, values))

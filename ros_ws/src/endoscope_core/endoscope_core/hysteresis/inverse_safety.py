@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 SMALLEST_ALPHA = 0.2
@@ -67,21 +66,3 @@ def check_inverse(model: str, alpha: float, lag: float, slope: float) -> None:
         raise ValueError(
             f'{model} inverse is too steep: {slope:.1f} exceeds {GREATEST_INVERSE_SLOPE:g}'
         )
-
-
-def numbers_by_name(model: str, kind: type, values: Mapping[str, Any]) -> dict[str, float]:
-    """Values for exactly the fields of the dataclass `kind`.
-
-    Raises
-    ------
-    ValueError
-        If a name is missing or unknown.
-    """
-    wanted = {field.name for field in fields(kind)}
-    if set(values) != wanted:
-        odd = ', '.join(sorted(set(values) ^ wanted))
-        raise ValueError(
-            f'{model} parameters must be exactly {", ".join(sorted(wanted))}; '
-            f'wrong or missing: {odd}'
-        )
-    return {name: float(value) for name, value in values.items()}

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.hysteresis.constant_lag import ConstantLag
 from endoscope_core.hysteresis.dahl_kernel import play_path, play_step
 from endoscope_core.hysteresis.inverse_safety import (
     GREATEST_OFFSET,
     check_inverse,
     check_numbers,
     check_range,
-    numbers_by_name,
 )
+from endoscope_core.hysteresis.named_numbers import NamedNumbers
 
 
 @dataclass(frozen=True)
-class PlayParameters:
+class PlayParameters(NamedNumbers, ConstantLag):
     """``theta_a = alpha theta + offset - lag y``, ``y' = theta' / travel`` within [-1, 1].
 
     With ``travel = lag / alpha`` this is the play (backlash) model of Tao and Kokotovic, which the
@@ -46,16 +46,18 @@ class PlayParameters:
         If a parameter is out of range or the inverse would be steeper than 40.
     """
 
+    MODEL: ClassVar[str] = 'play'
+
     alpha: float
     lag: float
     travel: float
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        check_numbers('play', asdict(self))
-        check_range('play', 'offset', self.offset, -GREATEST_OFFSET, GREATEST_OFFSET)
-        check_range('play', 'travel', self.travel, 1e-6, 100.0)
-        check_inverse('play', self.alpha, self.lag, self.inverse_slope)
+        check_numbers(self.MODEL, asdict(self))
+        check_range(self.MODEL, 'offset', self.offset, -GREATEST_OFFSET, GREATEST_OFFSET)
+        check_range(self.MODEL, 'travel', self.travel, 1e-6, 100.0)
+        check_inverse(self.MODEL, self.alpha, self.lag, self.inverse_slope)
 
     @property
     def inverse_slope(self) -> float:
@@ -70,20 +72,3 @@ class PlayParameters:
         """States (N,) along a driving angle (N,) in rad."""
         states: NDArray[np.float64] = play_path(driver, y0, self.travel)
         return states
-
-    def lag_at(self, angle: float) -> float:
-        """Half-width of the loop, rad."""
-        return self.lag
-
-    def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same for many angles (N,)."""
-        return np.full(angles.shape, self.lag)
-
-    def to_dict(self) -> dict[str, float]:
-        """The parameters by name."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> PlayParameters:
-        """Parameters from a mapping of exactly their names; ValueError otherwise."""
-        return cls(**numbers_by_name('play', cls, values))
