@@ -3,7 +3,7 @@
 import select
 import socket
 import time
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 import serial
 
@@ -21,9 +21,19 @@ class LineLostError(DeviceError):
     """The line went away: unplugged, or closed by the other side."""
 
 
-class Line(Protocol):
-    """A byte stream, used by one thread."""
+class Line(ABC):
+    """A byte stream, used by one thread.
 
+    Parameters
+    ----------
+    name
+        What messages call it.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    @abstractmethod
     def open(self) -> None:
         """Connect.
 
@@ -41,6 +51,10 @@ class Line(Protocol):
         LineLostError
             It went away.
         """
+        try:
+            self._send(data)
+        except OSError as error:
+            raise LineLostError(f'{self._name} is gone: {error}') from error
 
     def read(self, wanted: int, deadline_ns: int) -> bytes:
         """Bytes that arrive until there are ``wanted`` or the deadline has passed.
@@ -57,12 +71,32 @@ class Line(Protocol):
         LineLostError
             It went away.
         """
+        data = b''
+        try:
+            while len(data) < wanted:
+                left = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
+                part = self._receive(wanted - len(data), left)
+                if not part:
+                    break
+                data += part
+        except OSError as error:
+            raise LineLostError(f'{self._name} is gone: {error}') from error
+        return data
 
+    @abstractmethod
     def close(self) -> None:
         """Let go of it."""
 
+    @abstractmethod
+    def _send(self, data: bytes) -> None:
+        """Send bytes, or raise OSError or LineLostError."""
 
-class SerialLine:
+    @abstractmethod
+    def _receive(self, most: int, timeout: float) -> bytes:
+        """Bytes that arrive within `timeout` s, none if none do; errors as in `_send`."""
+
+
+class SerialLine(Line):
     """A serial port, silent between frames as Modbus over Serial Line V1.02, 2.5.1.1 asks for.
 
     That is 3.5 characters, or 1.75 ms above 19200 baud.
@@ -76,6 +110,7 @@ class SerialLine:
     """
 
     def __init__(self, port: str, settings: SerialSettings) -> None:
+        super().__init__(f'serial port {port}')
         self._path = port
         self._settings = settings
         self._silence_s = 3.5 * _BITS / settings.baud if settings.baud <= 19200 else 0.00175
@@ -94,40 +129,10 @@ class SerialLine:
                 write_timeout=1.0,
                 exclusive=True,
             )
-        except (serial.SerialException, OSError, ValueError) as error:
+        except (OSError, ValueError) as error:
             raise LineLostError(
-                f'serial port {self._path} cannot be opened ({error}): is it plugged in and yours?'
+                f'{self._name} cannot be opened ({error}): is it plugged in and yours?'
             ) from error
-
-    def write(self, data: bytes) -> None:
-        """See :class:`Line`."""
-        time.sleep(max(0.0, self._heard_s + self._silence_s - time.monotonic()))
-        try:
-            self._opened.write(data)
-        except (serial.SerialException, OSError) as error:
-            raise LineLostError(f'serial port {self._path} is gone: {error}') from error
-
-    def read(self, wanted: int, deadline_ns: int) -> bytes:
-        """See :class:`Line`.
-
-        Parameters
-        ----------
-        wanted, deadline_ns
-            Most bytes, and until when in ns.
-        """
-        data = b''
-        try:
-            while len(data) < wanted:
-                port = self._opened
-                port.timeout = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
-                part = port.read(wanted - len(data))
-                if not part:
-                    break
-                self._heard_s = time.monotonic()
-                data += part
-        except (serial.SerialException, OSError) as error:
-            raise LineLostError(f'serial port {self._path} is gone: {error}') from error
-        return data
 
     def close(self) -> None:
         """See :class:`Line`."""
@@ -135,14 +140,26 @@ class SerialLine:
             self._port.close()
             self._port = None
 
+    def _send(self, data: bytes) -> None:
+        time.sleep(max(0.0, self._heard_s + self._silence_s - time.monotonic()))
+        self._opened.write(data)
+
+    def _receive(self, most: int, timeout: float) -> bytes:
+        port = self._opened
+        port.timeout = timeout
+        data: bytes = port.read(most)
+        if data:
+            self._heard_s = time.monotonic()
+        return data
+
     @property
     def _opened(self) -> serial.Serial:
         if self._port is None:
-            raise LineLostError(f'serial port {self._path} is closed')
+            raise LineLostError(f'{self._name} is closed')
         return self._port
 
 
-class TcpLine:
+class TcpLine(Line):
     """A TCP connection.
 
     Parameters
@@ -163,6 +180,7 @@ class TcpLine:
         if not host or (port and not port.isdecimal()) or int(port or 1) not in range(1, 65536):
             raise DeviceError(f"'{address}' is no address: give HOST or HOST:PORT")
         self._address = (host, int(port) if port else MODBUS_TCP_PORT)
+        super().__init__(f'{self._address[0]}:{self._address[1]}')
         self._timeout = timeout
         self._socket: socket.socket | None = None
 
@@ -176,44 +194,23 @@ class TcpLine:
                 f'{self._name} does not accept a connection ({error}): is the transmitter on?'
             ) from error
 
-    def write(self, data: bytes) -> None:
-        """See :class:`Line`."""
-        try:
-            self._opened.sendall(data)
-        except OSError as error:
-            raise LineLostError(f'{self._name} is gone: {error}') from error
-
-    def read(self, wanted: int, deadline_ns: int) -> bytes:
-        """See :class:`Line`.
-
-        Parameters
-        ----------
-        wanted, deadline_ns
-            Most bytes, and until when in ns.
-        """
-        data = b''
-        try:
-            while len(data) < wanted:
-                left = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
-                if not select.select([self._opened], [], [], left)[0]:
-                    break
-                part = self._opened.recv(wanted - len(data))
-                if not part:
-                    raise LineLostError(f'{self._name} closed the connection')
-                data += part
-        except OSError as error:
-            raise LineLostError(f'{self._name} is gone: {error}') from error
-        return data
-
     def close(self) -> None:
         """See :class:`Line`."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
-    @property
-    def _name(self) -> str:
-        return f'{self._address[0]}:{self._address[1]}'
+    def _send(self, data: bytes) -> None:
+        self._opened.sendall(data)
+
+    def _receive(self, most: int, timeout: float) -> bytes:
+        connection = self._opened
+        if not select.select([connection], [], [], timeout)[0]:
+            return b''
+        data = connection.recv(most)
+        if not data:
+            raise LineLostError(f'{self._name} closed the connection')
+        return data
 
     @property
     def _opened(self) -> socket.socket:
