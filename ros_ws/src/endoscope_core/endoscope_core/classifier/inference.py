@@ -13,7 +13,8 @@ from endoscope_core.classifier.classification import (
     checked_tension,
     result_of,
 )
-from endoscope_core.classifier.tension_cnn import WIRES, TensionCnn
+from endoscope_core.classifier.standardised_tension import WIRES
+from endoscope_core.classifier.tension_cnn import TensionCnn
 from endoscope_core.classifier.weights_file import read_weights, unusable
 from endoscope_core.signals import CALIBRATION_SAMPLES, SINUSOID
 

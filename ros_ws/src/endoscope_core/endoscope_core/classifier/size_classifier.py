@@ -16,7 +16,7 @@ from endoscope_core.classifier.classification import (
     result_of,
 )
 from endoscope_core.classifier.size_model import STRANGENESS, BacklashSizeModel, SizeEstimate
-from endoscope_core.classifier.tension_cnn import WIRES
+from endoscope_core.classifier.standardised_tension import WIRES
 from endoscope_core.signals import calibration_motion
 
 HALF_CLASS = math.radians(5.0)

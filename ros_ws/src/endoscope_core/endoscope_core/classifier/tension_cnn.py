@@ -2,18 +2,17 @@
 
 from collections.abc import Sequence
 
-import torch
 from torch import Tensor, nn
 
+from endoscope_core.classifier.standardised_tension import WIRES, StandardisedTension
 from endoscope_core.signals import CALIBRATION_SAMPLES
 
 KERNEL = 3
 STRIDE = 3
-WIRES = 4
 CHANNELS = (16, 16, 32, 32, 64, 64, 64, 64)
 
 
-class TensionCnn(nn.Module):
+class TensionCnn(StandardisedTension):
     """Eight convolutions with batch normalisation and ReLU, then a dense layer.
 
     Eight strides of three reduce 9000 samples to exactly one, so that the dense layer sees one
@@ -28,9 +27,6 @@ class TensionCnn(nn.Module):
         Output channels of the eight convolutions.
     """
 
-    offset: Tensor
-    scale: Tensor
-
     def __init__(self, classes: int, channels: Sequence[int] = CHANNELS) -> None:
         super().__init__()
         layers: list[nn.Module] = []
@@ -43,16 +39,9 @@ class TensionCnn(nn.Module):
         for _ in channels:
             length //= STRIDE
         self.dense = nn.Linear(width * length, classes)
-        self.register_buffer('offset', torch.zeros(WIRES, 1))
-        self.register_buffer('scale', torch.ones(WIRES, 1))
-
-    def standardise_by(self, tension: Tensor) -> None:
-        """Take mean and spread of each wire over recordings (R, 4, N) as the unit of the input."""
-        self.offset = tension.mean(dim=(0, 2)).unsqueeze(1)
-        self.scale = tension.std(dim=(0, 2)).unsqueeze(1)
 
     def forward(self, tension: Tensor) -> Tensor:
         """Logits (R, classes) of tensions (R, 4, 9000) in N."""
-        features = self.features((tension - self.offset) / self.scale)
+        features = self.features(self.unitless(tension))
         logits: Tensor = self.dense(features.flatten(1))
         return logits

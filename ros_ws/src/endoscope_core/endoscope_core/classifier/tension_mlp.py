@@ -1,10 +1,9 @@
 """The multilayer perceptron that the first paper compares its 1D-CNN with (Table 3)."""
 
-import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from endoscope_core.classifier.tension_cnn import WIRES
+from endoscope_core.classifier.standardised_tension import WIRES, StandardisedTension
 from endoscope_core.signals import CALIBRATION_SAMPLES
 
 DECIMATION = 10
@@ -12,7 +11,7 @@ HIDDEN = (500, 500, 500)
 DROPOUT = (0.1, 0.2, 0.2, 0.3)
 
 
-class TensionMlp(nn.Module):
+class TensionMlp(StandardisedTension):
     """Three hidden layers of 500 units with ReLU and dropout, then a dense layer.
 
     The paper says no more than "MLP"; this is the usual one for time series (Wang, Yan, Oates,
@@ -24,9 +23,6 @@ class TensionMlp(nn.Module):
         Number of classes.
     """
 
-    offset: Tensor
-    scale: Tensor
-
     def __init__(self, classes: int) -> None:
         super().__init__()
         layers: list[nn.Module] = []
@@ -35,16 +31,9 @@ class TensionMlp(nn.Module):
             layers += [nn.Dropout(dropout), nn.Linear(width, units), nn.ReLU()]
             width = units
         self.layers = nn.Sequential(*layers, nn.Dropout(DROPOUT[-1]), nn.Linear(width, classes))
-        self.register_buffer('offset', torch.zeros(WIRES, 1))
-        self.register_buffer('scale', torch.ones(WIRES, 1))
-
-    def standardise_by(self, tension: Tensor) -> None:
-        """Take mean and spread of each wire over recordings (R, 4, N) as the unit of the input."""
-        self.offset = tension.mean(dim=(0, 2)).unsqueeze(1)
-        self.scale = tension.std(dim=(0, 2)).unsqueeze(1)
 
     def forward(self, tension: Tensor) -> Tensor:
         """Logits (R, classes) of tensions (R, 4, 9000) in N."""
-        unitless = (tension - self.offset) / self.scale
-        logits: Tensor = self.layers(functional.avg_pool1d(unitless, DECIMATION).flatten(1))
+        means = functional.avg_pool1d(self.unitless(tension), DECIMATION)
+        logits: Tensor = self.layers(means.flatten(1))
         return logits
