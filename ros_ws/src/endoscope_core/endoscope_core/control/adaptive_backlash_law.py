@@ -41,6 +41,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from endoscope_core.control.law_settings import check_settings
+
 
 @dataclass(frozen=True)
 class AdaptiveBacklashSettings:
@@ -94,18 +96,10 @@ class AdaptiveBacklashSettings:
     response_delay: float = 0.06
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f'{name} = {value} must be finite and not negative')
-        for name in (
-            'boundary_layer',
-            'filter_time',
-            'error_limit',
-            'direction_travel',
-            'output_limit',
-        ):
-            if getattr(self, name) == 0.0:
-                raise ValueError(f'{name} must be positive')
+        check_settings(
+            self,
+            ('boundary_layer', 'filter_time', 'error_limit', 'direction_travel', 'output_limit'),
+        )
         if self.loop_gain >= 1.0:
             raise ValueError(
                 f'loop_gain = {self.loop_gain} must stay below 1, '

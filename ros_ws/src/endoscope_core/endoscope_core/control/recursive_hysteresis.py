@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from endoscope_core.control.law_settings import check_settings
 from endoscope_core.control.tracker_feedback import FADE_TIME, STALE_AFTER, TrackerFeedback
 
 
@@ -52,12 +53,9 @@ class RecursiveHysteresisSettings:
     response_delay: float = 0.06
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f'{name} = {value} must be finite and not negative')
-        for name in ('transmission_gain', 'memory', 'noise', 'direction_travel', 'output_limit'):
-            if getattr(self, name) == 0.0:
-                raise ValueError(f'{name} must be positive')
+        check_settings(
+            self, ('transmission_gain', 'memory', 'noise', 'direction_travel', 'output_limit')
+        )
 
 
 class RecursiveHysteresisJoint:
