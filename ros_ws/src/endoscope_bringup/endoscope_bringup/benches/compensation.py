@@ -1,17 +1,16 @@
 """`endoscope bench compensation`: tracking error left on tubes that nothing was fitted on."""
 
 import argparse
-import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from endoscope_bringup.benches.inference_time import inference_time
+
 if TYPE_CHECKING:
-    from endoscope_core.classifier.classification import Classifier
     from endoscope_core.trials.unseen_tube_trial import UnseenTubeTrial
 
 FEEDFORWARD_LIMIT = 0.30
 FEEDBACK_LIMIT = 0.15
-_INFERENCES = 200
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -49,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
         print(_summary(signal.name, trials))
     near = sum(trial.nearest_class for trial in trials)
     print(f'class within 5 deg of the size: {near} of {len(trials)}')
-    print(f'inference: {_inference_time(classifier) * 1e3:.2f} ms on one thread')
+    print(f'inference: {inference_time(classifier) * 1e3:.2f} ms on one thread')
     worst = [
         max(getattr(trial, kind)['periodic'] for trial in trials)
         for kind in ('feedforward', 'feedback')
@@ -79,18 +78,3 @@ def _summary(signal: str, trials: 'Sequence[UnseenTubeTrial]') -> str:
             f'(worst {np.max(shares):.1f} %)'
         )
     return f'{signal}: {", ".join(parts)} of the uncompensated RMSE'
-
-
-def _inference_time(classifier: 'Classifier') -> float:
-    import numpy as np
-
-    from endoscope_core.dataset import record_calibration
-    from endoscope_core.plant import PlantDescription
-
-    tension = record_calibration(PlantDescription(), 0).tension
-    spent = []
-    for _ in range(_INFERENCES):
-        start = time.perf_counter()
-        classifier.classify(tension)
-        spent.append(time.perf_counter() - start)
-    return float(np.median(spent))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from endoscope_bringup.benches.inference_time import inference_time
 from endoscope_bringup.benches.papers_tables.row import PapersBench, Row
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ _UNSEEN_OF_EACH = 40
 _UNUSUAL_OF_EACH = 6
 _TRAINING_LIMIT_S = 120.0
 _INFERENCE_LIMIT_S = 0.010
-_INFERENCES = 200
 
 
 def rows(settings: PapersBench) -> list[Row]:
@@ -84,7 +84,7 @@ def _ours(name: str, dataset: 'CalibrationDataset', settings: PapersBench) -> li
         ),
         Row(
             'inference, share of 10 ms',
-            [_inference_time(classifier) / _INFERENCE_LIMIT_S],
+            [inference_time(classifier) / _INFERENCE_LIMIT_S],
             at_most=1.0,
         ),
     ]
@@ -141,19 +141,3 @@ def _accuracy_row(
         if i != j and count
     )
     return Row(name, shares, theirs, at_least=aim, note=f'{name}: {confused or "none confused"}')
-
-
-def _inference_time(classifier: 'SizeClassifier') -> float:
-    """Median of one judgement in s, on one thread, of what is judged to the end."""
-    from endoscope_core.dataset import record_calibration
-    from endoscope_core.plant import PlantDescription
-    from endoscope_core.signals import calibration_motion
-
-    motion = calibration_motion(classifier.motion)
-    tension = record_calibration(PlantDescription(), 0, motion).tension
-    spent = []
-    for _ in range(_INFERENCES):
-        start = time.perf_counter()
-        classifier.classify(tension)
-        spent.append(time.perf_counter() - start)
-    return float(np.median(spent))
