@@ -8,12 +8,11 @@ as far as the servos still obey.
 import queue
 import threading
 import time
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 from endoscope_devices.dynamixel.answers import Reply
 from endoscope_devices.dynamixel.bring_up import bring_up, enable
+from endoscope_devices.dynamixel.bus_records import BusFigures, ServoHealth, TimedReading
 from endoscope_devices.dynamixel.control_table import (
     ALERT,
     COUNT,
@@ -50,68 +49,6 @@ _DRAIN_S = 4e-3
 # A shaft that is driven by its wires may be faster than the motor without load.
 _SPEED_MARGIN = 1.5
 _LARGEST_CURRENT_A = 1193 * CURRENT_UNIT
-
-
-@dataclass(frozen=True)
-class TimedReading:
-    """A reading of all shafts.
-
-    Attributes
-    ----------
-    reading
-        What was measured.
-    taken_ns
-        Our monotonic time in ns at which the oldest of it was taken.
-    """
-
-    reading: MotorReading
-    taken_ns: int
-
-
-@dataclass
-class ServoHealth:
-    """What is known of a servo beside its motion.
-
-    Attributes
-    ----------
-    model
-        Its name.
-    error
-        Error byte of its last answer.
-    hardware
-        Hardware errors in words.
-    voltage, temperature
-        V and °C, as last read.
-    """
-
-    model: str = ''
-    error: int = 0
-    hardware: str = ''
-    voltage: float = 0.0
-    temperature: int = 0
-
-
-@dataclass
-class BusFigures:
-    """What the thread counts.
-
-    Attributes
-    ----------
-    cycles, readings
-        Cycles run, and those that gave a new reading of all servos.
-    failures
-        Failed cycles by reason.
-    last_failure
-        The last one in words.
-    last_ns
-        Monotonic time in ns of the last valid reading.
-    """
-
-    cycles: int = 0
-    readings: int = 0
-    failures: Counter[str] = field(default_factory=Counter)
-    last_failure: str = ''
-    last_ns: int = 0
 
 
 class BusThread:
