@@ -1,16 +1,13 @@
 """A recorder in the process of a test, real topics that it hears, and what was sent on them."""
 
-import itertools
-import os
 import time
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
-from rclpy.clock import Clock, ClockType
+from private_domain import private_domain
+from probed_runtime import ProbedRuntime
 from rclpy.context import Context
-from rclpy.node import Node
-from rclpy.task import Future
 from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import String
 
@@ -20,16 +17,9 @@ from endoscope_nodes.recorder_node import RecorderNode
 from endoscope_nodes.runtime import Runtime
 
 PATIENCE_S = 60.0
-_DOMAINS = itertools.cycle(range(100, 230))
-_FIRST = os.getpid() % 130
 
 
-def private_domain() -> int:
-    """Give a ROS domain that neither a person nor another test uses."""
-    return (next(_DOMAINS) + _FIRST) % 130 + 100
-
-
-class RecordedSession:
+class RecordedSession(ProbedRuntime):
     """A recorder, and a node that publishes to it.
 
     Parameters
@@ -45,32 +35,14 @@ class RecordedSession:
     def __init__(self, *, simulated=False, replay=None, **overrides) -> None:
         arguments = ['--ros-args', '--log-level', 'fatal']
         arguments += ['-p', 'use_sim_time:=true'] if simulated else []
-        self.runtime = Runtime(
+        runtime = Runtime(
             arguments,
             context=Context(),
             domain_id=private_domain(),
             overrides={'recorder': overrides, 'replay': replay or {}},
         )
-        self.recorder = self.runtime.add(RecorderNode)
-        self.probe = Node('probe', context=self.runtime.context, namespace='endoscope')
-        self.runtime.executor.add_node(self.probe)
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-
-    def wait(self, condition) -> None:
-        """Serve the nodes until something has come true."""
-        future = Future()
-
-        def look() -> None:
-            if not future.done() and condition():
-                future.set_result(None)
-
-        timer = self.probe.create_timer(0.002, look, clock=self._steady)
-        assert self.runtime.spin_until(future, PATIENCE_S), 'it does not come to it'
-        self.probe.destroy_timer(timer)
-
-    def serve(self, seconds: float) -> None:
-        """Serve the nodes for a while."""
-        self.runtime.spin_until(Future(), seconds)
+        self.recorder = runtime.add(RecorderNode)
+        super().__init__(runtime, PATIENCE_S)
 
     def publisher(self, kind: type, topic: str, qos):
         """Publish on a topic once the recorder hears it."""
@@ -82,15 +54,8 @@ class RecordedSession:
 
     def close(self):
         """End the recording like a process does, and return its report."""
-        self.probe.destroy_node()
-        self.runtime.close()
+        super().close()
         return self.recorder.last_report
-
-    def __enter__(self) -> 'RecordedSession':
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 SERVO = '/endoscope/motor/servo_jp'

@@ -1,41 +1,24 @@
 """All nodes in the process of a test, in simulated time that the test lets go on."""
 
-import itertools
-import os
-from collections import defaultdict
-
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.clock import Clock, ClockType
+from private_domain import private_domain
+from probed_graph import ProbedGraph
 from rclpy.context import Context
-from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
-from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.joint_stream import JointSample, JointSubscription
-from endoscope_nodes.matching import all_matched
-from endoscope_nodes.names import (
-    CALIBRATION_RESULT,
-    CALIBRATION_RUN,
-    JOINTS,
-    OPERATING_STATE,
-    STATE_COMMAND,
-)
-from endoscope_nodes.qos import EVENT, LOCK_STEP, RESULT
+from endoscope_nodes.names import CALIBRATION_RESULT, CALIBRATION_RUN, JOINTS
+from endoscope_nodes.qos import LOCK_STEP, RESULT
 from endoscope_nodes.runtime import Runtime
 
-# Domains from 100 on keep away from those of a person; each worker and each graph has its own.
-_DOMAINS = itertools.cycle(range(100, 230))
-_FIRST = os.getpid() % 130
 PATIENCE_S = 120.0
 
 
-class SimulatedGraph(ClosedOnExit):
+class SimulatedGraph(ProbedGraph):
     """The whole graph in lock-step, and a test node beside it.
 
     Parameters
@@ -49,40 +32,25 @@ class SimulatedGraph(ClosedOnExit):
     """
 
     def __init__(self, *, without=(), extra=(), overrides=None) -> None:
-        domain = (next(_DOMAINS) + _FIRST) % 130 + 100
-        self.runtime = Runtime(
+        self.domain = private_domain()
+        runtime = Runtime(
             args=['--ros-args', '-p', 'use_sim_time:=true', '--log-level', 'fatal'],
             context=Context(),
-            domain_id=domain,
+            domain_id=self.domain,
             overrides=overrides,
         )
         for factory in (*SLAVE_NODES, *CONTROL_NODES, *extra, ConductorNode):
             if factory.__module__.rpartition('.')[2].removesuffix('_node') not in without:
-                self.runtime.add(factory)
-        self.nodes = {node.get_name(): node for node in self.runtime.nodes}
-        self.runtime.check_parameters()
-        self.domain = domain
+                runtime.add(factory)
+        runtime.check_parameters()
+        super().__init__(runtime, PATIENCE_S)
         self.conductor = self.nodes['conductor']
-        self.probe = Node('probe', context=self.runtime.context, namespace='endoscope')
-        self.runtime.executor.add_node(self.probe)
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._commands = self.probe.create_publisher(String, STATE_COMMAND, EVENT)
-        self.states = []
-        self.probe.create_subscription(
-            String, OPERATING_STATE, lambda m: self.states.append(m.data), RESULT
-        )
         self.results = []
         self.probe.create_subscription(
             DiagnosticArray, CALIBRATION_RESULT, self.results.append, RESULT
         )
-        self.diagnostics = defaultdict(list)
-        self.probe.create_subscription(DiagnosticArray, '/diagnostics', self._note, EVENT)
         self._run = self.probe.create_client(Trigger, CALIBRATION_RUN)
         self.connect()
-
-    def _note(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            self.diagnostics[status.name].append(status)
 
     def listen(self, topic: str, names=JOINTS) -> list[JointSample]:
         """Collect all samples of a topic from now on.
@@ -100,22 +68,6 @@ class SimulatedGraph(ClosedOnExit):
         publisher = self.probe.create_publisher(kind, topic, qos)
         self.connect()
         return publisher
-
-    def connect(self) -> None:
-        """Wait until all publishers and subscriptions have found each other."""
-        self.wait(lambda: all_matched([*self.runtime.nodes, self.probe]))
-
-    def wait(self, condition) -> None:
-        """Serve the nodes in real time until something has come true."""
-        future = Future()
-
-        def look() -> None:
-            if not future.done() and condition():
-                future.set_result(None)
-
-        timer = self.probe.create_timer(0.002, look, clock=self._steady)
-        assert self.runtime.spin_until(future, PATIENCE_S), 'the graph does not come to it'
-        self.probe.destroy_timer(timer)
 
     def advance(self, seconds: float) -> None:
         """Let simulated time go on."""
@@ -157,21 +109,3 @@ class SimulatedGraph(ClosedOnExit):
         node = self.nodes.pop(name)
         node.close = lambda: None
         self.runtime.remove(node)
-
-    def set(self, node: str, **values) -> None:
-        """Set parameters of a node."""
-        for result in self.nodes[node].set_parameters(
-            [Parameter(k, value=v) for k, v in values.items()]
-        ):
-            assert result.successful, result.reason
-
-    def reported(self, name: str) -> dict[str, str]:
-        """Values last reported in the diagnostics of a subcomponent."""
-        return {v.key: v.value for v in self.diagnostics[name][-1].values}
-
-    def close(self) -> None:
-        try:
-            self.runtime.executor.remove_node(self.probe)
-            self.probe.destroy_node()
-        finally:
-            self.runtime.close()

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import parameter_table
 import pytest
+from private_domain import private_domain
 from rclpy.context import Context
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from recorded_session import private_domain
 
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES

@@ -10,9 +10,9 @@ import time
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from private_domain import private_domain
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
-from recorded_session import private_domain
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from private_domain import private_domain
 from rclpy.context import Context
-from recorded_session import SERVO, STATE, RecordedSession, private_domain
+from recorded_session import SERVO, STATE, RecordedSession
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from aurora_rig import Instrument
 from load_cell_rig import BROKEN, SATURATED, Cells, transmitter, write_calibration
+from private_domain import private_domain
 from rclpy.context import Context
-from recorded_session import private_domain
 from sensor_graph import SensorGraph
 
 from endoscope_bags import open_bag
