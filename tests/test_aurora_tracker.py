@@ -8,6 +8,7 @@ import ndicapy
 import numpy as np
 import pytest
 from aurora_rig import Instrument
+from device_readings import collect, figure, until
 
 from endoscope_core.kinematics import bending_from_orientation
 from endoscope_devices.em_tracker import (
@@ -25,7 +26,6 @@ from endoscope_devices.em_tracker.tx_reply import MalformedReplyError, parse_tx
 # In real time, on a machine that may stall for longer than a device may be silent.
 pytestmark = pytest.mark.flaky(reruns=2)
 
-PATIENCE_S = 20.0
 LATENCY = 0.03
 
 
@@ -46,23 +46,6 @@ def tracker(emulator):
     tracker.open()
     yield tracker
     tracker.close()
-
-
-def until(condition):
-    end = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end, 'it does not come to it'
-        time.sleep(0.005)
-
-
-def collect(tracker, readings):
-    taken = []
-    until(lambda: taken.extend(tracker.take()) or len(taken) >= readings)
-    return taken
-
-
-def figure(tracker, name):
-    return tracker.health()[1][name]
 
 
 def test_each_frame_comes_once_with_the_time_at_which_it_was_measured(tracker, emulator):

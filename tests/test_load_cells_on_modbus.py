@@ -1,9 +1,8 @@
 """Load cells over a real serial line and a real network connection, with what goes wrong there."""
 
-import time
-
 import minimalmodbus
 import pytest
+from device_readings import collect, figure, until
 from load_cell_rig import BROKEN, ZERO, Cells, transmitter, write_calibration
 
 from endoscope_devices.emulation.serial_cable import SerialCable
@@ -17,8 +16,6 @@ from endoscope_nodes.names import WIRES
 
 # In real time, on a machine that may stall for longer than a device may be silent.
 pytestmark = pytest.mark.flaky(reruns=2)
-
-PATIENCE_S = 20.0
 
 
 @pytest.fixture
@@ -61,23 +58,6 @@ def on_tcp(network, calibration):
     device.open()
     yield device
     device.close()
-
-
-def until(condition):
-    end = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end, 'it does not come to it'
-        time.sleep(0.005)
-
-
-def collect(device, readings):
-    taken = []
-    until(lambda: taken.extend(device.take()) or len(taken) >= readings)
-    return taken
-
-
-def figure(device, name):
-    return device.health()[1][name]
 
 
 @pytest.mark.parametrize('line', ['on_serial', 'on_tcp'])
