@@ -2,17 +2,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from play_loop import play
 
 from endoscope_core.metrics import tracking_rmse, width_at_mid_height
-
-
-def play(angle, half_gap):
-    state, states = 0.0, []
-    for value in angle:
-        state = min(max(state, value - half_gap), value + half_gap)
-        states.append(state)
-    return np.array(states)
-
 
 TIME = np.arange(0.0, 4.0 * np.pi, 0.002)
 SETTLED = 2.0 * np.pi <= TIME

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from safe_parameters import SAFE
 from scipy.integrate import solve_ivp
 
 from endoscope_core.hysteresis import (
@@ -23,17 +24,6 @@ from endoscope_core.hysteresis.inverse_safety import GREATEST_INVERSE_SLOPE
 
 TIME = np.arange(0.0, 9.0, 0.01)
 MOTION = 0.9 * np.sin(TIME) + 0.5 * np.sin(1.73 * TIME)
-SAFE = {
-    'bouc_wen': BoucWenParameters.from_shape(0.9, 0.5, 0.06, -0.9, 2.0),
-    'asymmetric_bouc_wen': AsymmetricBoucWenParameters(
-        0.9, 0.5, 0.1, 0.05, 0.08, -0.5, 2.0, 0.1, 0.3, 1.5
-    ),
-    'dahl': DahlParameters(0.9, 0.5, 0.1, 1.6, -0.03),
-    'play': PlayParameters(0.9, 0.5, 0.05, 0.02),
-    'prandtl_ishlinskii': PrandtlIshlinskiiParameters(
-        (0.0, 0.2, 0.5, 0.8), (0.1, 0.3, 0.4, 0.2), 0.04
-    ),
-}
 steps = st.floats(-1e6, 1e6) | st.floats(-1.0, 1.0) | st.floats(-1e-9, 1e-9)
 
 
