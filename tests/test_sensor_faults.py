@@ -146,44 +146,18 @@ def fault(rig, name, causes, begin, end):
 SILENT = 'wires/measured_js has been silent'
 
 
-def test_a_cell_that_breaks(rig):
-    fault(
-        rig,
-        'broken cell',
-        ['wire_x_pos: broken wire of the cell'],
-        lambda: rig.cells.count.update(wire_x_pos=BROKEN),
-        rig.cells.count.clear,
-    )
-
-
-def test_a_cell_that_saturates(rig):
-    fault(
-        rig,
-        'saturated cell',
-        ['wire_y_neg: saturated'],
-        lambda: rig.cells.count.update(wire_y_neg=SATURATED),
-        rig.cells.count.clear,
-    )
-
-
-def test_a_cell_that_freezes(rig):
-    fault(
-        rig,
-        'frozen cell',
-        ['wire_x_neg: frozen'],
-        lambda: rig.cells.freeze.add('wire_x_neg'),
-        rig.cells.freeze.clear,
-    )
-
-
-def test_a_wire_that_is_pulled_too_hard(rig):
-    fault(
-        rig,
-        'tension ceiling',
-        ['over the ceiling of 60.0 N'],
-        lambda: rig.cells.extra.update(wire_x_pos=58.0),
-        rig.cells.extra.clear,
-    )
+@pytest.mark.parametrize(
+    ('name', 'cause', 'kind', 'wires'),
+    [
+        ('broken cell', 'wire_x_pos: broken wire of the cell', 'count', {'wire_x_pos': BROKEN}),
+        ('saturated cell', 'wire_y_neg: saturated', 'count', {'wire_y_neg': SATURATED}),
+        ('frozen cell', 'wire_x_neg: frozen', 'freeze', {'wire_x_neg'}),
+        ('tension ceiling', 'over the ceiling of 60.0 N', 'extra', {'wire_x_pos': 58.0}),
+    ],
+)
+def test_a_cell_that_fails_or_is_pulled_too_hard(rig, name, cause, kind, wires):
+    spoilt = getattr(rig.cells, kind)
+    fault(rig, name, [cause], lambda: spoilt.update(wires), spoilt.clear)
 
 
 def test_load_cells_that_are_unplugged(rig):
