@@ -7,8 +7,8 @@ for a frame in whatever arrives and repeat requests; here a reply is known by it
 is read, and anything else is an error that is counted by kind.
 """
 
+from abc import ABC, abstractmethod
 from enum import StrEnum
-from typing import Protocol
 
 from pymodbus.exceptions import ModbusIOException
 from pymodbus.framer import FramerRTU, FramerSocket
@@ -48,70 +48,8 @@ class ReplyError(Exception):
         self.trouble = trouble
 
 
-class Framing(Protocol):
-    """How requests and replies lie in bytes; one request is out at a time."""
-
-    def request(self, address: int, count: int) -> bytes:
-        """Bytes that ask for registers.
-
-        Parameters
-        ----------
-        address, count
-            First register and number of registers.
-        """
-
-    def length(self, head: bytes) -> int:
-        """How long the reply is, as far as its first bytes tell.
-
-        Parameters
-        ----------
-        head
-            What has come so far; at least two bytes more are always wanted than decide.
-        """
-
-    def accept(self, reply: bytes) -> tuple[int, ...] | None:
-        """Registers of the reply to the last request; None if it answers an earlier one.
-
-        Raises
-        ------
-        ReplyError
-            It is not the reply to that request.
-        """
-
-
-class _Decoding:
-    """What RTU and TCP have in common: the protocol data unit."""
-
-    def __init__(self, unit: int, function: int) -> None:
-        self.unit = unit
-        self.function = function
-        self.count = 0
-        self.decoder = DecodePDU(False)
-
-    def pdu(self, address: int, count: int, transaction: int) -> ReadHoldingRegistersRequest:
-        self.count = count
-        return _REQUESTS[self.function](
-            address=address, count=count, dev_id=self.unit, transaction_id=transaction
-        )
-
-    def registers(self, unit: int, pdu: bytes) -> tuple[int, ...]:
-        if unit != self.unit:
-            raise ReplyError(ReplyTrouble.MALFORMED, f'from unit {unit}, asked was {self.unit}')
-        if len(pdu) == 2 and pdu[0] == self.function | 0x80:
-            raise ReplyError(ReplyTrouble.REFUSED, f'Modbus exception {pdu[1]}')
-        if pdu[0] != self.function or len(pdu) != 2 + 2 * self.count or pdu[1] != 2 * self.count:
-            raise ReplyError(ReplyTrouble.MALFORMED, f'{len(pdu)} bytes of function {pdu[0]}')
-        try:
-            reply = self.decoder.decode(pdu)
-        except ModbusIOException as error:
-            raise ReplyError(ReplyTrouble.MALFORMED, str(error)) from error
-        if isinstance(reply, ExceptionResponse) or type(reply) is not _REPLIES[self.function]:
-            raise ReplyError(ReplyTrouble.MALFORMED, f'a {type(reply).__name__}')
-        return tuple(reply.registers)
-
-
-class RtuFraming:
-    """Modbus RTU.
+class Framing(ABC):
+    """How requests and replies lie in bytes; one request is out at a time.
 
     Parameters
     ----------
@@ -122,8 +60,70 @@ class RtuFraming:
     """
 
     def __init__(self, unit: int, function: int) -> None:
-        self._decoding = _Decoding(unit, function)
-        self._framer = FramerRTU(self._decoding.decoder)
+        self._unit = unit
+        self._function = function
+        self._count = 0
+        self._decoder = DecodePDU(False)
+
+    @abstractmethod
+    def request(self, address: int, count: int) -> bytes:
+        """Bytes that ask for registers.
+
+        Parameters
+        ----------
+        address, count
+            First register and number of registers.
+        """
+
+    @abstractmethod
+    def length(self, head: bytes) -> int:
+        """How long the reply is, as far as its first bytes tell.
+
+        Parameters
+        ----------
+        head
+            What has come so far; at least two bytes more are always wanted than decide.
+        """
+
+    @abstractmethod
+    def accept(self, reply: bytes) -> tuple[int, ...] | None:
+        """Registers of the reply to the last request; None if it answers an earlier one.
+
+        Raises
+        ------
+        ReplyError
+            It is not the reply to that request.
+        """
+
+    def _pdu(self, address: int, count: int, transaction: int = 0) -> ReadHoldingRegistersRequest:
+        self._count = count
+        return _REQUESTS[self._function](
+            address=address, count=count, dev_id=self._unit, transaction_id=transaction
+        )
+
+    def _registers(self, unit: int, pdu: bytes) -> tuple[int, ...]:
+        if unit != self._unit:
+            raise ReplyError(ReplyTrouble.MALFORMED, f'from unit {unit}, asked was {self._unit}')
+        if len(pdu) == 2 and pdu[0] == self._function | 0x80:
+            raise ReplyError(ReplyTrouble.REFUSED, f'Modbus exception {pdu[1]}')
+        size = 2 * self._count
+        if pdu[0] != self._function or len(pdu) != 2 + size or pdu[1] != size:
+            raise ReplyError(ReplyTrouble.MALFORMED, f'{len(pdu)} bytes of function {pdu[0]}')
+        try:
+            reply = self._decoder.decode(pdu)
+        except ModbusIOException as error:
+            raise ReplyError(ReplyTrouble.MALFORMED, str(error)) from error
+        if isinstance(reply, ExceptionResponse) or type(reply) is not _REPLIES[self._function]:
+            raise ReplyError(ReplyTrouble.MALFORMED, f'a {type(reply).__name__}')
+        return tuple(reply.registers)
+
+
+class RtuFraming(Framing):
+    """Modbus RTU; parameters as of :class:`Framing`."""
+
+    def __init__(self, unit: int, function: int) -> None:
+        super().__init__(unit, function)
+        self._framer = FramerRTU(self._decoder)
 
     def request(self, address: int, count: int) -> bytes:
         """See :class:`Framing`.
@@ -133,7 +133,7 @@ class RtuFraming:
         address, count
             First register and number of registers.
         """
-        return self._framer.buildFrame(self._decoding.pdu(address, count, 0))
+        return self._framer.buildFrame(self._pdu(address, count))
 
     def length(self, head: bytes) -> int:
         """See :class:`Framing`: address, function, byte count or exception code, data, CRC."""
@@ -147,23 +147,15 @@ class RtuFraming:
             raise ReplyError(ReplyTrouble.MALFORMED, f'{len(reply)} bytes')
         if not FramerRTU.check_CRC(reply[:-2], int.from_bytes(reply[-2:], 'big')):
             raise ReplyError(ReplyTrouble.CHECKSUM, f'in {len(reply)} bytes')
-        return self._decoding.registers(reply[0], reply[1:-2])
+        return self._registers(reply[0], reply[1:-2])
 
 
-class TcpFraming:
-    """Modbus TCP.
-
-    Parameters
-    ----------
-    unit
-        Modbus address.
-    function
-        3 or 4.
-    """
+class TcpFraming(Framing):
+    """Modbus TCP; parameters as of :class:`Framing`."""
 
     def __init__(self, unit: int, function: int) -> None:
-        self._decoding = _Decoding(unit, function)
-        self._framer = FramerSocket(self._decoding.decoder)
+        super().__init__(unit, function)
+        self._framer = FramerSocket(self._decoder)
         self._transaction = 0
 
     def request(self, address: int, count: int) -> bytes:
@@ -175,7 +167,7 @@ class TcpFraming:
             First register and number of registers.
         """
         self._transaction = self._transaction % 0xFFFF + 1
-        return self._framer.buildFrame(self._decoding.pdu(address, count, self._transaction))
+        return self._framer.buildFrame(self._pdu(address, count, self._transaction))
 
     def length(self, head: bytes) -> int:
         """See :class:`Framing`: the header's length field counts from the unit on."""
@@ -190,4 +182,4 @@ class TcpFraming:
         _, unit, transaction, pdu = self._framer.decode(reply)
         if transaction != self._transaction:
             return None
-        return self._decoding.registers(unit, pdu)
+        return self._registers(unit, pdu)
