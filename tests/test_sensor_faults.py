@@ -233,28 +233,22 @@ def blind(rig, name, begin, diagnosis, end):
     assert graph.state == 'ENABLED', graph.nodes['supervisor'].machine.cause
 
 
-def test_a_tracker_that_goes_blind(rig):
-    def hide():
-        rig.instrument.hidden = True
+@pytest.mark.parametrize(
+    ('name', 'kind', 'diagnosis'),
+    [
+        ('out of volume', 'hidden', 'out of the measurement volume'),
+        ('broken coil', 'broken', 'coil of the sensor is broken'),
+    ],
+)
+def test_a_sensor_that_is_out_of_sight_or_breaks(rig, name, kind, diagnosis):
+    def suffer(suffers):
+        setattr(rig.instrument, kind, suffers)
 
-    def show():
-        rig.instrument.hidden = False
-
-    blind(rig, 'out of volume', hide, 'out of the measurement volume', show)
+    blind(rig, name, lambda: suffer(True), diagnosis, lambda: suffer(False))
 
 
 def test_a_tracker_that_is_unplugged(rig):
     blind(rig, 'unplugged tracker', rig.aurora.unplug, 'ttyAurora', rig.aurora.plug_in)
-
-
-def test_a_coil_that_breaks(rig):
-    def tear():
-        rig.instrument.broken = True
-
-    def mend():
-        rig.instrument.broken = False
-
-    blind(rig, 'broken coil', tear, 'coil of the sensor is broken', mend)
 
 
 def test_what_the_tracker_says_is_where_the_slave_was(rig):
