@@ -159,6 +159,14 @@ def test_faults_of_the_recording_leave_the_rig_alone(effect_id, nominal):
     assert changed_channels(with_effect(effect_id), nominal, 0) == set()
 
 
+ONLY_WITH = {
+    'memory_s': 'lagging',
+    'flank_compliance': 'loaded_tip',
+    'wire_end_damping': 'loaded_tip',
+}
+"""Choices without which a parameter has nothing to act on."""
+
+
 def slopes(effect_id, parameter, step):
     """Readings' slopes, in sensors' noise, by a parameter where a fit of the effect begins."""
     start = {
@@ -166,6 +174,8 @@ def slopes(effect_id, parameter, step):
         for p in CATALOGUE[effect_id].parameters
         if p.typical == 0.0 and p.starts and p is not parameter
     }
+    if parameter.name in ONLY_WITH:
+        start[ONLY_WITH[parameter.name]] = 1.0
     unit = abs(parameter.typical) or 0.1 * (parameter.high - parameter.low)
     sign = 1.0 if parameter.typical + step * unit <= parameter.high else -1.0
     here, there = (

@@ -52,6 +52,44 @@ def test_a_loaded_tip_leaves_the_wires_free_within_the_gap():
     assert lead[0] - lead[-1] == pytest.approx(0.2, abs=0.005)
 
 
+def test_flanks_give_way_by_the_moment_that_they_carry():
+    rigid = {'gap_rad': 0.2, 'loaded_tip': 1.0}
+    # Held by wires without friction, a spring of 0.003 N m/rad at 0.4 rad takes 0.0012 N m.
+    joint = JointParameters(capstan_exponent=0.0, joint_friction=0.0, joint_stiffness=3e-3)
+    held = np.full(3000, 0.5)
+
+    def lead(given):
+        run = answer(held, ('joint_backlash', given), joint=joint)
+        tip, moment = run.bending[-1, 0], 3e-3 * run.bending[-1, 0]
+        pull = 0.0025 * (run.tension[-1, 0, 0] - run.tension[-1, 0, 1])
+        assert pull == pytest.approx(moment, rel=1e-3)
+        return 2.0 * run.shaft_position[-1, 0] - tip - pull / (2.0 * 2000.0 * 0.0025**2), moment
+
+    here, _ = lead(rigid)
+    soft, moment = lead(rigid | {'flank_compliance': 10.0})
+    assert here == pytest.approx(0.1, abs=1e-4)
+    assert soft == pytest.approx(0.1 + 10.0 * moment, abs=1e-4)
+
+
+def test_a_damped_wire_end_crosses_the_gap_slowly():
+    smooth = JointParameters(capstan_exponent=0.0)
+    turn = int(np.argmax(SINE[:2000]))
+
+    def pull_and_speed(damping):
+        given = {'gap_rad': 0.2, 'loaded_tip': 1.0, 'wire_end_damping': damping}
+        run = answer(SINE, ('joint_backlash', given), joint=smooth)
+        pull = 0.0025 * (run.tension[:, 0, 0] - run.tension[:, 0, 1])
+        wire_end = 2.0 * run.shaft_position[:, 0] - pull / (2.0 * 2000.0 * 0.0025**2)
+        # In the gap the tip stands still.
+        crossing = np.flatnonzero(np.abs(np.gradient(run.bending[:, 0])) < 1e-7)
+        inside = crossing[(crossing > turn) & (crossing < turn + 1000)][20:-20]
+        return pull[inside], np.gradient(wire_end, TICK)[inside]
+
+    assert np.abs(pull_and_speed(0.0)[0]).max() < 2e-5
+    pull, speed = pull_and_speed(1e-3)
+    np.testing.assert_allclose(pull, 1e-3 * speed, rtol=0.05)
+
+
 @pytest.mark.parametrize('stiffness', [0.05, 0.5])
 def test_joint_stop_is_a_spring_beyond_its_angle_on_both_sides(stiffness):
     stop = ('joint_stop', {'angle_rad': 0.4, 'stiffness': stiffness})

@@ -122,10 +122,15 @@ def test_nominal_friction_is_the_capstan_equation():
     assert friction_of(answer(0.4 * TIME), 1500) == pytest.approx(np.exp(0.45), rel=1e-3)
 
 
-def test_stribeck_friction_is_the_curve_at_steady_speed():
+@pytest.mark.parametrize('lagging', [0.0, 1.0])
+@pytest.mark.parametrize(
+    ('tail', 'fall'), [(0.0, lambda s: np.exp(-s)), (1.0, lambda s: 1.0 / (1.0 + s**2))]
+)
+def test_stribeck_friction_is_the_curve_at_steady_speed(lagging, tail, fall):
     # Damped enough to slide smoothly; v = r (m' + q') / 2.
     damped = JointParameters(joint_damping=0.05)
-    effect = ('stribeck_friction', {'rise': 0.5, 'stribeck_speed': 1e-3})
+    given = {'rise': 0.5, 'stribeck_speed': 1e-3, 'tail': tail, 'lagging': lagging}
+    effect = ('stribeck_friction', given)
     for speed in (0.1, 0.4, 0.8):
         run = answer(speed * TIME, effect, joint=damped)
         wire_speed = (
@@ -133,8 +138,23 @@ def test_stribeck_friction_is_the_curve_at_steady_speed():
             * 0.0025
             * (speed / GEAR + (run.bending[2500, 0] - run.bending[2480, 0]) / (20 * TICK))
         )
-        expected = np.exp(0.45 * (1.0 + 0.5 * np.exp(-wire_speed / 1e-3)))
+        expected = np.exp(0.45 * (1.0 + 0.5 * fall(wire_speed / 1e-3)))
         assert friction_of(run, 2490) == pytest.approx(expected, rel=0.02)
+
+
+def test_lagging_friction_follows_the_speed_within_its_memory():
+    damped = JointParameters(joint_damping=0.05)
+    ramp = 0.8 * np.maximum(TIME - 2.0, 0.0) + 0.02 * TIME
+
+    def friction(memory_s):
+        given = {'rise': 0.5, 'stribeck_speed': 5e-4, 'lagging': 1.0, 'memory_s': memory_s}
+        run = answer(ramp, ('stribeck_friction', given), joint=damped)
+        return np.array([friction_of(run, row) for row in range(1900, 2400)])
+
+    prompt, late = friction(1e-4), friction(5e-2)
+    assert late[:50] == pytest.approx(prompt[:50], rel=2e-3)
+    assert np.max(late / prompt) > 1.05
+    assert late[-1] == pytest.approx(prompt[-1], rel=0.02)
 
 
 def test_a_wire_shudders_where_friction_falls_too_steeply_and_loses_friction():
@@ -209,8 +229,10 @@ def test_configuration_change_multiplies_the_friction_from_its_time_on():
     assert friction_of(run, 3000) == pytest.approx(np.exp(0.45 * 1.5), rel=1e-3)
 
 
-def test_friction_asymmetry_brakes_a_pulled_wire_more():
-    run = answer(0.4 * TIME, ('friction_asymmetry', {'asymmetry': 0.3}))
+@pytest.mark.parametrize('gradual', [0.0, 1.0])
+def test_friction_asymmetry_brakes_a_pulled_wire_more(gradual):
+    given = {'asymmetry': 0.3, 'gradual': gradual}
+    run = answer(0.4 * TIME, ('friction_asymmetry', given))
     stretch = 0.0025 * (run.shaft_position[1500, 0] / GEAR - run.bending[1500, 0])
     assert run.tension[1500, 0, 0] == pytest.approx(
         (5.0 + 2000.0 * stretch) * np.exp(0.45 * 1.3), rel=1e-3
@@ -218,6 +240,17 @@ def test_friction_asymmetry_brakes_a_pulled_wire_more():
     assert run.tension[1500, 0, 1] == pytest.approx(
         (5.0 - 2000.0 * stretch) * np.exp(-0.45 * 0.7), rel=1e-3
     )
+
+
+def test_gradual_asymmetry_grows_with_the_pre_sliding_state():
+    # Half way through pre-sliding, z = 1/2: exponents phi/2 z (1 +- a z) of both wires.
+    held = step_command(0.06, rise=2000)
+    even = answer(held)
+    uneven = answer(held, ('friction_asymmetry', {'asymmetry': 0.2, 'gradual': 1.0}))
+    sharp = answer(held, ('friction_asymmetry', {'asymmetry': 0.2}))
+    row = 700
+    change = uneven.tension[row, 0, 0] - even.tension[row, 0, 0]
+    assert 0.0 < change < 0.9 * (sharp.tension[row, 0, 0] - even.tension[row, 0, 0])
 
 
 def test_friction_run_in_falls_with_the_distance_slid():

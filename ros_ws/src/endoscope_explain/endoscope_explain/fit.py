@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE
+from endoscope_core.effects import CATALOGUE, stribeck_friction
 from endoscope_explain.evaluate import residuals, simulate_joint
 from endoscope_explain.free_parameters import LEAD, FreeParameter
 from endoscope_explain.observation import JointObservation
@@ -17,6 +17,9 @@ Flags = NDArray[np.bool_]
 CLOCK_SKEW = CATALOGUE['clock_skew']
 STEP = 1.0e-2
 """Difference step of a coordinate: large against the integrator's error, small against bends."""
+WIDE_STEP = 0.1
+"""With sticking and slipping, the times of the slips jump with the parameters, and so do the
+residuals: a wide difference looks over the jumps."""
 REACH = 0.7
 """Largest step of a coordinate: further away the derivative says little."""
 SLOW = 0.2
@@ -58,6 +61,12 @@ class JointModel:
         skew = parameters[CLOCK_SKEW.first_parameter] if self.flags[CLOCK_SKEW.flag] else 0.0
         outputs = simulate_joint(self.observation, parameters, self.flags)
         return residuals(self.observation, outputs, lead, skew)
+
+    @property
+    def step(self) -> float:
+        """Difference step of a logarithmic coordinate."""
+        sticks = self.flags[stribeck_friction.ON] and self.base[stribeck_friction.LAGGING] > 0.0
+        return WIDE_STEP if sticks else STEP
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest coordinates."""
@@ -125,7 +134,7 @@ def jacobian(model: JointModel, theta: Array, at: Array, columns: list[int] | No
     result = np.empty((len(at), len(columns)))
     for i, c in enumerate(columns):
         moved = theta.copy()
-        step = STEP if model.free[c].logarithmic else 2.0 * STEP
+        step = model.step if model.free[c].logarithmic else 2.0 * model.step
         step = step if theta[c] + step <= high[c] else -step
         moved[c] = max(theta[c] + step, low[c])
         result[:, i] = (model.residuals(moved) - at) / (moved[c] - theta[c])

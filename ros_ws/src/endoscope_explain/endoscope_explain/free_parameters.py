@@ -58,6 +58,9 @@ class FreeParameter:
 
     def value(self, coordinate: float) -> float:
         """The value of a coordinate, kept within the bounds."""
+        if self.logarithmic:
+            # What the recording does not determine at all has bounds far beyond any number.
+            coordinate = min(coordinate, math.log(self.high))
         value = math.exp(coordinate) if self.logarithmic else coordinate * self.unit
         return min(max(value, self.low), self.high)
 

@@ -17,6 +17,7 @@ from endoscope_explain.compose import (
 from endoscope_explain.evaluate import simulate_joint
 from endoscope_explain.fit import Fit
 from endoscope_explain.free_parameters import BAND
+from endoscope_explain.many_starts import RUGGED, from_many_starts
 from endoscope_explain.observation import JointObservation, couple
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.reconsider import reconsidered
@@ -106,6 +107,8 @@ def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = 2) -> JointSearch:
     for level in range(depth):
         polished = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
         grown = grow(parents, searchable_effects(), jobs, polished)
+        if grown and grown[0].effects == (RUGGED,) and not is_noise(grown[0].fit):
+            grown[0] = from_many_starts(grown[0], anchors[0], jobs)
         levels.append(tuple(grown))
         if (
             not grown

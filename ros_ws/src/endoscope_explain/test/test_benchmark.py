@@ -102,7 +102,10 @@ def test_a_second_recording_is_judged_against_noise_and_nominal():
     good = {'slave/measured_js:bend_x': (0.1, 0.0049, 0.00436)}
     bad = {'slave/measured_js:bend_x': (0.1, 0.2, 0.00436)}
     found = by_name([outcome(['gravity'], ['gravity'], second=s) for s in (good, bad)])
-    assert found['second recording: angles within 1.15 x noise'].value == '50.0 % (1 of 2)'
+    assert (
+        found['second recording (of joints moved): angles within 1.15 x noise'].value
+        == '50.0 % (1 of 2)'
+    )
     assert found['second recording: worse than nominal'].value == '50.0 % (1 of 2)'
 
 

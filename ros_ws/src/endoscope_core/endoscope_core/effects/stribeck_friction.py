@@ -10,22 +10,34 @@ from endoscope_core.effects.slots import CAPSTAN_EXPONENT, JOINT_DAMPING, JOINT_
 DEFINITION = define(
     'stribeck_friction',
     Stage.TRANSMISSION,
-    physics='Sheath friction is higher at low sliding speed; where it falls so steeply that the '
-    'wire cannot slide smoothly, wire and joint shudder and shake friction off.',
-    equation="phi(s) = phi (1 + rise exp(-s / stribeck_speed)), z' = (v - s z) / xs; mean speed "
-    's of the path: |v| and, below the speed of neutral stability, shudder times that',
-    source='Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, eq. 6; averaged '
-    'over fast shudder as in Iannelli et al., Automatica 42(4), 2006',
+    physics='Sheath friction is higher at low sliding speed. Where it follows the speed at once '
+    'and falls so steeply that the wire cannot slide smoothly, wire and joint shudder and shake '
+    'friction off; where it lags behind the speed, they stick and slip.',
+    equation='phi(s) = phi (1 + rise ((1 - tail) exp(-s / stribeck_speed) + tail / (1 + (s / '
+    "stribeck_speed)^2))), z' = (v - s z) / xs; mean speed s of the path: |v| and, below the speed "
+    "of neutral stability, shudder times that; if lagging, memory_s s' = |v| - s and z' = (v - "
+    '|v| z) / xs',
+    source='Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, eq. 6, with '
+    'frictional memory; averaged over fast shudder as in Iannelli et al., '
+    'Automatica 42(4), 2006',
     parameters=(
         EffectParameter('rise', '-', 0.0, 3.0, 0.5, off=0.0, starts=(0.4,)),
-        EffectParameter('stribeck_speed', 'm/s', 1e-5, 2e-2, 1e-3, starts=(5e-4, 3e-3)),
+        EffectParameter('stribeck_speed', 'm/s', 1e-5, 2e-2, 1e-3, starts=(1e-3, 3e-3)),
         EffectParameter('shudder', '-', 0.8, 5.0, 1.0),
+        EffectParameter('tail', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
+        EffectParameter('lagging', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
+        EffectParameter('memory_s', 's', 5e-5, 5e-2, 3e-3, starts=(5e-4, 3e-3)),
     ),
 )
 ON = DEFINITION.flag
 RISE = DEFINITION.first_parameter
 SPEED = RISE + 1
 SHUDDER = RISE + 2
+TAIL = RISE + 3
+LAGGING = RISE + 4
+MEMORY = RISE + 5
+REMEMBERED_SPEED = SLOTS.state_block()
+"""Sliding speed in m/s that lagging friction acts on."""
 BRAKING = SLOTS.state_block()
 """By how much the wires' friction would brake the joint per unit of exponent and radius, N."""
 
@@ -43,12 +55,29 @@ def factor_and_shudder(state: Array, parameters: Array, speed: float) -> tuple[f
     itself is chaotic and cannot be fitted.
     """
     stribeck_speed = parameters[SPEED]
+    if parameters[LAGGING] > 0.0:
+        return _factor(parameters, state[REMEMBERED_SPEED]), 0.0
     lever = 0.5 * parameters[JOINT_RADIUS]
     steepest = parameters[RISE] / stribeck_speed * lever * lever * state[BRAKING]
     instability = steepest * parameters[CAPSTAN_EXPONENT] / parameters[JOINT_DAMPING]
     shudder = parameters[SHUDDER] * stribeck_speed * _shudder_of(instability)
     mean_speed = dahl.path_length(speed, FRICTION_SHARE * shudder)
-    return 1.0 + parameters[RISE] * math.exp(-mean_speed / stribeck_speed), shudder
+    return _factor(parameters, mean_speed), shudder
+
+
+@compiled
+def remember(state: Array, parameters: Array, speed: float, duration: float) -> None:
+    """Let the speed that lagging friction acts on follow the sliding speed in m/s."""
+    behind = abs(speed) - state[REMEMBERED_SPEED]
+    state[REMEMBERED_SPEED] -= behind * math.expm1(-duration / parameters[MEMORY])
+
+
+@compiled
+def _factor(parameters: Array, speed: float) -> float:
+    ratio = speed / parameters[SPEED]
+    tail = parameters[TAIL]
+    fall = (1.0 - tail) * math.exp(-ratio) + tail / (1.0 + ratio * ratio)
+    return 1.0 + parameters[RISE] * fall
 
 
 @compiled

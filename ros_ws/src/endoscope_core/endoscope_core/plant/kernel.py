@@ -210,6 +210,7 @@ def advance_tick(
             drag = loaded + film
         offset = 0.0
         if loaded_tip:
+            drag += p[joint_backlash.WIRE_END_DAMPING]
             offset, pull, touching = joint_backlash.through_gap(
                 p, wire_end - q, pull, pull_slope + drag / dt
             )
@@ -240,6 +241,8 @@ def advance_tick(
             wire_creep.advance(state, p, ta - pretension, tb - pretension, dt)
         if on[friction_run_in.ON]:
             friction_run_in.advance(state, slid)
+        if on[stribeck_friction.ON]:
+            stribeck_friction.remember(state, p, slid / dt, dt)
         m, dm, pulley = m_new, dm_new, pulley_new
         state[PULLEY_SPEED] = pulley_speed
 

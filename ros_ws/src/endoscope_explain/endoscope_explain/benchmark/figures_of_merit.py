@@ -271,7 +271,7 @@ def _second(cases: Sequence[Outcome]) -> list[Figure]:
 
         return total(1) > total(0)
 
-    title = 'second recording: {} within 1.15 x noise'
+    title = 'second recording (of joints moved): {} within 1.15 x noise'
     return [
         _share(title.format('angles'), cases, lambda o: near_noise(o, 'slave'), 0.90),
         _share(title.format('angles and tensions'), cases, lambda o: near_noise(o, ''), 0.90),

@@ -45,8 +45,8 @@ class Outcome:
     truth : mapping
         The sealed file, read after the report was written.
     second : mapping of str to (float, float, float)
-        For each signal of the second recording: rmse of the nominal and of the augmented plant,
-        and the noise, all of raw samples.
+        For each signal of the second recording, of joints that the first one moved: rmse of the
+        nominal and of the augmented plant, and the noise, all of raw samples.
     runtime_s : float
     peers : mapping of str to str
         Effect that each peer named; empty where none was asked.

@@ -23,6 +23,9 @@ from endoscope_explain.predicted_signals import reading_lead, simulate_rig
 from endoscope_explain.recording import Recording
 from endoscope_explain.recording.signals import signal_name
 
+LEAST_MOTION = 0.02
+"""Commanded way in rad from which on a joint counts as moved."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -70,7 +73,12 @@ def run_case(task: Task) -> Outcome:
             case.places[0].stage if case.places else '',
             _named(case),
             truth,
-            second_recording(second, case.explanation.nominal, case.explanation.augmented),
+            second_recording(
+                second,
+                case.explanation.nominal,
+                case.explanation.augmented,
+                moved_joints(case.recording),
+            ),
             case.runtime_s,
             peers,
         )
@@ -90,8 +98,17 @@ def _named(case: ExplainedCase) -> tuple[Named, ...]:
     )
 
 
+def moved_joints(recording: Recording) -> tuple[str, ...]:
+    """Joints that were commanded to move: nothing is learnt of the others."""
+    reach = np.ptp(recording.command.values, axis=0)
+    return tuple(j for j, r in zip(recording.joints, reach, strict=True) if r > LEAST_MOTION)
+
+
 def second_recording(
-    recording: Recording, nominal: PlantDescription, augmented: PlantDescription
+    recording: Recording,
+    nominal: PlantDescription,
+    augmented: PlantDescription,
+    joints: Sequence[str],
 ) -> dict[str, tuple[float, float, float]]:
     """Compare two plants with a second recording, sample by sample.
 
@@ -100,6 +117,8 @@ def second_recording(
     recording : Recording
         As audited.
     nominal, augmented : PlantDescription
+    joints : sequence of str
+        Whose signals are compared.
 
     Returns
     -------
@@ -109,7 +128,7 @@ def second_recording(
     observations = observe(recording, augmented)
     lead = reading_lead(observations, simulate_rig(observations, augmented)) * TICK
     errors = {
-        name: _errors(recording, plant, lead)
+        name: _errors(recording, plant, lead, joints)
         for name, plant in (('nominal', nominal), ('augmented', augmented))
     }
     sensors = nominal.sensors
@@ -124,7 +143,9 @@ def second_recording(
     }
 
 
-def _errors(recording: Recording, plant: PlantDescription, lead: float) -> dict[str, float]:
+def _errors(
+    recording: Recording, plant: PlantDescription, lead: float, joints: Sequence[str]
+) -> dict[str, float]:
     def stamps(time: np.ndarray) -> np.ndarray:
         return np.round(time * 1e9).astype(np.int64)
 
@@ -137,7 +158,8 @@ def _errors(recording: Recording, plant: PlantDescription, lead: float) -> dict[
         read_delay=lead,
     )
     found = {}
-    for j, joint in enumerate(recording.joints):
+    for joint in joints:
+        j = recording.joints.index(joint)
         ok = bending.valid[:, j]
         wrong = (bending.values - answer.bending)[ok, j]
         found[signal_name('bending', joint)] = float(np.sqrt(np.mean(wrong**2)))
