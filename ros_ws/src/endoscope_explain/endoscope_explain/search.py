@@ -21,6 +21,7 @@ from endoscope_explain.many_starts import RUGGED, from_many_starts
 from endoscope_explain.observation import JointObservation, couple
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.reconsider import reconsidered
+from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.score import score
 from endoscope_explain.whiteness import is_noise
 
@@ -98,15 +99,19 @@ def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = 2) -> JointSearch:
     Returns
     -------
     JointSearch
+        Without effects that depend on time where the joint makes no motion twice.
     """
     nominal = Composition((), anchors[0], score(anchors[0]))
     levels: list[tuple[Composition, ...]] = []
     if is_noise(nominal.fit):
         return JointSearch(nominal, ())
+    effects = searchable_effects()
+    if not motion_repeats(anchors[0].model.observation):
+        effects = tuple(e for e in effects if e not in DEPENDS_ON_TIME)
     parents: list[Parent] = [(nominal, anchors)]
     for level in range(depth):
         polished = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
-        grown = grow(parents, searchable_effects(), jobs, polished)
+        grown = grow(parents, effects, jobs, polished)
         if grown and grown[0].effects == (RUGGED,) and not is_noise(grown[0].fit):
             grown[0] = from_many_starts(grown[0], anchors[0], jobs)
         levels.append(tuple(grown))
