@@ -14,7 +14,8 @@ NAMED = 20.0
 ADDED = 30.0
 """Fall of the score that a further effect must bring."""
 ADDED_SHARE = 0.25
-"""Share of the fall so far that a further effect must bring: less is an error of form."""
+"""Share of the fall so far that a second effect must bring: less is an error of form. Third ones
+and more are looked for only where they were asked for."""
 EXPLAINED = 0.68
 """Share of the misfit's logarithm that the catalogue must explain to be called adequate."""
 BARELY = 0.2
@@ -117,7 +118,8 @@ def _better(
     chosen: Composition, nominal: Composition, level: tuple[Composition, ...]
 ) -> Composition | None:
     so_far = nominal.score - chosen.score
-    needed = max(ADDED, ADDED_SHARE * so_far) if chosen.effects else NAMED
+    share = ADDED_SHARE if len(chosen.effects) == 1 else 0.0
+    needed = max(ADDED, share * so_far) if chosen.effects else NAMED
     alike = [c for c in level if is_noise(c.fit)]
     candidates = sorted(alike, key=_likelihood) if alike else level
     for candidate in candidates:

@@ -31,7 +31,7 @@ from endoscope_explain.observation import JointObservation, observe
 from endoscope_explain.probability import probability
 from endoscope_explain.recording import Recording
 from endoscope_explain.score import misfit
-from endoscope_explain.search import JointSearch, all_anchors, search
+from endoscope_explain.search import MOST_EFFECTS, JointSearch, all_anchors, search
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -66,6 +66,7 @@ def explain_recording(
     *,
     baseline: Recording | None = None,
     band: float = BAND,
+    most_effects: int = MOST_EFFECTS,
     jobs: int = 2,
     progress: Progress | None = None,
 ) -> Explanation:
@@ -81,6 +82,8 @@ def explain_recording(
         Of the same rig when it was well; only what is new since is explained.
     band : float
         Relative tolerance by which a healthy rig's parameters may differ from the plant's.
+    most_effects : int
+        Largest number of effects on a joint that are looked for.
     jobs : int
         Processes side by side.
     progress : callable, optional
@@ -111,13 +114,13 @@ def explain_recording(
         band = SAME_RIG
     anchors = all_anchors(observations, packed, jobs, band)
     cleaned = without_isolated(recording, observations, tuple(fitted for fitted, _ in anchors))
-    if any(a is not b for a, b in zip(cleaned, observations, strict=True)):
+    if cleaned is not observations:
         observations = cleaned
         anchors = all_anchors(observations, packed, jobs, band)
     searches, decisions = [], []
     for observation, pair in zip(observations, anchors, strict=True):
         tell(f'searching what {observation.joint} lacks')
-        searches.append(search(pair, jobs))
+        searches.append(search(pair, jobs, most_effects))
         decisions.append(decide(searches[-1]))
     unknown = None
     worst = _worst(decisions)

@@ -36,19 +36,24 @@ def without_isolated(
     Returns
     -------
     tuple of JointObservation
-        The same objects where nothing was left out.
+        The very same tuple where nothing was left out.
     """
     if recording.bending.valid.all():
         return observations
-    cleaned = []
-    for observation, fit in zip(observations, fits, strict=True):
-        channels = tuple(
-            _kept(channel, fit.residuals[part]) if channel.quantity == 'bending' else channel
-            for channel, part in zip(observation.channels, observation.slices(), strict=True)
-        )
-        same = all(a is b for a, b in zip(channels, observation.channels, strict=True))
-        cleaned.append(observation if same else replace(observation, channels=channels))
-    return tuple(cleaned)
+    cleaned = tuple(
+        _without_isolated(observation, fit)
+        for observation, fit in zip(observations, fits, strict=True)
+    )
+    before, after = (sum(o.size for o in group) for group in (observations, cleaned))
+    return cleaned if after < before else observations
+
+
+def _without_isolated(observation: JointObservation, fit: Fit) -> JointObservation:
+    channels = tuple(
+        _kept(channel, fit.residuals[part]) if channel.quantity == 'bending' else channel
+        for channel, part in zip(observation.channels, observation.slices(), strict=True)
+    )
+    return replace(observation, channels=channels)
 
 
 def _kept(channel: Channel, residual: NDArray[np.float64]) -> Channel:

@@ -22,6 +22,7 @@ from endoscope_explain.locate.locating import (
 )
 from endoscope_explain.next_experiment.proposal import propose
 from endoscope_explain.recording import Recording, plant_of_joints, recording_from_bag
+from endoscope_explain.search import MOST_EFFECTS
 
 Progress = Callable[[str], None]
 Engine = Callable[..., Explanation]
@@ -47,6 +48,8 @@ class Sources:
         Whether to leave out the black boxes and the next experiment.
     band : float
         Relative tolerance of the plant's parameters.
+    most_effects : int
+        Largest number of effects on a joint that are looked for.
     """
 
     bag: Path
@@ -56,6 +59,7 @@ class Sources:
     without: Collection[str] = ()
     quick: bool = False
     band: float = BAND
+    most_effects: int = MOST_EFFECTS
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,8 @@ class Inputs:
         As audited.
     band : float
         Relative tolerance of the plant's parameters.
+    most_effects : int
+        Largest number of effects on a joint that are looked for.
     """
 
     plant: PlantDescription
@@ -78,6 +84,7 @@ class Inputs:
     baseline: Recording | None
     validation: Recording | None
     band: float = BAND
+    most_effects: int = MOST_EFFECTS
 
 
 class JointsDifferError(BagError):
@@ -120,6 +127,7 @@ def read_inputs(sources: Sources) -> Inputs:
         second(sources.baseline),
         second(sources.validate),
         sources.band,
+        sources.most_effects,
     )
 
 
@@ -159,6 +167,7 @@ def explain_case(
         inputs.plant,
         baseline=inputs.baseline,
         band=inputs.band,
+        most_effects=inputs.most_effects,
         jobs=jobs,
         progress=progress,
     )

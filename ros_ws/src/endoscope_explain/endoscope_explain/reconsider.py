@@ -4,11 +4,13 @@ What was fitted while another effect was missing may have stopped in the wrong p
 composition's own numbers, one effect alone may do, or another one may do better beside the other.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from endoscope_core.effects import CATALOGUE
 from endoscope_core.effects.slots import NOMINAL_KEYS
-from endoscope_explain.compose import Composition, grow, searchable_effects
+from endoscope_explain.compose import Composition, grow
 from endoscope_explain.fit import Fit, JointModel, fit
 from endoscope_explain.score import score
 from endoscope_explain.whiteness import is_noise
@@ -50,13 +52,15 @@ def alone(nominal: Composition, pair: Composition, effect_id: str) -> tuple[Comp
 
 
 def reconsidered(
-    nominal: Composition, pair: Composition, jobs: int
+    nominal: Composition, pair: Composition, effects: Sequence[str], jobs: int
 ) -> tuple[list[Composition], list[Composition]]:
     """Look again at both effects of a pair.
 
     Parameters
     ----------
     nominal, pair : Composition
+    effects : sequence of str
+        Those that may be tried in place of one of the pair.
     jobs : int
         Processes side by side.
 
@@ -72,5 +76,5 @@ def reconsidered(
     if is_noise(pair.fit):
         return singles, []
     last, as_in_pair = found[-1]
-    pairs = grow([(last, (as_in_pair, last.fit))], searchable_effects(), jobs, REPLACED_POLISHED)
+    pairs = grow([(last, (as_in_pair, last.fit))], effects, jobs, REPLACED_POLISHED)
     return singles, pairs

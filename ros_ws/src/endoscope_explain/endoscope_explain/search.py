@@ -31,6 +31,7 @@ Flags = NDArray[np.bool_]
 SINGLES_POLISHED = 6
 PAIRS_POLISHED = 3
 BEAM = 3
+MOST_EFFECTS = 2
 RIVALS = 0.5
 """Share of the best composition's gain from which on a lesser one is worth adding to as well."""
 HOPELESS = 0.03
@@ -84,7 +85,7 @@ def all_anchors(
     return anchors
 
 
-def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = 2) -> JointSearch:
+def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = MOST_EFFECTS) -> JointSearch:
     """Search the compositions of effects on one joint.
 
     Parameters
@@ -124,7 +125,7 @@ def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = 2) -> JointSearch:
         needed = RIVALS * (nominal.score - grown[0].score)
         parents = [(c, (c.fit,)) for c in grown[:BEAM] if nominal.score - c.score >= needed]
     if len(levels) == 2 and levels[1]:
-        singles, pairs = reconsidered(nominal, levels[1][0], jobs)
+        singles, pairs = reconsidered(nominal, levels[1][0], effects, jobs)
         levels = [_sorted(levels[0], singles), _sorted(levels[1], pairs)]
     return JointSearch(nominal, tuple(levels))
 

@@ -53,6 +53,14 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'was never identified (default 0.15)',
     )
     parser.add_argument(
+        '--effects',
+        type=_positive,
+        default=2,
+        metavar='N',
+        help='how many effects to look for on a joint at most: 4 for a rig that the plant never '
+        'matched (default 2)',
+    )
+    parser.add_argument(
         '--jobs', type=_positive, default=2, metavar='N', help='processes side by side (default 2)'
     )
     parser.add_argument(
@@ -74,7 +82,14 @@ def run(args: argparse.Namespace) -> int:
     plant = load_plant(args.plant)
     sources = [
         Sources(
-            bag, plant, args.baseline, args.validate, tuple(args.without), args.quick, args.band
+            bag,
+            plant,
+            args.baseline,
+            args.validate,
+            tuple(args.without),
+            args.quick,
+            args.band,
+            args.effects,
         )
         for bag in args.bags
     ]

@@ -35,20 +35,26 @@ SLOW_B = SLOTS.state_block()
 
 @compiled
 def _creep(
-    state: Array, parameters: Array, both: int, slow: int, load: float, duration: float
+    state: Array,
+    parameters: Array,
+    both: int,
+    slow: int,
+    load: float,
+    fast_way: float,
+    slow_way: float,
 ) -> None:
-    """Let one wire creep; `both` and `slow` are places of its states."""
+    """Let one wire creep its ways' shares; `both` and `slow` are places of its states."""
     compliance = parameters[RATIO] / parameters[WIRE_STIFFNESS] * load
     fast_part = state[both] - state[slow]
-    share = -math.expm1(-duration / parameters[TIME_CONSTANT])
-    fast_part += share * ((1.0 - parameters[SLOW_SHARE]) * compliance - fast_part)
-    share = -math.expm1(-duration / parameters[SLOW_TIME_CONSTANT])
-    state[slow] += share * (parameters[SLOW_SHARE] * compliance - state[slow])
+    fast_part += fast_way * ((1.0 - parameters[SLOW_SHARE]) * compliance - fast_part)
+    state[slow] += slow_way * (parameters[SLOW_SHARE] * compliance - state[slow])
     state[both] = fast_part + state[slow]
 
 
 @compiled
 def advance(state: Array, parameters: Array, load_a: float, load_b: float, duration: float) -> None:
     """Let both wires creep under their tensions above pretension in N."""
-    _creep(state, parameters, CREEP_A, SLOW_A, load_a, duration)
-    _creep(state, parameters, CREEP_B, SLOW_B, load_b, duration)
+    fast_way = -math.expm1(-duration / parameters[TIME_CONSTANT])
+    slow_way = -math.expm1(-duration / parameters[SLOW_TIME_CONSTANT])
+    _creep(state, parameters, CREEP_A, SLOW_A, load_a, fast_way, slow_way)
+    _creep(state, parameters, CREEP_B, SLOW_B, load_b, fast_way, slow_way)

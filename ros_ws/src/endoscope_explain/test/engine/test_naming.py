@@ -4,6 +4,7 @@ import pytest
 from endoscope_core.plant import EffectSpec
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
+from endoscope_explain.repeated_motion import DEPENDS_ON_TIME
 
 OTHER = {'wire_stiffness': 2200.0, 'capstan_exponent': 0.83, 'joint_friction': 0.0044}
 
@@ -106,3 +107,44 @@ def test_a_rig_that_was_not_moved_cannot_be_explained(one_joint):
         one_joint.record(one_joint.rig(), np.zeros(3000)), one_joint.rig(), jobs=1
     )
     assert explanation.verdict is Verdict.INSUFFICIENT_DATA
+
+
+def test_sticking_and_slipping_is_fitted_from_many_starts(one_joint):
+    slipping = EffectSpec(
+        'stribeck_friction',
+        'bend_x',
+        {'rise': 0.6, 'stribeck_speed': 1.4e-3, 'tail': 1.0, 'lagging': 1.0, 'memory_s': 1e-3},
+    )
+    recording = one_joint.record(one_joint.rig(slipping), one_joint.motion())
+    explanation = explain_recording(recording, one_joint.rig(), jobs=1)
+    assert [e.id for e in explanation.effects] == ['stribeck_friction']
+    found = explanation.effects[0].parameters
+    assert found['lagging'].value == 1.0
+    assert found['rise'].value == pytest.approx(0.6, rel=0.4)
+    refitted, augmented = (
+        max(fit.ratio for fit in explanation.fit[rung].values())
+        for rung in ('refitted', 'augmented')
+    )
+    assert augmented < 0.5 * refitted
+
+
+def test_a_force_that_changes_with_time_is_not_named_on_a_single_pass(one_joint):
+    once = 1.1 * np.sin(np.arange(6280) * 1e-3)
+    loaded = EffectSpec('external_load', 'bend_x', {'moment_nm': 0.004, 'time_s': 3.5})
+    recording = one_joint.record(one_joint.rig(loaded), once)
+    explanation = explain_recording(recording, one_joint.rig(), jobs=1)
+    assert not {e.id for e in explanation.effects} & DEPENDS_ON_TIME
+    assert explanation.verdict is not Verdict.CONSISTENT
+
+
+def test_more_than_two_effects_are_found_where_they_are_asked_for(one_joint):
+    effects = (
+        EffectSpec('tracker_bias', 'bend_x', {'bias_rad': 0.05}),
+        EffectSpec('load_cell_gain', 'bend_x', {'gain': 0.85, 'wire': 1.0}),
+        EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.5, 'stiffness': 0.2}),
+    )
+    recording = one_joint.record(one_joint.rig(*effects), one_joint.motion())
+    two = explain_recording(recording, one_joint.rig(), jobs=1)
+    three = explain_recording(recording, one_joint.rig(), most_effects=3, jobs=1)
+    assert len(two.effects) <= 2
+    assert {e.id for e in three.effects} == {e.id for e in effects}
