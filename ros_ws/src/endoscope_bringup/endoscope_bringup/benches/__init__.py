@@ -4,6 +4,7 @@ BENCHES: tuple[str, ...] = (
     'graph',
     'recorder',
     'explain',
+    'closed_loop',
     'simulate',
     'compensation',
     'papers',

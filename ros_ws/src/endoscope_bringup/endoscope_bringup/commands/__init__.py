@@ -9,6 +9,7 @@ COMMANDS: tuple[str, ...] = (
     'demo',
     'simulate',
     'explain',
+    'invert',
     'convert',
     'record',
     'replay',

@@ -5,10 +5,15 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable
 
+from endoscope_core.errors import EndoscopeError
 from endoscope_core.signals.calibration_sinusoid import calibration_sinusoid
 from endoscope_core.signals.commissioning import commissioning_motion
 from endoscope_core.signals.signal import Motion, Signal
 from endoscope_core.signals.tracking_signals import non_periodic_signal, periodic_signal
+
+
+class UnknownMotionError(EndoscopeError, ValueError):
+    """A motion that is not in the catalogue."""
 
 
 def both_joints(signal: Signal) -> Motion:
@@ -29,12 +34,12 @@ def motion_by_name(name: str) -> Motion:
 
     Raises
     ------
-    ValueError
+    UnknownMotionError
         If there is none of that name; the message names the nearest.
     """
     if name not in MOTIONS:
         near = difflib.get_close_matches(name, MOTIONS, n=1, cutoff=0.0)
-        raise ValueError(
+        raise UnknownMotionError(
             f'unknown motion {name!r}, nearest is {near[0]!r} (known: {", ".join(MOTIONS)})'
         )
     return MOTIONS[name]()
