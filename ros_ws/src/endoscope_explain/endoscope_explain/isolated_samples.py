@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from endoscope_explain.audit.outliers import spike_heights
 from endoscope_explain.fit import Fit
 from endoscope_explain.observation import Channel, JointObservation
 from endoscope_explain.recording import Recording
@@ -17,6 +16,8 @@ ALONE = 5.0
 """Factor by which it is above the usual residual nearby."""
 NEARBY = 15
 """Samples whose median size is the usual one."""
+AROUND = 7
+"""Samples whose median is what the one in their middle should be."""
 
 
 def without_isolated(
@@ -58,7 +59,9 @@ def _without_isolated(observation: JointObservation, fit: Fit) -> JointObservati
 
 def _kept(channel: Channel, residual: NDArray[np.float64]) -> Channel:
     usual = median_filter(np.abs(residual), NEARBY, mode='nearest')
-    wrong = np.abs(spike_heights(residual)) > np.maximum(SPIKE, ALONE * usual)
+    # Up to three samples in a row stick out of the median; a step of the joint does not.
+    height = residual - median_filter(residual, AROUND, mode='nearest')
+    wrong = np.abs(height) > np.maximum(SPIKE, ALONE * usual)
     if not wrong.any():
         return channel
     keep = ~wrong

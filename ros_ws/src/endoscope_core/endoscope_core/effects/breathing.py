@@ -20,7 +20,8 @@ DEFINITION = define(
             0.02,
             5.0,
             0.25,
-            starts=(0.15, 0.2, 0.25, 0.3, 0.4, 0.6),
+            # No further apart than what 40 s resolve; people breathe 6 to 36 times a minute.
+            starts=tuple(0.1 + 0.02 * k for k in range(26)),
             comparable=True,
         ),
         EffectParameter('phase_rad', 'rad', -7.0, 7.0, 0.0, starts=(0.0, 1.6, 3.1, -1.6)),

@@ -1,4 +1,4 @@
-"""Isolated wrong samples of the EM tracker."""
+"""Isolated wrong samples of the EM tracker, alone or two in a row."""
 
 from collections.abc import Sequence
 
@@ -32,6 +32,30 @@ def spike_heights(values: Array) -> Array:
     same_side = before * after > 0
     height = np.where(same_side, np.sign(before) * np.minimum(abs(before), abs(after)), 0.0)
     return np.r_[0.0, height, 0.0]
+
+
+def pair_heights(values: Array) -> Array:
+    """Measure how far two samples in a row stick out beyond the samples around them.
+
+    Parameters
+    ----------
+    values : array (N,)
+
+    Returns
+    -------
+    array (N,)
+        For each sample, that of the pair it sticks out in furthest, as `spike_heights`.
+    """
+    heights = np.zeros(len(values))
+    if len(values) < 4:
+        return heights
+    before = values[1:-2] - values[:-3]
+    after = values[2:-1] - values[3:]
+    height = np.where(
+        before * after > 0, np.sign(before) * np.minimum(abs(before), abs(after)), 0.0
+    )
+    first, second = np.r_[0.0, height, 0.0, 0.0], np.r_[0.0, 0.0, height, 0.0]
+    return np.where(np.abs(first) > np.abs(second), first, second)
 
 
 def spike_chance(height: Array, noise: float) -> Array:
@@ -76,7 +100,8 @@ def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
     scale = max(noise, _quiet_noise(values))
     for _ in range(3):
         kept = np.flatnonzero(~wrong)
-        heights = spike_heights(values[kept])
+        alone, paired = spike_heights(values[kept]), pair_heights(values[kept])
+        heights = np.where(np.abs(paired) > np.abs(alone), paired, alone)
         roughness = _roughness_nearby(heights)
         chance = spike_chance(heights, scale)
         lonely = np.abs(heights) > np.maximum(3.0 * roughness, TRAVEL_FACTOR * travel[kept])
