@@ -18,21 +18,19 @@ Array = NDArray[np.float64]
 SAME_COMMAND_RAD = 1e-6
 
 
-def against_baseline(observation: JointObservation, healthy: Fit) -> tuple[JointObservation, Array]:
+def against_baseline(observation: JointObservation, healthy: Fit) -> JointObservation:
     """A joint's observation as seen against the same joint in health.
 
     Parameters
     ----------
     observation : JointObservation
     healthy : Fit
-        Nominal plant refitted to the baseline recording of the same joint.
+        Of the baseline recording of the same joint.
 
     Returns
     -------
-    observation : JointObservation
+    JointObservation
         With readings or noise corrected by what the plant never explained.
-    base : array (parameters,)
-        Packed parameters of the joint in health.
     """
     before = healthy.model.observation
     repeated = _same_commands(observation, before)
@@ -45,8 +43,7 @@ def against_baseline(observation: JointObservation, healthy: Fit) -> tuple[Joint
             continue
         residual = healthy.residuals[parts[channel.signal]]
         channels.append(_corrected(channel, known[channel.signal], residual, repeated))
-    base, _ = healthy.model.packed(healthy.theta)
-    return replace(observation, channels=tuple(channels)), base
+    return replace(observation, channels=tuple(channels))
 
 
 def _same_commands(one: JointObservation, other: JointObservation) -> bool:

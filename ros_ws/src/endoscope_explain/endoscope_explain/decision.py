@@ -1,6 +1,7 @@
 """From the compositions tried on one joint to what is said about it."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +25,8 @@ EXPLAINED_IN_SLIPS = 0.25
 """The same where wires stick and slip: the instant of a slip is nobody's to predict."""
 NEARLY_NOISE = 100.0
 """Score above noise alone at which an error of form needs no further explanation."""
+OF_A_DEVICE = frozenset({'clock_skew', 'tracker_delay'})
+"""Effects of a device that reads all joints."""
 RIVAL = 25.0
 """Score within which another effect in the same place cannot be told apart."""
 RIVAL_SHARE = 0.08
@@ -103,6 +106,51 @@ def decide(search: JointSearch) -> Decision:
         reach = RIVAL if measure is _likelihood else max(RIVAL, RIVAL_SHARE * margins[effect_id])
         alternatives[effect_id] = tuple(name for gap, name in rivals if gap < reach)
     return Decision(chosen, adequate, explained, alternatives, margins, gaps)
+
+
+def with_devices_agreed(
+    searches: Sequence[JointSearch], decisions: Sequence[Decision]
+) -> list[Decision]:
+    """Let the joints agree about the device that reads them all.
+
+    Where one joint shows beyond doubt that the tracker or its clock is late, and another joint's
+    effect might as well be that, it is that.
+
+    Parameters
+    ----------
+    searches, decisions : sequence
+        One for each joint.
+
+    Returns
+    -------
+    list of Decision
+    """
+    certain = {
+        effect_id
+        for decision in decisions
+        for effect_id in decision.chosen.effects
+        if effect_id in OF_A_DEVICE and not decision.alternatives[effect_id]
+    }
+    return [
+        _agreed(search, decision, certain)
+        for search, decision in zip(searches, decisions, strict=True)
+    ]
+
+
+def _agreed(search: JointSearch, decision: Decision, certain: set[str]) -> Decision:
+    for effect_id in decision.chosen.effects:
+        for rival in decision.alternatives[effect_id]:
+            effects = frozenset(decision.chosen.effects) - {effect_id} | {rival}
+            found = [c for c in search.tried() if frozenset(c.effects) == effects]
+            if rival in certain and found:
+                return replace(
+                    decision,
+                    chosen=found[0],
+                    alternatives=decision.alternatives | {rival: ()},
+                    margins=decision.margins | {rival: decision.margins[effect_id]},
+                    gaps=decision.gaps | {rival: decision.margins[effect_id]},
+                )
+    return decision
 
 
 def _score(composition: Composition) -> float:

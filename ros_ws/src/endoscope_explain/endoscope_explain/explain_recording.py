@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from endoscope_core.effects import CATALOGUE, Stage
 from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription
 from endoscope_explain.baseline import against_baseline
-from endoscope_explain.decision import Decision, decide
+from endoscope_explain.decision import Decision, decide, with_devices_agreed
 from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.explanation import (
     Candidate,
@@ -108,10 +108,13 @@ def explain_recording(
             runtime_s=time.monotonic() - begun,
         )
     tell('refitting the nominal plant')
-    packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
+    well = plant
+    known: dict[str, tuple[str, ...]] = {o.joint: () for o in observations}
     if baseline is not None:
-        observations, packed = _healthy(observations, baseline, plant, band, jobs)
+        tell('searching what the baseline lacks')
+        observations, well, known = _healthy(observations, baseline, plant, band, jobs)
         band = SAME_RIG
+    packed = {o.joint: packed_joint(well, o.joint) for o in observations}
     anchors = all_anchors(observations, packed, jobs, band)
     cleaned = without_isolated(recording, observations, tuple(fitted for fitted, _ in anchors))
     if cleaned is not observations:
@@ -120,8 +123,9 @@ def explain_recording(
     searches, decisions = [], []
     for observation, pair in zip(observations, anchors, strict=True):
         tell(f'searching what {observation.joint} lacks')
-        searches.append(search(pair, jobs, most_effects))
+        searches.append(search(pair, jobs, most_effects, known[observation.joint]))
         decisions.append(decide(searches[-1]))
+    decisions = with_devices_agreed(searches, decisions)
     unknown = None
     worst = _worst(decisions)
     if worst is not None:
@@ -129,7 +133,7 @@ def explain_recording(
         unknown = unknown_term(decisions[worst].chosen.fit, jobs, _siblings(searches[worst]))
     tell('judging on held-out blocks')
     effects = _named(observations, decisions)
-    verdict = _verdict(effects, decisions, plant)
+    verdict = _verdict(effects, decisions)
     return Explanation(
         verdict,
         effects,
@@ -138,8 +142,8 @@ def explain_recording(
             for o, d in zip(observations, decisions, strict=True)
         },
         plant,
-        _plant_of(plant, [s.nominal.fit for s in searches], [() for _ in searches]),
-        _plant_of(plant, [d.chosen.fit for d in decisions], [d.chosen.effects for d in decisions]),
+        _plant_of(well, [s.nominal.fit for s in searches], [() for _ in searches]),
+        _plant_of(well, [d.chosen.fit for d in decisions], [d.chosen.effects for d in decisions]),
         _ladder(anchors, searches, decisions),
         _candidates(observations, searches),
         unknown,
@@ -156,20 +160,24 @@ def _healthy(
     plant: PlantDescription,
     band: float,
     jobs: int,
-) -> tuple[tuple[JointObservation, ...], dict[str, tuple[Array, Flags]]]:
+) -> tuple[tuple[JointObservation, ...], PlantDescription, dict[str, tuple[str, ...]]]:
+    """Observations against a baseline, the plant in health, and the effects it has on each joint.
+
+    A rig that never matched the plant is described by the effect that comes nearest, right or not:
+    less is left that could hide what is new.
+    """
     before = with_held_noise(observe(baseline, plant))
     packed = {o.joint: packed_joint(plant, o.joint) for o in before}
-    fits = {
-        o.joint: refitted
-        for o, (refitted, _) in zip(before, all_anchors(before, packed, jobs, band), strict=True)
-    }
-    seen = []
-    for observation in observations:
-        flags = packed[observation.joint][1]
-        observation, base = against_baseline(observation, fits[observation.joint])
-        seen.append(observation)
-        packed[observation.joint] = base, flags
-    return tuple(seen), packed
+    healthy = [
+        min(tried.tried(), key=lambda c: c.score)
+        for tried in (
+            search(pair, jobs, depth=1) for pair in all_anchors(before, packed, jobs, band)
+        )
+    ]
+    by_joint = {c.fit.model.observation.joint: c for c in healthy}
+    seen = tuple(against_baseline(o, by_joint[o.joint].fit) for o in observations)
+    well = _plant_of(plant, [c.fit for c in healthy], [c.effects for c in healthy])
+    return seen, well, {joint: c.effects for joint, c in by_joint.items()}
 
 
 def _worst(decisions: list[Decision]) -> int | None:
@@ -242,9 +250,7 @@ def _named(
     return tuple(first + again)
 
 
-def _verdict(
-    effects: tuple[NamedEffect, ...], decisions: list[Decision], plant: PlantDescription
-) -> Verdict:
+def _verdict(effects: tuple[NamedEffect, ...], decisions: list[Decision]) -> Verdict:
     if not all(d.adequate for d in decisions):
         return Verdict.UNKNOWN_PHYSICS
     stages = {effect.stage for effect in effects}

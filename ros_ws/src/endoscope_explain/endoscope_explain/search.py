@@ -85,7 +85,12 @@ def all_anchors(
     return anchors
 
 
-def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = MOST_EFFECTS) -> JointSearch:
+def search(
+    anchors: tuple[Fit, Fit],
+    jobs: int,
+    depth: int = MOST_EFFECTS,
+    known: tuple[str, ...] = (),
+) -> JointSearch:
     """Search the compositions of effects on one joint.
 
     Parameters
@@ -96,6 +101,8 @@ def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = MOST_EFFECTS) -> Jo
         Processes side by side.
     depth : int
         Largest number of effects.
+    known : tuple of str
+        Effects that the plant has already and that are not looked for again.
 
     Returns
     -------
@@ -106,7 +113,7 @@ def search(anchors: tuple[Fit, Fit], jobs: int, depth: int = MOST_EFFECTS) -> Jo
     levels: list[tuple[Composition, ...]] = []
     if is_noise(nominal.fit):
         return JointSearch(nominal, ())
-    effects = searchable_effects()
+    effects = tuple(e for e in searchable_effects() if e not in known)
     if not motion_repeats(anchors[0].model.observation):
         effects = tuple(e for e in effects if e not in DEPENDS_ON_TIME)
     parents: list[Parent] = [(nominal, anchors)]
