@@ -8,7 +8,7 @@ import numpy as np
 from endoscope_explain.compose import Composition
 from endoscope_explain.score import PARAMETER_PRICE
 from endoscope_explain.search import JointSearch
-from endoscope_explain.whiteness import is_noise, slips
+from endoscope_explain.whiteness import is_noise, slips, worst_against_raw_noise
 
 NAMED = 20.0
 """Fall of the score that a first effect must bring; noise alone brings a few."""
@@ -27,6 +27,8 @@ NEARLY_NOISE = 100.0
 """Score above noise alone at which an error of form needs no further explanation."""
 OF_A_DEVICE = frozenset({'clock_skew', 'tracker_delay'})
 """Effects of a device that reads all joints."""
+LIKE_RAW_NOISE = 1.12
+"""Rmse over noise of raw samples up to which an improved plant predicts as well as anyone needs."""
 RIVAL = 25.0
 """Score within which another effect in the same place cannot be told apart."""
 RIVAL_SHARE = 0.08
@@ -81,6 +83,7 @@ def decide(search: JointSearch) -> Decision:
     adequate = (
         is_noise(chosen.fit)
         or left < NEARLY_NOISE
+        or (bool(chosen.effects) and worst_against_raw_noise(chosen.fit) < LIKE_RAW_NOISE)
         or (
             bool(chosen.effects)
             and explained

@@ -37,6 +37,20 @@ def is_noise(fit: Fit) -> bool:
     return all(z < LIMIT for z in excess(fit).values())
 
 
+def worst_against_raw_noise(fit: Fit) -> float:
+    """Largest rmse over noise of any wire or angle, as single raw samples would show it.
+
+    Averages over an analysis period show errors that no raw sample would.
+    """
+    observation = fit.model.observation
+    worst = 0.0
+    for channel, part in zip(observation.channels, observation.slices(), strict=True):
+        if channel.quantity in WHITE:
+            above = float(np.mean(fit.residuals[part] ** 2)) - 1.0
+            worst = max(worst, np.sqrt(max(1.0 + above / float(np.mean(channel.count)), 0.0)))
+    return float(worst)
+
+
 def slips(observation: JointObservation) -> bool:
     """Return whether wires stick and slip in a notable share of a recording."""
     wires = [c for c in observation.channels if c.quantity == 'tension']
