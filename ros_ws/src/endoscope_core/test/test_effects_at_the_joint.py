@@ -197,3 +197,13 @@ def test_breathing_with_its_second_harmonic_is_lujans_fourth_power():
     fourth_power = np.cos(np.pi * 0.5 * TIME) ** 4
     correlation = np.corrcoef(angle[100:], fourth_power[100:])[0, 1]
     assert correlation > 0.9999
+
+
+def test_soft_flanks_and_a_viscous_sheath_stay_bounded():
+    # The wire end must not be carried along by a tip that moves away from soft flanks.
+    soft = ('joint_backlash', {'gap_rad': 1.5, 'loaded_tip': 1.0, 'flank_compliance': 1.0})
+    viscous = ('viscous_friction', {'coefficient': 0.0, 'load_factor': 500.0})
+    jumping = np.repeat([0.5, 0.0, 0.5, 0.0], 50)
+    for quick in (JointParameters(), JointParameters(motor_bandwidth=120.0)):
+        run = answer(jumping, soft, viscous, joint=quick)
+        assert np.abs(run.bending).max() < 2.0

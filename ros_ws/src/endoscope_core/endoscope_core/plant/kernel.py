@@ -208,7 +208,7 @@ def advance_tick(
             loaded = 0.25 * r * r * p[viscous_friction.LOAD_FACTOR] * (ta * da + tb * db)
             pull += loaded * wire_end_speed - film * pulley_speed
             drag = loaded + film
-        offset = 0.0
+        offset, give = 0.0, 0.0
         if loaded_tip:
             drag += p[joint_backlash.WIRE_END_DAMPING]
             offset, pull, touching = joint_backlash.through_gap(
@@ -216,6 +216,7 @@ def advance_tick(
             )
             pull_slope *= touching
             drag *= touching
+            give = 1.0 - touching
 
         moment, slope = load(p, on, x, q, time, tick)
         moment += pull - p[JOINT_FRICTION] * zj
@@ -229,6 +230,8 @@ def advance_tick(
             dq = mean_dq
 
         q += mean_dq * dt
+        # A wire end that is free, or on soft flanks, does not go where the tip goes.
+        offset -= give * mean_dq * dt
         wire_end_speed = (q + offset - wire_end) / dt if loaded_tip else mean_dq
         wire_end = q + offset
         slid = 0.5 * r * (pulley_speed + wire_end_speed) * dt
