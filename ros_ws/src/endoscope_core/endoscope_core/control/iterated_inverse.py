@@ -88,8 +88,7 @@ def iterated_inverse(
     command = np.stack(
         [_by_law(law, desired[:, j], velocity[:, j]) for j, law in enumerate(laws)], axis=1
     )
-    best = command.copy()
-    tip = best_tip = np.zeros_like(command)
+    best = best_tip = command
     lowest = np.full(len(names), np.inf)
     gain = np.full(len(names), GAIN)
     for _ in range(max(iterations, 1)):

@@ -244,7 +244,7 @@ def advance_tick(
             wire_creep.advance(state, p, ta - pretension, tb - pretension, dt)
         if on[friction_run_in.ON]:
             friction_run_in.advance(state, slid)
-        if on[stribeck_friction.ON]:
+        if on[stribeck_friction.ON] and p[stribeck_friction.LAGGING] > 0.0:
             stribeck_friction.remember(state, p, slid / dt, dt)
         m, dm, pulley = m_new, dm_new, pulley_new
         state[PULLEY_SPEED] = pulley_speed

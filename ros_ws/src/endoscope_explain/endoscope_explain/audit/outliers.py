@@ -14,48 +14,36 @@ TRAVEL_FACTOR = 1.5
 """A spike is no motion of the joint where it exceeds the motor's travel by this factor."""
 
 
-def spike_heights(values: Array) -> Array:
-    """Measure how far each sample sticks out beyond both neighbours.
+def spike_heights(values: Array, width: int = 1) -> Array:
+    """Measure how far each sample sticks out beyond the samples around it.
 
     Parameters
     ----------
     values : array (N,)
+    width : int
+        How many samples in a row stick out together.
 
     Returns
     -------
     array (N,)
-        Distance to the nearer of the neighbours where both lie on the same side, else 0; with the
-        sign of the spike.
+        Distance of the first and the last of a row to the samples beside it, the smaller one, where
+        both stick out to the same side, else 0; with the sign of the spike. A sample that belongs
+        to several rows has the largest.
     """
-    before = values[1:-1] - values[:-2]
-    after = values[1:-1] - values[2:]
+    if len(values) < width + 2:
+        return np.zeros(len(values))
+    before = values[1:-width] - values[: -width - 1]
+    after = values[width:-1] - values[width + 1 :]
     same_side = before * after > 0
     height = np.where(same_side, np.sign(before) * np.minimum(abs(before), abs(after)), 0.0)
-    return np.r_[0.0, height, 0.0]
-
-
-def pair_heights(values: Array) -> Array:
-    """Measure how far two samples in a row stick out beyond the samples around them.
-
-    Parameters
-    ----------
-    values : array (N,)
-
-    Returns
-    -------
-    array (N,)
-        For each sample, that of the pair it sticks out in furthest, as `spike_heights`.
-    """
     heights = np.zeros(len(values))
-    if len(values) < 4:
-        return heights
-    before = values[1:-2] - values[:-3]
-    after = values[2:-1] - values[3:]
-    height = np.where(
-        before * after > 0, np.sign(before) * np.minimum(abs(before), abs(after)), 0.0
-    )
-    first, second = np.r_[0.0, height, 0.0, 0.0], np.r_[0.0, 0.0, height, 0.0]
-    return np.where(np.abs(first) > np.abs(second), first, second)
+    for place in range(width):
+        heights = _larger(heights, np.r_[np.zeros(place + 1), height, np.zeros(width - place)])
+    return heights
+
+
+def _larger(one: Array, other: Array) -> Array:
+    return np.where(np.abs(one) > np.abs(other), one, other)
 
 
 def spike_chance(height: Array, noise: float) -> Array:
@@ -100,8 +88,7 @@ def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
     scale = max(noise, _quiet_noise(values))
     for _ in range(3):
         kept = np.flatnonzero(~wrong)
-        alone, paired = spike_heights(values[kept]), pair_heights(values[kept])
-        heights = np.where(np.abs(paired) > np.abs(alone), paired, alone)
+        heights = _larger(spike_heights(values[kept], 2), spike_heights(values[kept]))
         roughness = _roughness_nearby(heights)
         chance = spike_chance(heights, scale)
         lonely = np.abs(heights) > np.maximum(3.0 * roughness, TRAVEL_FACTOR * travel[kept])

@@ -24,7 +24,7 @@ from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.generator import draw_case, write_case
 from endoscope_explain.generator.concealed_physics import TICK, move
 from endoscope_explain.generator.motions import GEAR
-from endoscope_explain.generator.rig import JOINTS, nominal_rig
+from endoscope_explain.generator.rig import JOINTS, RIG_TYPE
 from endoscope_explain.pipeline import Sources, explain_case, read_inputs
 
 Array = NDArray[np.float64]
@@ -118,9 +118,7 @@ def run_closed_loop(
 
 def rig_of(truth: Any) -> NDArray[np.void]:
     """The rig (2,) of a lumped case, from the numbers by joint and name in its truth."""
-    rig = nominal_rig()
-    for name in rig.dtype.names or ():
-        rig[name] = 0.0
+    rig = np.zeros(len(JOINTS), dtype=RIG_TYPE)
     for j, joint in enumerate(JOINTS):
         for name, value in truth[joint].items():
             rig[name][j] = value
