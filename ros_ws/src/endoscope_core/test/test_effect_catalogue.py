@@ -165,6 +165,8 @@ ONLY_WITH = {
     'wire_end_damping': 'loaded_tip',
 }
 """Choices without which a parameter has nothing to act on."""
+EVEN = {'flank_spread': 0.15}
+"""Parameters whose sign would not matter, and where a fit begins: at zero there is no slope."""
 
 
 def slopes(effect_id, parameter, step):
@@ -176,10 +178,11 @@ def slopes(effect_id, parameter, step):
     }
     if parameter.name in ONLY_WITH:
         start[ONLY_WITH[parameter.name]] = 1.0
-    unit = abs(parameter.typical) or 0.1 * (parameter.high - parameter.low)
-    sign = 1.0 if parameter.typical + step * unit <= parameter.high else -1.0
+    typical = EVEN.get(parameter.name, parameter.typical)
+    unit = abs(typical) or 0.1 * (parameter.high - parameter.low)
+    sign = 1.0 if typical + step * unit <= parameter.high else -1.0
     here, there = (
-        with_effect(effect_id, start | {parameter.name: parameter.typical + shift})
+        with_effect(effect_id, start | {parameter.name: typical + shift})
         for shift in (0.0, sign * step * unit)
     )
     return (

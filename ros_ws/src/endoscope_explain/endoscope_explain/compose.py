@@ -13,7 +13,7 @@ from endoscope_explain.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.rank import Look, look, polish
 from endoscope_explain.score import FLOOR_PER_PARAMETER, score
-from endoscope_explain.screen import Promise, promises, with_effect
+from endoscope_explain.screen import Promise, promises, unexplained, with_effect
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -144,8 +144,10 @@ def _screened(
         if effect_id not in parent.effects
     ]
 
+    left = [unexplained(anchors[0]) for _, anchors in parents]
+
     def screened(task: tuple[int, str]) -> list[Promise]:
-        return promises(parents[task[0]][1][0], [task[1]])
+        return promises(left[task[0]], task[1])
 
     found = parallel_map(screened, tasks, jobs)
     chosen = []

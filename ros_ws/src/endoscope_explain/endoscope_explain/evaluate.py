@@ -20,6 +20,7 @@ def simulate_joint(
     parameters: Array,
     flags: Flags,
     inputs: Array | None = None,
+    substeps: int = SUBSTEPS,
 ) -> Array:
     """Noise-free readings of one joint under the recorded commands.
 
@@ -32,6 +33,8 @@ def simulate_joint(
         Effects that are on.
     inputs : array (1, N, INPUTS), optional
         Instead of the observation's own, for latent pushes or cut chains.
+    substeps : int
+        Integration steps in a tick.
 
     Returns
     -------
@@ -41,7 +44,7 @@ def simulate_joint(
     packed = parameters[None]
     states, histories = rest_state(packed, np.array([observation.start]))
     out = np.empty((1, inputs.shape[1], OUTPUTS))
-    run_joints(states, histories, packed, flags[None], inputs, False, TICK, SUBSTEPS, out)
+    run_joints(states, histories, packed, flags[None], inputs, False, TICK, substeps, out)
     return out[0]
 
 

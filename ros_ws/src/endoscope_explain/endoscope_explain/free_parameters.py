@@ -131,5 +131,5 @@ def effect_parameters(effect_id: str) -> tuple[FreeParameter, ...]:
 
 def _of_effect(index: int, parameter: EffectParameter) -> FreeParameter:
     positive = parameter.low > 0.0 and not math.isfinite(parameter.off)
-    unit = abs(parameter.typical) or 0.1 * (parameter.high - parameter.low)
+    unit = parameter.scale or abs(parameter.typical) or 0.1 * (parameter.high - parameter.low)
     return FreeParameter(index, parameter.name, positive, unit, parameter.low, parameter.high)

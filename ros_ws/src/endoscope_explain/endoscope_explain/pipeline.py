@@ -5,6 +5,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from endoscope_bags.errors import BagError
 from endoscope_core.plant import PlantDescription
 from endoscope_explain.audit import AuditReport, audit_recording
@@ -162,15 +164,17 @@ def explain_case(
     audit = inputs.audit
     for finding in audit.findings:
         tell(f'audit: {finding.text}; {finding.remedy}')
-    explanation = engine(
-        audit.recording,
-        inputs.plant,
-        baseline=inputs.baseline,
-        band=inputs.band,
-        most_effects=inputs.most_effects,
-        jobs=jobs,
-        progress=progress,
-    )
+    # A fit's matrices are tall and narrow: threads would only wait for each other.
+    with threadpool_limits(1, 'blas'):
+        explanation = engine(
+            audit.recording,
+            inputs.plant,
+            baseline=inputs.baseline,
+            band=inputs.band,
+            most_effects=inputs.most_effects,
+            jobs=jobs,
+            progress=progress,
+        )
     tell('locating')
     plant = improved_plant(explanation, audit)
     case = ExplainedCase(

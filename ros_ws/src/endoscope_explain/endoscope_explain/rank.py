@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.fit import Fit, JointModel, bounded_step, fit, jacobian
+from endoscope_explain.onset_scan import redated
 from endoscope_explain.screen import Promise, with_effect
 
 Array = NDArray[np.float64]
@@ -105,4 +106,4 @@ def _quasi_newton(
 
 def polish(candidate: Look, iterations: int = 10) -> Fit:
     """Full fit of a candidate from where its look ended."""
-    return fit(candidate.model, candidate.theta, iterations=iterations)
+    return redated(fit(candidate.model, candidate.theta, iterations=iterations))

@@ -5,8 +5,8 @@ the nominal parameters have done their best is projected on the residual, which 
 test with a difference in place of the derivative (Rao, Proc. Camb. Phil. Soc. 44, 1948).
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
@@ -17,6 +17,9 @@ from endoscope_explain.fit import Fit, JointModel
 from endoscope_explain.free_parameters import effect_parameters, with_free_reference
 
 Array = NDArray[np.float64]
+
+SCREENING_SUBSTEPS = 1
+"""Integration steps in a tick: an effect is compared with the same plant without it."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +32,12 @@ class Promise:
     start : dict
         Parameters by name.
     gain : float
-        Predicted fall of the half deviance.
-    ratio : float
-        Best multiple of the effect at this start.
+        Predicted fall of the half deviance, at the best multiple of the effect where it is linear.
     """
 
     effect_id: str
     start: dict[str, float]
     gain: float
-    ratio: float
 
 
 def starting_points(effect_id: str) -> list[dict[str, float]]:
@@ -61,37 +61,69 @@ def with_effect(model: JointModel, effect_id: str, start: dict[str, float]) -> J
     return JointModel(model.observation, base, flags, free)
 
 
-def promises(anchor: Fit, effect_ids: Iterable[str]) -> list[Promise]:
-    """Promises of effects at all their starting points, best first.
+@dataclass(frozen=True)
+class Unexplained:
+    """What a fit leaves, beyond what its own parameters could still do.
+
+    Attributes
+    ----------
+    fit : Fit
+    span : array (size, n)
+        Orthonormal directions in which the parameters move the residual.
+    left : array (size,)
+        Residuals across these directions.
+    coarse : array (size,)
+        Residuals at the few integration steps at which effects are screened.
+    """
+
+    fit: Fit
+    span: Array = field(repr=False)
+    left: Array = field(repr=False)
+    coarse: Array = field(repr=False)
+
+
+def unexplained(anchor: Fit) -> Unexplained:
+    """What a fit leaves to effects that it does not have."""
+    span, _ = np.linalg.qr(anchor.jacobian)
+    left = anchor.residuals - span @ (span.T @ anchor.residuals)
+    coarse = anchor.model.residuals(anchor.theta, SCREENING_SUBSTEPS)
+    return Unexplained(anchor, span, left, coarse)
+
+
+def promises(background: Unexplained, effect_id: str) -> list[Promise]:
+    """Promises of an effect at all its starting points, best first.
 
     Parameters
     ----------
-    anchor : Fit
+    background : Unexplained
         Fit without the effect; its residual is to be explained.
-    effect_ids : iterable of str
+    effect_id : str
 
     Returns
     -------
     list of Promise
     """
-    span, _ = np.linalg.qr(anchor.jacobian)
-    left = anchor.residuals - span @ (span.T @ anchor.residuals)
+    anchor, span = background.fit, background.span
+    linear = not any(p.scale for p in CATALOGUE[effect_id].parameters)
     found = []
-    for effect_id in effect_ids:
-        for start in starting_points(effect_id):
-            model = with_effect(anchor.model, effect_id, start)
-            own = [
-                item.coordinate(float(model.base[item.index]))
-                for item in model.free[len(anchor.theta) :]
-            ]
-            moved = model.residuals(np.concatenate([anchor.theta, own])) - anchor.residuals
-            moved -= span @ (span.T @ moved)
-            size = float(moved @ moved)
-            ratio = -float(moved @ left) / size if size > 1e-6 else 0.0
-            if ratio < 0.0:
-                start, ratio = _mirrored(effect_id, start), -ratio
-            if start:
-                found.append(Promise(effect_id, start, 0.5 * ratio * ratio * size, ratio))
+    for start in starting_points(effect_id):
+        model = with_effect(anchor.model, effect_id, start)
+        own = [
+            item.coordinate(float(model.base[item.index]))
+            for item in model.free[len(anchor.theta) :]
+        ]
+        theta = np.concatenate([anchor.theta, own])
+        moved = model.residuals(theta, SCREENING_SUBSTEPS) - background.coarse
+        moved -= span @ (span.T @ moved)
+        size = float(moved @ moved)
+        towards = -float(moved @ background.left)
+        ratio = towards / size if size > 1e-6 else 0.0
+        if ratio < 0.0 and linear:
+            start, ratio, towards = _mirrored(effect_id, start), -ratio, -towards
+        if not linear:
+            ratio = 1.0
+        if start:
+            found.append(Promise(effect_id, start, ratio * towards - 0.5 * ratio * ratio * size))
     return sorted(found, key=lambda p: -p.gain)
 
 
@@ -99,8 +131,12 @@ def _mirrored(effect_id: str, start: dict[str, float]) -> dict[str, float]:
     """Return the start on the other side of no effect at all; empty where there is none."""
     mirrored, changed = dict(start), False
     for parameter in CATALOGUE[effect_id].parameters:
-        other = 2.0 * parameter.off - start[parameter.name]
+        value = start[parameter.name]
+        if parameter.phase:
+            mirrored[parameter.name], changed = value - math.copysign(math.pi, value), True
+            continue
+        other = 2.0 * parameter.off - value
         if parameter.low < parameter.off and parameter.low <= other <= parameter.high:
             mirrored[parameter.name] = other
-            changed = changed or other != start[parameter.name]
+            changed = changed or other != value
     return mirrored if changed else {}

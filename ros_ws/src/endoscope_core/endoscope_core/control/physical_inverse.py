@@ -92,7 +92,8 @@ class InternalModel:
         self.state[JOINT] = self.state[WIRE_END] = joint
         self.state[SLIDE_A], self.state[SLIDE_B] = slide, -slide
         self.state[JOINT_SLIDE] = slide
-        stretch = parameters.joint.joint_radius * (motor - joint) * distributed_friction.LENGTHS
+        lengths = np.array([distributed_friction.length(self.packed, i) for i in range(NODES + 1)])
+        stretch = parameters.joint.joint_radius * (motor - joint) * lengths
         for wire, sign in ((distributed_friction.WIRE_A, 1.0), (distributed_friction.WIRE_B, -1.0)):
             first = wire + distributed_friction.STRETCH
             self.state[first : first + NODES + 1] = sign * stretch

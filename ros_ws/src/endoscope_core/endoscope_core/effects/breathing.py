@@ -24,7 +24,7 @@ DEFINITION = define(
             starts=tuple(0.1 + 0.02 * k for k in range(26)),
             comparable=True,
         ),
-        EffectParameter('phase_rad', 'rad', -7.0, 7.0, 0.0, starts=(0.0, 1.6, 3.1, -1.6)),
+        EffectParameter('phase_rad', 'rad', -7.0, 7.0, 0.0, starts=(0.0, 1.6), phase=True),
         EffectParameter('second_harmonic', '-', -0.5, 0.5, 0.0),
     ),
 )

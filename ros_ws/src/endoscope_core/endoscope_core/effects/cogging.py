@@ -24,7 +24,7 @@ DEFINITION = define(
             12.0,
             starts=(4.0, 7.0, 10.0, 13.0, 16.0, 20.0, 24.0, 30.0),
         ),
-        EffectParameter('phase_rad', 'rad', -7.0, 7.0, 0.0, starts=(-1.6, 0.0, 1.6, 3.1)),
+        EffectParameter('phase_rad', 'rad', -7.0, 7.0, 0.0, starts=(0.0, 1.6), phase=True),
         EffectParameter('second_sine', '-', -1.0, 1.0, 0.0),
         EffectParameter('second_cosine', '-', -1.0, 1.0, 0.0),
     ),

@@ -7,9 +7,9 @@ DEFINITION = define(
     'contact',
     Stage.JOINT,
     physics='Compliant, one-sided contact (tissue) beyond an angle.',
-    equation='tau = -s stiffness d (d / 0.2 rad)^(exponent - 1), d = s (q - angle_rad) > 0, '
-    's = sgn(angle_rad)',
-    source='Hunt, Crossley, J. Appl. Mech. 42, 1975, without damping',
+    equation="tau = -stiffness d (d / 0.2 rad)^(exponent - 1) (s + loss_s q'), "
+    'd = s (q - angle_rad) > 0, s = sgn(angle_rad)',
+    source='Hunt, Crossley, J. Appl. Mech. 42, 1975',
     parameters=(
         EffectParameter(
             'angle_rad',
@@ -18,17 +18,19 @@ DEFINITION = define(
             2.5,
             0.5,
             off=2.5,
-            starts=(0.25, 0.5, 0.8, -0.25, -0.5, -0.8),
+            starts=(0.2, 0.35, 0.5, 0.65, 0.8, 1.0, -0.2, -0.35, -0.5, -0.65, -0.8, -1.0),
             comparable=True,
         ),
         EffectParameter('stiffness', 'N m/rad', 0.0, 1.0, 0.02, off=0.0, starts=(0.015,)),
         EffectParameter('exponent', '-', 1.0, 2.5, 1.0),
+        EffectParameter('loss_s', 's', 0.0, 0.5, 0.0),
     ),
 )
 ON = DEFINITION.flag
 ANGLE = DEFINITION.first_parameter
 STIFFNESS = ANGLE + 1
 EXPONENT = ANGLE + 2
+LOSS = ANGLE + 3
 DEPTH = 0.2
 
 
@@ -44,3 +46,10 @@ def moment_and_slope(parameters: Array, angle: float) -> tuple[float, float]:
     if exponent != 1.0:
         stiffness *= (deep / DEPTH) ** (exponent - 1.0)
     return -side * stiffness * deep, stiffness * exponent
+
+
+@compiled
+def damping(parameters: Array, angle: float) -> float:
+    """Coefficient in N m s/rad of the moment against the joint's speed."""
+    moment, _ = moment_and_slope(parameters, angle)
+    return parameters[LOSS] * abs(moment)

@@ -50,6 +50,11 @@ class EffectParameter:
         Where a fit begins; the typical value if empty.
     comparable : bool
         Whether a person could measure the parameter another way.
+    phase : bool
+        Whether half a turn more reverses the effect.
+    scale : float
+        Where the effect is far from linear in this parameter, the change over which it nearly is;
+        else 0.
     """
 
     name: str
@@ -61,6 +66,8 @@ class EffectParameter:
     choices: tuple[float, ...] = ()
     starts: tuple[float, ...] = ()
     comparable: bool = False
+    phase: bool = False
+    scale: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.low <= self.typical <= self.high:

@@ -1,7 +1,6 @@
 """`distributed_friction`: friction acts along the sheath; motion has to travel through it."""
 
-import numpy as np
-
+from endoscope_core.compiled import Array, compiled
 from endoscope_core.effects.definition import EffectParameter, Stage, define
 from endoscope_core.effects.slots import SLOTS
 
@@ -11,17 +10,20 @@ DEFINITION = define(
     physics='Friction acts all along the sheath: motion reaches the joint only after the sliding '
     'front has travelled through it.',
     equation='8 nodes along each wire, T_i exp(-phi_i z_i / 2) = T_(i+1) exp(phi_i z_i / 2), '
-    'phi_i = share phi / 8, each with its own Dahl z_i; springs between them',
+    'phi_i = share phi / 8, each with its own Dahl z_i; springs between them, and at both ends '
+    'one that has free_end of the length',
     source='Kaneko et al., IEEE ICRA 1991; Palli, Borghesan, Melchiorri, IEEE Trans. Robot. '
     '28(2), 2012 (lumped chain)',
-    parameters=(EffectParameter('share', '-', 0.0, 1.0, 1.0, off=0.0, starts=(0.7,)),),
+    parameters=(
+        EffectParameter('share', '-', 0.0, 1.0, 1.0, off=0.0, starts=(0.15, 0.7)),
+        EffectParameter('free_end', '-', 0.01, 0.4, 0.0625),
+    ),
 )
 ON = DEFINITION.flag
 SHARE = DEFINITION.first_parameter
+FREE_END = SHARE + 1
 
 NODES = 8
-LENGTHS = np.array([0.5, *[1.0] * (NODES - 1), 0.5]) / NODES
-"""Shares of the wire's length before, between and after the nodes."""
 
 STRETCH = 0
 """Elongations in m of the springs, the first of a chain's states; all states are zero at rest."""
@@ -34,3 +36,11 @@ GAIN = OFFSET + NODES
 """A node's step is its offset plus its gain times the next node's step."""
 WIRE_A = SLOTS.state_block(GAIN + NODES)
 WIRE_B = SLOTS.state_block(GAIN + NODES)
+
+
+@compiled
+def length(parameters: Array, spring: int) -> float:
+    """Share of the wire's length that is before, between or after the nodes."""
+    if spring == 0 or spring == NODES:
+        return parameters[FREE_END]
+    return (1.0 - 2.0 * parameters[FREE_END]) / (NODES - 1)

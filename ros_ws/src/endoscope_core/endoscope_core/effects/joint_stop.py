@@ -7,18 +7,29 @@ DEFINITION = define(
     'joint_stop',
     Stage.JOINT,
     physics='A stiff, two-sided end stop limits the bending angle.',
-    equation='tau = -stiffness (|q| - angle_rad) sgn q where |q| > angle_rad',
-    source='Kelvin-Voigt unilateral constraint: Gilardi, Sharf, Mech. Mach. Theory 37, 2002',
+    equation="tau = -stiffness d (sgn q + loss_s q'), d = |q| - angle_rad > 0",
+    source='Unilateral constraint with damping that grows with depth: Gilardi, Sharf, Mech. Mach. '
+    'Theory 37, 2002',
     parameters=(
         EffectParameter(
-            'angle_rad', 'rad', 0.05, 2.5, 0.6, off=2.5, starts=(0.4, 0.6, 0.8), comparable=True
+            'angle_rad',
+            'rad',
+            0.05,
+            2.5,
+            0.6,
+            off=2.5,
+            starts=tuple(0.25 * 1.06**k for k in range(32)),
+            comparable=True,
+            scale=0.05,
         ),
         EffectParameter('stiffness', 'N m/rad', 0.005, 2.0, 0.2, starts=(0.1,)),
+        EffectParameter('loss_s', 's', 0.0, 0.5, 0.0),
     ),
 )
 ON = DEFINITION.flag
 ANGLE = DEFINITION.first_parameter
 STIFFNESS = ANGLE + 1
+LOSS = ANGLE + 2
 
 
 @compiled
@@ -29,3 +40,10 @@ def moment_and_slope(parameters: Array, angle: float) -> tuple[float, float]:
         return 0.0, 0.0
     moment = parameters[STIFFNESS] * beyond
     return (-moment if angle > 0.0 else moment), parameters[STIFFNESS]
+
+
+@compiled
+def damping(parameters: Array, angle: float) -> float:
+    """Coefficient in N m s/rad of the moment against the joint's speed."""
+    beyond = abs(angle) - parameters[ANGLE]
+    return parameters[LOSS] * parameters[STIFFNESS] * max(0.0, beyond)

@@ -1,16 +1,20 @@
-"""`rate_limit`: the servo's speed saturates."""
+"""`rate_limit`: the servo's speed, or that of its command, saturates."""
+
+import math
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.effects.definition import EffectParameter, Stage, define
-from endoscope_core.effects.slots import JOINT_RADIUS, PULLEY_RADIUS
+from endoscope_core.effects.slots import JOINT_RADIUS, PULLEY_RADIUS, SLOTS
 
 DEFINITION = define(
     'rate_limit',
     Stage.ACTUATOR,
-    physics="The servo's speed saturates.",
-    equation="m'' = 2 zeta wm (sat(wm (u - m) / (2 zeta), limit / gear) - m')",
+    physics="The servo's speed saturates, or (of_command) its command is slewed.",
+    equation="m'' = 2 zeta wm (sat(wm (u - m) / (2 zeta), limit / gear) - m'), or |u'| <= limit / "
+    'gear',
     source='Position loop around a saturated speed loop: Ellis, Control System Design Guide, '
-    '4th ed. 2012, ch. 17',
+    '4th ed. 2012, ch. 17; slewed command: Rundqwist, Stahl-Gunnarsson, Phase '
+    'compensation of rate limiters in unstable aircraft, IEEE CCA 1996',
     parameters=(
         EffectParameter(
             'limit_rad_per_s',
@@ -22,10 +26,13 @@ DEFINITION = define(
             starts=(0.3, 0.7, 1.5),
             comparable=True,
         ),
+        EffectParameter('of_command', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
 )
 ON = DEFINITION.flag
 LIMIT = DEFINITION.first_parameter
+OF_COMMAND = LIMIT + 1
+COMMAND = SLOTS.angle_state()
 
 
 @compiled
@@ -42,3 +49,17 @@ def limited_error(
     limit = parameters[LIMIT] * parameters[PULLEY_RADIUS] / parameters[JOINT_RADIUS]
     largest = limit * (1.0 - speed_kept) / max(-speed_from_error, 1e-12)
     return min(largest, max(-largest, error))
+
+
+@compiled
+def slewed_command(state: Array, parameters: Array, command: float, duration: float) -> float:
+    """Mean of the slewed command over a step with `command` held; advances the slew."""
+    limit = parameters[LIMIT] * parameters[PULLEY_RADIUS] / parameters[JOINT_RADIUS]
+    way = command - state[COMMAND]
+    most = limit * duration
+    if abs(way) > most:
+        state[COMMAND] += math.copysign(most, way)
+        return state[COMMAND] - math.copysign(0.5 * most, way)
+    state[COMMAND] = command
+    # On the way for a share of the step, there for the rest.
+    return command - 0.5 * way * abs(way) / most

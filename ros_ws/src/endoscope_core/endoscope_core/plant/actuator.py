@@ -55,6 +55,8 @@ def servo_command(
         command = transport_delay.delayed_command(state, p, history, fraction, width, tick)
     if on[actuator_lag.ON]:
         command = actuator_lag.lagged_command(state, p, command, width * tick)
+    if on[rate_limit.ON] and p[rate_limit.OF_COMMAND] > 0.5:
+        command = rate_limit.slewed_command(state, p, command, width * tick)
     return command
 
 
@@ -70,7 +72,7 @@ def servo_step(
     """Motor angle and speed after a substep with `command` held."""
     a11, a12, a21, a22 = transition
     error = m - command
-    if on[rate_limit.ON]:
+    if on[rate_limit.ON] and p[rate_limit.OF_COMMAND] < 0.5:
         error = rate_limit.limited_error(p, error, a21, a22)
         command = m - error
     return command + a11 * error + a12 * dm, a21 * error + a22 * dm

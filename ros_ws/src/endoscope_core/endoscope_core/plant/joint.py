@@ -9,7 +9,7 @@ from endoscope_core.effects import (
     gravity,
     joint_stop,
 )
-from endoscope_core.effects.slots import JOINT_STIFFNESS
+from endoscope_core.effects.slots import JOINT_DAMPING, JOINT_STIFFNESS
 from endoscope_core.plant.inputs import IN_OTHER_JOINT, IN_PUSH_MOMENT
 
 
@@ -44,3 +44,14 @@ def load(
     if on[breathing.ON]:
         moment += breathing.moment(p, time)
     return moment, slope
+
+
+@compiled
+def damping(p: Array, on: Flags, q: float) -> float:
+    """Coefficient in N m s/rad of the moments against the joint's speed, without the wires'."""
+    coefficient = p[JOINT_DAMPING]
+    if on[joint_stop.ON]:
+        coefficient += joint_stop.damping(p, q)
+    if on[contact.ON]:
+        coefficient += contact.damping(p, q)
+    return coefficient

@@ -26,7 +26,6 @@ from endoscope_core.effects.slots import (
     COMMAND_HISTORY,
     HISTORY,
     JOINT,
-    JOINT_DAMPING,
     JOINT_FRICTION,
     JOINT_PRESLIDING,
     JOINT_RADIUS,
@@ -72,7 +71,7 @@ from endoscope_core.plant.inputs import (
     OUT_TENSION_B,
     OUTPUTS,
 )
-from endoscope_core.plant.joint import load
+from endoscope_core.plant.joint import damping, load
 from endoscope_core.plant.proximal import proximal_tensions, stretch_shift
 from endoscope_core.plant.readings import read_sensors
 from endoscope_core.plant.transmission import (
@@ -166,7 +165,7 @@ def advance_tick(
                 phi, _ = friction_exponent(state, p, on, v, time, tick)
                 stretch = r * (pulley - wire_end) + shift
                 loads = proximal_tensions(state, p, on, pretension, phi, v, stretch, shift)
-                step = torque_limit.yielding(p, m_new - m, loads)
+                step = torque_limit.yielding(p, m_new - m, loads, dt)
                 if step != m_new - m:
                     m_new, dm_new = m + step, step / dt
         pulley_new = pulley_angle(state, p, on, m_new) if geared else m_new
@@ -221,7 +220,7 @@ def advance_tick(
         moment, slope = load(p, on, x, q, time, tick)
         moment += pull - p[JOINT_FRICTION] * zj
         slope += pull_slope + p[JOINT_FRICTION] / qs * steep_j
-        resistance = p[JOINT_DAMPING] + drag
+        resistance = damping(p, on, q) + drag
         resistance += 0.5 * dt * max(slope, 0.0)
         mean_dq = moment / resistance
         if on[joint_inertia.ON]:

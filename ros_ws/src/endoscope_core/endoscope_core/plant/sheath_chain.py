@@ -11,7 +11,6 @@ from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.effects import dahl
 from endoscope_core.effects.distributed_friction import (
     GAIN,
-    LENGTHS,
     NODES,
     OFFSET,
     SHARE,
@@ -20,6 +19,7 @@ from endoscope_core.effects.distributed_friction import (
     STRETCH,
     WIRE_A,
     WIRE_B,
+    length,
 )
 from endoscope_core.effects.slots import PRESLIDING_DISTANCE, WIRE_STIFFNESS
 from endoscope_core.effects.wire_creep import CREEP_A, CREEP_B
@@ -40,10 +40,9 @@ def spring_tension(
     i: int,
 ) -> tuple[float, float]:
     """Tension and slope of spring `i`; `common` is stretch in m spread over the whole wire."""
-    tension, slope = wire_tension(
-        p, on, pretension, state[chain + STRETCH + i] / LENGTHS[i] + common
-    )
-    return tension, max(slope, LEAST_STIFFNESS * p[WIRE_STIFFNESS]) / LENGTHS[i]
+    share = length(p, i)
+    tension, slope = wire_tension(p, on, pretension, state[chain + STRETCH + i] / share + common)
+    return tension, max(slope, LEAST_STIFFNESS * p[WIRE_STIFFNESS]) / share
 
 
 @compiled

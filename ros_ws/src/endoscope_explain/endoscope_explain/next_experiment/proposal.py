@@ -23,7 +23,7 @@ from endoscope_explain.next_experiment.waveforms import Waveform, family
 from endoscope_explain.observation import observe
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording
-from endoscope_explain.screen import promises
+from endoscope_explain.screen import promises, unexplained
 
 Array = NDArray[np.float64]
 
@@ -111,7 +111,7 @@ def rival_plant(
     others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
     bare = replace(plant, effects=others)
     observation = next(o for o in observe(recording, bare) if o.joint == effect.joint)
-    ranked = promises(refit(bare, observation, 0.2, 2), [rival])
+    ranked = promises(unexplained(refit(bare, observation, 0.2, 2)), rival)
     if not ranked:
         return None
     spec = EffectSpec(rival, effect.joint, ranked[0].start)
