@@ -38,12 +38,15 @@ class JointModel:
         Packed parameters; the free ones are replaced.
     flags : array (flags,) of bool
     free : tuple of FreeParameter
+    wide_step : float
+        Difference step of a coordinate where wires stick and slip.
     """
 
     observation: JointObservation
     base: Array
     flags: Flags
     free: tuple[FreeParameter, ...]
+    wide_step: float = WIDE_STEP
 
     def packed(self, theta: Array) -> tuple[Array, float]:
         """Packed parameters and reading lead at the coordinates `theta` (n,)."""
@@ -67,7 +70,7 @@ class JointModel:
     def step(self) -> float:
         """Difference step of a logarithmic coordinate."""
         sticks = self.flags[stribeck_friction.ON] and self.base[stribeck_friction.LAGGING] > 0.0
-        return WIDE_STEP if sticks else STEP
+        return self.wide_step if sticks else STEP
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest coordinates."""

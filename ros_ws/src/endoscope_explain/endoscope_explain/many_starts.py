@@ -1,5 +1,7 @@
 """Fit again from many starts where sticking and slipping makes the cost rugged."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,10 @@ Array = NDArray[np.float64]
 RUGGED = 'stribeck_friction'
 """The effect under which the joint sticks and slips."""
 ITERATIONS = 12
+REFINED = 2
+"""Best fits that are gone on with by derivatives over other widths."""
+WIDTHS = (0.05, 0.02, 0.05, 0.02)
+"""What looks like a wall over one width is a slope over another."""
 
 
 def from_many_starts(composition: Composition, anchor: Fit, jobs: int) -> Composition:
@@ -27,7 +33,7 @@ def from_many_starts(composition: Composition, anchor: Fit, jobs: int) -> Compos
     composition : Composition
         Has `RUGGED` alone.
     anchor : Fit
-        The nominal plant refitted.
+        The nominal plant as described: refitted to slips that it cannot make, it lies in a corner.
     jobs : int
         Processes side by side.
 
@@ -57,5 +63,19 @@ def from_many_starts(composition: Composition, anchor: Fit, jobs: int) -> Compos
             models, parallel_map(numbers, range(len(models)), jobs), strict=True
         )
     ]
-    tried = [Composition(composition.effects, item, score(item)) for item in found]
-    return min((composition, *tried), key=lambda c: c.score)
+    tried = sorted(
+        (Composition(composition.effects, item, score(item)) for item in (composition.fit, *found)),
+        key=lambda c: c.score,
+    )
+
+    def refined(index: int) -> tuple[Array, Array, Array, float]:
+        best = tried[index].fit
+        for width in WIDTHS:
+            other = fit(replace(best.model, wide_step=width), best.theta, iterations=ITERATIONS)
+            best = other if other.cost < best.cost else best
+        return best.theta, best.residuals, best.jacobian, best.cost
+
+    for index, values in enumerate(parallel_map(refined, range(REFINED), jobs)):
+        item = Fit(tried[index].fit.model, *values)
+        tried.append(Composition(composition.effects, item, score(item)))
+    return min(tried, key=lambda c: c.score)

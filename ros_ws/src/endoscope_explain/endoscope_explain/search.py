@@ -121,7 +121,7 @@ def search(
         polished = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
         grown = grow(parents, effects, jobs, polished)
         if grown and grown[0].effects == (RUGGED,) and not is_noise(grown[0].fit):
-            grown[0] = from_many_starts(grown[0], anchors[0], jobs)
+            grown[0] = from_many_starts(grown[0], anchors[1], jobs)
         levels.append(tuple(grown))
         if (
             not grown
