@@ -90,6 +90,29 @@ def test_a_damped_wire_end_crosses_the_gap_slowly():
     np.testing.assert_allclose(pull, 1e-3 * speed, rtol=0.05)
 
 
+STOPS = (
+    ('joint_stop', {'angle_rad': 0.2, 'stiffness': 0.1}),
+    ('contact', {'angle_rad': 0.2, 'stiffness': 0.1, 'exponent': 1.0}),
+)
+
+
+@pytest.mark.parametrize(('effect_id', 'hard'), STOPS)
+def test_a_lossy_obstacle_resists_entry_and_lets_go_where_it_did(effect_id, hard):
+    joint = JointParameters(joint_friction=0.0, capstan_exponent=0.0)
+    plain = answer(SINE, (effect_id, hard), joint=joint).bending[:, 0]
+    lossy = answer(SINE, (effect_id, hard | {'loss_s': 0.4}), joint=joint).bending[:, 0]
+    rising = slice(0, int(np.argmax(SINE[:2000])))
+    inside = plain[rising] > 0.21
+    assert np.all(lossy[rising][inside] < plain[rising][inside])
+    # Damping does not move what stands still.
+    held = np.full(3000, SINE.max())
+    at_rest = [
+        answer(held, (effect_id, hard | {'loss_s': loss}), joint=joint).bending[-1, 0]
+        for loss in (0.0, 0.4)
+    ]
+    assert at_rest[0] == pytest.approx(at_rest[1], abs=1e-4)
+
+
 @pytest.mark.parametrize('stiffness', [0.05, 0.5])
 def test_joint_stop_is_a_spring_beyond_its_angle_on_both_sides(stiffness):
     stop = ('joint_stop', {'angle_rad': 0.4, 'stiffness': stiffness})

@@ -58,10 +58,48 @@ def test_rate_limit_is_the_largest_speed():
     assert ramped.shaft_position[-1, 0] == pytest.approx(1.0, abs=1e-6)
 
 
+def test_a_slewed_command_is_the_answer_to_a_ramp():
+    limited = {'limit_rad_per_s': 0.5, 'of_command': 1.0}
+    slewed = answer(np.full(3000, 1.0), ('rate_limit', limited))
+    ramp = answer(np.minimum(0.5 * TIME[:3000] + 0.25e-3, 1.0))
+    np.testing.assert_allclose(slewed.shaft_position, ramp.shaft_position, atol=3e-4)
+    # The servo itself is free to be faster where it overshoots.
+    assert np.abs(slewed.shaft_velocity).max() > 0.5
+
+
 def test_torque_limit_is_the_largest_effort_and_the_motor_stays_behind():
     stalled = answer(SINE, ('torque_limit', {'limit_nm': 0.03}))
     assert np.abs(stalled.shaft_effort).max() == pytest.approx(0.03, rel=1e-3)
     assert np.abs(stalled.shaft_position - answer(SINE).shaft_position).max() > 0.1
+
+
+def test_a_drooping_torque_limit_leaves_a_speed_in_proportion_to_the_torque_to_spare():
+    limit, droop = 0.05, 1e-3
+    drooping = answer(SINE, ('torque_limit', {'limit_nm': limit, 'droop': droop}))
+    effort, speed = drooping.shaft_effort[:, 0], drooping.shaft_velocity[:, 0]
+    line = (limit - np.abs(effort)) / droop
+    driving = effort * speed > 0.0
+    assert np.all(np.abs(speed[driving]) < line[driving] + 0.02)
+    # Where the sinusoid asks for more than there is, the motor is on the line.
+    assert np.sum(np.abs(np.abs(speed[driving]) - line[driving]) < 0.02) > 200
+
+
+def test_worn_flanks_take_over_one_after_the_other():
+    ramp = np.concatenate([0.3 * TIME, 1.2 - 0.3 * TIME])
+
+    def played(spread):
+        worn = {'gap_rad': 0.1, 'flank_spread': spread}
+        return answer(ramp, ('gear_backlash', worn))
+
+    sharp, gradual = played(0.0), played(0.3)
+    shaft = sharp.shaft_position[:, 0]
+    turn = int(np.argmax(shaft))
+    differ = np.abs(gradual.tension - sharp.tension)[:, 0, 0] > 0.02
+    # The narrowest flank carries after 0.07 rad, and 0.13 rad after the turn all of them do.
+    back = shaft[turn] - shaft[turn:]
+    assert not differ[turn:][back < 0.068].any()
+    assert differ[turn:][(back > 0.08) & (back < 0.12)].all()
+    assert not differ[-300:].any()
 
 
 def test_gear_backlash_has_the_width_of_its_gap():
@@ -273,6 +311,23 @@ def test_distributed_friction_ends_at_the_same_capstan_ratio():
     stretch = 0.0025 * (run.shaft_position[2500, 0] / GEAR - run.bending[2500, 0])
     middle = (5.0 + 2000.0 * stretch) / (shares @ levels)
     assert run.tension[2500, 0, 0] == pytest.approx(middle * np.exp(0.45), rel=1e-3)
+
+
+def test_the_free_end_before_a_chain_is_the_spring_that_a_reversal_meets_first():
+    # While friction holds the first node, only the wire before it is released.
+    back = np.concatenate([0.4 * TIME, 1.6 - 0.4 * TIME])
+    grips = JointParameters(presliding_distance=5e-5)
+
+    def stiffness(free_end):
+        given = {'share': 1.0, 'free_end': free_end}
+        run = answer(back, ('distributed_friction', given), joint=grips)
+        after = int(np.argmax(run.shaft_position[:, 0])) + 10
+        few = slice(after, after + 2)
+        return np.ptp(run.tension[few, 0, 0]) / np.ptp(run.shaft_position[few, 0])
+
+    # The pulley winds 5 mm a radian of a wire of 2000 N/m.
+    assert stiffness(0.2) == pytest.approx(0.005 * 2000.0 / 0.2, rel=0.2)
+    assert stiffness(0.1) == pytest.approx(0.005 * 2000.0 / 0.1, rel=0.2)
 
 
 def test_distributed_friction_lets_the_joint_wait_for_the_sliding_front():

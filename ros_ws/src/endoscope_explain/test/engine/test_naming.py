@@ -37,6 +37,7 @@ def test_other_parameters_are_found_and_no_effect_is_named(one_joint):
         ('joint_stop', {'angle_rad': 0.55, 'stiffness': 0.15}, Verdict.MISSING_PHYSICS),
         ('load_cell_gain', {'gain': 0.9, 'wire': 1.0}, Verdict.SENSOR_FAULT),
         ('transport_delay', {'delay_s': 0.03}, Verdict.MISSING_PHYSICS),
+        ('torque_limit', {'limit_nm': 0.05, 'droop': 1e-3}, Verdict.MISSING_PHYSICS),
     ],
 )
 def test_the_effect_that_was_left_out_is_named(effect_id, parameters, verdict, one_joint):

@@ -1,0 +1,54 @@
+"""Where screening begins and where a fit of an onset ends."""
+
+import math
+
+import numpy as np
+import pytest
+
+from endoscope_core.effects import CATALOGUE
+from endoscope_core.plant import EffectSpec
+from endoscope_explain.compose import nominal_anchors
+from endoscope_explain.evaluate import packed_joint
+from endoscope_explain.fit import fit
+from endoscope_explain.observation import observe
+from endoscope_explain.onset_scan import redated
+from endoscope_explain.screen import promises, unexplained, with_effect
+
+
+def anchors(one_joint, effect_id, parameters):
+    """Nominal plant, refitted and as described, of a rig that has an effect."""
+    plant = one_joint.rig()
+    true = one_joint.rig(EffectSpec(effect_id, 'bend_x', parameters))
+    (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
+    return nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+
+
+def test_a_load_that_was_dated_seconds_late_is_dated_again(one_joint):
+    refitted, _ = anchors(one_joint, 'external_load', {'moment_nm': 0.004, 'time_s': 3.2})
+    model = with_effect(refitted.model, 'external_load', {'moment_nm': 0.003, 'time_s': 8.0})
+    own = [item.coordinate(float(model.base[item.index])) for item in model.free[-2:]]
+    late = fit(model, np.concatenate([refitted.theta, own]), iterations=10)
+    first = CATALOGUE['external_load'].first_parameter
+    dated, _ = redated(late).model.packed(redated(late).theta)
+    assert abs(late.model.packed(late.theta)[0][first + 1] - 3.2) > 1.0
+    assert dated[first + 1] == pytest.approx(3.2, abs=0.05)
+    assert dated[first] == pytest.approx(0.004, rel=0.03)
+
+
+def test_a_disturbance_in_the_opposite_phase_is_promised_there(one_joint):
+    _, described = anchors(
+        one_joint, 'breathing', {'moment_nm': 0.003, 'frequency_hz': 0.3, 'phase_rad': -2.5}
+    )
+    found = promises(unexplained(described), 'breathing')
+    best = next(p for p in found if p.start['frequency_hz'] == pytest.approx(0.3))
+    distance = math.remainder(best.start['phase_rad'] + 2.5, 2.0 * math.pi)
+    assert abs(distance) < math.pi / 2.0
+
+
+def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(one_joint):
+    _, described = anchors(one_joint, 'torque_limit', {'limit_nm': 0.05})
+    found = promises(unexplained(described), 'torque_limit')
+    assert found[0].start['limit_nm'] == pytest.approx(0.05, rel=0.05)
+    gains = {p.start['limit_nm']: p.gain for p in found}
+    assert gains[max(gains)] == pytest.approx(0.0, abs=1e-6)
+    assert gains[min(gains)] < 0.5 * found[0].gain
