@@ -17,6 +17,8 @@ ADDED = 30.0
 ADDED_SHARE = 0.25
 """Share of the fall so far that a second effect must bring: less is an error of form. Third ones
 and more are looked for only where they were asked for."""
+ADDED_SHARE_TO_NOISE = 0.08
+"""The same where only noise is left then: no error of form looks just like another effect."""
 EXPLAINED = 0.68
 """Share of the misfit's logarithm that the catalogue must explain to be called adequate."""
 BARELY = 0.2
@@ -169,9 +171,11 @@ def _better(
     chosen: Composition, nominal: Composition, level: tuple[Composition, ...]
 ) -> Composition | None:
     so_far = nominal.score - chosen.score
-    share = ADDED_SHARE if len(chosen.effects) == 1 else 0.0
-    needed = max(ADDED, share * so_far) if chosen.effects else NAMED
     alike = [c for c in level if is_noise(c.fit)]
+    share = ADDED_SHARE_TO_NOISE if alike else ADDED_SHARE
+    if len(chosen.effects) > 1:
+        share = 0.0
+    needed = max(ADDED, share * so_far) if chosen.effects else NAMED
     candidates = sorted(alike, key=_likelihood) if alike else level
     for candidate in candidates:
         if candidate.score < chosen.score - needed or (

@@ -125,7 +125,7 @@ def effect_parameters(effect_id: str) -> tuple[FreeParameter, ...]:
     return tuple(
         _of_effect(definition.first_parameter + i, parameter)
         for i, parameter in enumerate(definition.parameters)
-        if not parameter.choices
+        if not (parameter.choices or parameter.is_duration)
     )
 
 

@@ -113,6 +113,11 @@ class JointObservation:
         """Number of analysis samples of all channels."""
         return sum(len(channel.time) for channel in self.channels)
 
+    @property
+    def duration(self) -> float:
+        """Length in s."""
+        return self.inputs.shape[1] * TICK
+
     def slices(self) -> tuple[slice, ...]:
         """Place of each channel in a residual vector of all channels."""
         ends = np.cumsum([0, *(len(channel.time) for channel in self.channels)])

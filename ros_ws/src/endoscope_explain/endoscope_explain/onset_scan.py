@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.fit import Fit, fit
-from endoscope_explain.observation import TICK
 
 Array = NDArray[np.float64]
 
@@ -35,7 +34,7 @@ def redated(found: Fit) -> Fit:
     """
     for place, item in enumerate(found.model.free):
         if item.name == ONSET:
-            end = found.model.observation.inputs.shape[1] * TICK
+            end = found.model.observation.duration
             found = _better(found, place, np.arange(COARSE_S, end, COARSE_S))
             dated = item.value(float(found.theta[place]))
             near = dated + np.arange(-FINE_REACH_S, FINE_REACH_S + 0.5 * FINE_S, FINE_S)

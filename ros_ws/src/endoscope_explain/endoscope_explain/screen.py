@@ -56,7 +56,10 @@ def with_effect(model: JointModel, effect_id: str, start: dict[str, float]) -> J
     base, flags = model.base.copy(), model.flags.copy()
     flags[definition.flag] = True
     for i, parameter in enumerate(definition.parameters):
-        base[definition.first_parameter + i] = start.get(parameter.name, parameter.typical)
+        value = start.get(parameter.name, parameter.typical)
+        base[definition.first_parameter + i] = (
+            model.observation.duration if parameter.is_duration else value
+        )
     free = with_free_reference(model.free, effect_id) + effect_parameters(effect_id)
     return JointModel(model.observation, base, flags, free)
 

@@ -17,10 +17,10 @@ DEFINITION = define(
             0.0,
             3600.0,
             15.0,
-            starts=(3.0, 8.0, 15.0, 22.0, 30.0, 40.0),
+            starts=onset.STARTS,
             comparable=True,
         ),
-        EffectParameter('factor', '-', 0.1, 8.0, 1.6, off=1.0, starts=(0.7, 1.4)),
+        EffectParameter('factor', '-', 0.1, 8.0, 1.6, off=1.0, starts=(1.4,)),
     ),
 )
 ON = DEFINITION.flag

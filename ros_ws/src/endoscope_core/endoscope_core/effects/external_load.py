@@ -20,7 +20,7 @@ DEFINITION = define(
             0.0,
             3600.0,
             15.0,
-            starts=(3.0, 8.0, 15.0, 22.0, 30.0, 40.0),
+            starts=onset.STARTS,
             comparable=True,
         ),
     ),

@@ -2,6 +2,9 @@
 
 from endoscope_core.compiled import compiled
 
+STARTS = tuple(0.75 * k for k in range(1, 54))
+"""Times in s where fits begin: between one motion and the next, a wrong one leads nowhere."""
+
 
 @compiled
 def share_after(onset: float, time: float, tick: float) -> float:
