@@ -160,13 +160,20 @@ def test_faults_of_the_recording_leave_the_rig_alone(effect_id, nominal):
 
 
 ONLY_WITH = {
-    'memory_s': 'lagging',
-    'flank_compliance': 'loaded_tip',
-    'wire_end_damping': 'loaded_tip',
+    'memory_s': {'lagging': 1.0},
+    'flank_compliance': {'loaded_tip': 1.0},
+    'wire_end_damping': {'loaded_tip': 1.0},
+    'sharpness': {'dead_zone_m': 5e-4},
+    'span_s': {'time_constant_s': 20.0},
 }
-"""Choices without which a parameter has nothing to act on."""
-EVEN = {'flank_spread': 0.15}
-"""Parameters whose sign would not matter, and where a fit begins: at zero there is no slope."""
+"""What other parameters have to be for one to have anything to act on."""
+JUDGED_AT = {
+    ('gear_backlash', 'flank_spread'): 0.15,
+    ('configuration_change', 'duration_s'): 0.05,
+    ('external_load', 'duration_s'): 0.05,
+    ('pretension_loss', 'time_constant_s'): 20.0,
+}
+"""Where parameters are judged that have no slope at their typical value."""
 
 
 def slopes(effect_id, parameter, step):
@@ -177,8 +184,8 @@ def slopes(effect_id, parameter, step):
         if p.typical == 0.0 and p.starts and p is not parameter
     }
     if parameter.name in ONLY_WITH:
-        start[ONLY_WITH[parameter.name]] = 1.0
-    typical = EVEN.get(parameter.name, parameter.typical)
+        start |= ONLY_WITH[parameter.name]
+    typical = JUDGED_AT.get((effect_id, parameter.name), parameter.typical)
     unit = abs(typical) or 0.1 * (parameter.high - parameter.low)
     sign = 1.0 if typical + step * unit <= parameter.high else -1.0
     here, there = (

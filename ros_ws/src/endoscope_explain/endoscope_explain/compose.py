@@ -121,7 +121,13 @@ def grow(
     list of Composition
         Best first.
     """
-    looks = _looks(parents, _screened(parents, effect_ids, jobs), jobs)
+    screened = _screened(parents, effect_ids, jobs)
+    looks = _looks(parents, screened, jobs)
+    if screened:
+        # Where the misfit is rugged, a look from a good start may end far away from it.
+        index, promise = max(screened, key=lambda s: s[1].gain)
+        promised = {*parents[index][0].effects, promise.effect_id}
+        looks.sort(key=lambda item: set(item.effects) != promised)
     grown: list[Composition] = []
     batch = max(jobs, 2)
     while looks and len(grown) < polished:

@@ -8,7 +8,7 @@ DEFINITION = define(
     'configuration_change',
     Stage.TRANSMISSION,
     physics='The tube changes its shape during the recording, and sheath friction jumps.',
-    equation='phi(t) = phi for t < time_s, factor phi after',
+    equation='phi(t) = phi before time_s, factor phi after, evenly within duration_s around it',
     source='phi = mu Theta, Euler-Eytelwein: Kaneko et al., IEEE ICRA 1991',
     parameters=(
         EffectParameter(
@@ -21,15 +21,17 @@ DEFINITION = define(
             comparable=True,
         ),
         EffectParameter('factor', '-', 0.1, 8.0, 1.6, off=1.0, starts=(1.4,)),
+        EffectParameter('duration_s', 's', 0.0, 5.0, 0.0, starts=(0.05,)),
     ),
 )
 ON = DEFINITION.flag
 TIME = DEFINITION.first_parameter
 FACTOR = TIME + 1
+DURATION = TIME + 2
 
 
 @compiled
 def friction_factor(parameters: Array, time: float, tick: float) -> float:
     """Mean factor on the capstan exponent over the tick around `time`."""
-    after = onset.share_after(parameters[TIME], time, tick)
+    after = onset.share_after(parameters[TIME], parameters[DURATION], time, tick)
     return 1.0 + after * (parameters[FACTOR] - 1.0)

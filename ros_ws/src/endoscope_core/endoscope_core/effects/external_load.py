@@ -8,7 +8,7 @@ DEFINITION = define(
     'external_load',
     Stage.JOINT,
     physics='A constant moment acts on the joint from some time on.',
-    equation='tau = moment_nm for t >= time_s',
+    equation='tau = moment_nm after time_s, risen evenly within duration_s around it',
     source='Step disturbance: De Luca, Mattone, IEEE ICRA 2005',
     parameters=(
         EffectParameter(
@@ -23,14 +23,17 @@ DEFINITION = define(
             starts=onset.STARTS,
             comparable=True,
         ),
+        EffectParameter('duration_s', 's', 0.0, 5.0, 0.0, starts=(0.05,)),
     ),
 )
 ON = DEFINITION.flag
 MOMENT = DEFINITION.first_parameter
 TIME = MOMENT + 1
+DURATION = MOMENT + 2
 
 
 @compiled
 def mean_moment(parameters: Array, time: float, tick: float) -> float:
     """Mean moment in N m over the tick around `time`."""
-    return parameters[MOMENT] * onset.share_after(parameters[TIME], time, tick)
+    begun = onset.share_after(parameters[TIME], parameters[DURATION], time, tick)
+    return parameters[MOMENT] * begun

@@ -7,9 +7,10 @@ STARTS = tuple(0.75 * k for k in range(1, 54))
 
 
 @compiled
-def share_after(onset: float, time: float, tick: float) -> float:
-    """Share in [0, 1] of the tick around `time`, all in s, that lies after `onset`.
+def share_after(onset: float, duration: float, time: float, tick: float) -> float:
+    """Share in [0, 1] that has begun, in the mean over the tick around `time`.
 
-    Samples come once a tick: a step that takes as long shows in their sum wherever it lies.
+    What begins rises evenly for `duration` around `onset`; all in s. Samples come once a tick: a
+    step that takes as long shows in their sum wherever it lies.
     """
-    return min(1.0, max(0.0, 0.5 + (time - onset) / tick))
+    return min(1.0, max(0.0, 0.5 + (time - onset) / (tick + duration)))

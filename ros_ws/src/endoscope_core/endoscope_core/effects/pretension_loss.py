@@ -16,7 +16,7 @@ DEFINITION = define(
         EffectParameter(
             'rate_n_per_s', 'N/s', -1.0, 1.0, 0.04, off=0.0, starts=(0.03,), comparable=True
         ),
-        EffectParameter('time_constant_s', 's', 1.0, 1e6, 1e6, starts=(60.0,)),
+        EffectParameter('time_constant_s', 's', 1.0, 1e12, 1e12, starts=(60.0,)),
         EffectParameter('span_s', 's', 1e-3, 1e6, 40.0, is_duration=True),
     ),
 )

@@ -28,7 +28,8 @@ def wire_tension(p: Array, on: Flags, pretension: float, stretch: float) -> tupl
     """Tension in N of a wire at a stretch in m, and its slope in N/m."""
     slope = p[WIRE_STIFFNESS]
     if on[wire_slack.ON]:
-        stretch = wire_slack.taut_stretch(p, stretch)
+        stretch, growth = wire_slack.taut_stretch(p, stretch)
+        slope *= growth
     if on[wire_stiffening.ON]:
         stretch, growth = wire_stiffening.linear_equivalent(p, stretch)
         slope *= growth
