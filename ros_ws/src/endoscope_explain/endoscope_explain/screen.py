@@ -71,10 +71,10 @@ class Unexplained:
     Attributes
     ----------
     fit : Fit
-    span : array (size, n)
-        Orthonormal directions in which the parameters move the residual.
-    left : array (size,)
-        Residuals across these directions.
+    span : array (size + n, n)
+        Orthonormal directions in which the parameters move the residual and the priors' deviations.
+    left : array (size + n,)
+        Residuals and deviations across these directions.
     coarse : array (size,)
         Residuals at the few integration steps at which effects are screened.
     """
@@ -87,9 +87,11 @@ class Unexplained:
 
 def unexplained(anchor: Fit) -> Unexplained:
     """What a fit leaves to effects that it does not have."""
-    span, _ = np.linalg.qr(anchor.jacobian)
-    left = anchor.residuals - span @ (span.T @ anchor.residuals)
-    coarse = anchor.model.residuals(anchor.theta, SCREENING_SUBSTEPS)
+    model = anchor.model
+    span, _ = np.linalg.qr(np.vstack([anchor.jacobian, np.diag(model.prior_weight())]))
+    here = np.concatenate([anchor.residuals, model.prior(anchor.theta)])
+    left = here - span @ (span.T @ here)
+    coarse = model.residuals(anchor.theta, SCREENING_SUBSTEPS)
     return Unexplained(anchor, span, left, coarse)
 
 
@@ -116,7 +118,12 @@ def promises(background: Unexplained, effect_id: str) -> list[Promise]:
             for item in model.free[len(anchor.theta) :]
         ]
         theta = np.concatenate([anchor.theta, own])
-        moved = model.residuals(theta, SCREENING_SUBSTEPS) - background.coarse
+        moved = np.concatenate(
+            [
+                model.residuals(theta, SCREENING_SUBSTEPS) - background.coarse,
+                np.zeros(len(anchor.theta)),
+            ]
+        )
         moved -= span @ (span.T @ moved)
         size = float(moved @ moved)
         towards = -float(moved @ background.left)

@@ -26,7 +26,9 @@ def anchors(one_joint, effect_id, parameters):
 def test_a_load_that_was_dated_seconds_late_is_dated_again(one_joint):
     refitted, _ = anchors(one_joint, 'external_load', {'moment_nm': 0.004, 'time_s': 3.2})
     model = with_effect(refitted.model, 'external_load', {'moment_nm': 0.003, 'time_s': 8.0})
-    own = [item.coordinate(float(model.base[item.index])) for item in model.free[-2:]]
+    own = [
+        item.coordinate(float(model.base[item.index])) for item in model.free[len(refitted.theta) :]
+    ]
     late = fit(model, np.concatenate([refitted.theta, own]), iterations=10)
     first = CATALOGUE['external_load'].first_parameter
     dated, _ = redated(late).model.packed(redated(late).theta)
