@@ -6,9 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from endoscope_core.plant import PlantDescription
 from endoscope_explain.fit import Fit
 from endoscope_explain.observation import Channel, JointObservation
+from endoscope_explain.predicted_signals import view
 from endoscope_explain.recording import Recording
+from endoscope_explain.recording.signals import signal_name
+
+Array = NDArray[np.float64]
 
 SPIKE = 8.0
 """Height in noise units of a residual that stands alone."""
@@ -18,6 +23,8 @@ NEARBY = 15
 """Samples whose median size is the usual one."""
 AROUND = 7
 """Samples whose median is what the one in their middle should be."""
+SAME_STAMP_S = 1e-6
+"""Stamps that differ by less are the same one."""
 
 
 def without_isolated(
@@ -57,11 +64,43 @@ def _without_isolated(observation: JointObservation, fit: Fit) -> JointObservati
     return replace(observation, channels=channels)
 
 
-def _kept(channel: Channel, residual: NDArray[np.float64]) -> Channel:
+def with_isolated_marked(recording: Recording, plant: PlantDescription) -> Recording:
+    """Mark tracker samples that stick out of what a plant predicts as wrong.
+
+    Parameters
+    ----------
+    recording : Recording
+        As audited. Where the audit found no wrong sample, none is marked here.
+    plant : PlantDescription
+        That explains the rig.
+
+    Returns
+    -------
+    Recording
+    """
+    bending = recording.bending
+    if bending.valid.all():
+        return recording
+    seen = view(recording, {'explained': plant})
+    valid = bending.valid.copy()
+    for j, joint in enumerate(recording.joints):
+        signal = signal_name('bending', joint)
+        if signal in seen.signals:
+            shown = seen.signals[signal]
+            wrong = shown.time[_sticks_out(shown.residual('explained'))]
+            valid[np.searchsorted(bending.time, wrong - SAME_STAMP_S), j] = False
+    return recording.with_series({'bending': replace(bending, valid=valid)})
+
+
+def _sticks_out(residual: Array) -> NDArray[np.bool_]:
     usual = median_filter(np.abs(residual), NEARBY, mode='nearest')
     # Up to three samples in a row stick out of the median; a step of the joint does not.
     height = residual - median_filter(residual, AROUND, mode='nearest')
-    wrong = np.abs(height) > np.maximum(SPIKE, ALONE * usual)
+    return np.asarray(np.abs(height) > np.maximum(SPIKE, ALONE * usual))
+
+
+def _kept(channel: Channel, residual: Array) -> Channel:
+    wrong = _sticks_out(residual)
     if not wrong.any():
         return channel
     keep = ~wrong

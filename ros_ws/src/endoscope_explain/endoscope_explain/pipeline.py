@@ -14,6 +14,7 @@ from endoscope_explain.case import ExplainedCase, NextExperiment, Place
 from endoscope_explain.combine import combined_effects, combined_verdict, improved_plant
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.free_parameters import BAND
+from endoscope_explain.isolated_samples import with_isolated_marked
 from endoscope_explain.ladder import ladders
 from endoscope_explain.locate.chain_cut import cut_at_motor
 from endoscope_explain.locate.locating import (
@@ -196,7 +197,8 @@ def explain_case(
         # Before the black boxes, whose libraries start threads: a fork is not safe after that.
         case = replace(case, next_experiment=_next(case, jobs, tell))
     tell('judging beside black boxes' if extras else 'judging')
-    held_out, second = ladders(audit.recording, explanation, inputs.validation, extras)
+    validation = inputs.validation and with_isolated_marked(inputs.validation, plant)
+    held_out, second = ladders(audit.recording, explanation, validation, extras)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
 
 

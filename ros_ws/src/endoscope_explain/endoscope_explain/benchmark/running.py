@@ -17,6 +17,7 @@ from endoscope_explain.benchmark.peers import name_with_peers
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.generator import CaseRequest, draw_case, write_case
+from endoscope_explain.isolated_samples import with_isolated_marked
 from endoscope_explain.observation import TICK, observe
 from endoscope_explain.pipeline import Sources, explain_case, read_inputs
 from endoscope_explain.predicted_signals import reading_lead, simulate_rig
@@ -74,7 +75,7 @@ def run_case(task: Task) -> Outcome:
             _named(case),
             truth,
             second_recording(
-                second,
+                with_isolated_marked(second, case.plant),
                 case.explanation.nominal,
                 case.explanation.augmented,
                 moved_joints(case.recording),

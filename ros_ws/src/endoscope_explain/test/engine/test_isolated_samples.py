@@ -6,7 +6,7 @@ import numpy as np
 
 from endoscope_core.plant import PlantDescription
 from endoscope_explain.evaluate import packed_joint
-from endoscope_explain.isolated_samples import without_isolated
+from endoscope_explain.isolated_samples import with_isolated_marked, without_isolated
 from endoscope_explain.observation import observe
 from endoscope_explain.search import all_anchors
 
@@ -41,3 +41,12 @@ def test_spikes_are_left_out_where_some_samples_were_wrong_already(record):
 def test_without_a_known_wrong_sample_a_spike_may_be_physics(record):
     before, after = cleaned(spiked(record(duration=4.0), known=False), PLANT)
     assert after is before
+
+
+def test_a_second_recording_is_judged_without_what_sticks_out_of_the_prediction(record):
+    recording = spiked(record(duration=4.0), known=True)
+    judged = with_isolated_marked(recording, PLANT)
+    marked = np.argwhere(judged.bending.valid != recording.bending.valid)
+    np.testing.assert_array_equal(marked, [[40, 0], [44, 0]])
+    untouched = spiked(record(duration=4.0), known=False)
+    assert with_isolated_marked(untouched, PLANT) is untouched
