@@ -7,7 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import endoscope_core
+from endoscope_core.compiled_cache import source_hash
 from endoscope_explain import generator
+from endoscope_explain.generator import compiled_physics
+from endoscope_explain.generator.compiled_physics import cache_folder
 from endoscope_explain.generator.concealed_physics import TICK, move
 from endoscope_explain.generator.motions import GEAR, joint_command
 from endoscope_explain.generator.rig import NOMINAL, nominal_rig
@@ -162,3 +166,11 @@ def test_shares_nothing_with_the_plant_that_fits():
                 own = name.startswith('endoscope_explain.generator')
                 foreign = not name.startswith('endoscope_') or name.startswith('endoscope_bags')
                 assert own or foreign or name == 'endoscope_core.compiled_cache', (path, name)
+
+
+def test_compiled_functions_are_kept_by_the_sources_of_plant_and_generator():
+    plant = Path(endoscope_core.__file__).parent
+    generator = Path(compiled_physics.__file__).parent
+    name = cache_folder().name
+    assert source_hash(plant) in name
+    assert source_hash(generator) in name

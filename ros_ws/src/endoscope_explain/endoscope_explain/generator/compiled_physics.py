@@ -1,5 +1,6 @@
 """How the generator's physics is compiled, and where numba keeps it."""
 
+import inspect
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -10,20 +11,20 @@ import numba
 from endoscope_core.compiled_cache import source_hash
 
 
-def _use_cache_of_the_generator() -> None:
-    """Point numba at the generator's own cache folder, unless NUMBA_CACHE_DIR is set.
+def cache_folder() -> Path:
+    """Cache folder of exactly the sources of the generator and of the plant.
 
     Numba notices a change of the file that holds a compiled function, not of those it calls in
-    other files; hence a folder named after a hash of all of them.
+    other files. What the plant's package compiles after the generator was imported is kept here,
+    too, and would be run for ever if the folder did not change with the plant's sources.
     """
-    if 'NUMBA_CACHE_DIR' in os.environ:
-        return
     base = Path(os.environ.get('XDG_CACHE_HOME', Path.home() / '.cache'))
-    folder = base / 'endoscope' / 'numba' / f'generator-{source_hash(Path(__file__).parent)}'
-    vars(numba.config)['CACHE_DIR'] = str(folder)
+    plant = source_hash(Path(inspect.getfile(source_hash)).parent)
+    return base / 'endoscope' / 'numba' / f'generator-{source_hash(Path(__file__).parent)}-{plant}'
 
 
-_use_cache_of_the_generator()
+if 'NUMBA_CACHE_DIR' not in os.environ:
+    vars(numba.config)['CACHE_DIR'] = str(cache_folder())
 
 _OPTIONS: dict[str, Any] = {'cache': True, 'error_model': 'numpy', '_nrt': False}
 compiled: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(**_OPTIONS)
