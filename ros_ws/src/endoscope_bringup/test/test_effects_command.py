@@ -12,7 +12,7 @@ def test_lists_every_effect(capsys):
 
 def test_tells_equation_source_and_parameters(capsys):
     assert main(['effects', 'joint_stop', 'load_cell_gain']) == 0
-    told = capsys.readouterr().out
+    told = ' '.join(capsys.readouterr().out.split())
     definition = CATALOGUE['joint_stop']
     assert definition.equation in told
     assert definition.source in told

@@ -21,11 +21,11 @@ Array = NDArray[np.float64]
 
 BLOCK_S = 1.0
 NINETY_PERCENT = 1.645
-WIDENING = 2.0
+WIDENING = 1.2
 """Calibrated on concealed cases: what the sandwich misses when the form differs."""
-FORM = 0.002
+FORM = 0.0012
 """Relative error of a parameter by form alone, where nothing but noise is left."""
-FORM_SEEN = 0.012
+FORM_SEEN = 0.0072
 """The same where an error of form is seen."""
 
 

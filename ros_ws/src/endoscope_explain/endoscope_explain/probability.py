@@ -3,8 +3,8 @@
 import math
 
 GAP_SCALE = 12.0
-CEILING = 0.99
-INADEQUATE = 0.45
+CEILING = 0.97
+INADEQUATE = 0.25
 """Probability of a name where the fit stays inadequate, however far its rivals are behind."""
 
 
