@@ -243,6 +243,19 @@ class BagWriter:
         if pending or topics:
             self._sink.write(topics, pending, size)
 
+    def settle(self) -> None:
+        """Flush, and wait until everything is in the file or has found no room.
+
+        Raises
+        ------
+        BagWriteError
+            As in `flush`, for every chunk so far.
+        """
+        try:
+            self.flush()
+        finally:
+            self._sink.wait()
+
     def close(self, custom_data: Mapping[str, str] | None = None) -> None:
         """Finish the recording; harmless when it is closed already.
 
@@ -262,8 +275,7 @@ class BagWriter:
         self.closed = True
         full: BagWriteError | None = None
         try:
-            self.flush()
-            self._sink.wait()
+            self.settle()
         except BagWriteError as error:
             full = error
         custom = dict(custom_data or {})

@@ -190,6 +190,11 @@ class RecordingSession:
         self._finish()
 
     def _finish(self) -> None:
+        # A writing thread may only now find that the last chunks have no room; the notes say so.
+        try:
+            self._writer.settle()
+        except BagWriteError as error:
+            self._full = str(error)
         try:
             self._writer.close(self._notes())
         except BagWriteError as error:

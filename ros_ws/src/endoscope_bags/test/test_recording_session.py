@@ -84,24 +84,26 @@ FULL = """
     import numpy as np
     from endoscope_bags.recording_session import Arrival, RecordingSession
     path, limit, threaded = sys.argv[1], int(sys.argv[2]), sys.argv[3] == 'threaded'
+    count = int(sys.argv[4])
     if limit:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
     session = RecordingSession(path, threaded=threaded)
     topic = session.add_topic('/a', 'std_msgs/msg/String')
     noise = np.random.default_rng(0)
-    for k in range(0, 4000, 5):
-        session.accept([
-            Arrival(n * 10**6, topic, n + 1, n * 10**6, noise.bytes(400)) for n in range(k, k + 5)
-        ])
+    arrivals = [
+        Arrival(n * 10**6, topic, n + 1, n * 10**6, noise.bytes(400)) for n in range(count)
+    ]
+    for k in range(0, count, 5):
+        session.accept(arrivals[k : k + 5])
     report = session.close()
     print(report.message_count, report.lost_count, report.complete, report.finished)
     print(report)
 """
 
 
-def fill(path, limit, threaded):
+def fill(path, limit, threaded, count):
     done = subprocess.run(
-        [sys.executable, '-c', textwrap.dedent(FULL), str(path), str(limit), threaded],
+        [sys.executable, '-c', textwrap.dedent(FULL), str(path), str(limit), threaded, str(count)],
         capture_output=True,
         text=True,
         check=False,
@@ -112,10 +114,13 @@ def fill(path, limit, threaded):
     return int(recorded), int(lost), complete, finished, second
 
 
+# A writing thread has up to 16 chunks, of 250 messages here, before it: it finds the disk full on
+# closing in the short recording, and while it is made in the long one.
+@pytest.mark.parametrize('count', [4000, 8000])
 @pytest.mark.parametrize('threaded', ['threaded', 'inline'])
-def test_a_full_disk_keeps_what_is_there_and_is_said(tmp_path, threaded):
-    recorded, lost, complete, finished, text = fill(tmp_path / 'bag', 700_000, threaded)
-    assert recorded + lost == 4000
+def test_a_full_disk_keeps_what_is_there_and_is_said(tmp_path, threaded, count):
+    recorded, lost, complete, finished, text = fill(tmp_path / 'bag', 700_000, threaded, count)
+    assert recorded + lost == count
     assert 500 < recorded < 2000
     assert (complete, finished) == ('False', 'True')
     assert 'File too large; recording ended there' in text
@@ -126,7 +131,7 @@ def test_a_full_disk_keeps_what_is_there_and_is_said(tmp_path, threaded):
 
 
 def test_the_limit_is_what_stopped_it(tmp_path):
-    recorded, lost, complete, *_ = fill(tmp_path / 'bag', 0, 'threaded')
+    recorded, lost, complete, *_ = fill(tmp_path / 'bag', 0, 'threaded', 4000)
     assert (recorded, lost, complete) == (4000, 0, 'True')
 
 
