@@ -13,7 +13,10 @@ from pathlib import Path
 import numba
 from numba import njit
 
-__all__ = ['njit', 'source_hash', 'use_cache_of_these_sources']
+__all__ = ['SOURCES', 'cache_folder', 'njit', 'source_hash', 'use_cache_of']
+
+SOURCES = Path(__file__).parent
+"""This package, the plant's."""
 
 
 def source_hash(package: Path) -> str:
@@ -25,14 +28,21 @@ def source_hash(package: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-def use_cache_of_these_sources() -> None:
-    """Point numba at a cache folder of exactly these sources, unless NUMBA_CACHE_DIR is set."""
-    if 'NUMBA_CACHE_DIR' in os.environ:
-        return
+def cache_folder(*packages: Path) -> Path:
+    """Cache folder of exactly the sources of these packages."""
     base = Path(os.environ.get('XDG_CACHE_HOME', Path.home() / '.cache'))
-    folder = base / 'endoscope' / 'numba' / source_hash(Path(__file__).parent)
-    # Numba sets the names of its configuration at run time, out of the type checker's sight.
-    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+    return base / 'endoscope' / 'numba' / '-'.join(source_hash(package) for package in packages)
 
 
-use_cache_of_these_sources()
+def use_cache_of(*packages: Path) -> None:
+    """Keep what is compiled from now on by the sources of `packages`, unless NUMBA_CACHE_DIR says.
+
+    Numba takes the folder when a function is decorated: whoever names another one names `SOURCES`
+    with his own, as modules of this package may be imported after it.
+    """
+    if 'NUMBA_CACHE_DIR' not in os.environ:
+        # Numba sets the names of its configuration at run time, out of the type checker's sight.
+        numba.config.CACHE_DIR = str(cache_folder(*packages))  # type: ignore[attr-defined]
+
+
+use_cache_of(SOURCES)

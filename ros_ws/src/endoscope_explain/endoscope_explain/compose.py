@@ -11,6 +11,7 @@ from endoscope_explain.fit import Fit, JointModel, fit, jacobian
 from endoscope_explain.free_parameters import BAND, nominal_parameters
 from endoscope_explain.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
+from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.rank import Look, look, polish
 from endoscope_explain.score import FLOOR_PER_PARAMETER, score
 from endoscope_explain.screen import Promise, promises, unexplained, with_effect
@@ -191,12 +192,5 @@ def _looks(
 
 
 def _polished(looks: Sequence[Look], jobs: int) -> list[Composition]:
-    def numbers(index: int) -> tuple[Array, Array, Array, float]:
-        done = polish(looks[index])
-        return done.theta, done.residuals, done.jacobian, done.cost
-
-    fits = [
-        Fit(item.model, *found)
-        for item, found in zip(looks, parallel_map(numbers, range(len(looks)), jobs), strict=True)
-    ]
+    fits = parallel_fits(lambda i: polish(looks[i]), [item.model for item in looks], jobs)
     return [Composition(item.effects, f, score(f)) for item, f in zip(looks, fits, strict=True)]

@@ -13,6 +13,8 @@ Flags = NDArray[np.bool_]
 
 SUBSTEPS = 3
 """Integration steps in a tick: 2e-3 N and 1e-4 rad from the exact solution."""
+COARSE_SUBSTEPS = 1
+"""The same where a plant is compared with one that differs little from it."""
 
 
 def simulate_joint(

@@ -59,6 +59,13 @@ class JointModel:
                 parameters[item.index] = item.value(float(coordinate))
         return parameters, lead
 
+    def begun_at(self, theta: Array) -> Array:
+        """Coordinates `theta` of the first free parameters; the others as `base` has them."""
+        others = self.free[len(theta) :]
+        return np.concatenate(
+            [theta, [item.coordinate(float(self.base[item.index])) for item in others]]
+        )
+
     def residuals(self, theta: Array, substeps: int = SUBSTEPS) -> Array:
         """Residuals in noise units, all channels in a row; `substeps` are those of a tick."""
         parameters, lead = self.packed(theta)

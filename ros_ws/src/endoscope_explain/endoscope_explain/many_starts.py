@@ -2,16 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from endoscope_explain.compose import Composition
 from endoscope_explain.fit import Fit, fit
-from endoscope_explain.parallel import parallel_map
+from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.score import score
 from endoscope_explain.screen import starting_points, with_effect
-
-Array = NDArray[np.float64]
 
 RUGGED = 'stribeck_friction'
 """The effect under which the joint sticks and slips."""
@@ -48,34 +43,21 @@ def from_many_starts(composition: Composition, anchor: Fit, jobs: int) -> Compos
         if start['lagging'] > 0.0
     ]
 
-    def numbers(index: int) -> tuple[Array, Array, Array, float]:
+    def fitted(index: int) -> Fit:
         model = models[index]
-        own = [
-            item.coordinate(float(model.base[item.index]))
-            for item in model.free[len(anchor.theta) :]
-        ]
-        done = fit(model, np.concatenate([anchor.theta, own]), iterations=ITERATIONS)
-        return done.theta, done.residuals, done.jacobian, done.cost
+        return fit(model, model.begun_at(anchor.theta), iterations=ITERATIONS)
 
-    found = [
-        Fit(model, *values)
-        for model, values in zip(
-            models, parallel_map(numbers, range(len(models)), jobs), strict=True
-        )
-    ]
-    tried = sorted(
-        (Composition(composition.effects, item, score(item)) for item in (composition.fit, *found)),
-        key=lambda c: c.score,
-    )
+    found = [composition.fit, *parallel_fits(fitted, models, jobs)]
+    best = sorted(found, key=score)[:REFINED]
 
-    def refined(index: int) -> tuple[Array, Array, Array, float]:
-        best = tried[index].fit
+    def refined(index: int) -> Fit:
+        narrowed = best[index]
         for width in WIDTHS:
-            other = fit(replace(best.model, wide_step=width), best.theta, iterations=ITERATIONS)
-            best = other if other.cost < best.cost else best
-        return best.theta, best.residuals, best.jacobian, best.cost
+            model = replace(narrowed.model, wide_step=width)
+            other = fit(model, narrowed.theta, iterations=ITERATIONS)
+            narrowed = other if other.cost < narrowed.cost else narrowed
+        return narrowed
 
-    for index, values in enumerate(parallel_map(refined, range(REFINED), jobs)):
-        item = Fit(tried[index].fit.model, *values)
-        tried.append(Composition(composition.effects, item, score(item)))
-    return min(tried, key=lambda c: c.score)
+    found += parallel_fits(refined, [item.model for item in best], jobs)
+    chosen = min(found, key=score)
+    return Composition(composition.effects, chosen, score(chosen))

@@ -7,6 +7,7 @@ holds the joint it has none at all; a fit stays in the valley in which it starte
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_explain.evaluate import COARSE_SUBSTEPS
 from endoscope_explain.fit import Fit, fit
 
 Array = NDArray[np.float64]
@@ -16,7 +17,6 @@ ONSET = 'time_s'
 COARSE_S = 0.5
 FINE_S = 0.1
 FINE_REACH_S = 0.6
-SUBSTEPS = 1
 REFIT_STEPS = 6
 
 
@@ -48,7 +48,7 @@ def _better(found: Fit, place: int, times: Array) -> Fit:
 
     def left(theta: Array) -> float:
         """Squares that the other parameters could not take away."""
-        residuals = found.model.residuals(theta, SUBSTEPS)
+        residuals = found.model.residuals(theta, COARSE_SUBSTEPS)
         return float(residuals @ residuals - np.sum((span.T @ residuals) ** 2))
 
     def dated(time: float) -> Array:

@@ -59,11 +59,9 @@ def look(
     Look
     """
     model = with_effect(anchors[0].model, promise.effect_id, promise.start)
-    added = model.free[len(anchors[0].theta) :]
-    own = np.array([item.coordinate(float(model.base[item.index])) for item in added])
     begun = []
     for anchor in anchors:
-        theta = np.concatenate([anchor.theta, own])
+        theta = model.begun_at(anchor.theta)
         begun.append((theta, model.residuals(theta), anchor))
     theta, residuals, anchor = min(
         begun, key=lambda b: float(np.sum(b[1] ** 2) + np.sum(model.prior(b[0]) ** 2))

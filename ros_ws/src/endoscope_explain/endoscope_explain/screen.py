@@ -13,13 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.effects import CATALOGUE
+from endoscope_explain.evaluate import COARSE_SUBSTEPS
 from endoscope_explain.fit import Fit, JointModel
 from endoscope_explain.free_parameters import effect_parameters, with_free_reference
 
 Array = NDArray[np.float64]
-
-SCREENING_SUBSTEPS = 1
-"""Integration steps in a tick: an effect is compared with the same plant without it."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ def unexplained(anchor: Fit) -> Unexplained:
     span, _ = np.linalg.qr(np.vstack([anchor.jacobian, np.diag(model.prior_weight())]))
     here = np.concatenate([anchor.residuals, model.prior(anchor.theta)])
     left = here - span @ (span.T @ here)
-    coarse = model.residuals(anchor.theta, SCREENING_SUBSTEPS)
+    coarse = model.residuals(anchor.theta, COARSE_SUBSTEPS)
     return Unexplained(anchor, span, left, coarse)
 
 
@@ -113,14 +111,10 @@ def promises(background: Unexplained, effect_id: str) -> list[Promise]:
     found = []
     for start in starting_points(effect_id):
         model = with_effect(anchor.model, effect_id, start)
-        own = [
-            item.coordinate(float(model.base[item.index]))
-            for item in model.free[len(anchor.theta) :]
-        ]
-        theta = np.concatenate([anchor.theta, own])
+        theta = model.begun_at(anchor.theta)
         moved = np.concatenate(
             [
-                model.residuals(theta, SCREENING_SUBSTEPS) - background.coarse,
+                model.residuals(theta, COARSE_SUBSTEPS) - background.coarse,
                 np.zeros(len(anchor.theta)),
             ]
         )

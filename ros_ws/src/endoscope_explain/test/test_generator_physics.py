@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import endoscope_core
-from endoscope_core.compiled_cache import source_hash
+from endoscope_core.compiled_cache import cache_folder, source_hash
 from endoscope_explain import generator
 from endoscope_explain.generator import compiled_physics
-from endoscope_explain.generator.compiled_physics import cache_folder
 from endoscope_explain.generator.concealed_physics import TICK, move
 from endoscope_explain.generator.motions import GEAR, joint_command
 from endoscope_explain.generator.rig import NOMINAL, nominal_rig
@@ -171,6 +170,6 @@ def test_shares_nothing_with_the_plant_that_fits():
 def test_compiled_functions_are_kept_by_the_sources_of_plant_and_generator():
     plant = Path(endoscope_core.__file__).parent
     generator = Path(compiled_physics.__file__).parent
-    name = cache_folder().name
+    name = cache_folder(*compiled_physics.KEPT_BY).name
     assert source_hash(plant) in name
     assert source_hash(generator) in name

@@ -92,10 +92,10 @@ def equilibrium_stretch(p: Array, q: float, speed: float, z: float, zj: float) -
     if spread > 0.0:
         more = less = 0.0
         for spring in range(NODES + 1):
-            length = 0.5 if spring in (0, NODES) else 1.0
+            length = distributed_friction.length(p, spring)
             exponent = spread * along * (NODES - spring) / NODES
-            more += length * math.exp(exponent) / NODES
-            less += length * math.exp(-exponent) / NODES
+            more += length * math.exp(exponent)
+            less += length * math.exp(-exponent)
         tight *= more
         loose *= less
     return (load / r - p[PRETENSION] * (1.0 / tight - 1.0 / loose)) / (

@@ -46,10 +46,3 @@ def moment_and_slope(parameters: Array, angle: float) -> tuple[float, float]:
     if exponent != 1.0:
         stiffness *= (deep / DEPTH) ** (exponent - 1.0)
     return -side * stiffness * deep, stiffness * exponent
-
-
-@compiled
-def damping(parameters: Array, angle: float) -> float:
-    """Coefficient in N m s/rad of the moment against the joint's speed."""
-    moment, _ = moment_and_slope(parameters, angle)
-    return parameters[LOSS] * abs(moment)

@@ -40,10 +40,3 @@ def moment_and_slope(parameters: Array, angle: float) -> tuple[float, float]:
         return 0.0, 0.0
     moment = parameters[STIFFNESS] * beyond
     return (-moment if angle > 0.0 else moment), parameters[STIFFNESS]
-
-
-@compiled
-def damping(parameters: Array, angle: float) -> float:
-    """Coefficient in N m s/rad of the moment against the joint's speed."""
-    beyond = abs(angle) - parameters[ANGLE]
-    return parameters[LOSS] * parameters[STIFFNESS] * max(0.0, beyond)

@@ -36,6 +36,12 @@ COMMAND = SLOTS.angle_state()
 
 
 @compiled
+def largest_speed(parameters: Array) -> float:
+    """Limit in rad/s, joint-equivalent."""
+    return parameters[LIMIT] * parameters[PULLEY_RADIUS] / parameters[JOINT_RADIUS]
+
+
+@compiled
 def limited_error(
     parameters: Array,
     error: float,
@@ -46,17 +52,15 @@ def limited_error(
 
     Over one step the servo's speed becomes ``speed_from_error * error + speed_kept * speed``.
     """
-    limit = parameters[LIMIT] * parameters[PULLEY_RADIUS] / parameters[JOINT_RADIUS]
-    largest = limit * (1.0 - speed_kept) / max(-speed_from_error, 1e-12)
+    largest = largest_speed(parameters) * (1.0 - speed_kept) / max(-speed_from_error, 1e-12)
     return min(largest, max(-largest, error))
 
 
 @compiled
 def slewed_command(state: Array, parameters: Array, command: float, duration: float) -> float:
     """Mean of the slewed command over a step with `command` held; advances the slew."""
-    limit = parameters[LIMIT] * parameters[PULLEY_RADIUS] / parameters[JOINT_RADIUS]
     way = command - state[COMMAND]
-    most = limit * duration
+    most = largest_speed(parameters) * duration
     if abs(way) > most:
         state[COMMAND] += math.copysign(most, way)
         return state[COMMAND] - math.copysign(0.5 * most, way)

@@ -21,18 +21,24 @@ def load(
     q: float,
     time: float,
     tick: float,
-) -> tuple[float, float]:
-    """Moment in N m of all but wires, friction and damping, and minus its slope by the angle."""
+) -> tuple[float, float, float]:
+    """Moment in N m of all but wires, friction and damping; minus its slope by the angle; damping.
+
+    Damping is the coefficient in N m s/rad of the moments against the joint's speed.
+    """
     moment = x[IN_PUSH_MOMENT] - p[JOINT_STIFFNESS] * q
     slope = p[JOINT_STIFFNESS]
+    damping = p[JOINT_DAMPING]
     if on[joint_stop.ON]:
         added, steeper = joint_stop.moment_and_slope(p, q)
         moment += added
         slope += steeper
+        damping += p[joint_stop.LOSS] * abs(added)
     if on[contact.ON]:
         added, steeper = contact.moment_and_slope(p, q)
         moment += added
         slope += steeper
+        damping += p[contact.LOSS] * abs(added)
     if on[gravity.ON]:
         added, steeper = gravity.moment_and_slope(p, q)
         moment += added
@@ -43,15 +49,4 @@ def load(
         moment += cross_coupling.moment(p, x[IN_OTHER_JOINT])
     if on[breathing.ON]:
         moment += breathing.moment(p, time)
-    return moment, slope
-
-
-@compiled
-def damping(p: Array, on: Flags, q: float) -> float:
-    """Coefficient in N m s/rad of the moments against the joint's speed, without the wires'."""
-    coefficient = p[JOINT_DAMPING]
-    if on[joint_stop.ON]:
-        coefficient += joint_stop.damping(p, q)
-    if on[contact.ON]:
-        coefficient += contact.damping(p, q)
-    return coefficient
+    return moment, slope, damping

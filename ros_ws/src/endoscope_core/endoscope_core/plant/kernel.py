@@ -71,7 +71,7 @@ from endoscope_core.plant.inputs import (
     OUT_TENSION_B,
     OUTPUTS,
 )
-from endoscope_core.plant.joint import damping, load
+from endoscope_core.plant.joint import load
 from endoscope_core.plant.proximal import proximal_tensions, stretch_shift
 from endoscope_core.plant.readings import read_sensors
 from endoscope_core.plant.transmission import (
@@ -217,10 +217,10 @@ def advance_tick(
             drag *= touching
             give = 1.0 - touching
 
-        moment, slope = load(p, on, x, q, time, tick)
+        moment, slope, damping = load(p, on, x, q, time, tick)
         moment += pull - p[JOINT_FRICTION] * zj
         slope += pull_slope + p[JOINT_FRICTION] / qs * steep_j
-        resistance = damping(p, on, q) + drag
+        resistance = damping + drag
         resistance += 0.5 * dt * max(slope, 0.0)
         mean_dq = moment / resistance
         if on[joint_inertia.ON]:

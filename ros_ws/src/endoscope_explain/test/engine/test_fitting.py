@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from endoscope_core.effects import CATALOGUE
@@ -26,12 +25,10 @@ def anchors(one_joint, effect_id, parameters):
 def test_a_load_that_was_dated_seconds_late_is_dated_again(one_joint):
     refitted, _ = anchors(one_joint, 'external_load', {'moment_nm': 0.004, 'time_s': 3.2})
     model = with_effect(refitted.model, 'external_load', {'moment_nm': 0.003, 'time_s': 8.0})
-    own = [
-        item.coordinate(float(model.base[item.index])) for item in model.free[len(refitted.theta) :]
-    ]
-    late = fit(model, np.concatenate([refitted.theta, own]), iterations=10)
+    late = fit(model, model.begun_at(refitted.theta), iterations=10)
     first = CATALOGUE['external_load'].first_parameter
-    dated, _ = redated(late).model.packed(redated(late).theta)
+    again = redated(late)
+    dated, _ = again.model.packed(again.theta)
     assert abs(late.model.packed(late.theta)[0][first + 1] - 3.2) > 1.0
     assert dated[first + 1] == pytest.approx(3.2, abs=0.05)
     assert dated[first] == pytest.approx(0.004, rel=0.03)
