@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from endoscope_core.effects import presliding_shape
 from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription, simulate
 
 TICK = 1e-3
@@ -338,24 +339,35 @@ def test_distributed_friction_lets_the_joint_wait_for_the_sliding_front():
     assert moves_at(('distributed_friction', {'share': 1.0})) > moves_at() + 5
 
 
+def wire_travel_to(level, *effects):
+    """Sliding distance (m) at which the sheath's friction has grown to a share of its full size."""
+    run = answer(0.08 * TIME, *effects, joint=JointParameters(joint_stiffness=1e6))
+    friction = (
+        np.log(run.tension[:, 0, 0] / (5.0 + 2000.0 * 0.0025 * run.shaft_position[:, 0] / GEAR))
+        / 0.45
+    )
+    wire = 0.5 * 0.0025 * run.shaft_position[:, 0] / GEAR
+    return float(np.interp(level, friction, wire))
+
+
 @pytest.mark.parametrize(('exponent', 'softer'), [(0.5, False), (2.0, True)])
 def test_presliding_shape_is_sharper_or_softer_than_dahl(exponent, softer):
-    def distance_to_half(*effects):
-        run = answer(0.08 * TIME, *effects, joint=JointParameters(joint_stiffness=1e6))
-        friction = (
-            np.log(run.tension[:, 0, 0] / (5.0 + 2000.0 * 0.0025 * run.shaft_position[:, 0] / GEAR))
-            / 0.45
-        )
-        wire = 0.5 * 0.0025 * run.shaft_position[:, 0] / GEAR
-        return float(np.interp(0.8, friction, wire))
-
-    shaped = distance_to_half(
-        ('presliding_shape', {'exponent': exponent, 'memory': 0.0, 'at_joint': 0.0})
-    )
+    shape = {'exponent': exponent, 'memory': 0.0, 'at_joint': 0.0}
+    shaped = wire_travel_to(0.8, ('presliding_shape', shape))
     # z' = (1 - z)^n from 0: at z = 0.8, x / xs = (1 - 0.2^(1 - n)) / (1 - n).
     expected = 1e-4 * (1.0 - 0.2 ** (1.0 - exponent)) / (1.0 - exponent)
     assert shaped == pytest.approx(expected, rel=0.02)
-    assert (shaped > distance_to_half()) is softer
+    assert (shaped > wire_travel_to(0.8)) is softer
+
+
+@pytest.mark.parametrize(('spread', 'reach'), [(1.0, 1.0), (1.0, 0.5), (0.3, 1.0), (2.0, 0.7)])
+@pytest.mark.parametrize('level', [0.3, 0.8])
+def test_slip_elements_yield_one_after_the_other(spread, reach, level):
+    shape = {'exponent': 1.0, 'memory': 1.0, 'spread': spread, 'reach': reach, 'at_joint': 0.0}
+    travelled = wire_travel_to(level, ('presliding_shape', shape)) / 1e-4
+    # Equal elements in parallel, elastic until each yields (Iwan, J. Appl. Mech. 33(4), 1966).
+    yields = reach * presliding_shape.YIELD**spread
+    assert np.mean(np.minimum(1.0, travelled / yields)) == pytest.approx(level, rel=0.02)
 
 
 def test_presliding_memory_closes_inner_loops():

@@ -27,11 +27,17 @@ from endoscope_explain.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.isolated_samples import without_isolated
 from endoscope_explain.latent import unknown_term
-from endoscope_explain.observation import JointObservation, observe
+from endoscope_explain.observation import JointObservation, couple, observe
 from endoscope_explain.probability import probability
 from endoscope_explain.recording import Recording
 from endoscope_explain.score import misfit
-from endoscope_explain.search import MOST_EFFECTS, JointSearch, all_anchors, search
+from endoscope_explain.search import (
+    MOST_EFFECTS,
+    JointSearch,
+    all_anchors,
+    search,
+    simulated_bending,
+)
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -125,6 +131,14 @@ def explain_recording(
         tell(f'searching what {observation.joint} lacks')
         searches.append(search(pair, jobs, most_effects, known[observation.joint]))
         decisions.append(decide(searches[-1]))
+    for joint in _misled_by_the_other(decisions):
+        tell(
+            f'searching what {observations[joint].joint} lacks beside the other joint as explained'
+        )
+        couple(observations, tuple(simulated_bending(d.chosen.fit) for d in decisions))
+        lacking = known[observations[joint].joint]
+        searches[joint] = search(anchors[joint], jobs, most_effects, lacking)
+        decisions[joint] = decide(searches[joint])
     decisions = with_devices_agreed(searches, decisions)
     unknown = None
     worst = _worst(decisions)
@@ -178,6 +192,18 @@ def _healthy(
     seen = tuple(against_baseline(o, by_joint[o.joint].fit) for o in observations)
     well = _plant_of(plant, [c.fit for c in healthy], [c.effects for c in healthy])
     return seen, well, {joint: c.effects for joint, c in by_joint.items()}
+
+
+def _misled_by_the_other(decisions: list[Decision]) -> list[int]:
+    """Joints not explained while the other one, which may move them, was taken for nominal."""
+    return [
+        i
+        for i, decision in enumerate(decisions)
+        if not decision.adequate
+        and any(
+            other.adequate and other.chosen.effects for other in decisions if other is not decision
+        )
+    ]
 
 
 def _worst(decisions: list[Decision]) -> int | None:

@@ -77,12 +77,14 @@ def all_anchors(
     ):
         model = nominal_model(observation, *packed[observation.joint], band)
         anchors.append((Fit(model, *found[0]), Fit(model, *found[1])))
-    angles = []
-    for observation, (fitted, _) in zip(observations, anchors, strict=True):
-        parameters, _ = fitted.model.packed(fitted.theta)
-        angles.append(simulate_joint(observation, parameters, fitted.model.flags)[:, OUT_JOINT])
-    couple(observations, tuple(angles))
+    couple(observations, tuple(simulated_bending(fitted) for fitted, _ in anchors))
     return anchors
+
+
+def simulated_bending(fitted: Fit) -> Array:
+    """Bending angle (N,) in rad of a fitted joint at every tick of its recording."""
+    parameters, _ = fitted.model.packed(fitted.theta)
+    return simulate_joint(fitted.model.observation, parameters, fitted.model.flags)[:, OUT_JOINT]
 
 
 def search(

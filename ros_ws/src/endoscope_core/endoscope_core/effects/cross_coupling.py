@@ -14,7 +14,7 @@ DEFINITION = define(
     'Trans. Robot. 24(6), 2008 (elastic coupling)',
     parameters=(
         EffectParameter(
-            'moment_per_rad', 'N m/rad', -0.05, 0.05, 0.005, off=0.0, starts=(0.003, 0.0)
+            'moment_per_rad', 'N m/rad', -0.05, 0.05, 0.005, off=0.0, starts=(0.003, 0.012, 0.0)
         ),
         EffectParameter('wire_per_rad', '-', -1.0, 1.0, 0.0, off=0.0, starts=(0.0, 0.05)),
         EffectParameter('moment_per_rad2', 'N m/rad2', -0.05, 0.05, 0.0),

@@ -14,20 +14,24 @@ DEFINITION = define(
     Stage.TRANSMISSION,
     physics='Friction builds up with displacement sharper or softer than exponentially, or with '
     'memory of inner loops.',
-    equation='z = (1 - memory) d + memory mean_j clip(x / (xs g_j)); '
+    equation='z = (1 - memory) d + memory mean_j clip(x / (xs reach g_j^spread)); '
     "d' = (v / xs) |1 - d sgn v|^exponent",
-    source='Dahl, AIAA J. 14(12), 1976 (exponent); Al-Bender, Lampaert, Swevers, IEEE Trans. '
-    'Autom. Control 50(11), 2005 (generalised Maxwell-slip)',
+    source='Dahl, AIAA J. 14(12), 1976 (exponent); Iwan, J. Appl. Mech. 33(4), 1966 (elements in '
+    'parallel); Al-Bender, Lampaert, Swevers, IEEE Trans. Autom. Control 50(11), 2005',
     parameters=(
         EffectParameter('exponent', '-', 0.1, 4.0, 1.8, off=1.0, starts=(0.5, 2.0)),
         EffectParameter('memory', '-', 0.0, 1.0, 0.0, off=0.0, starts=(0.1, 0.7)),
+        EffectParameter('spread', '-', 0.2, 3.0, 1.0),
+        EffectParameter('reach', '-', 0.2, 3.0, 1.0),
         EffectParameter('at_joint', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
 )
 ON = DEFINITION.flag
 EXPONENT = DEFINITION.first_parameter
 MEMORY = EXPONENT + 1
-AT_JOINT = EXPONENT + 2
+SPREAD = EXPONENT + 2
+REACH = EXPONENT + 3
+AT_JOINT = EXPONENT + 4
 
 YIELD = np.array([0.4771, 0.9613, 1.4247, 1.9610, 2.6926, 4.1176])
 """Yield displacements of equal Maxwell-slip elements, in pre-sliding distances: the middles of
@@ -46,6 +50,12 @@ def acts(parameters: Array, on: Flags, place: int) -> bool:
 
 
 @compiled
+def _yield(parameters: Array, j: int) -> float:
+    """Yield displacement of an element in pre-sliding distances."""
+    return parameters[REACH] * YIELD[j] ** parameters[SPREAD]
+
+
+@compiled
 def steepness(state: Array, parameters: Array, place: int, way: float) -> float:
     """Growth of the friction state by displacement in pre-sliding distances, towards `way`."""
     rest = max(0.0, 1.0 - state[place] * way)
@@ -53,7 +63,7 @@ def steepness(state: Array, parameters: Array, place: int, way: float) -> float:
     elastic = 0.0
     for j in range(ELEMENTS):
         if state[place + 1 + j] * way < 1.0:
-            elastic += 1.0 / YIELD[j]
+            elastic += 1.0 / _yield(parameters, j)
     memory = parameters[MEMORY]
     return (1.0 - memory) * power + memory * elastic / ELEMENTS
 
@@ -70,7 +80,7 @@ def slid(state: Array, parameters: Array, place: int, ratio: float) -> float:
         state[place] = way * (1.0 - _rest_after(rest, abs(ratio), excess))
     mean = 0.0
     for j in range(ELEMENTS):
-        element = min(1.0, max(-1.0, state[place + 1 + j] + ratio / YIELD[j]))
+        element = min(1.0, max(-1.0, state[place + 1 + j] + ratio / _yield(parameters, j)))
         state[place + 1 + j] = element
         mean += element / ELEMENTS
     memory = parameters[MEMORY]

@@ -21,16 +21,17 @@ def short_motion(duration: float = 12.0) -> np.ndarray:
 
 
 def record(plant: PlantDescription, command: np.ndarray, seed: int = 1) -> Recording:
-    """What the sensors of a one-joint rig read under a joint-equivalent command (N,)."""
-    joint = plant.joint_names()[0]
-    shaft = command[:, None] * plant.joints[joint].gear
+    """What a rig's sensors read under a joint-equivalent command: (N,), or (N, joints)."""
+    joints = plant.joint_names()
+    gears = np.array([plant.joints[joint].gear for joint in joints])
+    shaft = command.reshape(len(command), len(joints)) * gears
     answer = simulate(plant, shaft)
     sensors = SensorModel(plant.sensors, seed)
     slow = slice(None, None, 25)
     return Recording(
         'simulated',
         0.0,
-        (joint,),
+        joints,
         Series.of(COMMAND, answer.time, shaft),
         Series.of(WIRES, answer.time, sensors.tension(answer.tension)),
         Series.of(BENDING, answer.time[slow], sensors.bending(answer.bending[slow])),

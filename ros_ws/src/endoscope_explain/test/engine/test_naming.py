@@ -1,7 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from endoscope_core.plant import EffectSpec
+from endoscope_core.plant import EffectSpec, PlantDescription
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME
@@ -149,3 +151,18 @@ def test_more_than_two_effects_are_found_where_they_are_asked_for(one_joint):
     three = explain_recording(recording, one_joint.rig(), most_effects=3, jobs=1)
     assert len(two.effects) <= 2
     assert {e.id for e in three.effects} == {e.id for e in effects}
+
+
+def test_a_joint_moved_by_another_one_that_is_not_nominal_either(one_joint):
+    stopped = EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.4, 'stiffness': 0.2})
+    coupled = EffectSpec('cross_coupling', 'bend_y', {'moment_per_rad': -0.01})
+    described = PlantDescription()
+    motion = np.column_stack([one_joint.motion(), 0.7 * one_joint.motion()[::-1]])
+    motion -= motion[0]
+    recording = one_joint.record(replace(described, effects=(stopped, coupled)), motion)
+    explanation = explain_recording(recording, described, jobs=1)
+    assert explanation.adequate
+    assert {(e.id, e.joint) for e in explanation.effects} == {
+        ('joint_stop', 'bend_x'),
+        ('cross_coupling', 'bend_y'),
+    }
