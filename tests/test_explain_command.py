@@ -82,6 +82,10 @@ def test_many_bags_have_one_report_each_and_one_table(rig, tmp_path, capsys):
     for name in ('sound', 'sound_2'):
         assert (tmp_path / 'out' / name / 'report.html').is_file()
     assert '2/2' in capsys.readouterr().out
+    with (tmp_path / 'out' / 'parameters.csv').open(newline='') as file:
+        rows = {row['parameter']: row for row in csv.DictReader(file)}
+    exponents = [float(rows['capstan_exponent'][name]) for name in ('sound', 'sound_2')]
+    assert exponents == pytest.approx([0.9, 0.9], rel=0.05)
 
 
 def test_a_dask_cluster_does_the_same(rig, tmp_path):
@@ -165,3 +169,15 @@ def test_a_folder_that_holds_something_is_left_alone(rig, tmp_path, capsys):
 def test_a_cluster_that_is_not_there_is_named(rig, tmp_path, capsys):
     message = refused(capsys, rig, tmp_path / 'out', rig / 'sound', '--dask', 'tcp://127.0.0.1:9')
     assert 'tcp://127.0.0.1:9' in message
+
+
+def test_second_recordings_that_do_not_match_the_bags_are_refused(rig, tmp_path, capsys):
+    seconds = [option for _ in range(3) for option in ('--validate', rig / 'sound')]
+    message = refused(capsys, rig, tmp_path / 'out', rig / 'sound', rig / 'sound', *seconds)
+    assert '--validate was given 3 times for 2 bags' in message
+
+
+def test_one_physics_for_all_bags_leaves_no_room_for_a_baseline(rig, tmp_path, capsys):
+    bags = (rig / 'sound', rig / 'stopped.mcap')
+    options = ('--same-physics', '--baseline', rig / 'sound')
+    assert '--baseline' in refused(capsys, rig, tmp_path / 'out', *bags, *options)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from endoscope_core.effects import CATALOGUE
 from endoscope_core.plant import EffectSpec, PlantDescription
 from endoscope_explain.audit import AuditReport, Finding
-from endoscope_explain.explain_recording import CHANGED
+from endoscope_explain.conclusions import CHANGED
 from endoscope_explain.explanation import Explanation, NamedEffect, NominalEstimate, Verdict
 
 AUDITED_EFFECTS = {

@@ -22,7 +22,8 @@ Flags = NDArray[np.bool_]
 AUDITED = frozenset({'recording_gap', 'tracker_outliers'})
 """Effects that lose or replace single samples: the audit finds them, no simulation can."""
 LOOKED_AT = 14
-"""Effects that get a cheap fit, of all that were screened."""
+"""Effects that get a cheap fit beside another one, of all that were screened. Alone, every effect
+gets one: a plant refitted far from its description promises little of the right one."""
 LOOKED_AT_TWICE = 4
 """Effects of these that get one from their second best start as well."""
 LEAST_GAIN = 5.0
@@ -64,14 +65,24 @@ def searchable_effects() -> tuple[str, ...]:
 
 
 def nominal_model(
-    observation: JointObservation, base: Array, flags: Flags, band: float = BAND
+    observation: JointObservation,
+    base: Array,
+    flags: Flags,
+    band: float = BAND,
+    *,
+    tightened: bool = False,
 ) -> JointModel:
     """Return the plant as described, its nominal parameters free within a band."""
-    return JointModel(observation, base, flags, nominal_parameters(base, band))
+    return JointModel(observation, base, flags, nominal_parameters(base, band, tightened=tightened))
 
 
 def nominal_anchors(
-    observation: JointObservation, base: Array, flags: Flags, band: float = BAND
+    observation: JointObservation,
+    base: Array,
+    flags: Flags,
+    band: float = BAND,
+    *,
+    tightened: bool = False,
 ) -> tuple[Fit, Fit]:
     """The nominal plant refitted, and as described, each with its derivative.
 
@@ -82,15 +93,15 @@ def nominal_anchors(
         Packed plant as described, with what effects it has.
     band : float
         Relative deviation of a healthy rig from its description.
+    tightened : bool
+        Whether friction may hold the wires at the start.
 
     Returns
     -------
     refitted, described : Fit
     """
-    model = nominal_model(observation, base, flags, band)
-    theta = np.array(
-        [item.mean if item.logarithmic else item.coordinate(1.0) for item in model.free]
-    )
+    model = nominal_model(observation, base, flags, band, tightened=tightened)
+    theta = np.array([item.mean for item in model.free])
     residuals = model.residuals(theta)
     described = Fit(
         model,
@@ -162,7 +173,8 @@ def _screened(
         own = sorted(
             (p for (i, _), p in zip(tasks, found, strict=True) if i == index and p),
             key=lambda p: -p[0].gain,
-        )[:LOOKED_AT]
+        )
+        own = own[:LOOKED_AT] if parents[index][0].effects else own
         chosen += [(index, p[0]) for p in own if p[0].gain > LEAST_GAIN]
         chosen += [
             (index, p[1]) for p in own[:LOOKED_AT_TWICE] if len(p) > 1 and p[1].gain > LEAST_GAIN

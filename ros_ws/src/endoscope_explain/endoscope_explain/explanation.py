@@ -195,6 +195,8 @@ class Explanation:
     adequacy : mapping of str to float
         Numbers behind `adequate`.
     baseline_used : bool
+    start_friction : mapping of joint name to float
+        Share of the sheath's friction that held the wires at the start.
     runtime_s : float
     """
 
@@ -210,4 +212,5 @@ class Explanation:
     adequate: bool = True
     adequacy: Mapping[str, float] = field(default_factory=dict)
     baseline_used: bool = False
+    start_friction: Mapping[str, float] = field(default_factory=dict)
     runtime_s: float = 0.0

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.effects import CATALOGUE, EffectParameter
-from endoscope_core.effects.slots import NOMINAL_KEYS
+from endoscope_core.effects.slots import NOMINAL_KEYS, START_FRICTION
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,13 @@ class FreeParameter:
         return min(max(value, self.low), self.high)
 
 
-def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, ...]:
+TIGHTENED = FreeParameter(START_FRICTION, 'start_friction', False, 1.0, -1.0, 1.0, 0.5, 0.5)
+"""Friction that tightening the wires from the motor's side may have left at the start."""
+
+
+def nominal_parameters(
+    base: Array, band: float = BAND, *, tightened: bool = False
+) -> tuple[FreeParameter, ...]:
     """The nominal plant's parameters around packed values `base`, and the reading's lead.
 
     Parameters
@@ -74,6 +80,8 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
         Packed parameters as described.
     band : float
         Relative deviation that the fit may not leave by more than a third.
+    tightened : bool
+        Whether friction may hold the wires at the start.
 
     Returns
     -------
@@ -100,7 +108,7 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
         )
     mean, spread = LEAD_PRIOR
     free.append(FreeParameter(LEAD, 'reading_lead', False, 1.0, 0.0, 1.0, mean, spread))
-    return tuple(free)
+    return (*free, TIGHTENED) if tightened else tuple(free)
 
 
 def with_free_reference(

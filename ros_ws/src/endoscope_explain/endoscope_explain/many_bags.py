@@ -7,7 +7,7 @@ import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from endoscope_core.atomic_output import atomic_directory, require_free_directory
@@ -15,8 +15,10 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
 from endoscope_explain.report.writing import REPORT_JSON, write_report
+from endoscope_explain.shared_physics import physics_of_all
 
 SUMMARY_CSV = 'summary.csv'
+PARAMETERS_CSV = 'parameters.csv'
 
 Say = Callable[[str], None]
 
@@ -25,6 +27,10 @@ class ClusterError(EndoscopeError, ConnectionError):
     """The Dask cluster cannot be reached."""
 
     __str__ = Exception.__str__
+
+
+class TogetherError(EndoscopeError, ValueError):
+    """What was asked for several bags does not go together."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,7 @@ def explain_bags(
     *,
     jobs: int = 2,
     dask_address: str | None = None,
+    same_physics: bool = False,
     say: Say = print,
 ) -> None:
     """Explain bags and write their reports, all or none.
@@ -96,6 +103,8 @@ def explain_bags(
         Processes on this machine.
     dask_address : str, optional
         Scheduler of a cluster whose workers see the bags under the same paths.
+    same_physics : bool
+        Whether all bags show one rig, so that one choice of effects has to explain all of them.
     say : callable
         Told each line for the terminal.
 
@@ -105,6 +114,13 @@ def explain_bags(
         If a recording, the folder or the cluster cannot be used; nothing is written then.
     """
     require_free_directory(out)
+    if same_physics:
+        if any(one.baseline is not None for one in sources):
+            raise TogetherError(
+                '--same-physics cannot be had with --baseline: leave one of them out'
+            )
+        order = physics_of_all(sources, jobs, say)
+        sources = [replace(one, order=order) for one in sources]
     if len(sources) == 1 and dask_address is None:
         reported = explain_one(sources[0], jobs, say)
         with atomic_directory(out) as folder:
@@ -124,8 +140,9 @@ def explain_bags(
             _write(reported, folder / name)
             rows[name] = reported
             say(f'{len(rows)}/{len(sources)} {name}: {sentence(reported)}')
-        table = summary_table({name: rows[name] for name in names})
-        (folder / SUMMARY_CSV).write_text(table, encoding='utf-8')
+        in_order = {name: rows[name] for name in names}
+        (folder / SUMMARY_CSV).write_text(summary_table(in_order), encoding='utf-8')
+        (folder / PARAMETERS_CSV).write_text(parameter_table(in_order), encoding='utf-8')
 
 
 def unique_names(bags: Sequence[Path]) -> list[str]:
@@ -179,6 +196,29 @@ def summary_table(reports: Mapping[str, Reported]) -> str:
                 f'{content["runtime_s"]:.1f}',
             ]
         )
+    return text.getvalue()
+
+
+def parameter_table(reports: Mapping[str, Reported]) -> str:
+    """Return one CSV line for each fitted parameter, bags beside each other in columns."""
+    columns: dict[tuple[str, str, str], dict[str, float]] = {}
+    for name, reported in reports.items():
+        content = json.loads(reported.files[REPORT_JSON])
+        for joint, estimates in content['parameters'].items():
+            for parameter, estimate in estimates.items():
+                columns.setdefault((joint, 'plant', parameter), {})[name] = estimate['value']
+        for joint, value in content.get('start_friction', {}).items():
+            columns.setdefault((joint, 'start', 'start_friction'), {})[name] = value
+        for effect in content['effects']:
+            for parameter, estimate in effect['parameters'].items():
+                key = (effect['joint'], effect['id'], parameter)
+                columns.setdefault(key, {})[name] = estimate['value']
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator='\n')
+    writer.writerow(['joint', 'of', 'parameter', *reports])
+    for key, values in columns.items():
+        cells = [f'{values[name]:.5g}' if name in values else '' for name in reports]
+        writer.writerow([*key, *cells])
     return text.getvalue()
 
 

@@ -101,12 +101,15 @@ class JointObservation:
     start : float
         Joint-equivalent motor angle in rad at which the joint rests at first.
     channels : tuple of Channel
+    start_friction : float
+        Share of the sheath's friction that holds the wires at first.
     """
 
     joint: str
     inputs: Array
     start: float
     channels: tuple[Channel, ...]
+    start_friction: float = 0.0
 
     @property
     def size(self) -> int:
@@ -158,7 +161,9 @@ def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObserva
         inputs[0, :, IN_COMMAND] = held[:, j] / gear
         inputs[0, :, IN_MOTOR] = np.nan
         channels = _channels(recording, j, joint, gear, plant.sensors, begin, ticks)
-        joints.append(JointObservation(joint, inputs, float(inputs[0, 0, IN_COMMAND]), channels))
+        held_at_start = recording.start_friction.get(joint, 0.0)
+        start = float(inputs[0, 0, IN_COMMAND])
+        joints.append(JointObservation(joint, inputs, start, channels, held_at_start))
     return tuple(joints)
 
 

@@ -43,6 +43,9 @@ def redated(found: Fit) -> Fit:
 
 
 def _better(found: Fit, place: int, times: Array) -> Fit:
+    if not len(times):
+        # The fit has it begin after the recording's end, where nothing tells one time from another.
+        return found
     span, _ = np.linalg.qr(np.delete(found.jacobian, place, axis=1))
     item = found.model.free[place]
 

@@ -1,7 +1,7 @@
 """From bags to an explained case: read, audit, explain, locate, judge, propose."""
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_bags.errors import BagError
 from endoscope_core.plant import PlantDescription
+from endoscope_explain.agreement import GivenEffect
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import ExplainedCase, NextExperiment, Place
 from endoscope_explain.combine import combined_effects, combined_verdict, improved_plant
@@ -53,6 +54,10 @@ class Sources:
         Relative tolerance of the plant's parameters.
     most_effects : int
         Largest number of effects on a joint that are looked for.
+    tightened : bool
+        Whether the wires were tightened from the motor's side before the recording.
+    order : mapping of joint to sequence of GivenEffect, or None
+        The effects of each joint, if they are not to be searched.
     """
 
     bag: Path
@@ -63,6 +68,8 @@ class Sources:
     quick: bool = False
     band: float = BAND
     most_effects: int = MOST_EFFECTS
+    tightened: bool = False
+    order: Mapping[str, Sequence[GivenEffect]] | None = None
 
 
 @dataclass(frozen=True)
@@ -80,6 +87,8 @@ class Inputs:
         Relative tolerance of the plant's parameters.
     most_effects : int
         Largest number of effects on a joint that are looked for.
+    tightened, order
+        As in `Sources`.
     """
 
     plant: PlantDescription
@@ -88,6 +97,8 @@ class Inputs:
     validation: Recording | None
     band: float = BAND
     most_effects: int = MOST_EFFECTS
+    tightened: bool = False
+    order: Mapping[str, Sequence[GivenEffect]] | None = None
 
 
 class JointsDifferError(BagError):
@@ -131,6 +142,8 @@ def read_inputs(sources: Sources) -> Inputs:
         second(sources.validate),
         sources.band,
         sources.most_effects,
+        sources.tightened,
+        sources.order,
     )
 
 
@@ -173,13 +186,16 @@ def explain_case(
             baseline=inputs.baseline,
             band=inputs.band,
             most_effects=inputs.most_effects,
+            tightened=inputs.tightened,
+            order=inputs.order,
             jobs=jobs,
             progress=progress,
         )
     tell('locating')
     plant = improved_plant(explanation, audit)
+    recording = replace(audit.recording, start_friction=explanation.start_friction)
     case = ExplainedCase(
-        audit.recording,
+        recording,
         audit,
         explanation,
         combined_verdict(explanation, audit),
@@ -190,15 +206,16 @@ def explain_case(
         validation_name='' if inputs.validation is None else inputs.validation.name,
         baseline_name='' if inputs.baseline is None else inputs.baseline.name,
     )
-    case = replace(
-        case, places=_places(case), cuts=cut_at_motor(audit.recording, explanation.refitted)
-    )
+    case = replace(case, places=_places(case), cuts=cut_at_motor(recording, explanation.refitted))
     if extras:
         # Before the black boxes, whose libraries start threads: a fork is not safe after that.
         case = replace(case, next_experiment=_next(case, jobs, tell))
     tell('judging beside black boxes' if extras else 'judging')
-    validation = inputs.validation and with_isolated_marked(inputs.validation, plant)
-    held_out, second = ladders(audit.recording, explanation, validation, extras)
+    validation = inputs.validation
+    if validation is not None:
+        validation = replace(validation, start_friction=explanation.start_friction)
+        validation = with_isolated_marked(validation, plant)
+    held_out, second = ladders(recording, explanation, validation, extras)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
 
 

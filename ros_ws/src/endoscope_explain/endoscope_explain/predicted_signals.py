@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.effects.slots import START_FRICTION
 from endoscope_core.plant import PlantDescription
 from endoscope_core.plant.kernel import OUTPUTS, run_joints
 from endoscope_core.plant.packing import pack, rest_state
@@ -95,6 +96,7 @@ def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescrip
     parameters, flags = pack(plant)
     rows = [plant.joint_names().index(o.joint) for o in observations]
     parameters, flags = parameters[rows], flags[rows]
+    parameters[:, START_FRICTION] = [o.start_friction for o in observations]
     inputs = np.concatenate([o.inputs for o in observations])
     states, histories = rest_state(parameters, np.array([o.start for o in observations]))
     out = np.empty((len(observations), inputs.shape[1], OUTPUTS))

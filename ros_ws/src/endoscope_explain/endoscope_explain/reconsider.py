@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from endoscope_core.effects import CATALOGUE
-from endoscope_core.effects.slots import NOMINAL_KEYS
+from endoscope_core.effects.slots import START_FRICTION
 from endoscope_explain.compose import Composition, grow
 from endoscope_explain.fit import Fit, JointModel, fit
 from endoscope_explain.score import score
@@ -42,7 +42,7 @@ def alone(nominal: Composition, pair: Composition, effect_id: str) -> tuple[Comp
     base, _ = pair.fit.model.packed(pair.fit.theta)
     free = pair.fit.model.free
     kept = [
-        i for i, item in enumerate(free) if item.index < len(NOMINAL_KEYS) or item.index in places
+        i for i, item in enumerate(free) if item.index <= START_FRICTION or item.index in places
     ]
     model = JointModel(nominal.fit.model.observation, base, flags, tuple(free[i] for i in kept))
     theta = pair.fit.theta[kept]

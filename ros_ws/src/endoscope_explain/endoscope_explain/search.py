@@ -5,21 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.plant.kernel import OUT_JOINT
 from endoscope_explain.compose import (
     Composition,
     Parent,
     grow,
-    nominal_anchors,
-    nominal_model,
     searchable_effects,
 )
-from endoscope_explain.evaluate import simulate_joint
 from endoscope_explain.fit import Fit
-from endoscope_explain.free_parameters import BAND
 from endoscope_explain.many_starts import RUGGED, from_many_starts
-from endoscope_explain.observation import JointObservation, couple
-from endoscope_explain.parallel import parallel_map
 from endoscope_explain.reconsider import reconsidered
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.score import score
@@ -56,35 +49,6 @@ class JointSearch:
     def tried(self) -> list[Composition]:
         """Return all compositions, the nominal one first."""
         return [self.nominal, *(c for level in self.levels for c in level)]
-
-
-def all_anchors(
-    observations: tuple[JointObservation, ...],
-    packed: dict[str, tuple[Array, Flags]],
-    jobs: int,
-    band: float = BAND,
-) -> list[tuple[Fit, Fit]]:
-    """Refit the nominal plant of every joint, and let the joints see each other's angle."""
-
-    def numbers(index: int) -> tuple[tuple[Array, Array, Array, float], ...]:
-        observation = observations[index]
-        fits = nominal_anchors(observation, *packed[observation.joint], band)
-        return tuple((f.theta, f.residuals, f.jacobian, f.cost) for f in fits)
-
-    anchors = []
-    for observation, found in zip(
-        observations, parallel_map(numbers, range(len(observations)), jobs), strict=True
-    ):
-        model = nominal_model(observation, *packed[observation.joint], band)
-        anchors.append((Fit(model, *found[0]), Fit(model, *found[1])))
-    couple(observations, tuple(simulated_bending(fitted) for fitted, _ in anchors))
-    return anchors
-
-
-def simulated_bending(fitted: Fit) -> Array:
-    """Bending angle (N,) in rad of a fitted joint at every tick of its recording."""
-    parameters, _ = fitted.model.packed(fitted.theta)
-    return simulate_joint(fitted.model.observation, parameters, fitted.model.flags)[:, OUT_JOINT]
 
 
 def search(

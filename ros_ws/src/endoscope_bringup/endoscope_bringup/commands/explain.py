@@ -3,6 +3,12 @@
 import argparse
 from pathlib import Path
 
+from endoscope_core.errors import EndoscopeError
+
+
+class SecondsError(EndoscopeError, ValueError):
+    """Second recordings that cannot be told to belong to which bag."""
+
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `explain`."""
@@ -32,9 +38,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--validate',
+        action='append',
         type=Path,
         metavar='BAG2',
-        help='a second recording of the same rig to judge the fit on',
+        help='a second recording of the same rig to judge the fit on; give it once for all bags or '
+        'once for each',
     )
     parser.add_argument(
         '--without',
@@ -61,6 +69,18 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'matched (default 2)',
     )
     parser.add_argument(
+        '--same-physics',
+        action='store_true',
+        help='all bags show one rig, in other shapes or at other times: choose the effects that '
+        'explain all of them together',
+    )
+    parser.add_argument(
+        '--tightened',
+        action='store_true',
+        help="the wires were tightened from the motor's side: estimate the friction that holds "
+        'them at the start',
+    )
+    parser.add_argument(
         '--jobs', type=_positive, default=2, metavar='N', help='processes side by side (default 2)'
     )
     parser.add_argument(
@@ -85,16 +105,36 @@ def run(args: argparse.Namespace) -> int:
             bag,
             plant,
             args.baseline,
-            args.validate,
+            second,
             tuple(args.without),
             args.quick,
             args.band,
             args.effects,
+            args.tightened,
         )
-        for bag in args.bags
+        for bag, second in zip(args.bags, _seconds(args), strict=True)
     ]
-    explain_bags(sources, args.out, jobs=args.jobs, dask_address=args.dask)
+    explain_bags(
+        sources,
+        args.out,
+        jobs=args.jobs,
+        dask_address=args.dask,
+        same_physics=args.same_physics,
+    )
     return 0
+
+
+def _seconds(args: argparse.Namespace) -> list[Path | None]:
+    """The second recording of each bag."""
+    given: list[Path | None] = list(args.validate or [None])
+    if len(given) == 1:
+        return given * len(args.bags)
+    if len(given) != len(args.bags):
+        raise SecondsError(
+            f'--validate was given {len(given)} times for {len(args.bags)} bags: '
+            'give it once, or once for each'
+        )
+    return given
 
 
 def _positive_share(text: str) -> float:

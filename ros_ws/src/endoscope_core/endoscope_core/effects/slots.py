@@ -54,6 +54,10 @@ class SlotAllocator:
 
 SLOTS = SlotAllocator()
 
+START_FRICTION = SLOTS.parameter_block(1)
+"""Share of the sheath's friction that holds both wires at rest, as tightening them from the motor's
+side leaves it: how a rig begins rather than what it is, and no key of a plant file."""
+
 PRETENSION = NOMINAL_KEYS.index('pretension')
 WIRE_STIFFNESS = NOMINAL_KEYS.index('wire_stiffness')
 JOINT_RADIUS = NOMINAL_KEYS.index('joint_radius')

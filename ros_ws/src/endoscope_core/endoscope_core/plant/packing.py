@@ -6,9 +6,23 @@ from dataclasses import astuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE, UnknownEffectError, describe, nearest
-from endoscope_core.effects.slots import HISTORY, SLOTS
+from endoscope_core.effects import (
+    CATALOGUE,
+    UnknownEffectError,
+    describe,
+    nearest,
+    presliding_shape,
+)
+from endoscope_core.effects.slots import HISTORY, SLIDE_A, SLIDE_B, SLOTS, START_FRICTION
 from endoscope_core.plant.parameters import EffectSpec, PlantDescription
+
+START_SLIDES = (
+    (SLIDE_A, 1),
+    (SLIDE_B, 1),
+    (presliding_shape.WIRE_A, 1 + presliding_shape.ELEMENTS),
+    (presliding_shape.WIRE_B, 1 + presliding_shape.ELEMENTS),
+)
+"""First index and number of the states that hold the friction of a sheath of one piece."""
 
 
 def effect_values(spec: EffectSpec) -> NDArray[np.float64]:
@@ -88,7 +102,9 @@ def pack(plant: PlantDescription) -> tuple[NDArray[np.float64], NDArray[np.bool_
 def rest_state(
     parameters: NDArray[np.float64], motor: NDArray[np.float64] | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """States and histories of joints at rest, not yet slid either way.
+    """States and histories of joints at rest, their wires slid towards the motor as packed.
+
+    Only friction of one piece knows its start: a sheath in segments has not slid either way.
 
     Parameters
     ----------
@@ -104,6 +120,8 @@ def rest_state(
     joints = len(parameters)
     states = np.zeros((joints, SLOTS.states))
     histories = np.zeros((joints, 2, HISTORY))
+    for first, count in START_SLIDES:
+        states[:, first : first + count] = parameters[:, START_FRICTION, None]
     if motor is not None:
         for index in SLOTS.resting_angles:
             states[:, index] = motor

@@ -186,12 +186,17 @@ def run_cases(
     Yields
     ------
     Outcome
-        As they are done.
+        As they are done. An error in a case ends the run; what has not begun is not begun any more.
     """
     context = multiprocessing.get_context('spawn')
     with ProcessPoolExecutor(jobs, mp_context=context) as pool:
-        futures = [pool.submit(run_case, task) for task in tasks]
+        futures = {pool.submit(run_case, task): task for task in tasks}
         for done, future in enumerate(as_completed(futures), 1):
+            error = future.exception()
+            if error is not None:
+                error.add_note(f'in the case of seed {futures[future].request.seed}')
+                pool.shutdown(cancel_futures=True)
+                raise error
             outcome = future.result()
             tell(done, outcome)
             yield outcome

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from endoscope_core.effects.slots import START_FRICTION
 from endoscope_core.plant import PlantDescription
 from endoscope_core.plant.kernel import IN_MOTOR, OUTPUTS, run_joints
 from endoscope_core.plant.packing import pack, rest_state
@@ -76,7 +77,8 @@ def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCu
             lead,
             inputs.shape[1],
         )
-        packed = parameters[row : row + 1]
+        packed = parameters[row : row + 1].copy()
+        packed[:, START_FRICTION] = observation.start_friction
         states, histories = rest_state(packed, np.array([observation.start]))
         out = np.empty((1, inputs.shape[1], OUTPUTS))
         run_joints(

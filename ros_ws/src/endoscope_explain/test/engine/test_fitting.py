@@ -34,6 +34,13 @@ def test_a_load_that_was_dated_seconds_late_is_dated_again(one_joint):
     assert dated[first] == pytest.approx(0.004, rel=0.03)
 
 
+def test_a_load_after_the_end_has_no_other_date(one_joint):
+    refitted, _ = anchors(one_joint, 'gravity', {'moment_nm': 0.002, 'phase_rad': 0.0})
+    model = with_effect(refitted.model, 'external_load', {'moment_nm': 0.0, 'time_s': 60.0})
+    never = fit(model, model.begun_at(refitted.theta), iterations=0)
+    assert redated(never) is never
+
+
 def test_a_disturbance_in_the_opposite_phase_is_promised_there(one_joint):
     _, described = anchors(
         one_joint, 'breathing', {'moment_nm': 0.003, 'frequency_hz': 0.3, 'phase_rad': -2.5}

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from endoscope_core.plant import PlantDescription
+from endoscope_explain.anchoring import all_anchors
 from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.isolated_samples import with_isolated_marked, without_isolated
 from endoscope_explain.observation import observe
-from endoscope_explain.search import all_anchors
 
 PLANT = PlantDescription()
 

@@ -1,0 +1,183 @@
+"""Which effects explain several recordings of one rig best together.
+
+A rig whose tube is bent differently from one recording to the next keeps its physics, and only its
+parameters change. Explained one by one, two recordings may well be given different names for the
+same misfit; the effects are therefore chosen by the sum of all scores, and fitted one by one.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+from threadpoolctl import threadpool_limits
+
+from endoscope_explain.agreement import GivenEffect, agreed_parameters, in_line, must_agree
+from endoscope_explain.anchoring import anchored
+from endoscope_explain.compose import searchable_effects
+from endoscope_explain.fit import Fit
+from endoscope_explain.held_noise import with_held_noise
+from endoscope_explain.observation import observe
+from endoscope_explain.ordered_search import Glance, glance, separate_fit, settled
+from endoscope_explain.parallel import parallel_map
+from endoscope_explain.parallel_fits import parallel_fits
+from endoscope_explain.pipeline import JointsDifferError, Sources, read_inputs
+from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
+from endoscope_explain.score import score
+
+Anchors = tuple[Fit, ...]
+
+POLISHED = 6
+"""Effects that are fitted fully to all recordings before one is chosen."""
+LEAST_FALL = 10.0
+"""Fall of the score per recording that an effect must bring."""
+
+
+def physics_of_all(
+    sources: Sequence[Sources], jobs: int, tell: Callable[[str], None]
+) -> dict[str, tuple[GivenEffect, ...]]:
+    """Read several recordings of a rig and choose the effects that explain all of them.
+
+    Parameters
+    ----------
+    sources : sequence of Sources
+    jobs : int
+        Processes side by side.
+    tell : callable
+        Told what is being done.
+
+    Returns
+    -------
+    dict of joint name to tuple of GivenEffect
+        Effects in the order in which they were added.
+
+    Raises
+    ------
+    BagError
+        If a recording cannot be used, or has other joints than the first one.
+    """
+    recordings: list[dict[str, Anchors]] = []
+    with threadpool_limits(1, 'blas'):
+        for one in sources:
+            inputs = read_inputs(one)
+            recording = inputs.audit.recording
+            tell(f'{recording.name}: refitting the nominal plant')
+            _, anchors = anchored(
+                recording,
+                with_held_noise(observe(recording, inputs.plant)),
+                inputs.plant,
+                inputs.band,
+                jobs,
+                tightened=inputs.tightened,
+            )
+            joints = recording.joints
+            if recordings and set(joints) != set(recordings[0]):
+                raise JointsDifferError(
+                    f'{one.bag}: has {", ".join(joints)}, but {sources[0].bag} has '
+                    f'{", ".join(recordings[0])}'
+                )
+            recordings.append(dict(zip(joints, anchors, strict=True)))
+        return shared_effects(recordings, sources[0].most_effects, jobs, tell)
+
+
+def shared_effects(
+    recordings: Sequence[Mapping[str, Anchors]],
+    most_effects: int,
+    jobs: int,
+    tell: Callable[[str], None],
+) -> dict[str, tuple[GivenEffect, ...]]:
+    """Choose effects for all recordings of a rig together.
+
+    Parameters
+    ----------
+    recordings : sequence of mapping of joint name to anchors
+        Nominal fits of each joint of each recording; see `rank.look`.
+    most_effects : int
+        Largest number of effects on a joint.
+    jobs : int
+        Processes side by side.
+    tell : callable
+        Told each effect when it is chosen.
+
+    Returns
+    -------
+    dict of joint name to tuple of GivenEffect
+        Effects in the order in which they were added.
+    """
+    chosen = {}
+    for joint in recordings[0]:
+        parents: list[Anchors] = [anchors[joint] for anchors in recordings]
+        given: tuple[GivenEffect, ...] = ()
+        while len(given) < most_effects:
+            effects = tuple(effect.id for effect in given)
+            tell(f'{joint}: what all recordings lack beside {", ".join(effects) or "nothing"}')
+            found = _next_effect(parents, effects, jobs)
+            if found is None:
+                break
+            effect, parents, fall = found
+            given = (*given, effect)
+            tell(f'{joint}: {effect.id}, by {fall:.0f} per recording')
+        chosen[joint] = given
+    return chosen
+
+
+def _next_effect(
+    parents: list[Anchors], effects: tuple[str, ...], jobs: int
+) -> tuple[GivenEffect, list[Anchors], float] | None:
+    """The effect that brings most, all recordings with it, and its mean fall of the score."""
+    repeated = all(motion_repeats(anchors[0].model.observation) for anchors in parents)
+    tried = [
+        e
+        for e in searchable_effects()
+        if e not in effects and (repeated or e not in DEPENDS_ON_TIME)
+    ]
+    glances = _glances(parents, effects, tried, jobs)
+    promising = sorted(tried, key=lambda e: _logarithm_of_costs(parents, glances[e]))[:POLISHED]
+    grown = {e: _grown(parents, effects, e, glances[e], jobs) for e in promising}
+    total = {e: sum(score(anchors[0]) for anchors in grown[e][1]) for e in promising}
+    best = min(total, key=lambda e: total[e])
+    fall = (sum(score(anchors[0]) for anchors in parents) - total[best]) / len(parents)
+    return (*grown[best], fall) if fall >= LEAST_FALL else None
+
+
+def _glances(
+    parents: list[Anchors], effects: tuple[str, ...], tried: Sequence[str], jobs: int
+) -> dict[str, list[Glance | None]]:
+    tasks = [(e, n) for e in tried for n in range(len(parents))]
+
+    def glanced(task: tuple[str, int]) -> Glance | None:
+        return glance(parents[task[1]], effects, task[0])
+
+    found = iter(parallel_map(glanced, tasks, jobs))
+    return {e: [next(found) for _ in parents] for e in tried}
+
+
+def _logarithm_of_costs(parents: list[Anchors], glances: list[Glance | None]) -> float:
+    return sum(
+        math.log(anchors[0].cost if item is None else min(item.cost, anchors[0].cost))
+        for anchors, item in zip(parents, glances, strict=True)
+    )
+
+
+def _grown(
+    parents: list[Anchors],
+    effects: tuple[str, ...],
+    effect_id: str,
+    glances: list[Glance | None],
+    jobs: int,
+) -> tuple[GivenEffect, list[Anchors]]:
+    """All recordings with one more effect; a recording that has no use for it stays as it is."""
+    wanted = [n for n, item in enumerate(glances) if item is not None]
+    begun = [
+        item.look(anchors, effects)
+        for anchors, item in zip(parents, glances, strict=True)
+        if item is not None
+    ]
+    fits = parallel_fits(lambda i: separate_fit(begun[i]), [item.model for item in begun], jobs)
+    effect = GivenEffect(effect_id)
+    if must_agree(effect_id) and fits:
+        effect = GivenEffect(effect_id, agreed_parameters(fits, effect_id))
+        held = [in_line(f, effect) for f in fits]
+        fits = parallel_fits(lambda i: settled(*held[i]), [model for model, _ in held], jobs)
+    grown = list(parents)
+    for n, f in zip(wanted, fits, strict=True):
+        grown[n] = (f,)
+    return effect, grown

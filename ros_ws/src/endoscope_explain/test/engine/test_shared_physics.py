@@ -1,0 +1,62 @@
+"""One choice of effects for several recordings of a rig whose tube changes."""
+
+import pytest
+
+from endoscope_core.plant import EffectSpec
+from endoscope_explain.anchoring import anchored
+from endoscope_explain.explain_recording import explain_recording
+from endoscope_explain.observation import observe
+from endoscope_explain.shared_physics import shared_effects
+
+GAIN = 0.9
+TUBES = {0.7: 0.006, 1.0: 0.009}
+"""Capstan exponent, and the moment of gravity in N m in that pose."""
+
+
+@pytest.fixture(scope='module')
+def recordings(one_joint):
+    return [
+        one_joint.record(
+            one_joint.rig(
+                EffectSpec('load_cell_gain', 'bend_x', {'gain': GAIN, 'wire': 1.0}),
+                EffectSpec('gravity', 'bend_x', {'moment_nm': moment, 'phase_rad': 0.8}),
+                capstan_exponent=exponent,
+            ),
+            one_joint.motion(6.0),
+        )
+        for exponent, moment in TUBES.items()
+    ]
+
+
+@pytest.fixture(scope='module')
+def chosen(one_joint, recordings):
+    anchors = []
+    for recording in recordings:
+        observations = observe(recording, one_joint.rig())
+        _, (pair,) = anchored(recording, observations, one_joint.rig(), 0.5, 1)
+        anchors.append({'bend_x': pair})
+    return shared_effects(anchors, 3, 2, lambda _: None)['bend_x']
+
+
+def test_what_all_recordings_lack_is_found_and_nothing_else(chosen):
+    assert {effect.id for effect in chosen} == {'load_cell_gain', 'gravity'}
+
+
+def test_a_device_is_the_same_in_all_recordings_and_a_pose_is_not(chosen):
+    gain = next(effect for effect in chosen if effect.id == 'load_cell_gain')
+    gravity = next(effect for effect in chosen if effect.id == 'gravity')
+    assert gain.agreed['gain'] == pytest.approx(GAIN, abs=0.005)
+    assert gain.agreed['wire'] == 1.0
+    assert gravity.agreed == {}
+
+
+def test_a_recording_is_explained_by_the_effects_it_is_given(one_joint, recordings, chosen):
+    for recording, moment in zip(recordings, TUBES.values(), strict=True):
+        explanation = explain_recording(
+            recording, one_joint.rig(), band=0.5, order={'bend_x': chosen}, jobs=1
+        )
+        named = {e.id: e.parameters for e in explanation.effects}
+        assert set(named) == {'load_cell_gain', 'gravity'}
+        assert named['gravity']['moment_nm'].value == pytest.approx(moment, rel=0.05)
+        assert named['load_cell_gain']['gain'].value == pytest.approx(GAIN, abs=0.005)
+        assert explanation.adequate
