@@ -88,6 +88,18 @@ def test_many_bags_have_one_report_each_and_one_table(rig, tmp_path, capsys):
     assert exponents == pytest.approx([0.9, 0.9], rel=0.05)
 
 
+def test_sound_recordings_of_one_rig_share_no_missing_physics(rig, tmp_path, capsys):
+    write_short_bag(tmp_path / 'other' / 'sound', seed=5)
+    bags = (rig / 'sound', tmp_path / 'other' / 'sound')
+    out = tmp_path / 'out'
+    assert explain(rig, out, *bags, '--quick', '--same-physics', '--tightened') == 0
+    assert summary(out) == {'sound': 'consistent', 'sound_2': 'consistent'}
+    for name in ('sound', 'sound_2'):
+        held = json.loads((out / name / 'report.json').read_text())['start_friction']
+        assert held['bend_x'] == pytest.approx(0.0, abs=0.1)
+    assert 'beside nothing' in capsys.readouterr().out
+
+
 def test_a_dask_cluster_does_the_same(rig, tmp_path):
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         assert (

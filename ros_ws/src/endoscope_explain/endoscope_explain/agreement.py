@@ -7,7 +7,7 @@ combined by their precisions (Hartung, Knapp, Sinha, Statistical Meta-Analysis, 
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,21 +19,6 @@ from endoscope_explain.intervals import covariance
 Array = NDArray[np.float64]
 
 OF_A_DEVICE = frozenset({Stage.ACTUATOR, Stage.SENSING})
-
-
-@dataclass(frozen=True)
-class GivenEffect:
-    """An effect that a recording is to be explained with.
-
-    Attributes
-    ----------
-    id : str
-    agreed : mapping of str to float
-        Parameters that all recordings agree on; empty where each has its own.
-    """
-
-    id: str
-    agreed: Mapping[str, float] = field(default_factory=dict)
 
 
 def must_agree(effect_id: str) -> bool:
@@ -75,14 +60,15 @@ def agreed_parameters(fits: Sequence[Fit], effect_id: str) -> dict[str, float]:
     return parameters
 
 
-def in_line(separate: Fit, effect: GivenEffect) -> tuple[JointModel, Array]:
+def in_line(separate: Fit, effect_id: str, agreed: Mapping[str, float]) -> tuple[JointModel, Array]:
     """Set an effect's parameters to what all recordings agree on; they are not free any more.
 
     Parameters
     ----------
     separate : Fit
         Has the effect, with its own parameters.
-    effect : GivenEffect
+    effect_id : str
+    agreed : mapping of str to float
 
     Returns
     -------
@@ -90,13 +76,13 @@ def in_line(separate: Fit, effect: GivenEffect) -> tuple[JointModel, Array]:
     theta : array (n,)
         Where to begin its fit.
     """
-    definition = CATALOGUE[effect.id]
+    definition = CATALOGUE[effect_id]
     model = separate.model
     base = model.base.copy()
     for i, parameter in enumerate(definition.parameters):
         if not parameter.is_duration:
-            base[definition.first_parameter + i] = effect.agreed[parameter.name]
-    own = set(_columns(separate, effect.id))
+            base[definition.first_parameter + i] = agreed[parameter.name]
+    own = set(_columns(separate, effect_id))
     kept = [k for k in range(len(model.free)) if k not in own]
     held = replace(model, base=base, free=tuple(model.free[k] for k in kept))
     return held, separate.theta[kept]

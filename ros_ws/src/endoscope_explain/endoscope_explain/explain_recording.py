@@ -1,13 +1,12 @@
 """From a cleaned recording and a plant description to named effects."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.plant import PlantDescription
-from endoscope_explain.agreement import GivenEffect
 from endoscope_explain.anchoring import all_anchors, anchored, simulated_bending
 from endoscope_explain.baseline import against_baseline
 from endoscope_explain.conclusions import (
@@ -26,11 +25,11 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.free_parameters import BAND
+from endoscope_explain.given_physics import GivenJoints, explained_by
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.intervals import nominal_estimates
 from endoscope_explain.latent import unknown_term
 from endoscope_explain.observation import JointObservation, couple, observe
-from endoscope_explain.ordered_search import in_order
 from endoscope_explain.recording import Recording
 from endoscope_explain.search import MOST_EFFECTS, JointSearch, search
 
@@ -53,7 +52,7 @@ def explain_recording(
     band: float = BAND,
     most_effects: int = MOST_EFFECTS,
     tightened: bool = False,
-    order: Mapping[str, Sequence[GivenEffect]] | None = None,
+    given: GivenJoints | None = None,
     jobs: int = 2,
     progress: Progress | None = None,
 ) -> Explanation:
@@ -74,8 +73,8 @@ def explain_recording(
     tightened : bool
         Whether the wires were tightened from the motor's side, so that friction may hold them at
         the start.
-    order : mapping of joint to sequence of GivenEffect, optional
-        The effects of each joint; they are not searched then, but fitted one after the other.
+    given : mapping of joint to GivenPhysics, optional
+        The physics of each joint, if it is not to be searched.
     jobs : int
         Processes side by side.
     progress : callable, optional
@@ -110,8 +109,8 @@ def explain_recording(
 
     def searched(index: int) -> JointSearch:
         joint = observations[index].joint
-        if order is not None:
-            return in_order(anchors[index], order[joint], jobs)
+        if given is not None:
+            return explained_by(anchors[index], given[joint], jobs)
         return search(anchors[index], jobs, most_effects, known[joint])
 
     searches, decisions = [], []

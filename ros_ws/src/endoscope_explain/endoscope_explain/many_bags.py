@@ -119,8 +119,8 @@ def explain_bags(
             raise TogetherError(
                 '--same-physics cannot be had with --baseline: leave one of them out'
             )
-        order = physics_of_all(sources, jobs, say)
-        sources = [replace(one, order=order) for one in sources]
+        all_given = physics_of_all(sources, jobs, say)
+        sources = [replace(o, given=g) for o, g in zip(sources, all_given, strict=True)]
     if len(sources) == 1 and dask_address is None:
         reported = explain_one(sources[0], jobs, say)
         with atomic_directory(out) as folder:

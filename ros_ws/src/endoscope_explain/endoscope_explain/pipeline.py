@@ -1,7 +1,7 @@
 """From bags to an explained case: read, audit, explain, locate, judge, propose."""
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,12 +9,12 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_bags.errors import BagError
 from endoscope_core.plant import PlantDescription
-from endoscope_explain.agreement import GivenEffect
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import ExplainedCase, NextExperiment, Place
 from endoscope_explain.combine import combined_effects, combined_verdict, improved_plant
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.free_parameters import BAND
+from endoscope_explain.given_physics import GivenJoints
 from endoscope_explain.isolated_samples import with_isolated_marked
 from endoscope_explain.ladder import ladders
 from endoscope_explain.locate.chain_cut import cut_at_motor
@@ -56,8 +56,8 @@ class Sources:
         Largest number of effects on a joint that are looked for.
     tightened : bool
         Whether the wires were tightened from the motor's side before the recording.
-    order : mapping of joint to sequence of GivenEffect, or None
-        The effects of each joint, if they are not to be searched.
+    given : mapping of joint to GivenPhysics, or None
+        The physics of each joint, if it is not to be searched.
     """
 
     bag: Path
@@ -69,7 +69,7 @@ class Sources:
     band: float = BAND
     most_effects: int = MOST_EFFECTS
     tightened: bool = False
-    order: Mapping[str, Sequence[GivenEffect]] | None = None
+    given: GivenJoints | None = None
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Inputs:
         Relative tolerance of the plant's parameters.
     most_effects : int
         Largest number of effects on a joint that are looked for.
-    tightened, order
+    tightened, given
         As in `Sources`.
     """
 
@@ -98,7 +98,7 @@ class Inputs:
     band: float = BAND
     most_effects: int = MOST_EFFECTS
     tightened: bool = False
-    order: Mapping[str, Sequence[GivenEffect]] | None = None
+    given: GivenJoints | None = None
 
 
 class JointsDifferError(BagError):
@@ -143,7 +143,7 @@ def read_inputs(sources: Sources) -> Inputs:
         sources.band,
         sources.most_effects,
         sources.tightened,
-        sources.order,
+        sources.given,
     )
 
 
@@ -187,7 +187,7 @@ def explain_case(
             band=inputs.band,
             most_effects=inputs.most_effects,
             tightened=inputs.tightened,
-            order=inputs.order,
+            given=inputs.given,
             jobs=jobs,
             progress=progress,
         )

@@ -7,22 +7,29 @@ same misfit; the effects are therefore chosen by the sum of all scores, and fitt
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from endoscope_explain.agreement import GivenEffect, agreed_parameters, in_line, must_agree
+from endoscope_core.effects import CATALOGUE
+from endoscope_explain.agreement import agreed_parameters, in_line, must_agree
 from endoscope_explain.anchoring import anchored
 from endoscope_explain.compose import searchable_effects
-from endoscope_explain.fit import Fit
+from endoscope_explain.fit import Fit, JointModel
+from endoscope_explain.given_physics import GivenJoints, GivenPhysics, settled, without_recording
+from endoscope_explain.glance import Glance, glance
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.observation import observe
-from endoscope_explain.ordered_search import Glance, glance, separate_fit, settled
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.pipeline import JointsDifferError, Sources, read_inputs
+from endoscope_explain.rank import Look, polish
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.score import score
 
+Array = NDArray[np.float64]
 Anchors = tuple[Fit, ...]
 
 POLISHED = 6
@@ -33,7 +40,7 @@ LEAST_FALL = 10.0
 
 def physics_of_all(
     sources: Sequence[Sources], jobs: int, tell: Callable[[str], None]
-) -> dict[str, tuple[GivenEffect, ...]]:
+) -> list[GivenJoints]:
     """Read several recordings of a rig and choose the effects that explain all of them.
 
     Parameters
@@ -46,8 +53,8 @@ def physics_of_all(
 
     Returns
     -------
-    dict of joint name to tuple of GivenEffect
-        Effects in the order in which they were added.
+    list of mapping of joint name to GivenPhysics
+        For each recording.
 
     Raises
     ------
@@ -83,7 +90,7 @@ def shared_effects(
     most_effects: int,
     jobs: int,
     tell: Callable[[str], None],
-) -> dict[str, tuple[GivenEffect, ...]]:
+) -> list[GivenJoints]:
     """Choose effects for all recordings of a rig together.
 
     Parameters
@@ -99,29 +106,31 @@ def shared_effects(
 
     Returns
     -------
-    dict of joint name to tuple of GivenEffect
-        Effects in the order in which they were added.
+    list of mapping of joint name to GivenPhysics
+        For each recording; the effects are those of all, in the order in which they were added.
     """
-    chosen = {}
+    given: list[dict[str, GivenPhysics]] = [{} for _ in recordings]
     for joint in recordings[0]:
         parents: list[Anchors] = [anchors[joint] for anchors in recordings]
-        given: tuple[GivenEffect, ...] = ()
-        while len(given) < most_effects:
-            effects = tuple(effect.id for effect in given)
+        effects: tuple[str, ...] = ()
+        while len(effects) < most_effects:
             tell(f'{joint}: what all recordings lack beside {", ".join(effects) or "nothing"}')
             found = _next_effect(parents, effects, jobs)
             if found is None:
                 break
-            effect, parents, fall = found
-            given = (*given, effect)
-            tell(f'{joint}: {effect.id}, by {fall:.0f} per recording')
-        chosen[joint] = given
-    return chosen
+            effect_id, parents, fall = found
+            effects = (*effects, effect_id)
+            tell(f'{joint}: {effect_id}, by {fall:.0f} per recording')
+        for physics, anchors in zip(given, parents, strict=True):
+            flags = anchors[0].model.flags
+            own = tuple(e for e in effects if flags[CATALOGUE[e].flag])
+            physics[joint] = without_recording(own, anchors[0])
+    return list(given)
 
 
 def _next_effect(
     parents: list[Anchors], effects: tuple[str, ...], jobs: int
-) -> tuple[GivenEffect, list[Anchors], float] | None:
+) -> tuple[str, list[Anchors], float] | None:
     """The effect that brings most, all recordings with it, and its mean fall of the score."""
     repeated = all(motion_repeats(anchors[0].model.observation) for anchors in parents)
     tried = [
@@ -132,10 +141,15 @@ def _next_effect(
     glances = _glances(parents, effects, tried, jobs)
     promising = sorted(tried, key=lambda e: _logarithm_of_costs(parents, glances[e]))[:POLISHED]
     grown = {e: _grown(parents, effects, e, glances[e], jobs) for e in promising}
-    total = {e: sum(score(anchors[0]) for anchors in grown[e][1]) for e in promising}
+    total = {e: _total(grown[e]) for e in promising}
     best = min(total, key=lambda e: total[e])
-    fall = (sum(score(anchors[0]) for anchors in parents) - total[best]) / len(parents)
-    return (*grown[best], fall) if fall >= LEAST_FALL else None
+    chosen = _borrowed(grown[best], jobs)
+    fall = (_total(parents) - _total(chosen)) / len(parents)
+    return (best, chosen, fall) if fall >= LEAST_FALL else None
+
+
+def _total(recordings: Sequence[Anchors]) -> float:
+    return sum(score(anchors[0]) for anchors in recordings)
 
 
 def _glances(
@@ -163,7 +177,7 @@ def _grown(
     effect_id: str,
     glances: list[Glance | None],
     jobs: int,
-) -> tuple[GivenEffect, list[Anchors]]:
+) -> list[Anchors]:
     """All recordings with one more effect; a recording that has no use for it stays as it is."""
     wanted = [n for n, item in enumerate(glances) if item is not None]
     begun = [
@@ -171,13 +185,46 @@ def _grown(
         for anchors, item in zip(parents, glances, strict=True)
         if item is not None
     ]
-    fits = parallel_fits(lambda i: separate_fit(begun[i]), [item.model for item in begun], jobs)
-    effect = GivenEffect(effect_id)
+    fits = parallel_fits(lambda i: _separate(begun[i]), [item.model for item in begun], jobs)
     if must_agree(effect_id) and fits:
-        effect = GivenEffect(effect_id, agreed_parameters(fits, effect_id))
-        held = [in_line(f, effect) for f in fits]
+        agreed = agreed_parameters(fits, effect_id)
+        held = [in_line(f, effect_id, agreed) for f in fits]
         fits = parallel_fits(lambda i: settled(*held[i]), [model for model, _ in held], jobs)
     grown = list(parents)
     for n, f in zip(wanted, fits, strict=True):
         grown[n] = (f,)
-    return effect, grown
+    return grown
+
+
+def _separate(item: Look) -> Fit:
+    begun = polish(item)
+    return settled(begun.model, begun.theta)
+
+
+def _borrowed(recordings: list[Anchors], jobs: int) -> list[Anchors]:
+    """Each recording fitted once more from the neighbour whose numbers suit it best.
+
+    The numbers of one rig in two shapes are alike, and a fit by itself may lie in a worse valley.
+    """
+    begun = [
+        min(
+            (
+                _moved_to(anchors[0], other[0])
+                for m, other in enumerate(recordings)
+                if m != n and len(other[0].theta) == len(anchors[0].theta)
+            ),
+            key=lambda b: float(np.sum(b[0].residuals(b[1]) ** 2)),
+            default=(anchors[0].model, anchors[0].theta),
+        )
+        for n, anchors in enumerate(recordings)
+    ]
+    fits = parallel_fits(lambda i: settled(*begun[i]), [model for model, _ in begun], jobs)
+    return [
+        (other,) if score(other) < score(anchors[0]) else anchors
+        for anchors, other in zip(recordings, fits, strict=True)
+    ]
+
+
+def _moved_to(own: Fit, other: Fit) -> tuple[JointModel, Array]:
+    """Another recording's physics, with its numbers, on one's own recording."""
+    return replace(other.model, observation=own.model.observation), other.theta

@@ -15,7 +15,7 @@ from endoscope_explain.benchmark.peers.sindy import name_by_sindy
 from endoscope_explain.benchmark.peers.symbolic import name_by_symbolic_regression
 from endoscope_explain.benchmark.peers.term_library import Problem, problem_of
 from endoscope_explain.benchmark.printing import confusion_table, progress_line, table
-from endoscope_explain.benchmark.running import Task, run_case
+from endoscope_explain.benchmark.running import Task, run_case, run_cases
 from endoscope_explain.generator import CaseRequest
 from endoscope_explain.predicted_signals import view
 
@@ -216,3 +216,13 @@ def test_symbolic_regression_names_the_state_that_the_residual_follows(library):
         {k: library.states[k] for k in ('lagging', 'other', 't') if k in library.states},
     )
     assert name_by_symbolic_regression(problem) == 'wire_creep'
+
+
+def test_an_error_in_a_case_is_said_at_once_and_with_the_case():
+    wrong = Task(CaseRequest(7, 'single', 'calibration', ('no_such_effect',)), False)
+    right = Task(CaseRequest(8, 'null', 'calibration', None), False)
+    told = []
+    with pytest.raises(ValueError, match='no_such_effect') as error:
+        list(run_cases([wrong, *[right] * 50], 1, lambda *done: told.append(done)))
+    assert error.value.__notes__ == ['in the case of seed 7']
+    assert len(told) < 5

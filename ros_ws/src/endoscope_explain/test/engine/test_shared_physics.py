@@ -2,6 +2,7 @@
 
 import pytest
 
+from endoscope_core.effects import CATALOGUE
 from endoscope_core.plant import EffectSpec
 from endoscope_explain.anchoring import anchored
 from endoscope_explain.explain_recording import explain_recording
@@ -35,25 +36,28 @@ def chosen(one_joint, recordings):
         observations = observe(recording, one_joint.rig())
         _, (pair,) = anchored(recording, observations, one_joint.rig(), 0.5, 1)
         anchors.append({'bend_x': pair})
-    return shared_effects(anchors, 3, 2, lambda _: None)['bend_x']
+    return [given['bend_x'] for given in shared_effects(anchors, 3, 2, lambda _: None)]
 
 
 def test_what_all_recordings_lack_is_found_and_nothing_else(chosen):
-    assert {effect.id for effect in chosen} == {'load_cell_gain', 'gravity'}
+    for given in chosen:
+        assert set(given.effects) == {'load_cell_gain', 'gravity'}
 
 
 def test_a_device_is_the_same_in_all_recordings_and_a_pose_is_not(chosen):
-    gain = next(effect for effect in chosen if effect.id == 'load_cell_gain')
-    gravity = next(effect for effect in chosen if effect.id == 'gravity')
-    assert gain.agreed['gain'] == pytest.approx(GAIN, abs=0.005)
-    assert gain.agreed['wire'] == 1.0
-    assert gravity.agreed == {}
+    gain = CATALOGUE['load_cell_gain'].first_parameter
+    first, second = (given.base[gain : gain + 2] for given in chosen)
+    assert first.tolist() == second.tolist() == pytest.approx([GAIN, 1.0], abs=0.005)
+    for given in chosen:
+        free = {item.name for item in given.free}
+        assert 'gain' not in free
+        assert 'moment_nm' in free
 
 
-def test_a_recording_is_explained_by_the_effects_it_is_given(one_joint, recordings, chosen):
-    for recording, moment in zip(recordings, TUBES.values(), strict=True):
+def test_a_recording_is_explained_by_the_physics_it_is_given(one_joint, recordings, chosen):
+    for recording, given, moment in zip(recordings, chosen, TUBES.values(), strict=True):
         explanation = explain_recording(
-            recording, one_joint.rig(), band=0.5, order={'bend_x': chosen}, jobs=1
+            recording, one_joint.rig(), band=0.5, given={'bend_x': given}, jobs=1
         )
         named = {e.id: e.parameters for e in explanation.effects}
         assert set(named) == {'load_cell_gain', 'gravity'}

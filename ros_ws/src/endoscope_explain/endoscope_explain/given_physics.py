@@ -1,0 +1,103 @@
+"""Explain a joint by physics that was chosen elsewhere."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.effects import CATALOGUE
+from endoscope_explain.compose import Composition
+from endoscope_explain.fit import Fit, JointModel, fit
+from endoscope_explain.free_parameters import FreeParameter
+from endoscope_explain.parallel_fits import parallel_fits
+from endoscope_explain.score import score
+from endoscope_explain.search import JointSearch
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+SETTLED = 1e-4
+SETTLING_STEPS = 20
+
+
+@dataclass(frozen=True)
+class GivenPhysics:
+    """A fitted joint without its recording.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        In the order in which they were added.
+    base : array (parameters,)
+    flags : array (flags,) of bool
+    free : tuple of FreeParameter
+        As in `JointModel`.
+    theta : array (n,)
+    """
+
+    effects: tuple[str, ...]
+    base: Array
+    flags: Flags
+    free: tuple[FreeParameter, ...]
+    theta: Array
+
+
+GivenJoints = Mapping[str, GivenPhysics]
+"""By joint."""
+
+
+def without_recording(effects: tuple[str, ...], found: Fit) -> GivenPhysics:
+    """The physics of a fit."""
+    model = found.model
+    return GivenPhysics(effects, model.base, model.flags, model.free, found.theta)
+
+
+def settled(model: JointModel, theta: Array) -> Fit:
+    """Fit until nothing moves any more."""
+    return fit(model, theta, iterations=SETTLING_STEPS, tolerance=SETTLED)
+
+
+def explained_by(anchors: tuple[Fit, Fit], given: GivenPhysics, jobs: int) -> JointSearch:
+    """Fit given physics to a joint, and see what each of its effects is needed for.
+
+    Parameters
+    ----------
+    anchors : (Fit, Fit)
+        Nominal plant refitted, and as described.
+    given : GivenPhysics
+    jobs : int
+        Processes side by side.
+
+    Returns
+    -------
+    JointSearch
+        One level: all effects together, then without each of them.
+    """
+    nominal = Composition((), anchors[0], score(anchors[0]))
+    if not given.effects:
+        return JointSearch(nominal, ())
+    model = JointModel(anchors[0].model.observation, given.base, given.flags, given.free)
+    found = settled(model, given.theta)
+    whole = Composition(given.effects, found, score(found))
+    lesser = [_begun_without(found, effect_id) for effect_id in given.effects]
+    fits = parallel_fits(lambda i: fit(*lesser[i]), [model for model, _ in lesser], jobs)
+    level = [
+        Composition(tuple(e for e in given.effects if e != effect_id), f, score(f))
+        for effect_id, f in zip(given.effects, fits, strict=True)
+    ]
+    return JointSearch(nominal, ((whole, *sorted(level, key=lambda c: c.score)),))
+
+
+def _begun_without(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
+    """Model and first coordinates of a fit that has lost one effect."""
+    definition = CATALOGUE[effect_id]
+    places = range(
+        definition.first_parameter, definition.first_parameter + len(definition.parameters)
+    )
+    model = found.model
+    flags = model.flags.copy()
+    flags[definition.flag] = False
+    kept = [i for i, item in enumerate(model.free) if item.index not in places]
+    free = tuple(model.free[i] for i in kept)
+    return replace(model, flags=flags, free=free), found.theta[kept]
