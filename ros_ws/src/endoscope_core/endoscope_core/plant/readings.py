@@ -1,5 +1,7 @@
 """What the noise-free sensors of one joint read."""
 
+import math
+
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.effects import (
     load_cell_crosstalk,
@@ -13,10 +15,13 @@ from endoscope_core.effects import (
 )
 from endoscope_core.effects.slots import (
     ANGLE_HISTORY,
+    CAPSTAN_EXPONENT,
     HISTORY,
     MOTOR,
     MOTOR_SPEED,
     PULLEY_RADIUS,
+    SLIDE_A,
+    SLIDE_B,
     TENSION_A,
     TENSION_B,
     TICKS,
@@ -31,7 +36,12 @@ from endoscope_core.plant.inputs import (
     OUT_TENSION_A,
     OUT_TENSION_B,
 )
-from endoscope_core.plant.transmission import pretension_now, wire_tension
+from endoscope_core.plant.transmission import (
+    half_exponent,
+    is_distributed,
+    pretension_now,
+    wire_tension,
+)
 
 
 @compiled
@@ -90,6 +100,10 @@ def read_sensors(
     if state[TICKS] == 0.0:
         rest, _ = wire_tension(p, on, pretension_now(p, on, 0.0), 0.0)
         state[TENSION_A] = state[TENSION_B] = rest
+        if not is_distributed(p, on):
+            for tension, slide in ((TENSION_A, SLIDE_A), (TENSION_B, SLIDE_B)):
+                held, _ = half_exponent(p, on, p[CAPSTAN_EXPONENT], state[slide], 0.0)
+                state[tension] *= math.exp(held)
     ta, tb = state[TENSION_A], state[TENSION_B]
     time = state[TICKS] * tick
     out[OUT_MOTOR] = state[MOTOR]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.effects.slots import START_FRICTION
+from endoscope_core.plant.kernel import OUT_TENSION_A, OUT_TENSION_B
 from endoscope_explain.compose import nominal_anchors
 from endoscope_explain.conclusions import start_friction
 from endoscope_explain.evaluate import packed_joint
@@ -47,6 +48,16 @@ def test_a_tightened_wire_is_read_tighter_by_the_capstan_at_rest(one_joint):
         # Held from the motor's side, the proximal tension is larger than the middle one.
         assert held[-1] == pytest.approx(free[-1], abs=1e-3)
         assert held[0] > 1.05 * free[0]
+
+
+def test_what_is_held_is_read_from_the_first_sample_on(one_joint):
+    plant = one_joint.rig()
+    resting = one_joint.record(plant, np.zeros(200))
+    (observation,) = observe(replace(resting, start_friction={'bend_x': HELD}), plant)
+    outputs = simulate_rig((observation,), plant)[0]
+    joint = plant.joints['bend_x']
+    held = joint.pretension * np.exp(0.5 * joint.capstan_exponent * HELD)
+    np.testing.assert_allclose(outputs[:, [OUT_TENSION_A, OUT_TENSION_B]], held, rtol=1e-9)
 
 
 def test_how_much_it_was_is_found_where_it_is_asked_for(one_joint, observation):
