@@ -41,7 +41,9 @@ def agreed_parameters(fits: Sequence[Fit], effect_id: str) -> dict[str, float]:
         All parameters; of a number without a scale, such as a wire's, the most frequent one.
     """
     definition = CATALOGUE[effect_id]
-    columns = [_columns(f, effect_id) for f in fits]
+    columns = [
+        [k for k, item in enumerate(f.model.free) if item.index in definition.places] for f in fits
+    ]
     precisions = [
         np.linalg.inv(covariance(f)[np.ix_(own, own)]) for f, own in zip(fits, columns, strict=True)
     ]
@@ -82,14 +84,4 @@ def in_line(separate: Fit, effect_id: str, agreed: Mapping[str, float]) -> tuple
     for i, parameter in enumerate(definition.parameters):
         if not parameter.is_duration:
             base[definition.first_parameter + i] = agreed[parameter.name]
-    own = set(_columns(separate, effect_id))
-    kept = [k for k in range(len(model.free)) if k not in own]
-    held = replace(model, base=base, free=tuple(model.free[k] for k in kept))
-    return held, separate.theta[kept]
-
-
-def _columns(fitted: Fit, effect_id: str) -> list[int]:
-    """Places of an effect's parameters among the free ones."""
-    definition = CATALOGUE[effect_id]
-    first, count = definition.first_parameter, len(definition.parameters)
-    return [k for k, i in enumerate(fitted.model.free) if first <= i.index < first + count]
+    return replace(model, base=base).holding(definition.places, separate.theta)

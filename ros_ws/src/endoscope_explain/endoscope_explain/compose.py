@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from endoscope_core.effects import CATALOGUE
 from endoscope_explain.fit import Fit, JointModel, fit, jacobian
 from endoscope_explain.free_parameters import BAND, nominal_parameters
+from endoscope_explain.glance import Glance, glance
 from endoscope_explain.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.parallel_fits import parallel_fits
-from endoscope_explain.rank import Look, look, polish
+from endoscope_explain.rank import Look, polish
 from endoscope_explain.score import FLOOR_PER_PARAMETER, score
-from endoscope_explain.screen import Promise, promises, unexplained, with_effect
+from endoscope_explain.screen import Promise, promises, unexplained
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -185,21 +186,16 @@ def _screened(
 def _looks(
     parents: Sequence[Parent], chosen: Sequence[tuple[int, Promise]], jobs: int
 ) -> list[Look]:
-    def looked(task: tuple[int, Promise]) -> tuple[Array, float]:
+    def glanced(task: tuple[int, Promise]) -> Glance:
         parent, anchors = parents[task[0]]
-        item = look(anchors, parent.effects, task[1])
-        return item.theta, item.cost
+        return glance(anchors, parent.effects, task[1])
 
     best: dict[frozenset[str], Look] = {}
-    for (index, promise), (theta, cost) in zip(
-        chosen, parallel_map(looked, chosen, jobs), strict=True
-    ):
+    for (index, _), item in zip(chosen, parallel_map(glanced, chosen, jobs), strict=True):
         parent, anchors = parents[index]
-        effects = (*parent.effects, promise.effect_id)
-        key = frozenset(effects)
-        if key not in best or cost < best[key].cost:
-            model = with_effect(anchors[0].model, promise.effect_id, promise.start)
-            best[key] = Look(effects, model, theta, cost)
+        key = frozenset((*parent.effects, item.effect_id))
+        if key not in best or item.cost < best[key].cost:
+            best[key] = item.look(anchors, parent.effects)
     return sorted(best.values(), key=lambda item: item.cost)
 
 

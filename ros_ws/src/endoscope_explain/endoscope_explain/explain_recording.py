@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.plant import PlantDescription
 from endoscope_explain.anchoring import all_anchors, anchored, simulated_bending
@@ -20,10 +19,7 @@ from endoscope_explain.conclusions import (
 )
 from endoscope_explain.decision import Decision, decide, with_devices_agreed
 from endoscope_explain.evaluate import packed_joint
-from endoscope_explain.explanation import (
-    Explanation,
-    Verdict,
-)
+from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.free_parameters import BAND
 from endoscope_explain.given_physics import GivenJoints, explained_by
 from endoscope_explain.held_noise import with_held_noise
@@ -33,8 +29,6 @@ from endoscope_explain.observation import JointObservation, couple, observe
 from endoscope_explain.recording import Recording
 from endoscope_explain.search import MOST_EFFECTS, JointSearch, search
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Progress = Callable[[str], None]
 
 LEAST_DURATION_S = 2.0

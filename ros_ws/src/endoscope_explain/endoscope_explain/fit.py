@@ -1,7 +1,7 @@
 """Output-error least squares of one joint: Levenberg-Marquardt with bounds and priors."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,11 @@ class JointModel:
             [theta, [item.coordinate(float(self.base[item.index])) for item in others]]
         )
 
+    def holding(self, places: range, theta: Array) -> tuple['JointModel', Array]:
+        """The model with the packed `places` held as in `base`, and the coordinates left free."""
+        kept = [k for k, item in enumerate(self.free) if item.index not in places]
+        return replace(self, free=tuple(self.free[k] for k in kept)), theta[kept]
+
     def residuals(self, theta: Array, substeps: int = SUBSTEPS) -> Array:
         """Residuals in noise units, all channels in a row; `substeps` are those of a tick."""
         parameters, lead = self.packed(theta)
@@ -122,6 +127,14 @@ class Fit:
     residuals: Array
     jacobian: Array = field(repr=False)
     cost: float
+
+
+def without_effect(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
+    """Model and first coordinates (n,) of a fit that has lost one of its effects."""
+    definition = CATALOGUE[effect_id]
+    flags = found.model.flags.copy()
+    flags[definition.flag] = False
+    return replace(found.model, flags=flags).holding(definition.places, found.theta)
 
 
 def jacobian(model: JointModel, theta: Array, at: Array, columns: list[int] | None = None) -> Array:

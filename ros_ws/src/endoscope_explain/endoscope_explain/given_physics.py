@@ -1,14 +1,13 @@
 """Explain a joint by physics that was chosen elsewhere."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE
 from endoscope_explain.compose import Composition
-from endoscope_explain.fit import Fit, JointModel, fit
+from endoscope_explain.fit import Fit, JointModel, fit, without_effect
 from endoscope_explain.free_parameters import FreeParameter
 from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.score import score
@@ -80,24 +79,10 @@ def explained_by(anchors: tuple[Fit, Fit], given: GivenPhysics, jobs: int) -> Jo
     model = JointModel(anchors[0].model.observation, given.base, given.flags, given.free)
     found = settled(model, given.theta)
     whole = Composition(given.effects, found, score(found))
-    lesser = [_begun_without(found, effect_id) for effect_id in given.effects]
+    lesser = [without_effect(found, effect_id) for effect_id in given.effects]
     fits = parallel_fits(lambda i: fit(*lesser[i]), [model for model, _ in lesser], jobs)
     level = [
         Composition(tuple(e for e in given.effects if e != effect_id), f, score(f))
         for effect_id, f in zip(given.effects, fits, strict=True)
     ]
     return JointSearch(nominal, ((whole, *sorted(level, key=lambda c: c.score)),))
-
-
-def _begun_without(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
-    """Model and first coordinates of a fit that has lost one effect."""
-    definition = CATALOGUE[effect_id]
-    places = range(
-        definition.first_parameter, definition.first_parameter + len(definition.parameters)
-    )
-    model = found.model
-    flags = model.flags.copy()
-    flags[definition.flag] = False
-    kept = [i for i, item in enumerate(model.free) if item.index not in places]
-    free = tuple(model.free[i] for i in kept)
-    return replace(model, flags=flags, free=free), found.theta[kept]

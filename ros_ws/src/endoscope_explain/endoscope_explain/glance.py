@@ -7,12 +7,9 @@ from numpy.typing import NDArray
 
 from endoscope_explain.fit import Fit
 from endoscope_explain.rank import Look, look
-from endoscope_explain.screen import promises, unexplained, with_effect
+from endoscope_explain.screen import Promise, with_effect
 
 Array = NDArray[np.float64]
-
-STARTS = 2
-"""Starting points of an effect from which it is fitted."""
 
 
 @dataclass(frozen=True)
@@ -40,20 +37,7 @@ class Glance:
         return Look((*effects, self.effect_id), model, self.theta, self.cost)
 
 
-def glance(anchors: tuple[Fit, ...], effects: tuple[str, ...], effect_id: str) -> Glance | None:
-    """Cheap fit of one more effect from its best starting points; None where it has none.
-
-    Parameters
-    ----------
-    anchors : tuple of Fit
-        See `rank.look`.
-    effects : tuple of str
-        Effects that the anchors have.
-    effect_id : str
-        The one to add.
-    """
-    found = []
-    for promise in promises(unexplained(anchors[0]), effect_id)[:STARTS]:
-        item = look(anchors, effects, promise)
-        found.append(Glance(effect_id, promise.start, item.theta, item.cost))
-    return min(found, key=lambda item: item.cost, default=None)
+def glance(anchors: tuple[Fit, ...], effects: tuple[str, ...], promise: Promise) -> Glance:
+    """Cheap fit of one more effect from one starting point; arguments as in `rank.look`."""
+    item = look(anchors, effects, promise)
+    return Glance(promise.effect_id, promise.start, item.theta, item.cost)

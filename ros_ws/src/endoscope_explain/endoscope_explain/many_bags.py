@@ -127,7 +127,7 @@ def explain_bags(
             _write(reported, folder)
         say(sentence(reported))
         return
-    if dask_address is None:
+    if dask_address is None and not same_physics:
         for one in sources:
             read_inputs(one)
     names = unique_names([one.bag for one in sources])

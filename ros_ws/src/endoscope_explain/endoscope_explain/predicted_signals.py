@@ -17,6 +17,7 @@ from endoscope_explain.observation import TICK, JointObservation, observe
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,17 @@ class RecordedView:
         return tuple(s for s in self.signals.values() if s.joint == joint)
 
 
+def packed_rig(
+    observations: tuple[JointObservation, ...], plant: PlantDescription
+) -> tuple[Array, Flags]:
+    """Parameters (J, parameters), with the start of each recorded joint, and flags (J, flags)."""
+    parameters, flags = pack(plant)
+    rows = [plant.joint_names().index(o.joint) for o in observations]
+    parameters, flags = parameters[rows], flags[rows]
+    parameters[:, START_FRICTION] = [o.start_friction for o in observations]
+    return parameters, flags
+
+
 def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescription) -> Array:
     """Simulate all joints of a recording side by side.
 
@@ -93,10 +105,7 @@ def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescrip
     -------
     array (J, N, OUTPUTS)
     """
-    parameters, flags = pack(plant)
-    rows = [plant.joint_names().index(o.joint) for o in observations]
-    parameters, flags = parameters[rows], flags[rows]
-    parameters[:, START_FRICTION] = [o.start_friction for o in observations]
+    parameters, flags = packed_rig(observations, plant)
     inputs = np.concatenate([o.inputs for o in observations])
     states, histories = rest_state(parameters, np.array([o.start for o in observations]))
     out = np.empty((len(observations), inputs.shape[1], OUTPUTS))

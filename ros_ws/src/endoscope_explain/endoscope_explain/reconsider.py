@@ -8,10 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.effects.slots import START_FRICTION
 from endoscope_explain.compose import Composition, grow
-from endoscope_explain.fit import Fit, JointModel, fit
+from endoscope_explain.fit import Fit, fit, without_effect
 from endoscope_explain.score import score
 from endoscope_explain.whiteness import is_noise
 
@@ -19,12 +17,12 @@ REPLACED_POLISHED = 2
 ALONE_STEPS = 6
 
 
-def alone(nominal: Composition, pair: Composition, effect_id: str) -> tuple[Composition, Fit]:
+def alone(pair: Composition, effect_id: str) -> tuple[Composition, Fit]:
     """One effect of a pair by itself, refitted from where the pair has it.
 
     Parameters
     ----------
-    nominal, pair : Composition
+    pair : Composition
     effect_id : str
         Of the pair.
 
@@ -34,18 +32,8 @@ def alone(nominal: Composition, pair: Composition, effect_id: str) -> tuple[Comp
     as_in_pair : Fit
         The effect with the pair's numbers, before the refit.
     """
-    definition = CATALOGUE[effect_id]
-    first = definition.first_parameter
-    places = range(first, first + len(definition.parameters))
-    flags = nominal.fit.model.flags.copy()
-    flags[definition.flag] = True
-    base, _ = pair.fit.model.packed(pair.fit.theta)
-    free = pair.fit.model.free
-    kept = [
-        i for i, item in enumerate(free) if item.index <= START_FRICTION or item.index in places
-    ]
-    model = JointModel(nominal.fit.model.observation, base, flags, tuple(free[i] for i in kept))
-    theta = pair.fit.theta[kept]
+    (other,) = set(pair.effects) - {effect_id}
+    model, theta = without_effect(pair.fit, other)
     refitted = fit(model, theta, iterations=ALONE_STEPS)
     as_in_pair = Fit(model, theta, model.residuals(theta), refitted.jacobian, np.inf)
     return Composition((effect_id,), refitted, score(refitted)), as_in_pair
@@ -71,7 +59,7 @@ def reconsidered(
     pairs : list of Composition
         Others in the place of the effect that was chosen first.
     """
-    found = [alone(nominal, pair, effect_id) for effect_id in pair.effects]
+    found = [alone(pair, effect_id) for effect_id in pair.effects]
     singles = [single for single, _ in found]
     if is_noise(pair.fit):
         return singles, []

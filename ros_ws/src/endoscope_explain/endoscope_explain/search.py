@@ -2,9 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from endoscope_explain.compose import (
     Composition,
     Parent,
@@ -17,9 +14,6 @@ from endoscope_explain.reconsider import reconsidered
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.score import score
 from endoscope_explain.whiteness import is_noise
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 SINGLES_POLISHED = 6
 PAIRS_POLISHED = 3

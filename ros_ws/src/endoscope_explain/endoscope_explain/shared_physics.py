@@ -28,10 +28,13 @@ from endoscope_explain.pipeline import JointsDifferError, Sources, read_inputs
 from endoscope_explain.rank import Look, polish
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.score import score
+from endoscope_explain.screen import promises, unexplained
 
 Array = NDArray[np.float64]
 Anchors = tuple[Fit, ...]
 
+STARTS = 2
+"""Starting points of an effect that get a cheap fit."""
 POLISHED = 6
 """Effects that are fitted fully to all recordings before one is chosen."""
 LEAST_FALL = 10.0
@@ -156,9 +159,13 @@ def _glances(
     parents: list[Anchors], effects: tuple[str, ...], tried: Sequence[str], jobs: int
 ) -> dict[str, list[Glance | None]]:
     tasks = [(e, n) for e in tried for n in range(len(parents))]
+    left = [unexplained(anchors[0]) for anchors in parents]
 
     def glanced(task: tuple[str, int]) -> Glance | None:
-        return glance(parents[task[1]], effects, task[0])
+        effect_id, n = task
+        starts = promises(left[n], effect_id)[:STARTS]
+        found = [glance(parents[n], effects, start) for start in starts]
+        return min(found, key=lambda item: item.cost, default=None)
 
     found = iter(parallel_map(glanced, tasks, jobs))
     return {e: [next(found) for _ in parents] for e in tried}

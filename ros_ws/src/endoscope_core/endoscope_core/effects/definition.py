@@ -107,6 +107,11 @@ class EffectDefinition:
     flag: int
     first_parameter: int
 
+    @property
+    def places(self) -> range:
+        """Indices of its parameters in the compiled physics' parameter array."""
+        return range(self.first_parameter, self.first_parameter + len(self.parameters))
+
 
 CATALOGUE: dict[str, EffectDefinition] = {}
 

@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from endoscope_core.effects.slots import START_FRICTION
 from endoscope_core.plant import PlantDescription
-from endoscope_core.plant.kernel import IN_MOTOR, OUTPUTS, run_joints
-from endoscope_core.plant.packing import pack, rest_state
-from endoscope_explain.evaluate import SUBSTEPS
+from endoscope_core.plant.kernel import IN_MOTOR
+from endoscope_explain.evaluate import simulate_joint
 from endoscope_explain.observation import TICK, JointObservation, observe
-from endoscope_explain.predicted_signals import reading_lead, simulate_rig
+from endoscope_explain.predicted_signals import packed_rig, reading_lead, simulate_rig
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
@@ -65,10 +63,9 @@ def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCu
     observations = observe(recording, plant)
     whole = simulate_rig(observations, plant)
     lead = reading_lead(observations, whole)
-    parameters, flags = pack(plant)
+    parameters, flags = packed_rig(observations, plant)
     cuts = []
     for j, observation in enumerate(observations):
-        row = plant.joint_names().index(observation.joint)
         inputs = observation.inputs.copy()
         inputs[0, :, IN_MOTOR] = _measured_motor(
             recording,
@@ -77,18 +74,12 @@ def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCu
             lead,
             inputs.shape[1],
         )
-        packed = parameters[row : row + 1].copy()
-        packed[:, START_FRICTION] = observation.start_friction
-        states, histories = rest_state(packed, np.array([observation.start]))
-        out = np.empty((1, inputs.shape[1], OUTPUTS))
-        run_joints(
-            states, histories, packed, flags[row : row + 1], inputs, False, TICK, SUBSTEPS, out
-        )
+        out = simulate_joint(observation, parameters[j], flags[j], inputs)
         cuts.append(
             ChainCut(
                 observation.joint,
                 _misfit(observation, whole[j], lead),
-                _misfit(observation, out[0], lead),
+                _misfit(observation, out, lead),
             )
         )
     return tuple(cuts)
