@@ -20,6 +20,12 @@ def test_tells_equation_source_and_parameters(capsys):
     assert 'one of 0, 1' in told
 
 
+def test_tells_which_parameters_are_counted(capsys):
+    assert main(['effects', 'distributed_friction']) == 0
+    told = ' '.join(capsys.readouterr().out.split())
+    assert 'nodes a whole number from 2 to 12, typical 8' in told
+
+
 def test_an_unknown_effect_is_one_line_and_exit_2(capsys):
     assert main(['effects', 'joint_stp']) == 2
     err = capsys.readouterr().err

@@ -119,6 +119,12 @@ def test_a_parameter_out_of_bounds_is_named(value):
         effect_values(EffectSpec('transport_delay', 'bend_x', {'delay_s': value}))
 
 
+@pytest.mark.parametrize(('nodes', 'wrong'), [(2.5, 'a whole number'), (13, 'between 2 and 12')])
+def test_a_count_is_a_whole_number_within_its_bounds(nodes, wrong):
+    with pytest.raises(ValueError, match=f'distributed_friction: nodes is {nodes:g}.*{wrong}'):
+        effect_values(EffectSpec('distributed_friction', 'bend_x', {'nodes': nodes}))
+
+
 def test_an_effect_given_twice_on_a_joint_is_refused():
     twice = (EffectSpec('gravity', 'bend_x'), EffectSpec('gravity', 'bend_x'))
     with pytest.raises(ValueError, match='gravity is given twice on joint bend_x'):
@@ -209,7 +215,7 @@ def slopes(effect_id, parameter, step):
         (effect_id, p.name)
         for effect_id in IN_THE_PLANT
         for p in CATALOGUE[effect_id].parameters
-        if not p.choices and p.name != 'time_s'
+        if not (p.choices or p.counted) and p.name != 'time_s'
     ],
 )
 def test_readings_have_a_slope_by_every_parameter(effect_id, name):

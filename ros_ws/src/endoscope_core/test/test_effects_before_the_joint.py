@@ -213,12 +213,16 @@ def test_a_wire_shudders_where_friction_falls_too_steeply_and_loses_friction():
     [
         ({'coefficient': 300.0, 'load_factor': 0.0}, lambda t, v: 0.5 * 300.0 * v),
         (
+            {'coefficient': 80.0, 'thinning': 50.0},
+            lambda _, v: 40.0 * v / (1.0 + 50.0 * v),
+        ),
+        (
             {'coefficient': 0.0, 'load_factor': 60.0},
             lambda t, v: t * (np.exp(0.5 * 60.0 * v) - 1.0),
         ),
     ],
 )
-def test_viscous_friction_is_proportional_to_speed(given, expected):
+def test_viscous_friction_is_its_law_of_speed(given, expected):
     run = answer(0.4 * TIME, ('viscous_friction', given))
     row = 1500
     speed = (
@@ -268,6 +272,13 @@ def test_configuration_change_multiplies_the_friction_from_its_time_on():
     assert friction_of(run, 3000) == pytest.approx(np.exp(0.45 * 1.5), rel=1e-3)
 
 
+@pytest.mark.parametrize(('smooth', 'begun'), [(0.0, 0.25), (1.0, 0.5 - 0.5 * np.cos(np.pi / 4))])
+def test_configuration_change_rises_evenly_or_along_a_half_cosine(smooth, begun):
+    given = {'time_s': 3.0, 'factor': 1.5, 'duration_s': 2.0, 'smooth': smooth}
+    run = answer(0.3 * TIME, ('configuration_change', given))
+    assert friction_of(run, 2500) == pytest.approx(np.exp(0.45 * (1.0 + 0.5 * begun)), rel=1e-3)
+
+
 @pytest.mark.parametrize('gradual', [0.0, 1.0])
 def test_friction_asymmetry_brakes_a_pulled_wire_more(gradual):
     given = {'asymmetry': 0.3, 'gradual': gradual}
@@ -302,13 +313,15 @@ def test_friction_run_in_falls_with_the_distance_slid():
         assert friction_of(run, row) == pytest.approx(expected, rel=5e-3)
 
 
-def test_distributed_friction_ends_at_the_same_capstan_ratio():
-    run = answer(0.4 * TIME, ('distributed_friction', {'share': 1.0}))
+@pytest.mark.parametrize('nodes', [2, 5, 8, 12])
+def test_distributed_friction_ends_at_the_same_capstan_ratio(nodes):
+    given = {'share': 1.0, 'nodes': nodes, 'free_end': 0.5 / nodes}
+    run = answer(0.4 * TIME, ('distributed_friction', given))
     assert run.tension[2500, 0, 0] > run.tension[2500, 0, 1]
-    # Sliding everywhere, tension falls exponentially along the wire; the mean of the 8 nodes'
-    # springs is what is stretched.
-    levels = np.exp(0.9 * (0.5 - np.arange(9) / 8.0))
-    shares = np.array([0.5, *[1.0] * 7, 0.5]) / 8.0
+    # Sliding everywhere, tension falls exponentially along the wire; the mean of the springs is
+    # what is stretched.
+    levels = np.exp(0.9 * (0.5 - np.arange(nodes + 1) / nodes))
+    shares = np.array([0.5, *[1.0] * (nodes - 1), 0.5]) / nodes
     stretch = 0.0025 * (run.shaft_position[2500, 0] / GEAR - run.bending[2500, 0])
     middle = (5.0 + 2000.0 * stretch) / (shares @ levels)
     assert run.tension[2500, 0, 0] == pytest.approx(middle * np.exp(0.45), rel=1e-3)
@@ -317,7 +330,7 @@ def test_distributed_friction_ends_at_the_same_capstan_ratio():
 def test_the_free_end_before_a_chain_is_the_spring_that_a_reversal_meets_first():
     # While friction holds the first node, only the wire before it is released.
     back = np.concatenate([0.4 * TIME, 1.6 - 0.4 * TIME])
-    grips = JointParameters(presliding_distance=5e-5)
+    grips = JointParameters(presliding_distance=1e-5)
 
     def stiffness(free_end):
         given = {'share': 1.0, 'free_end': free_end}
@@ -329,6 +342,15 @@ def test_the_free_end_before_a_chain_is_the_spring_that_a_reversal_meets_first()
     # The pulley winds 5 mm a radian of a wire of 2000 N/m.
     assert stiffness(0.2) == pytest.approx(0.005 * 2000.0 / 0.2, rel=0.2)
     assert stiffness(0.1) == pytest.approx(0.005 * 2000.0 / 0.1, rel=0.2)
+
+
+def test_a_chain_that_turns_after_a_hold_is_integrated_alike_with_few_and_many_substeps():
+    # Every node slid freely; a node that turns and is still taken to slide freely runs ahead.
+    held = np.interp(TIME, [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.5, 0.5, 0.47, 0.1])
+    effect = EffectSpec('distributed_friction', 'bend_x', {'share': 1.0})
+    plant = PlantDescription(joints={'bend_x': JointParameters()}, effects=(effect,))
+    few, many = (simulate(plant, held[:, None], substeps=n).tension for n in (3, 30))
+    assert np.abs(few - many).max() < 1e-3
 
 
 def test_distributed_friction_lets_the_joint_wait_for_the_sliding_front():

@@ -15,6 +15,8 @@ NOMINAL = JointParameters()
 def value_of(parameter):
     if parameter.choices:
         return st.sampled_from(parameter.choices)
+    if parameter.counted:
+        return st.integers(int(parameter.low), int(parameter.high)).map(float)
     return st.one_of(
         st.sampled_from((parameter.low, parameter.high, parameter.typical)),
         st.floats(parameter.low, parameter.high),

@@ -133,7 +133,7 @@ def effect_parameters(effect_id: str) -> tuple[FreeParameter, ...]:
     return tuple(
         _of_effect(definition.first_parameter + i, parameter)
         for i, parameter in enumerate(definition.parameters)
-        if not (parameter.choices or parameter.is_duration)
+        if not (parameter.choices or parameter.counted or parameter.is_duration)
     )
 
 

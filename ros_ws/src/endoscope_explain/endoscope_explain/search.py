@@ -14,6 +14,7 @@ from endoscope_explain.reconsider import reconsidered
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.score import score
 from endoscope_explain.whiteness import is_noise
+from endoscope_explain.whole_numbers import with_counted_numbers
 
 SINGLES_POLISHED = 6
 PAIRS_POLISHED = 3
@@ -82,6 +83,8 @@ def search(
         grown = grow(parents, effects, jobs, polished)
         if grown and grown[0].effects == (RUGGED,) and not is_noise(grown[0].fit):
             grown[0] = from_many_starts(grown[0], anchors[1], jobs)
+        if grown:
+            grown[0] = with_counted_numbers(grown[0], jobs)
         levels.append(tuple(grown))
         if (
             not grown

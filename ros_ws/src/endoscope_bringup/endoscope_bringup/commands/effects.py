@@ -46,6 +46,8 @@ def _told(definition: 'EffectDefinition') -> str:
 def _parameter(parameter: 'EffectParameter') -> str:
     if parameter.choices:
         allowed = 'one of ' + ', '.join(f'{choice:g}' for choice in parameter.choices)
+    elif parameter.counted:
+        allowed = f'a whole number from {parameter.low:g} to {parameter.high:g}'
     else:
         allowed = f'{parameter.low:g} to {parameter.high:g} {parameter.unit}'
     off = '' if math.isnan(parameter.off) else f', off at {parameter.off:g}'

@@ -55,6 +55,8 @@ class EffectParameter:
     scale : float
         Where the effect is far from linear in this parameter, the change over which it nearly is;
         else 0.
+    counted : bool
+        Whether it is a whole number, which a fit steps through one by one.
     is_duration : bool
         Whether it is the length of the recording, which nobody has to look for.
     """
@@ -70,6 +72,7 @@ class EffectParameter:
     comparable: bool = False
     phase: bool = False
     scale: float = 0.0
+    counted: bool = False
     is_duration: bool = False
 
     def __post_init__(self) -> None:

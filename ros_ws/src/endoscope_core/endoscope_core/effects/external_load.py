@@ -8,7 +8,8 @@ DEFINITION = define(
     'external_load',
     Stage.JOINT,
     physics='A constant moment acts on the joint from some time on.',
-    equation='tau = moment_nm after time_s, risen evenly within duration_s around it',
+    equation='tau = moment_nm after time_s, risen within duration_s around it: evenly, or if '
+    'smooth along a half cosine',
     source='Step disturbance: De Luca, Mattone, IEEE ICRA 2005',
     parameters=(
         EffectParameter(
@@ -24,16 +25,20 @@ DEFINITION = define(
             comparable=True,
         ),
         EffectParameter('duration_s', 's', 0.0, 5.0, 0.0, starts=(0.05,)),
+        EffectParameter('smooth', '-', 0.0, 1.0, 0.0, counted=True),
     ),
 )
 ON = DEFINITION.flag
 MOMENT = DEFINITION.first_parameter
 TIME = MOMENT + 1
 DURATION = MOMENT + 2
+SMOOTH = MOMENT + 3
 
 
 @compiled
 def mean_moment(parameters: Array, time: float, tick: float) -> float:
     """Mean moment in N m over the tick around `time`."""
-    begun = onset.share_after(parameters[TIME], parameters[DURATION], time, tick)
+    begun = onset.share_after(
+        parameters[TIME], parameters[DURATION], parameters[SMOOTH], time, tick
+    )
     return parameters[MOMENT] * begun

@@ -203,7 +203,7 @@ def advance_tick(
         pull -= 0.5 * dt * grip * pulley_speed
         drag = 0.0
         if on[viscous_friction.ON]:
-            film = 0.5 * r * r * p[viscous_friction.COEFFICIENT]
+            film = 0.5 * r * r * viscous_friction.film(p, v)
             loaded = 0.25 * r * r * p[viscous_friction.LOAD_FACTOR] * (ta * da + tb * db)
             pull += loaded * wire_end_speed - film * pulley_speed
             drag = loaded + film

@@ -33,7 +33,7 @@ def effect_values(spec: EffectSpec) -> NDArray[np.float64]:
     UnknownEffectError
         If the effect or one of its parameters is unknown.
     ValueError
-        If a value is not finite or outside the parameter's bounds.
+        If a value is not finite, outside the parameter's bounds or, where it must be, not whole.
     """
     definition = describe(spec.id)
     names = [parameter.name for parameter in definition.parameters]
@@ -53,6 +53,10 @@ def effect_values(spec: EffectSpec) -> NDArray[np.float64]:
             raise ValueError(
                 f'effect {spec.id}: {parameter.name} is {value:g}, it must be between '
                 f'{parameter.low:g} and {parameter.high:g} {parameter.unit}'
+            )
+        if parameter.counted and not value.is_integer():
+            raise ValueError(
+                f'effect {spec.id}: {parameter.name} is {value:g}, it must be a whole number'
             )
     return values
 

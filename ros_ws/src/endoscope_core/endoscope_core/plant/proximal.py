@@ -79,7 +79,7 @@ def proximal_tensions(
     ra, rb = math.exp(ea), math.exp(eb)
     film = 0.0
     if on[viscous_friction.ON]:
-        film = 0.5 * p[viscous_friction.COEFFICIENT] * speed
+        film = 0.5 * viscous_friction.film(p, speed) * speed
     positive = max(0.0, ta * ra + film)
     negative = max(0.0, tb * rb - film)
     elastic = ka * ra + kb * rb

@@ -10,8 +10,8 @@ import math
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.effects import dahl
 from endoscope_core.effects.distributed_friction import (
+    COUNT,
     GAIN,
-    NODES,
     OFFSET,
     SHARE,
     SLIDE,
@@ -27,6 +27,11 @@ from endoscope_core.plant.transmission import half_exponent, wire_tension
 
 LEAST_STIFFNESS = 1e-3
 """Share of its stiffness that a slack spring keeps in the linearisation: it must be solvable."""
+MORE_SWEEPS = 3
+"""Most further eliminations in a substep, until all nodes move the way that their friction was
+taken for: a node that turns is gripped at once, though it slid freely before."""
+AT_REST = 1e-12
+"""Displacement in m below which the way of a node does not matter."""
 
 
 @compiled
@@ -67,12 +72,32 @@ def _eliminate(
     motor_step : float
         By how much the motor pulls the wire in this substep, m.
     """
+    tension, slope = _sweep(state, chain, p, on, pretension, common, phi, motor_step)
+    for _ in range(MORE_SWEEPS):
+        if not _turns(state, chain, int(p[COUNT])):
+            break
+        tension, slope = _sweep(state, chain, p, on, pretension, common, phi, motor_step)
+    return tension, slope
+
+
+@compiled
+def _sweep(
+    state: Array,
+    chain: int,
+    p: Array,
+    on: Flags,
+    pretension: float,
+    common: float,
+    phi: float,
+    motor_step: float,
+) -> tuple[float, float]:
     offset, gain = motor_step, 0.0
     before, slope_before = spring_tension(state, chain, p, on, pretension, common, 0)
-    for i in range(NODES):
+    nodes = int(p[COUNT])
+    for i in range(nodes):
         after, slope_after = spring_tension(state, chain, p, on, pretension, common, i + 1)
         slide = state[chain + SLIDE + i]
-        exponent, share = half_exponent(p, on, phi / NODES, slide, 0.0)
+        exponent, share = half_exponent(p, on, phi / nodes, slide, 0.0)
         released = math.exp(-exponent)
         pulled = 1.0 / released
         way = 1.0 if state[chain + STEP + i] > 0.0 else -1.0
@@ -90,6 +115,19 @@ def _eliminate(
 
 
 @compiled
+def _turns(state: Array, chain: int, nodes: int) -> bool:
+    """Whether a node is about to move the other way than was assumed; now it is assumed to."""
+    turning = False
+    step = state[chain + STEP + nodes]
+    for i in range(nodes - 1, -1, -1):
+        step = state[chain + OFFSET + i] + state[chain + GAIN + i] * step
+        if abs(step) > AT_REST and (step > 0.0) != (state[chain + STEP + i] > 0.0):
+            state[chain + STEP + i] = step
+            turning = True
+    return turning
+
+
+@compiled
 def _follow(
     state: Array,
     chain: int,
@@ -99,8 +137,10 @@ def _follow(
     joint_step: float,
 ) -> None:
     """Move the nodes, once the joint has let out `joint_step` m of wire towards the motor."""
+    nodes = int(p[COUNT])
     step = joint_step
-    for i in range(NODES - 1, -1, -1):
+    state[chain + STEP + nodes] = joint_step
+    for i in range(nodes - 1, -1, -1):
         beyond = step
         step = state[chain + OFFSET + i] + state[chain + GAIN + i] * beyond
         state[chain + STRETCH + i + 1] += step - beyond

@@ -131,6 +131,18 @@ def test_sticking_and_slipping_is_fitted_from_many_starts(one_joint):
     assert augmented < 0.5 * refitted
 
 
+def test_the_number_of_nodes_is_found_by_counting(one_joint):
+    chain = EffectSpec(
+        'distributed_friction', 'bend_x', {'share': 1.0, 'nodes': 5.0, 'free_end': 0.1}
+    )
+    recording = one_joint.record(one_joint.rig(chain), one_joint.motion())
+    explanation = explain_recording(recording, one_joint.rig(), jobs=1)
+    assert [e.id for e in explanation.effects] == ['distributed_friction']
+    found = explanation.effects[0].parameters
+    assert found['nodes'].value == 5.0
+    assert found['free_end'].value == pytest.approx(0.1, rel=0.05)
+
+
 def test_a_force_that_changes_with_time_is_not_named_on_a_single_pass(one_joint):
     once = 1.1 * np.sin(np.arange(6280) * 1e-3)
     loaded = EffectSpec('external_load', 'bend_x', {'moment_nm': 0.004, 'time_s': 3.5})

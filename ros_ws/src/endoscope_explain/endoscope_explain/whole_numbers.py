@@ -1,0 +1,69 @@
+"""Fit again with other whole numbers, which no derivative leads to."""
+
+from dataclasses import replace
+
+from endoscope_core.effects import CATALOGUE
+from endoscope_explain.compose import Composition
+from endoscope_explain.fit import Fit, fit
+from endoscope_explain.parallel_fits import parallel_fits
+from endoscope_explain.score import score
+
+STRIDES = (2, 1)
+ITERATIONS = 8
+
+
+def counted_places(effects: tuple[str, ...]) -> dict[int, range]:
+    """Admissible whole numbers by their index in the packed parameters."""
+    return {
+        CATALOGUE[effect_id].first_parameter + i: range(int(p.low), int(p.high) + 1)
+        for effect_id in effects
+        for i, p in enumerate(CATALOGUE[effect_id].parameters)
+        if p.counted
+    }
+
+
+def with_counted_numbers(composition: Composition, jobs: int) -> Composition:
+    """The best fit of a composition over the whole numbers of its effects.
+
+    Each number goes up or down as long as the fit improves, first by two, then by one.
+
+    Parameters
+    ----------
+    composition : Composition
+    jobs : int
+        Processes side by side.
+
+    Returns
+    -------
+    Composition
+        The one given where no other number fits better.
+    """
+    best = composition.fit
+    for place, admissible in counted_places(composition.effects).items():
+        best = _counted(best, place, admissible, jobs)
+    return Composition(composition.effects, best, score(best))
+
+
+def _counted(best: Fit, place: int, admissible: range, jobs: int) -> Fit:
+    tried = {int(best.model.base[place])}
+    for stride in STRIDES:
+        improved = True
+        while improved:
+            now = int(best.model.base[place])
+            numbers = {now - stride, now + stride}.intersection(admissible) - tried
+            tried |= numbers
+            found = _fits(best, place, sorted(numbers), jobs)
+            improved = any(score(item) < score(best) for item in found)
+            best = min([best, *found], key=score)
+    return best
+
+
+def _fits(origin: Fit, place: int, numbers: list[int], jobs: int) -> list[Fit]:
+    models = []
+    for number in numbers:
+        base = origin.model.base.copy()
+        base[place] = number
+        models.append(replace(origin.model, base=base))
+    return parallel_fits(
+        lambda i: fit(models[i], origin.theta, iterations=ITERATIONS), models, jobs
+    )
