@@ -175,11 +175,12 @@ ONLY_WITH = {
 """What other parameters have to be for one to have anything to act on."""
 JUDGED_AT = {
     ('gear_backlash', 'flank_spread'): 0.15,
+    ('stribeck_friction', 'memory_s'): 1e-2,
     ('configuration_change', 'duration_s'): 0.05,
     ('external_load', 'duration_s'): 0.05,
     ('pretension_loss', 'time_constant_s'): 20.0,
 }
-"""Where parameters are judged that have no slope at their typical value."""
+"""Where parameters are judged that have no slope at their typical value, or a rugged one."""
 
 
 def slopes(effect_id, parameter, step):

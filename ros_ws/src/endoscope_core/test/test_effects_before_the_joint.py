@@ -235,6 +235,18 @@ def test_viscous_friction_is_its_law_of_speed(given, expected):
     assert run.tension[row, 0, 0] - dry == pytest.approx(expected(dry, speed), rel=0.02)
 
 
+def test_sticking_and_slipping_needs_few_substeps():
+    # Ten times as far off where friction does not follow the speed of the very step.
+    lagging = {'rise': 0.75, 'stribeck_speed': 1.8e-3, 'tail': 1.0, 'lagging': 1.0}
+    effect = EffectSpec('stribeck_friction', 'bend_x', lagging)
+    joints = {'bend_x': JointParameters(capstan_exponent=0.8)}
+    plant = PlantDescription(joints=joints, effects=(effect,))
+    few, many = (simulate(plant, SINE[:, None], substeps=n).tension[:, 0, 0] for n in (6, 100))
+    smooth = simulate(PlantDescription(joints=joints), SINE[:, None]).tension[:, 0, 0]
+    assert np.std(np.diff(many)) > 1.2 * np.std(np.diff(smooth))
+    assert np.std(few - many) < 0.1
+
+
 def test_wire_stiffening_is_its_law():
     # A joint that cannot bend: stretch is what the motor winds; no friction.
     blocked = JointParameters(capstan_exponent=0.0, joint_stiffness=1e6)

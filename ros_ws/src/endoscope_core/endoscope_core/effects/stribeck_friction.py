@@ -2,7 +2,7 @@
 
 import math
 
-from endoscope_core.compiled import Array, compiled
+from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.effects import dahl
 from endoscope_core.effects.definition import EffectParameter, Stage, define
 from endoscope_core.effects.slots import CAPSTAN_EXPONENT, JOINT_DAMPING, JOINT_RADIUS, SLOTS
@@ -41,22 +41,37 @@ REMEMBERED_SPEED = SLOTS.state_block()
 BRAKING = SLOTS.state_block()
 """By how much the wires' friction would brake the joint per unit of exponent and radius, N."""
 
+FINER = 2
+"""Integration steps in place of one where friction lags: a slip begins within fractions of a
+millisecond."""
+LEAST_RESISTANCE = 0.1
+"""Share of the joint's damping that remains however steeply friction falls within a step."""
 FRICTION_SHARE = 0.9
 """Share of the shudder's speed at which a shuddering wire's mean friction is found."""
 
 
 @compiled
-def factor_and_shudder(state: Array, parameters: Array, speed: float) -> tuple[float, float]:
+def is_lagging(parameters: Array, on: Flags) -> bool:
+    """Whether the friction lags behind the speed, so that wires stick and slip."""
+    return on[ON] and parameters[LAGGING] > 0.0
+
+
+@compiled
+def factor_and_shudder(
+    state: Array, parameters: Array, speed: float, ahead: float
+) -> tuple[float, float]:
     """Factor on the capstan exponent at a mean sliding speed, and the wire's shudder.
 
-    Both speeds in m/s. Where friction's fall with speed outweighs the joint's damping, the
-    massless joint's speed is ambiguous, and it jumps to and fro between fast and slow sliding many
-    times a millisecond. The averages of that motion vary smoothly with every parameter; the motion
-    itself is chaotic and cannot be fitted.
+    Both speeds in m/s; lagging friction is that of `ahead` s later. Where friction's fall with
+    speed outweighs the joint's damping, the massless joint's speed is ambiguous, and it jumps to
+    and fro between fast and slow sliding many times a millisecond. The averages of that motion
+    vary smoothly with every parameter; the motion itself is chaotic and cannot be fitted.
     """
     stribeck_speed = parameters[SPEED]
     if parameters[LAGGING] > 0.0:
-        return _factor(parameters, state[REMEMBERED_SPEED]), 0.0
+        later = state[REMEMBERED_SPEED]
+        later += _followed(parameters, ahead) * (abs(speed) - later)
+        return _factor(parameters, later), 0.0
     lever = 0.5 * parameters[JOINT_RADIUS]
     steepest = parameters[RISE] / stribeck_speed * lever * lever * state[BRAKING]
     instability = steepest * parameters[CAPSTAN_EXPONENT] / parameters[JOINT_DAMPING]
@@ -66,10 +81,29 @@ def factor_and_shudder(state: Array, parameters: Array, speed: float) -> tuple[f
 
 
 @compiled
+def steepness(state: Array, parameters: Array, speed: float, ahead: float) -> float:
+    """Relative slope of lagging friction `ahead` s later by the sliding speed until then, s/m."""
+    share = _followed(parameters, ahead)
+    later = state[REMEMBERED_SPEED]
+    later += share * (abs(speed) - later)
+    ratio = later / parameters[SPEED]
+    tail = parameters[TAIL]
+    broad = 1.0 / (1.0 + ratio * ratio)
+    slope = (tail - 1.0) * math.exp(-ratio) - 2.0 * tail * ratio * broad * broad
+    slope *= share * parameters[RISE] / parameters[SPEED] / _factor(parameters, later)
+    return slope if speed > 0.0 else -slope
+
+
+@compiled
+def _followed(parameters: Array, duration: float) -> float:
+    return -math.expm1(-duration / parameters[MEMORY])
+
+
+@compiled
 def remember(state: Array, parameters: Array, speed: float, duration: float) -> None:
     """Let the speed that lagging friction acts on follow the sliding speed in m/s."""
     behind = abs(speed) - state[REMEMBERED_SPEED]
-    state[REMEMBERED_SPEED] -= behind * math.expm1(-duration / parameters[MEMORY])
+    state[REMEMBERED_SPEED] += behind * _followed(parameters, duration)
 
 
 @compiled

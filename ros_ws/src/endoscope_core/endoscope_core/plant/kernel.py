@@ -132,6 +132,9 @@ def advance_tick(
     substeps : int
         Integration steps in the tick.
     """
+    lagging = stribeck_friction.is_lagging(p, on)
+    if lagging:
+        substeps *= stribeck_friction.FINER
     dt = tick / substeps
     width = 1.0 / substeps
     start = state[TICKS] * tick
@@ -162,7 +165,7 @@ def advance_tick(
             if on[torque_limit.ON]:
                 state[SLIDE_A], state[SLIDE_B] = za, zb
                 v = 0.5 * r * (state[PULLEY_SPEED] + wire_end_speed)
-                phi, _ = friction_exponent(state, p, on, v, time, tick)
+                phi, _ = friction_exponent(state, p, on, v, 0.0, time, tick)
                 stretch = r * (pulley - wire_end) + shift
                 loads = proximal_tensions(state, p, on, pretension, phi, v, stretch, shift)
                 step = torque_limit.yielding(p, m_new - m, loads, dt)
@@ -172,7 +175,7 @@ def advance_tick(
         pulley_speed = (pulley_new - pulley) / dt
 
         v = 0.5 * r * (pulley_speed + wire_end_speed)
-        phi, shudder = friction_exponent(state, p, on, v, time, tick)
+        phi, shudder = friction_exponent(state, p, on, v, 0.5 * dt, time, tick)
         shake = shudder * dt / xs
         # The wires' mean speed is half the motor's and half the joint's, and it is the joint's
         # half that shudders.
@@ -202,6 +205,11 @@ def advance_tick(
         # The half step of sliding that the motor alone causes; the joint's share is in the slope.
         pull -= 0.5 * dt * grip * pulley_speed
         drag = 0.0
+        if lagging and not loaded_tip:
+            falls = stribeck_friction.steepness(state, p, v, 0.5 * dt)
+            falls *= 0.25 * phi * r * r * (ta * da * za - tb * db * zb)
+            pull += falls * wire_end_speed
+            drag += falls
         if on[viscous_friction.ON]:
             film = 0.5 * r * r * viscous_friction.film(p, v)
             loaded = 0.25 * r * r * p[viscous_friction.LOAD_FACTOR] * (ta * da + tb * db)
@@ -222,6 +230,8 @@ def advance_tick(
         slope += pull_slope + p[JOINT_FRICTION] / qs * steep_j
         resistance = damping + drag
         resistance += 0.5 * dt * max(slope, 0.0)
+        if lagging:
+            resistance = max(resistance, stribeck_friction.LEAST_RESISTANCE * damping)
         mean_dq = moment / resistance
         if on[joint_inertia.ON]:
             mean_dq, dq = joint_inertia.speeds(p, dq, mean_dq, resistance, dt)
@@ -243,7 +253,7 @@ def advance_tick(
             wire_creep.advance(state, p, ta - pretension, tb - pretension, dt)
         if on[friction_run_in.ON]:
             friction_run_in.advance(state, slid)
-        if on[stribeck_friction.ON] and p[stribeck_friction.LAGGING] > 0.0:
+        if lagging:
             stribeck_friction.remember(state, p, slid / dt, dt)
         m, dm, pulley = m_new, dm_new, pulley_new
         state[PULLEY_SPEED] = pulley_speed
@@ -259,7 +269,7 @@ def advance_tick(
         pulley_speed = dm
     v = 0.5 * r * (pulley_speed + (wire_end_speed if loaded_tip else dq))
     end = state[TICKS] * tick
-    phi, _ = friction_exponent(state, p, on, v, end, tick)
+    phi, _ = friction_exponent(state, p, on, v, 0.0, end, tick)
     loads = proximal_tensions(
         state, p, on, pretension_now(p, on, end), phi, v, r * (pulley - wire_end) + shift, shift
     )

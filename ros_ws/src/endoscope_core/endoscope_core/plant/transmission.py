@@ -45,17 +45,18 @@ def friction_exponent(
     p: Array,
     on: Flags,
     speed: float,
+    ahead: float,
     time: float,
     tick: float,
 ) -> tuple[float, float]:
     """Capstan exponent of the whole sheath, as the mean over the tick around `time`; and shudder.
 
-    Sliding speed and the wires' shudder are in m/s.
+    Sliding speed and the wires' shudder are in m/s. The states are those of `ahead` s earlier.
     """
     phi = p[CAPSTAN_EXPONENT]
     shudder = 0.0
     if on[stribeck_friction.ON]:
-        factor, shudder = stribeck_friction.factor_and_shudder(state, p, speed)
+        factor, shudder = stribeck_friction.factor_and_shudder(state, p, speed, ahead)
         phi *= factor
     if on[friction_run_in.ON]:
         phi *= friction_run_in.friction_factor(state, p)
