@@ -242,7 +242,7 @@ def test_sticking_and_slipping_needs_few_substeps():
     joints = {'bend_x': JointParameters(capstan_exponent=0.8)}
     plant = PlantDescription(joints=joints, effects=(effect,))
     slow = 0.5 * np.sin(2.0 * TIME)[:, None]
-    few, many = (simulate(plant, slow, substeps=n).tension[:, 0, 0] for n in (6, 100))
+    few, many = (simulate(plant, slow, substeps=n).tension[:, 0, 0] for n in (12, 100))
     smooth = simulate(PlantDescription(joints=joints), slow).tension[:, 0, 0]
     assert np.std(np.diff(many)) > 10.0 * np.std(np.diff(smooth))
     assert np.std(few - many) < 0.1

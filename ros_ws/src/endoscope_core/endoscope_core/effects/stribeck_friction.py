@@ -41,9 +41,6 @@ REMEMBERED_SPEED = SLOTS.state_block()
 BRAKING = SLOTS.state_block()
 """By how much the wires' friction would brake the joint per unit of exponent and radius, N."""
 
-FINER = 2
-"""Integration steps in place of one where friction lags: a slip begins within fractions of a
-millisecond."""
 LEAST_RESISTANCE = 0.1
 """Share of the joint's damping that remains however steeply friction falls within a step."""
 FRICTION_SHARE = 0.9

@@ -133,8 +133,6 @@ def advance_tick(
         Integration steps in the tick.
     """
     lagging = stribeck_friction.is_lagging(p, on)
-    if lagging:
-        substeps *= stribeck_friction.FINER
     dt = tick / substeps
     width = 1.0 / substeps
     start = state[TICKS] * tick
