@@ -41,6 +41,8 @@ WIRE_A = SLOTS.state_block(1 + ELEMENTS)
 WIRE_B = SLOTS.state_block(1 + ELEMENTS)
 JOINT = SLOTS.state_block(1 + ELEMENTS)
 """Of each place: the state of the power-law Dahl part, then those of the elements."""
+STIFFNESS = SLOTS.state_block(ELEMENTS)
+"""Growth of each element by displacement in pre-sliding distances: inverse yield displacements."""
 
 
 @compiled
@@ -50,9 +52,10 @@ def acts(parameters: Array, on: Flags, place: int) -> bool:
 
 
 @compiled
-def _yield(parameters: Array, j: int) -> float:
-    """Yield displacement of an element in pre-sliding distances."""
-    return parameters[REACH] * YIELD[j] ** parameters[SPREAD]
+def prepare(state: Array, parameters: Array) -> None:
+    """Set what does not change while a joint moves."""
+    for j in range(ELEMENTS):
+        state[STIFFNESS + j] = YIELD[j] ** -parameters[SPREAD] / parameters[REACH]
 
 
 @compiled
@@ -63,7 +66,7 @@ def steepness(state: Array, parameters: Array, place: int, way: float) -> float:
     elastic = 0.0
     for j in range(ELEMENTS):
         if state[place + 1 + j] * way < 1.0:
-            elastic += 1.0 / _yield(parameters, j)
+            elastic += state[STIFFNESS + j]
     memory = parameters[MEMORY]
     return (1.0 - memory) * power + memory * elastic / ELEMENTS
 
@@ -80,7 +83,7 @@ def slid(state: Array, parameters: Array, place: int, ratio: float) -> float:
         state[place] = way * (1.0 - _rest_after(rest, abs(ratio), excess))
     mean = 0.0
     for j in range(ELEMENTS):
-        element = min(1.0, max(-1.0, state[place + 1 + j] + ratio / _yield(parameters, j)))
+        element = min(1.0, max(-1.0, state[place + 1 + j] + ratio * state[STIFFNESS + j]))
         state[place + 1 + j] = element
         mean += element / ELEMENTS
     memory = parameters[MEMORY]

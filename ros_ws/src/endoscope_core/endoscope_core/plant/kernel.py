@@ -15,6 +15,7 @@ from endoscope_core.effects import (
     gear_backlash,
     joint_backlash,
     joint_inertia,
+    presliding_shape,
     stribeck_friction,
     torque_limit,
     viscous_friction,
@@ -140,6 +141,8 @@ def advance_tick(
     r = p[JOINT_RADIUS]
     xs = p[PRESLIDING_DISTANCE]
     qs = p[JOINT_PRESLIDING]
+    if on[presliding_shape.ON]:
+        presliding_shape.prepare(state, p)
     transition = servo_transition(p[MOTOR_BANDWIDTH], p[MOTOR_DAMPING_RATIO], dt)
     driven = not math.isnan(x[IN_MOTOR])
     driven_speed = (x[IN_MOTOR] - state[MOTOR]) / tick if driven else 0.0

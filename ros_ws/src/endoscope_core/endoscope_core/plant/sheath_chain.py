@@ -105,9 +105,9 @@ def _sweep(
         grip *= (1.0 - slide * way) / p[PRESLIDING_DISTANCE]
         towards = slope_before * released
         away = slope_after * pulled
-        pivot = towards * (1.0 - gain) + away + grip
-        offset = (before * released - after * pulled + towards * offset) / pivot
-        gain = away / pivot
+        yielding = 1.0 / (towards * (1.0 - gain) + away + grip)
+        offset = (before * released - after * pulled + towards * offset) * yielding
+        gain = away * yielding
         state[chain + OFFSET + i] = offset
         state[chain + GAIN + i] = gain
         before, slope_before = after, slope_after
