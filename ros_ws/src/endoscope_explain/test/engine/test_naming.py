@@ -13,7 +13,7 @@ OTHER = {'wire_stiffness': 2200.0, 'capstan_exponent': 0.83, 'joint_friction': 0
 
 def test_a_rig_like_its_description_is_consistent(one_joint):
     explanation = explain_recording(
-        one_joint.record(one_joint.rig(), one_joint.motion()), one_joint.rig(), jobs=1
+        one_joint.record(one_joint.rig(), one_joint.motion()), one_joint.rig(), jobs=2
     )
     assert explanation.verdict is Verdict.CONSISTENT
     assert explanation.effects == ()
@@ -22,7 +22,7 @@ def test_a_rig_like_its_description_is_consistent(one_joint):
 
 def test_other_parameters_are_found_and_no_effect_is_named(one_joint):
     explanation = explain_recording(
-        one_joint.record(one_joint.rig(**OTHER), one_joint.motion()), one_joint.rig(), jobs=1
+        one_joint.record(one_joint.rig(**OTHER), one_joint.motion()), one_joint.rig(), jobs=2
     )
     assert explanation.verdict is Verdict.PARAMETERS_DIFFER
     assert explanation.effects == ()
@@ -45,7 +45,7 @@ def test_other_parameters_are_found_and_no_effect_is_named(one_joint):
 def test_the_effect_that_was_left_out_is_named(effect_id, parameters, verdict, one_joint):
     true = one_joint.rig(EffectSpec(effect_id, 'bend_x', parameters), **OTHER)
     explanation = explain_recording(
-        one_joint.record(true, one_joint.motion()), one_joint.rig(), jobs=1
+        one_joint.record(true, one_joint.motion()), one_joint.rig(), jobs=2
     )
     assert explanation.verdict is verdict
     assert [e.id for e in explanation.effects] == [effect_id]
@@ -80,7 +80,7 @@ def test_physics_outside_the_catalogue_is_unknown_and_given_as_a_formula(monkeyp
     recording = one_joint.record(one_joint.rig(), command)
     monkeypatch.undo()
     assert np.abs(recording.bending.values - nominal.bending.values).max() > 0.05
-    explanation = explain_recording(recording, one_joint.rig(), jobs=1)
+    explanation = explain_recording(recording, one_joint.rig(), jobs=2)
     assert explanation.verdict is Verdict.UNKNOWN_PHYSICS
     unknown = explanation.unknown
     assert unknown is not None
@@ -98,7 +98,7 @@ def test_what_was_there_in_health_is_not_explained_again(one_joint):
         one_joint.record(worn, command, 1),
         one_joint.rig(),
         baseline=one_joint.record(healthy, command, 2),
-        jobs=1,
+        jobs=2,
     )
     assert explanation.baseline_used
     assert [e.id for e in explanation.effects] == ['tracker_bias']
@@ -107,7 +107,7 @@ def test_what_was_there_in_health_is_not_explained_again(one_joint):
 
 def test_a_rig_that_was_not_moved_cannot_be_explained(one_joint):
     explanation = explain_recording(
-        one_joint.record(one_joint.rig(), np.zeros(3000)), one_joint.rig(), jobs=1
+        one_joint.record(one_joint.rig(), np.zeros(3000)), one_joint.rig(), jobs=2
     )
     assert explanation.verdict is Verdict.INSUFFICIENT_DATA
 
@@ -119,7 +119,7 @@ def test_sticking_and_slipping_is_fitted_from_many_starts(one_joint):
         {'rise': 0.6, 'stribeck_speed': 1.4e-3, 'tail': 1.0, 'lagging': 1.0, 'memory_s': 1e-3},
     )
     recording = one_joint.record(one_joint.rig(slipping), one_joint.motion())
-    explanation = explain_recording(recording, one_joint.rig(), jobs=1)
+    explanation = explain_recording(recording, one_joint.rig(), jobs=2)
     assert [e.id for e in explanation.effects] == ['stribeck_friction']
     found = explanation.effects[0].parameters
     assert found['lagging'].value == 1.0
@@ -136,7 +136,7 @@ def test_the_number_of_nodes_is_found_by_counting(one_joint):
         'distributed_friction', 'bend_x', {'share': 1.0, 'nodes': 5.0, 'free_end': 0.1}
     )
     recording = one_joint.record(one_joint.rig(chain), one_joint.motion())
-    explanation = explain_recording(recording, one_joint.rig(), jobs=1)
+    explanation = explain_recording(recording, one_joint.rig(), jobs=2)
     assert [e.id for e in explanation.effects] == ['distributed_friction']
     found = explanation.effects[0].parameters
     assert found['nodes'].value == 5.0
@@ -147,7 +147,7 @@ def test_a_force_that_changes_with_time_is_not_named_on_a_single_pass(one_joint)
     once = 1.1 * np.sin(np.arange(6280) * 1e-3)
     loaded = EffectSpec('external_load', 'bend_x', {'moment_nm': 0.004, 'time_s': 3.5})
     recording = one_joint.record(one_joint.rig(loaded), once)
-    explanation = explain_recording(recording, one_joint.rig(), jobs=1)
+    explanation = explain_recording(recording, one_joint.rig(), jobs=2)
     assert not {e.id for e in explanation.effects} & DEPENDS_ON_TIME
     assert explanation.verdict is not Verdict.CONSISTENT
 
@@ -159,8 +159,8 @@ def test_more_than_two_effects_are_found_where_they_are_asked_for(one_joint):
         EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.5, 'stiffness': 0.2}),
     )
     recording = one_joint.record(one_joint.rig(*effects), one_joint.motion())
-    two = explain_recording(recording, one_joint.rig(), jobs=1)
-    three = explain_recording(recording, one_joint.rig(), most_effects=3, jobs=1)
+    two = explain_recording(recording, one_joint.rig(), jobs=2)
+    three = explain_recording(recording, one_joint.rig(), most_effects=3, jobs=2)
     assert len(two.effects) <= 2
     assert {e.id for e in three.effects} == {e.id for e in effects}
 
@@ -172,7 +172,7 @@ def test_a_joint_moved_by_another_one_that_is_not_nominal_either(one_joint):
     motion = np.column_stack([one_joint.motion(), 0.7 * one_joint.motion()[::-1]])
     motion -= motion[0]
     recording = one_joint.record(replace(described, effects=(stopped, coupled)), motion)
-    explanation = explain_recording(recording, described, jobs=1)
+    explanation = explain_recording(recording, described, jobs=2)
     assert explanation.adequate
     assert {(e.id, e.joint) for e in explanation.effects} == {
         ('joint_stop', 'bend_x'),

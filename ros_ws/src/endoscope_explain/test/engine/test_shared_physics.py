@@ -57,7 +57,7 @@ def test_a_device_is_the_same_in_all_recordings_and_a_pose_is_not(chosen):
 def test_a_recording_is_explained_by_the_physics_it_is_given(one_joint, recordings, chosen):
     for recording, given, moment in zip(recordings, chosen, TUBES.values(), strict=True):
         explanation = explain_recording(
-            recording, one_joint.rig(), band=0.5, given={'bend_x': given}, jobs=1
+            recording, one_joint.rig(), band=0.5, given={'bend_x': given}, jobs=2
         )
         named = {e.id: e.parameters for e in explanation.effects}
         assert set(named) == {'load_cell_gain', 'gravity'}
