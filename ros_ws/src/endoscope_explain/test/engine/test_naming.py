@@ -158,7 +158,7 @@ def test_more_than_two_effects_are_found_where_they_are_asked_for(one_joint):
         EffectSpec('load_cell_gain', 'bend_x', {'gain': 0.85, 'wire': 1.0}),
         EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.5, 'stiffness': 0.2}),
     )
-    recording = one_joint.record(one_joint.rig(*effects), one_joint.motion())
+    recording = one_joint.record(one_joint.rig(*effects), one_joint.motion(7.0))
     two = explain_recording(recording, one_joint.rig(), jobs=2)
     three = explain_recording(recording, one_joint.rig(), most_effects=3, jobs=2)
     assert len(two.effects) <= 2
