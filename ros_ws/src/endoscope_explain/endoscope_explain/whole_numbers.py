@@ -12,7 +12,7 @@ STRIDES = (2, 1)
 ITERATIONS = 8
 
 
-def counted_places(effects: tuple[str, ...]) -> dict[int, range]:
+def _counted_places(effects: tuple[str, ...]) -> dict[int, range]:
     """Admissible whole numbers by their index in the packed parameters."""
     return {
         CATALOGUE[effect_id].first_parameter + i: range(int(p.low), int(p.high) + 1)
@@ -39,7 +39,7 @@ def with_counted_numbers(composition: Composition, jobs: int) -> Composition:
         The one given where no other number fits better.
     """
     best = composition.fit
-    for place, admissible in counted_places(composition.effects).items():
+    for place, admissible in _counted_places(composition.effects).items():
         best = _counted(best, place, admissible, jobs)
     return Composition(composition.effects, best, score(best))
 
@@ -52,9 +52,9 @@ def _counted(best: Fit, place: int, admissible: range, jobs: int) -> Fit:
             now = int(best.model.base[place])
             numbers = {now - stride, now + stride}.intersection(admissible) - tried
             tried |= numbers
-            found = _fits(best, place, sorted(numbers), jobs)
-            improved = any(score(item) < score(best) for item in found)
-            best = min([best, *found], key=score)
+            found = min([best, *_fits(best, place, sorted(numbers), jobs)], key=score)
+            improved = found is not best
+            best = found
     return best
 
 

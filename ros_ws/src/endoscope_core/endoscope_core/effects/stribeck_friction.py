@@ -66,8 +66,7 @@ def factor_and_shudder(
     """
     stribeck_speed = parameters[SPEED]
     if parameters[LAGGING] > 0.0:
-        later = state[REMEMBERED_SPEED]
-        later += _followed(parameters, ahead) * (abs(speed) - later)
+        later, _ = _remembered(state, parameters, speed, ahead)
         return _factor(parameters, later), 0.0
     lever = 0.5 * parameters[JOINT_RADIUS]
     steepest = parameters[RISE] / stribeck_speed * lever * lever * state[BRAKING]
@@ -80,9 +79,7 @@ def factor_and_shudder(
 @compiled
 def steepness(state: Array, parameters: Array, speed: float, ahead: float) -> float:
     """Relative slope of lagging friction `ahead` s later by the sliding speed until then, s/m."""
-    share = _followed(parameters, ahead)
-    later = state[REMEMBERED_SPEED]
-    later += share * (abs(speed) - later)
+    later, share = _remembered(state, parameters, speed, ahead)
     ratio = later / parameters[SPEED]
     tail = parameters[TAIL]
     broad = 1.0 / (1.0 + ratio * ratio)
@@ -92,15 +89,19 @@ def steepness(state: Array, parameters: Array, speed: float, ahead: float) -> fl
 
 
 @compiled
-def _followed(parameters: Array, duration: float) -> float:
-    return -math.expm1(-duration / parameters[MEMORY])
+def remember(state: Array, parameters: Array, speed: float, duration: float) -> None:
+    """Let the speed that lagging friction acts on follow the sliding speed in m/s."""
+    state[REMEMBERED_SPEED], _ = _remembered(state, parameters, speed, duration)
 
 
 @compiled
-def remember(state: Array, parameters: Array, speed: float, duration: float) -> None:
-    """Let the speed that lagging friction acts on follow the sliding speed in m/s."""
-    behind = abs(speed) - state[REMEMBERED_SPEED]
-    state[REMEMBERED_SPEED] += behind * _followed(parameters, duration)
+def _remembered(
+    state: Array, parameters: Array, speed: float, duration: float
+) -> tuple[float, float]:
+    """Remembered speed after sliding at a speed for a duration, and its slope by that speed."""
+    share = -math.expm1(-duration / parameters[MEMORY])
+    before = state[REMEMBERED_SPEED]
+    return before + share * (abs(speed) - before), share
 
 
 @compiled

@@ -27,9 +27,9 @@ from endoscope_core.plant.transmission import half_exponent, wire_tension
 
 LEAST_STIFFNESS = 1e-3
 """Share of its stiffness that a slack spring keeps in the linearisation: it must be solvable."""
-MORE_SWEEPS = 3
-"""Most further eliminations in a substep, until all nodes move the way that their friction was
-taken for: a node that turns is gripped at once, though it slid freely before."""
+SWEEPS = 4
+"""Most eliminations in a substep, until all nodes move the way that their friction was taken for: a
+node that turns is gripped at once, though it slid freely before."""
 AT_REST = 1e-12
 """Displacement in m below which the way of a node does not matter."""
 
@@ -72,45 +72,30 @@ def _eliminate(
     motor_step : float
         By how much the motor pulls the wire in this substep, m.
     """
-    tension, slope = _sweep(state, chain, p, on, pretension, common, phi, motor_step)
-    for _ in range(MORE_SWEEPS):
-        if not _turns(state, chain, int(p[COUNT])):
-            break
-        tension, slope = _sweep(state, chain, p, on, pretension, common, phi, motor_step)
-    return tension, slope
-
-
-@compiled
-def _sweep(
-    state: Array,
-    chain: int,
-    p: Array,
-    on: Flags,
-    pretension: float,
-    common: float,
-    phi: float,
-    motor_step: float,
-) -> tuple[float, float]:
-    offset, gain = motor_step, 0.0
-    before, slope_before = spring_tension(state, chain, p, on, pretension, common, 0)
     nodes = int(p[COUNT])
-    for i in range(nodes):
-        after, slope_after = spring_tension(state, chain, p, on, pretension, common, i + 1)
-        slide = state[chain + SLIDE + i]
-        exponent, share = half_exponent(p, on, phi / nodes, slide, 0.0)
-        released = math.exp(-exponent)
-        pulled = 1.0 / released
-        way = 1.0 if state[chain + STEP + i] > 0.0 else -1.0
-        grip = share * (before * released + after * pulled)
-        grip *= (1.0 - slide * way) / p[PRESLIDING_DISTANCE]
-        towards = slope_before * released
-        away = slope_after * pulled
-        yielding = 1.0 / (towards * (1.0 - gain) + away + grip)
-        offset = (before * released - after * pulled + towards * offset) * yielding
-        gain = away * yielding
-        state[chain + OFFSET + i] = offset
-        state[chain + GAIN + i] = gain
-        before, slope_before = after, slope_after
+    first, first_slope = spring_tension(state, chain, p, on, pretension, common, 0)
+    offset, gain, before, slope_before = motor_step, 0.0, first, first_slope
+    for _ in range(SWEEPS):
+        offset, gain, before, slope_before = motor_step, 0.0, first, first_slope
+        for i in range(nodes):
+            after, slope_after = spring_tension(state, chain, p, on, pretension, common, i + 1)
+            slide = state[chain + SLIDE + i]
+            exponent, share = half_exponent(p, on, phi / nodes, slide, 0.0)
+            released = math.exp(-exponent)
+            pulled = 1.0 / released
+            way = 1.0 if state[chain + STEP + i] > 0.0 else -1.0
+            grip = share * (before * released + after * pulled)
+            grip *= (1.0 - slide * way) / p[PRESLIDING_DISTANCE]
+            towards = slope_before * released
+            away = slope_after * pulled
+            yielding = 1.0 / (towards * (1.0 - gain) + away + grip)
+            offset = (before * released - after * pulled + towards * offset) * yielding
+            gain = away * yielding
+            state[chain + OFFSET + i] = offset
+            state[chain + GAIN + i] = gain
+            before, slope_before = after, slope_after
+        if not _turns(state, chain, nodes):
+            break
     return before + slope_before * offset, slope_before * (1.0 - gain)
 
 
