@@ -235,12 +235,15 @@ def test_viscous_friction_is_its_law_of_speed(given, expected):
     assert run.tension[row, 0, 0] - dry == pytest.approx(expected(dry, speed), rel=0.02)
 
 
-def test_sticking_and_slipping_needs_few_substeps():
+@pytest.mark.parametrize(
+    'beside', [(), (EffectSpec('viscous_friction', 'bend_x', {'coefficient': 1.0}),)]
+)
+def test_sticking_and_slipping_needs_few_substeps(beside):
     # Ten times as far off where friction does not follow the speed of the very step.
     lagging = {'rise': 0.75, 'stribeck_speed': 1.8e-3, 'tail': 1.0, 'lagging': 1.0}
     effect = EffectSpec('stribeck_friction', 'bend_x', lagging)
     joints = {'bend_x': JointParameters(capstan_exponent=0.8)}
-    plant = PlantDescription(joints=joints, effects=(effect,))
+    plant = PlantDescription(joints=joints, effects=(effect, *beside))
     slow = 0.5 * np.sin(2.0 * TIME)[:, None]
     few, many = (simulate(plant, slow, substeps=n).tension[:, 0, 0] for n in (12, 100))
     smooth = simulate(PlantDescription(joints=joints), slow).tension[:, 0, 0]

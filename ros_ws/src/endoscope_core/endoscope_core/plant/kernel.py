@@ -215,7 +215,7 @@ def advance_tick(
             film = 0.5 * r * r * viscous_friction.film(p, v)
             loaded = 0.25 * r * r * p[viscous_friction.LOAD_FACTOR] * (ta * da + tb * db)
             pull += loaded * wire_end_speed - film * pulley_speed
-            drag = loaded + film
+            drag += loaded + film
         offset, give = 0.0, 0.0
         if loaded_tip:
             drag += p[joint_backlash.WIRE_END_DAMPING]
