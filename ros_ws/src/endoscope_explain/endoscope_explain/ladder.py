@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.black_box.held_out_times import judged, trained_on
-from endoscope_explain.black_box.rungs import black_box_rungs
+from endoscope_explain.black_box.rungs import Exam, black_box_rungs
 from endoscope_explain.case import Ladder
 from endoscope_explain.explanation import ChannelFit, Explanation
 from endoscope_explain.predicted_signals import rung, view
@@ -23,6 +23,7 @@ def ladders(
     explanation: Explanation,
     validation: Recording | None,
     black_boxes: bool,
+    jobs: int,
 ) -> tuple[Ladder, Ladder]:
     """Judge all fits, on held-out blocks and on a second recording.
 
@@ -36,6 +37,8 @@ def ladders(
         on it.
     black_boxes : bool
         Whether to train them.
+    jobs : int
+        Processes side by side.
 
     Returns
     -------
@@ -54,17 +57,18 @@ def ladders(
         second = {name: rung(seen, name) for name in PHYSICS}
     if black_boxes:
         recorded = view(recording, plants)
-        begin = recorded.begin
-        held_out |= black_box_rungs(
+        blocks = Exam(
+            lambda t: trained_on(t - recorded.begin),
             recording,
             recorded,
-            lambda t: trained_on(t - begin),
-            {'held out': (recording, recorded, lambda t: judged(t - begin))},
-        )['held out']
+            lambda t: judged(t - recorded.begin),
+        )
+        exams = [blocks]
         if validation is not None and seen is not None:
-            second |= black_box_rungs(
-                recording, recorded, _all, {'second': (validation, seen, _all)}
-            )['second']
+            exams.append(Exam(_all, validation, seen, _all))
+        rungs = black_box_rungs(recording, recorded, exams, jobs)
+        for ladder, found in zip((held_out, second), rungs, strict=False):
+            ladder.update(found)
     return held_out, second
 
 

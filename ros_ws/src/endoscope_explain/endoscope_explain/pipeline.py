@@ -208,14 +208,13 @@ def explain_case(
     )
     case = replace(case, places=_places(case), cuts=cut_at_motor(recording, explanation.refitted))
     if extras:
-        # Before the black boxes, whose libraries start threads: a fork is not safe after that.
         case = replace(case, next_experiment=_next(case, jobs, tell))
     tell('judging beside black boxes' if extras else 'judging')
     validation = inputs.validation
     if validation is not None:
         validation = replace(validation, start_friction=explanation.start_friction)
         validation = with_isolated_marked(validation, plant)
-    held_out, second = ladders(recording, explanation, validation, extras)
+    held_out, second = ladders(recording, explanation, validation, extras, jobs)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
 
 

@@ -36,7 +36,7 @@ def test_what_is_judged_was_not_trained_on():
 def test_physics_beats_black_boxes_on_a_second_recording(stribeck_case, record):
     explanation = stribeck_case.explanation
     second = record(explanation.augmented, duration=8.0, seed=9)
-    held_out, validation = ladders(stribeck_case.recording, explanation, second, True)
+    held_out, validation = ladders(stribeck_case.recording, explanation, second, True, jobs=1)
     wire = 'wires/measured_js:wire_x_pos'
     for ladder in (held_out, validation):
         assert set(ladder) == {

@@ -1,6 +1,7 @@
 """The black boxes' rungs of the ladder: nominal parameters refitted, then the residual learnt."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from endoscope_explain.black_box.features import motion_features
 from endoscope_explain.black_box.regressors import GaussianProcess, NeuralNetwork, Regressor
 from endoscope_explain.explanation import ChannelFit
+from endoscope_explain.parallel import parallel_map
 from endoscope_explain.predicted_signals import RecordedView, SignalView
 from endoscope_explain.recording import Recording
 
@@ -67,47 +69,75 @@ class ResidualModel:
         return motion_features(recording.command.time, angle, at)
 
 
+@dataclass(frozen=True)
+class Exam:
+    """What black boxes are trained on, and what they are judged on.
+
+    Attributes
+    ----------
+    use : callable
+        Training samples of the first recording, by their times.
+    recording : Recording
+        To judge on.
+    recorded : RecordedView
+        With the prediction `BASE`.
+    test : callable
+        Which of its samples count, by their times.
+    """
+
+    use: Callable[[Array], Mask]
+    recording: Recording
+    recorded: RecordedView
+    test: Callable[[Array], Mask]
+
+
 def black_box_rungs(
-    recording: Recording,
-    recorded: RecordedView,
-    use: Callable[[Array], Mask],
-    judged: Mapping[str, tuple[Recording, RecordedView, Callable[[Array], Mask]]],
-) -> dict[str, dict[str, dict[str, ChannelFit]]]:
-    """Train both black boxes and judge them.
+    recording: Recording, recorded: RecordedView, exams: Sequence[Exam], jobs: int
+) -> list[dict[str, dict[str, ChannelFit]]]:
+    """Train both black boxes for each joint and exam, and judge them.
 
     Parameters
     ----------
     recording : Recording
+        To train on.
     recorded : RecordedView
         With the prediction `BASE`.
-    use : callable
-        Training samples by their times.
-    judged : mapping of str to (Recording, RecordedView, callable)
-        What to judge on, and on which samples.
+    exams : sequence of Exam
+    jobs : int
+        Processes side by side. With two or more the libraries of the black boxes, which start
+        threads, stay out of this process, so that it can still be forked.
 
     Returns
     -------
-    dict
-        By name of what was judged on, black box and signal.
+    list of dict
+        For each exam by black box and signal.
     """
-    rungs: dict[str, dict[str, dict[str, ChannelFit]]] = {
-        name: {kind: {} for kind in KINDS} for name in judged
-    }
-    for joint in recorded.joints:
-        for kind in KINDS:
-            model = ResidualModel(kind, recording, recorded, joint, use)
-            for name, (other, seen, test) in judged.items():
-                for one in _learnt(seen, joint):
-                    chosen = test(one.time)
-                    if not chosen.any():
-                        continue
-                    correction = model.correction(other, seen, one.signal, one.time[chosen])
-                    left = (one.measured - one.predicted[BASE])[chosen] - correction
-                    rungs[name][kind][one.signal] = ChannelFit(
-                        float(np.sqrt(np.mean(left**2))),
-                        float(np.sqrt(np.mean(one.noise[chosen] ** 2))),
-                    )
+    tasks = [(e, kind, j) for e in range(len(exams)) for j in recorded.joints for kind in KINDS]
+
+    def judged(task: tuple[int, str, str]) -> dict[str, ChannelFit]:
+        index, kind, joint = task
+        exam = exams[index]
+        return _judged(ResidualModel(kind, recording, recorded, joint, exam.use), exam, joint)
+
+    rungs: list[dict[str, dict[str, ChannelFit]]] = [{kind: {} for kind in KINDS} for _ in exams]
+    for (index, kind, _), found in zip(tasks, parallel_map(judged, tasks, jobs), strict=True):
+        rungs[index][kind] |= found
     return rungs
+
+
+def _judged(model: ResidualModel, exam: Exam, joint: str) -> dict[str, ChannelFit]:
+    found = {}
+    for one in _learnt(exam.recorded, joint):
+        chosen = exam.test(one.time)
+        if not chosen.any():
+            continue
+        correction = model.correction(exam.recording, exam.recorded, one.signal, one.time[chosen])
+        left = (one.measured - one.predicted[BASE])[chosen] - correction
+        found[one.signal] = ChannelFit(
+            float(np.sqrt(np.mean(left**2))),
+            float(np.sqrt(np.mean(one.noise[chosen] ** 2))),
+        )
+    return found
 
 
 def _learnt(recorded: RecordedView, joint: str) -> list[SignalView]:
