@@ -2,6 +2,7 @@
 
 import errno
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from endoscope_devices.dynamixel.control_table import (
     Register,
     hardware_errors_in_words,
 )
-from endoscope_devices.dynamixel.packet_handler import BusError, PacketHandler
+from endoscope_devices.dynamixel.packet_handler import BusError, NoReplyError, PacketHandler
 from endoscope_devices.dynamixel.serial_port import BusPort, latency_timer
 from endoscope_devices.dynamixel.wire_time import bytes_of_cycle, cycles_per_second
 from endoscope_devices.motor_device import DeviceError
@@ -32,6 +33,8 @@ _WATCHDOG_FIRMWARE = 38
 _WANTED_RATE = 1000.0
 _WANTED_LATENCY_S = 1e-3
 _NEAR_LIMIT_DEGC = 10
+_ATTEMPTS = 3
+"""Questions until a servo is taken to be silent: one reply may be lost on a busy computer."""
 
 
 @dataclass
@@ -50,6 +53,8 @@ class ServoFinding:
         Hardware errors in words.
     mode, current_limit, return_delay, torque
         Settings; A and s.
+    complete
+        Whether all of this was read: it may answer a ping and then no more.
     """
 
     device: int
@@ -63,11 +68,14 @@ class ServoFinding:
     current_limit: float = 0.0
     return_delay: float = 0.0
     torque: bool = False
+    complete: bool = False
 
     def __str__(self) -> str:
+        known = f'  servo {self.device}: {self.model}, firmware {self.firmware}, {self.baud} baud'
+        if not self.complete:
+            return f'{known}; answers a ping, but not what it is asked'
         return (
-            f'  servo {self.device}: {self.model}, firmware {self.firmware}, {self.baud} baud, '
-            f'{self.voltage:.1f} V, {self.temperature} °C, '
+            f'{known}, {self.voltage:.1f} V, {self.temperature} °C, '
             f'{self.hardware or "no hardware error"}\n'
             f'    operating mode {self.mode}, current limit {self.current_limit:.2f} A, '
             f'return delay {self.return_delay * 1e6:.0f} us, '
@@ -199,6 +207,8 @@ def _advise_servo(servo: ServoFinding) -> list[str]:
             f'firmware {servo.firmware} has no bus watchdog: update it to {_WATCHDOG_FIRMWARE} or '
             'newer'
         )
+    if not servo.complete:
+        return advice
     if servo.hardware:
         advice.append(
             f'{servo.hardware}: remove the cause, then '
@@ -232,6 +242,9 @@ def _listen(finding: PortFinding, baud: int) -> None:
 
 def _ask(bus: PacketHandler, servo: ServoFinding) -> None:
     def value(register: Register) -> float:
+        for _ in range(_ATTEMPTS - 1):
+            with suppress(NoReplyError):
+                return bus.read_register(servo.device, register) * register.scale
         return bus.read_register(servo.device, register) * register.scale
 
     servo.voltage = value(PRESENT_INPUT_VOLTAGE)
@@ -241,6 +254,7 @@ def _ask(bus: PacketHandler, servo: ServoFinding) -> None:
     servo.current_limit = value(CURRENT_LIMIT)
     servo.return_delay = value(RETURN_DELAY_TIME)
     servo.torque = bool(value(TORQUE_ENABLE))
+    servo.complete = True
 
 
 def _told(port: str, error: DeviceError) -> str:
