@@ -52,7 +52,7 @@ def test_feed_forward_and_feedback_reduce_the_error_of_60_sin_t(tmp_path):
     'change', [{'node': 'compensator', 'mode': 'none'}, {'node': 'controller', 'active': False}]
 )
 def test_switching_while_moving_does_not_jump(change):
-    with SimulatedGraph() as graph:
+    with SimulatedGraph(overrides={'calibration': {'motion': 'brief'}}) as graph:
         drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         graph.enable()
         graph.calibrate()

@@ -23,7 +23,7 @@ STREAMS = {
 
 
 def whole_run():
-    with SimulatedGraph() as graph:
+    with SimulatedGraph(overrides={'calibration': {'motion': 'brief'}}) as graph:
         streams = {topic: graph.listen(topic, names) for topic, names in STREAMS.items()}
         graph.enable()
         result = graph.calibrate()

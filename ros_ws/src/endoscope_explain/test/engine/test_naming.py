@@ -169,7 +169,7 @@ def test_a_joint_moved_by_another_one_that_is_not_nominal_either(one_joint):
     stopped = EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.4, 'stiffness': 0.2})
     coupled = EffectSpec('cross_coupling', 'bend_y', {'moment_per_rad': -0.01})
     described = PlantDescription()
-    motion = np.column_stack([one_joint.motion(), 0.7 * one_joint.motion()[::-1]])
+    motion = np.column_stack([one_joint.motion(8.0), 0.7 * one_joint.motion(8.0)[::-1]])
     motion -= motion[0]
     recording = one_joint.record(replace(described, effects=(stopped, coupled)), motion)
     explanation = explain_recording(recording, described, jobs=2)
