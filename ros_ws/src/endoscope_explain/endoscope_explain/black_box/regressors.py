@@ -1,6 +1,8 @@
 """The two black boxes: a Gaussian process and a small neural network, many outputs at once."""
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Protocol
 
 import numpy as np
@@ -37,10 +39,8 @@ class GaussianProcess:
     """
 
     def __init__(self, features: Array, outputs: Array) -> None:
-        from sklearn.exceptions import ConvergenceWarning
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import RBF, WhiteKernel
-        from threadpoolctl import threadpool_limits
 
         self._scaling = _Scaling(features, outputs)
         x, y = self._scaling.scaled(features, outputs)
@@ -50,10 +50,7 @@ class GaussianProcess:
         )
         kernel = RBF(np.full(x.shape[1], 3.0), (0.1, 1e3)) + WhiteKernel(0.1, (1e-3, 2.0))
         tuning = GaussianProcessRegressor(kernel, optimizer=_few_steps)
-        # Matrices this small are slower on several threads than on one.
-        with warnings.catch_warnings(), threadpool_limits(1):
-            # A length scale at its bound is a feature that does not matter.
-            warnings.simplefilter('ignore', ConvergenceWarning)
+        with _training():
             tuning.fit(x[few], y[few])
             self._process = GaussianProcessRegressor(tuning.kernel_, optimizer=None)
             self._process.fit(x[many], y[many])
@@ -76,9 +73,7 @@ class NeuralNetwork:
     """
 
     def __init__(self, features: Array, outputs: Array, seed: int = 0) -> None:
-        from sklearn.exceptions import ConvergenceWarning
         from sklearn.neural_network import MLPRegressor
-        from threadpoolctl import threadpool_limits
 
         self._scaling = _Scaling(features, outputs)
         x, y = self._scaling.scaled(features, outputs)
@@ -92,15 +87,26 @@ class NeuralNetwork:
             n_iter_no_change=NETWORK_STEPS,
             random_state=seed,
         )
-        with warnings.catch_warnings(), threadpool_limits(1):
-            # The number of steps is the limit that is meant.
-            warnings.simplefilter('ignore', ConvergenceWarning)
+        with _training():
             self._network.fit(x, y)
 
     def predict(self, features: Array) -> Array:
         """Return the network's outputs (M, K)."""
         found = self._network.predict(self._scaling.scaled_features(features))
         return self._scaling.unscaled(np.asarray(found).reshape(len(features), -1))
+
+
+@contextmanager
+def _training() -> Iterator[None]:
+    from sklearn.exceptions import ConvergenceWarning
+    from threadpoolctl import threadpool_limits
+
+    # Matrices this small are slower on several threads than on one.
+    with warnings.catch_warnings(), threadpool_limits(1):
+        # A length scale at its bound is a feature that does not matter, and so many steps of the
+        # network are meant.
+        warnings.simplefilter('ignore', ConvergenceWarning)
+        yield
 
 
 class _Scaling:
