@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.model_selection import StratifiedGroupKFold
 
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 
@@ -59,5 +58,8 @@ def grouped_folds(
     ValueError
         If a class has fewer configurations than there are folds.
     """
+    # Only training divides rows: a node that classifies would load it for nothing, and for seconds.
+    from sklearn.model_selection import StratifiedGroupKFold
+
     splitter = StratifiedGroupKFold(folds, shuffle=True, random_state=seed)
     return list(splitter.split(dataset.tension, dataset.class_deg, dataset.configuration))
