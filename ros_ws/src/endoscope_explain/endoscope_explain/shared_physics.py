@@ -113,11 +113,13 @@ def _searched(
 ) -> SharedChoice:
     """Add effects one by one to the best few choices: the best single effect may mislead."""
     best, beam = nominal, [nominal]
-    while len(best.effects) < most_effects and not best.leaves_noise():
+    while len(best.effects) < most_effects:
+        if best.leaves_noise():
+            tell(f'{nominal.joint}: only noise is left beside {_listed(best)}')
+            break
         grown: dict[frozenset[str], SharedChoice] = {}
         for choice in beam:
-            known = ', '.join(choice.effects) or 'nothing'
-            tell(f'{nominal.joint}: what all recordings lack beside {known}')
+            tell(f'{nominal.joint}: what all recordings lack beside {_listed(choice)}')
             for found in with_one_more(choice, jobs):
                 key = frozenset(found.effects)
                 grown[key] = min(found, grown.get(key, found), key=SharedChoice.total)
@@ -126,6 +128,10 @@ def _searched(
         if not beam or not best.is_beaten_by(beam[0]):
             break
         fall = (best.total() - beam[0].total()) / len(best.recordings)
-        tell(f'{nominal.joint}: {", ".join(beam[0].effects)}, better by {fall:.0f} per recording')
+        tell(f'{nominal.joint}: {_listed(beam[0])}, better by {fall:.0f} per recording')
         best = beam[0]
     return best
+
+
+def _listed(choice: SharedChoice) -> str:
+    return ', '.join(choice.effects) or 'nothing'
