@@ -23,7 +23,7 @@ def recordings(one_joint):
                 EffectSpec('gravity', 'bend_x', {'moment_nm': moment, 'phase_rad': 0.8}),
                 capstan_exponent=exponent,
             ),
-            one_joint.motion(6.0),
+            one_joint.motion(4.0),
         )
         for exponent, moment in TUBES.items()
     ]
