@@ -32,8 +32,6 @@ STARTS = 2
 """Starting points of an effect that get a cheap fit."""
 POLISHED_FIRST, POLISHED = 6, 3
 """Effects that are fitted fully to all recordings, beside no other one and beside others."""
-LEAST_FALL = 4.0
-"""Fall of the score per recording that an effect must bring."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +55,9 @@ class SharedChoice:
         """Sum of the scores of all recordings."""
         return sum(score(anchors[0]) for anchors in self.recordings)
 
-    def is_beaten_by(self, other: 'SharedChoice') -> bool:
-        """Whether another choice brings as much as an effect must."""
-        return self.total() - other.total() >= LEAST_FALL * len(self.recordings)
+    def fall_to(self, other: 'SharedChoice') -> float:
+        """Mean fall of the score of a recording from this choice to another."""
+        return (self.total() - other.total()) / len(self.recordings)
 
     def leaves_noise(self) -> bool:
         """Whether nothing is left to explain in any recording."""

@@ -24,6 +24,8 @@ from endoscope_explain.shared_choice import (
 
 BEAM = 3
 """Choices of effects that are gone on with."""
+LEAST_FALL = 4.0
+"""Fall of the score per recording that an effect must bring."""
 
 
 def physics_of_all(
@@ -125,9 +127,9 @@ def _searched(
                 grown[key] = min(found, grown.get(key, found), key=SharedChoice.total)
         chosen = sorted(grown.values(), key=SharedChoice.total)[:BEAM]
         beam = sorted((with_borrowed_numbers(c, jobs) for c in chosen), key=SharedChoice.total)
-        if not beam or not best.is_beaten_by(beam[0]):
+        fall = best.fall_to(beam[0]) if beam else 0.0
+        if fall < LEAST_FALL:
             break
-        fall = (best.total() - beam[0].total()) / len(best.recordings)
         tell(f'{nominal.joint}: {_listed(beam[0])}, better by {fall:.0f} per recording')
         best = beam[0]
     return best
