@@ -7,13 +7,15 @@ from simulated_graph import SimulatedGraph
 # In real time, on a machine that may stall for longer than a device may be silent.
 pytestmark = pytest.mark.flaky(reruns=2)
 
+CALIBRATION = {'calibration': {'motion': 'brief'}}
+
 
 def weight(graph):
     return graph.nodes['controller'].controller.weight
 
 
 def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
-    with SimulatedGraph() as graph:
+    with SimulatedGraph(overrides=CALIBRATION) as graph:
         drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         corrections = graph.listen('controller/correction_js')
         graph.enable()
@@ -41,7 +43,7 @@ def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
 
 
 def test_a_dead_tracker_node_leaves_the_feed_forward_going():
-    with SimulatedGraph() as graph:
+    with SimulatedGraph(overrides=CALIBRATION) as graph:
         drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         graph.enable()
         graph.calibrate()

@@ -34,6 +34,6 @@ def test_a_reading_that_never_came_is_not_told_as_zero(bus):
     finding = examine(bus.port, [1_000_000])
     while not any(not servo.complete for servo in finding.servos):
         finding = examine(bus.port, [1_000_000])
-    assert 'answers a ping, but not what it is asked' in str(finding)
+    assert 'answers a ping; not all of its registers could be read' in str(finding)
     assert ' 0.0 V' not in str(finding)
     assert not any('supply' in line for line in finding.advice)

@@ -93,9 +93,10 @@ def with_isolated_marked(recording: Recording, plant: PlantDescription) -> Recor
 
 
 def _sticks_out(residual: Array) -> NDArray[np.bool_]:
-    usual = median_filter(np.abs(residual), NEARBY, mode='nearest')
+    # Mirrored at the ends: with the last sample repeated, a wrong one would be its own median.
+    usual = median_filter(np.abs(residual), NEARBY, mode='mirror')
     # Up to three samples in a row stick out of the median; a step of the joint does not.
-    height = residual - median_filter(residual, AROUND, mode='nearest')
+    height = residual - median_filter(residual, AROUND, mode='mirror')
     return np.asarray(np.abs(height) > np.maximum(SPIKE, ALONE * usual))
 
 

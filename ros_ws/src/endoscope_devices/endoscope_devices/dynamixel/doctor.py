@@ -73,7 +73,7 @@ class ServoFinding:
     def __str__(self) -> str:
         known = f'  servo {self.device}: {self.model}, firmware {self.firmware}, {self.baud} baud'
         if not self.complete:
-            return f'{known}; answers a ping, but not what it is asked'
+            return f'{known}; answers a ping; not all of its registers could be read'
         return (
             f'{known}, {self.voltage:.1f} V, {self.temperature} °C, '
             f'{self.hardware or "no hardware error"}\n'

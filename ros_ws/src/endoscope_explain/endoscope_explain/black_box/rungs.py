@@ -55,12 +55,12 @@ class ResidualModel:
         self._signals = [v.signal for v in views]
         self._model = KINDS[kind](self._features(recording, recorded, time), residuals)
 
-    def correction(
-        self, recording: Recording, recorded: RecordedView, signal: str, time: Array
-    ) -> Array:
-        """Return the learnt residual of a signal at some times, in the signal's unit."""
+    def corrections(
+        self, recording: Recording, recorded: RecordedView, time: Array
+    ) -> dict[str, Array]:
+        """Return the learnt residual of each signal at some times, in the signal's unit."""
         predicted = self._model.predict(self._features(recording, recorded, time))
-        return predicted[:, self._signals.index(signal)]
+        return dict(zip(self._signals, predicted.T, strict=True))
 
     def _features(self, recording: Recording, recorded: RecordedView, at: Array) -> Array:
         order = [self._joint, *(o for o in recorded.joints if o != self._joint)]
@@ -127,12 +127,17 @@ def black_box_rungs(
 
 def _judged(model: ResidualModel, exam: Exam, joint: str) -> dict[str, ChannelFit]:
     found = {}
+    # Signals of one device have the same stamps, and a prediction is of all signals.
+    predicted: dict[bytes, dict[str, Array]] = {}
     for one in _learnt(exam.recorded, joint):
         chosen = exam.test(one.time)
         if not chosen.any():
             continue
-        correction = model.correction(exam.recording, exam.recorded, one.signal, one.time[chosen])
-        left = (one.measured - one.predicted[BASE])[chosen] - correction
+        time = one.time[chosen]
+        stamps = time.tobytes()
+        if stamps not in predicted:
+            predicted[stamps] = model.corrections(exam.recording, exam.recorded, time)
+        left = (one.measured - one.predicted[BASE])[chosen] - predicted[stamps][one.signal]
         found[one.signal] = ChannelFit(
             float(np.sqrt(np.mean(left**2))),
             float(np.sqrt(np.mean(one.noise[chosen] ** 2))),
