@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from endoscope_explain.compose import Composition
-from endoscope_explain.score import PARAMETER_PRICE
+from endoscope_explain.score import NEARLY_NOISE, PARAMETER_PRICE
 from endoscope_explain.search import JointSearch
 from endoscope_explain.whiteness import is_noise, slips, worst_against_raw_noise
 
@@ -18,15 +18,14 @@ ADDED_SHARE = 0.25
 """Share of the fall so far that a second effect must bring: less is an error of form. Third ones
 and more are looked for only where they were asked for."""
 ADDED_SHARE_TO_NOISE = 0.08
-"""The same where only noise is left then: no error of form looks just like another effect."""
+"""The same where only noise, or no more score than noise has, is left then: no error of form looks
+just like another effect."""
 EXPLAINED = 0.68
 """Share of the misfit's logarithm that the catalogue must explain to be called adequate."""
 BARELY = 0.2
 """Share below which a name would mislead: the physics is another one, and none is named."""
 EXPLAINED_IN_SLIPS = 0.25
 """The same where wires stick and slip: the instant of a slip is nobody's to predict."""
-NEARLY_NOISE = 100.0
-"""Score above noise alone at which an error of form needs no further explanation."""
 OF_A_DEVICE = frozenset({'clock_skew', 'tracker_delay'})
 """Effects of a device that reads all joints."""
 LIKE_RAW_NOISE = 1.12
@@ -172,7 +171,8 @@ def _better(
 ) -> Composition | None:
     so_far = nominal.score - chosen.score
     alike = [c for c in level if is_noise(c.fit)]
-    share = ADDED_SHARE_TO_NOISE if alike else ADDED_SHARE
+    like_noise = alike or any(c.score < c.floor() for c in level)
+    share = ADDED_SHARE_TO_NOISE if like_noise else ADDED_SHARE
     if len(chosen.effects) > 1:
         share = 0.0
     needed = max(ADDED, share * so_far) if chosen.effects else NAMED

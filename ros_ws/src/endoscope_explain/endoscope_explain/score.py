@@ -20,6 +20,8 @@ PARAMETER_PRICE = 2.0
 """Score of one more free parameter."""
 FLOOR_PER_PARAMETER = PARAMETER_PRICE + 0.5
 """Score of a parameter where only noise is left: its price, and its prior on average."""
+NEARLY_NOISE = 100.0
+"""Score above noise alone at which an error of form needs no further explanation."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Which effects a joint's recording shows: nominal refit, singles, and a beam of more."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from endoscope_explain.compose import (
@@ -10,10 +11,12 @@ from endoscope_explain.compose import (
 )
 from endoscope_explain.fit import Fit
 from endoscope_explain.many_starts import RUGGED, from_many_starts
+from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.reconsider import reconsidered
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
-from endoscope_explain.score import score
-from endoscope_explain.whiteness import is_noise
+from endoscope_explain.robust_refit import robustly_refitted
+from endoscope_explain.score import NEARLY_NOISE, score
+from endoscope_explain.whiteness import is_noise, slips
 from endoscope_explain.whole_numbers import with_counted_numbers
 
 SINGLES_POLISHED = 6
@@ -81,6 +84,8 @@ def search(
     for level in range(depth):
         polished = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
         grown = grow(parents, effects, jobs, polished)
+        if level > 0 and grown and grown[0].score - grown[0].floor() > NEARLY_NOISE:
+            grown = _sorted(grown, _grown_robustly(parents, effects, jobs))
         if grown and grown[0].effects == (RUGGED,) and not is_noise(grown[0].fit):
             grown[0] = from_many_starts(grown[0], anchors[1], jobs)
         if grown:
@@ -96,13 +101,28 @@ def search(
         parents = [(c, (c.fit,)) for c in grown[:BEAM] if nominal.score - c.score >= needed]
     if len(levels) == 2 and levels[1]:
         singles, pairs = reconsidered(nominal, levels[1][0], effects, jobs)
-        levels = [_sorted(levels[0], singles), _sorted(levels[1], pairs)]
+        levels = [tuple(_sorted(levels[0], singles)), tuple(_sorted(levels[1], pairs))]
     return JointSearch(nominal, tuple(levels))
 
 
-def _sorted(found: tuple[Composition, ...], more: list[Composition]) -> tuple[Composition, ...]:
+def _grown_robustly(
+    parents: Sequence[Parent], effects: Sequence[str], jobs: int
+) -> list[Composition]:
+    """Add to what the parents say of the larger part of the motion.
+
+    Not where wires stick and slip: the instants of the slips are nobody's to explain.
+    """
+    chosen = [c for c, _ in parents if not slips(c.fit.model.observation)]
+    fits = parallel_fits(
+        lambda i: robustly_refitted(chosen[i].fit), [c.fit.model for c in chosen], jobs
+    )
+    robust = [(c, (found,)) for c, found in zip(chosen, fits, strict=True)]
+    return grow(robust, effects, jobs, PAIRS_POLISHED)
+
+
+def _sorted(found: Sequence[Composition], more: Sequence[Composition]) -> list[Composition]:
     """Compositions best first, each set of effects once."""
     unique: dict[frozenset[str], Composition] = {}
     for composition in sorted((*found, *more), key=lambda c: c.score):
         unique.setdefault(frozenset(composition.effects), composition)
-    return tuple(unique.values())
+    return list(unique.values())

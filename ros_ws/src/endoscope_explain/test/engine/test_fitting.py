@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from endoscope_core.effects import CATALOGUE
@@ -11,6 +12,7 @@ from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.fit import fit
 from endoscope_explain.observation import observe
 from endoscope_explain.onset_scan import redated
+from endoscope_explain.robust_refit import robustly_refitted
 from endoscope_explain.screen import promises, unexplained, with_effect
 
 
@@ -58,3 +60,13 @@ def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(one_j
     gains = {p.start['limit_nm']: p.gain for p in found}
     assert gains[max(gains)] == pytest.approx(0.0, abs=1e-6)
     assert gains[min(gains)] < 0.5 * found[0].gain
+
+
+def test_what_a_stop_does_beyond_an_angle_bends_no_parameters_of_a_robust_fit(one_joint):
+    refitted, true = anchors(one_joint, 'joint_stop', {'angle_rad': 0.6, 'stiffness': 0.15})
+    robust = robustly_refitted(refitted)
+    nominal = slice(0, -1)
+    assert refitted.model.free[-1].name == 'reading_lead'
+    assert np.abs(refitted.theta - true.theta)[nominal].max() > 0.1
+    assert np.abs(robust.theta - true.theta)[nominal].max() < 0.03
+    assert robust.cost > refitted.cost
