@@ -33,8 +33,9 @@ def test_the_slave_is_the_rig_that_was_recorded():
 
 
 def test_the_explained_inverse_tracks_better_than_the_described_one():
+    signal = periodic_signal(2.5 * np.pi)
     found = run_closed_loop(
-        1, 'gravity', periodic_signal(2.5 * np.pi), load_classifier(), load_class_parameters()
+        1, 'gravity', signal, load_classifier(), load_class_parameters(), 'calibration'
     )
     assert found.named == ('gravity',)
     assert set(found.errors) == set(WAYS)

@@ -63,8 +63,9 @@ def run_closed_loop(
     signal: Signal,
     classifier: Classifier,
     sets: Mapping[int, LawParameters],
+    recorded: str = 'commissioning',
 ) -> ClosedLoop:
-    """Conceal an effect, explain the commissioning recording, and track on the same slave.
+    """Conceal an effect, explain a recording, and track on the same slave.
 
     Parameters
     ----------
@@ -78,12 +79,14 @@ def run_closed_loop(
         Of the calibration sinusoid.
     sets : mapping of int to LawParameters
         Bouc-Wen parameters by class.
+    recorded : str
+        Motion of the recording: `commissioning`, or `calibration`, which moves the first joint.
 
     Returns
     -------
     ClosedLoop
     """
-    case = draw_case(seed, 'single', 'commissioning', (effect,))
+    case = draw_case(seed, 'single', recorded, (effect,))
     rig = rig_of(case.truth['rig'])
     concealed = case.truth['concealed']
     assert isinstance(concealed, list)
