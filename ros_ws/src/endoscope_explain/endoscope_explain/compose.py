@@ -56,6 +56,10 @@ class Composition:
         """Return the score that this composition would have if nothing but noise were left."""
         return FLOOR_PER_PARAMETER * len(self.fit.theta)
 
+    def above_noise(self) -> float:
+        """Return by how much the score is above `floor`."""
+        return self.score - self.floor()
+
 
 Parent = tuple[Composition, tuple[Fit, ...]]
 

@@ -72,14 +72,14 @@ def decide(search: JointSearch) -> Decision:
             if better is None:
                 break
             chosen = better
-    above = nominal.score - nominal.floor()
+    above = nominal.above_noise()
     if (
         chosen.effects
         and not is_noise(chosen.fit)
         and (nominal.score - chosen.score < BARELY * above)
     ):
         chosen = nominal
-    left = chosen.score - chosen.floor()
+    left = chosen.above_noise()
     explained = 1.0 if above <= 0.0 or is_noise(chosen.fit) else 1.0 - left / above
     adequate = (
         is_noise(chosen.fit)
@@ -171,7 +171,7 @@ def _better(
 ) -> Composition | None:
     so_far = nominal.score - chosen.score
     alike = [c for c in level if is_noise(c.fit)]
-    like_noise = alike or any(c.score < c.floor() for c in level)
+    like_noise = alike or any(c.above_noise() < 0.0 for c in level)
     share = ADDED_SHARE_TO_NOISE if like_noise else ADDED_SHARE
     if len(chosen.effects) > 1:
         share = 0.0

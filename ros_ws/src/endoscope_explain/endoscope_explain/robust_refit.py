@@ -4,6 +4,8 @@ Where a motor stalls or a joint stands at its stop, a few seconds of large misfi
 parameters of a least-squares fit, and the effect that made them no longer promises anything.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,8 +39,7 @@ def robustly_refitted(found: Fit) -> Fit:
     for _ in range(PASSES):
         found = fit(found.model, found.theta, weight=_weights(found), iterations=STEPS)
     prior = found.model.prior(found.theta)
-    cost = 0.5 * float(found.residuals @ found.residuals + prior @ prior)
-    return Fit(found.model, found.theta, found.residuals, found.jacobian, cost)
+    return replace(found, cost=0.5 * float(found.residuals @ found.residuals + prior @ prior))
 
 
 def _weights(found: Fit) -> Array:

@@ -84,8 +84,8 @@ def search(
     for level in range(depth):
         polished = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
         grown = grow(parents, effects, jobs, polished)
-        if level > 0 and grown and grown[0].score - grown[0].floor() > NEARLY_NOISE:
-            grown = _sorted(grown, _grown_robustly(parents, effects, jobs))
+        if level > 0 and grown and grown[0].above_noise() > NEARLY_NOISE:
+            grown = list(_sorted(grown, _grown_robustly(parents, effects, jobs)))
         if grown and grown[0].effects == (RUGGED,) and not is_noise(grown[0].fit):
             grown[0] = from_many_starts(grown[0], anchors[1], jobs)
         if grown:
@@ -101,7 +101,7 @@ def search(
         parents = [(c, (c.fit,)) for c in grown[:BEAM] if nominal.score - c.score >= needed]
     if len(levels) == 2 and levels[1]:
         singles, pairs = reconsidered(nominal, levels[1][0], effects, jobs)
-        levels = [tuple(_sorted(levels[0], singles)), tuple(_sorted(levels[1], pairs))]
+        levels = [_sorted(levels[0], singles), _sorted(levels[1], pairs)]
     return JointSearch(nominal, tuple(levels))
 
 
@@ -120,9 +120,9 @@ def _grown_robustly(
     return grow(robust, effects, jobs, PAIRS_POLISHED)
 
 
-def _sorted(found: Sequence[Composition], more: Sequence[Composition]) -> list[Composition]:
+def _sorted(found: Sequence[Composition], more: Sequence[Composition]) -> tuple[Composition, ...]:
     """Compositions best first, each set of effects once."""
     unique: dict[frozenset[str], Composition] = {}
     for composition in sorted((*found, *more), key=lambda c: c.score):
         unique.setdefault(frozenset(composition.effects), composition)
-    return list(unique.values())
+    return tuple(unique.values())

@@ -11,8 +11,6 @@ from endoscope_explain.isolated_samples import with_isolated_marked, without_iso
 from endoscope_explain.observation import observe
 
 PLANT = PlantDescription()
-
-
 SPIKES = [40, 44, 159]
 
 

@@ -159,8 +159,10 @@ def test_more_than_two_effects_are_found_where_they_are_asked_for(one_joint):
         EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.5, 'stiffness': 0.2}),
     )
     recording = one_joint.record(one_joint.rig(*effects), one_joint.motion(7.0))
-    explanation = explain_recording(recording, one_joint.rig(), most_effects=3, jobs=2)
-    assert {e.id for e in explanation.effects} == {e.id for e in effects}
+    two = explain_recording(recording, one_joint.rig(), jobs=2)
+    three = explain_recording(recording, one_joint.rig(), most_effects=3, jobs=2)
+    assert len(two.effects) <= 2
+    assert {e.id for e in three.effects} == {e.id for e in effects}
 
 
 def test_a_joint_moved_by_another_one_that_is_not_nominal_either(one_joint):
