@@ -9,7 +9,9 @@
 
 Further keys, all optional: `delimiter` (`,`, or `whitespace`), `header_lines` (lines to skip),
 `namespace`, `start_s` (added to every time), `drop_repeats` (whether a row whose time is that of
-the row before is dropped; true). A column may have a `scale` (after the unit) and an `offset`.
+the row before is dropped; true), `sample_and_hold` (whether the table was written faster than its
+sources gave new numbers, and repeats old ones until then; false). A column may have a `scale`
+(after the unit) and an `offset`.
 """
 
 import math
@@ -75,6 +77,9 @@ class TableMapping:
     namespace : str
     start_s : float
     drop_repeats : bool
+    sample_and_hold : bool
+        Rows of one time lie evenly between it and the next one, and a topic has a message where one
+        of its columns changes.
     """
 
     time: Column
@@ -84,6 +89,7 @@ class TableMapping:
     namespace: str = '/endoscope'
     start_s: float = 0.0
     drop_repeats: bool = True
+    sample_and_hold: bool = False
 
 
 def load_table_mapping(path: str | Path) -> TableMapping:
@@ -119,7 +125,16 @@ def _mapping(content: Any) -> TableMapping:
     given = _section(
         content,
         'the mapping',
-        ('time', 'topics', 'delimiter', 'header_lines', 'namespace', 'start_s', 'drop_repeats'),
+        (
+            'time',
+            'topics',
+            'delimiter',
+            'header_lines',
+            'namespace',
+            'start_s',
+            'drop_repeats',
+            'sample_and_hold',
+        ),
     )
     for key in ('time', 'topics'):
         if key not in given:
@@ -130,6 +145,8 @@ def _mapping(content: Any) -> TableMapping:
     }
     if not topics:
         raise ValueError('topics is empty')
+    if 'drop_repeats' in given and given.get('sample_and_hold'):
+        raise ValueError('drop_repeats has no meaning beside sample_and_hold: leave it out')
     delimiter = str(given.get('delimiter', ','))
     return TableMapping(
         _column(given['time'], 'time'),
@@ -139,6 +156,7 @@ def _mapping(content: Any) -> TableMapping:
         str(given.get('namespace', '/endoscope')).rstrip('/'),
         _number(given.get('start_s', 0.0), 'start_s'),
         bool(given.get('drop_repeats', True)),
+        bool(given.get('sample_and_hold', False)),
     )
 
 

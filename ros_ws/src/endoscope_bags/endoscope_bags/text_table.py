@@ -29,7 +29,8 @@ class Converted:
     rows : int
         Rows of the table.
     repeated : int
-        Those of them that were dropped because their time is that of the row before.
+        Those of them that were dropped because their time is that of the row before or, where the
+        table samples and holds, because no topic has a new number in them.
     messages : int
     """
 
@@ -66,11 +67,13 @@ def convert_table(table: str | Path, mapping: TableMapping, out: str | Path) -> 
     numbers = _read(table, mapping)
     rows = len(numbers)
     time = _si(numbers, mapping.time) + mapping.start_s
-    if mapping.drop_repeats:
+    if mapping.drop_repeats and not mapping.sample_and_hold:
         fresh = np.r_[True, np.diff(time) != 0.0]
         numbers, time = numbers[fresh], time[fresh]
     _check(table, time)
-    stamps = np.round(time * 1e9).astype(np.int64)
+    if mapping.sample_and_hold:
+        time = _between_times(table, time)
+    used = np.zeros(len(time), bool)
     streams = []
     for topic, quantities in mapping.topics.items():
         names = list(next(iter(quantities.values())))
@@ -80,6 +83,12 @@ def convert_table(table: str | Path, mapping: TableMapping, out: str | Path) -> 
         }
         for quantity, array in values.items():
             _check_finite(table, topic, quantity, array)
+        fresh = np.ones(len(time), bool)
+        if mapping.sample_and_hold:
+            fresh[1:] = np.any([np.diff(v, axis=0).any(axis=1) for v in values.values()], axis=0)
+            values = {quantity: array[fresh] for quantity, array in values.items()}
+        used |= fresh
+        stamps = np.round(time[fresh] * 1e9).astype(np.int64)
         streams.append(
             MessageStream(
                 f'{mapping.namespace}/{topic}',
@@ -96,7 +105,7 @@ def convert_table(table: str | Path, mapping: TableMapping, out: str | Path) -> 
         )
     with BagWriter(out) as bag:
         bag.write_streams(streams)
-    return Converted(rows, rows - len(time), len(time) * len(streams))
+    return Converted(rows, rows - int(used.sum()), sum(len(stream.payloads) for stream in streams))
 
 
 def _read(table: Path, mapping: TableMapping) -> Array:
@@ -137,6 +146,19 @@ def _columns(mapping: TableMapping) -> list[Column]:
 
 def _si(numbers: Array, column: Column) -> Array:
     return np.asarray(numbers[:, column.number - 1] * column.scale + column.offset)
+
+
+def _between_times(table: Path, time: Array) -> Array:
+    """Times of rows that lie evenly between the time that they share and the next one."""
+    first = np.flatnonzero(np.r_[True, np.diff(time) > 0.0])
+    if len(first) < 2:
+        raise TableError(f'{table}: all rows have the same time: where a row lies is not known')
+    rows = np.diff(np.r_[first, len(time)])
+    steps = np.diff(time[first]) / rows[:-1]
+    steps = np.r_[steps, steps[-1]]
+    return np.asarray(
+        time + (np.arange(len(time)) - np.repeat(first, rows)) * np.repeat(steps, rows)
+    )
 
 
 def _check(table: Path, time: Array) -> None:

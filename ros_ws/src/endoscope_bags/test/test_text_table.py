@@ -61,6 +61,41 @@ def test_repeats_are_kept_where_asked(table, tmp_path):
     assert convert_table(table, load_table_mapping(path), tmp_path / 'bag.mcap').repeated == 0
 
 
+def test_a_table_written_faster_than_its_sources_gives_each_number_its_own_time(tmp_path):
+    # Four rows a time; the command is new in the first, the angle in the second, every other time
+    # only, one wire in the third and the other one in the fourth.
+    rows = [
+        f'{0.025 * n:.3f}, {n}, {(n - (k < 1)) // 2}, {n + 3 * (k >= 2)}, {n - 2 * (k == 3)}'
+        for n in range(10)
+        for k in range(4)
+    ]
+    (tmp_path / 'table.txt').write_text('\n'.join(rows))
+    path = tmp_path / 'mapping.yaml'
+    path.write_text(MAPPING + 'sample_and_hold: true\n')
+    done = convert_table(tmp_path / 'table.txt', load_table_mapping(path), tmp_path / 'bag')
+    bag = open_bag(tmp_path / 'bag')
+    command, bending = bag.joint_state('slave/servo_jp'), bag.joint_state('slave/measured_js')
+    wires = bag.joint_state('wires/measured_js')
+    stamps = 100.0 + 0.025 * np.arange(10)
+    assert command.stamp_ns * 1e-9 == pytest.approx(stamps, abs=1e-6)
+    assert command.position[:, 0] == pytest.approx(np.radians(np.arange(10)), abs=1e-6)
+    # -1, in force at first, then 0 to 4.
+    assert bending.stamp_ns * 1e-9 == pytest.approx(np.r_[100.0, stamps[::2] + 0.00625], abs=1e-6)
+    assert bending.position[:, 0] == pytest.approx(np.radians(np.arange(6)), abs=1e-6)
+    fresh = np.sort(np.r_[stamps, stamps + 0.0125, stamps + 0.01875])
+    assert wires.stamp_ns * 1e-9 == pytest.approx(fresh, abs=1e-6)
+    assert (done.rows, done.repeated, done.messages) == (40, 5, 10 + 6 + 30)
+
+
+def test_what_samples_and_holds_needs_more_than_one_time(tmp_path):
+    (tmp_path / 'table.txt').write_text('1, 2, 3, 4, 5\n1, 2, 3, 4, 6\n')
+    path = tmp_path / 'mapping.yaml'
+    path.write_text(MAPPING + 'sample_and_hold: true\n')
+    with pytest.raises(TableError, match='all rows have the same time'):
+        convert_table(tmp_path / 'table.txt', load_table_mapping(path), tmp_path / 'bag')
+    assert not (tmp_path / 'bag').exists()
+
+
 @pytest.mark.parametrize(
     ('old', 'new', 'message'),
     [
@@ -70,6 +105,11 @@ def test_repeats_are_kept_where_asked(table, tmp_path):
         ('column: 3', 'column: 0', 'from 1'),
         ('position: {bend_x: {column: 2', 'angle: {bend_x: {column: 2', 'unknown key angle'),
         ('start_s: 100.0', 'start_s: soon', "start_s is 'soon'"),
+        (
+            'start_s: 100.0',
+            'drop_repeats: true\nsample_and_hold: true',
+            'drop_repeats has no meaning beside sample_and_hold',
+        ),
     ],
 )
 def test_a_wrong_mapping_is_refused_by_its_key(tmp_path, old, new, message):

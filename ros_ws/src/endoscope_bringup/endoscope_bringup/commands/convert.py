@@ -10,7 +10,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'convert',
         help='turn a text table of measurements into a bag',
         description='Writes the columns of TABLE, described by a mapping file, as topics of a bag. '
-        'Rows whose time is that of the row before are dropped.',
+        'Rows whose time is that of the row before are dropped, unless the mapping says that the '
+        'table was written faster than its sources (sample_and_hold): then a topic has a message '
+        'where one of its columns changes.',
     )
     parser.add_argument('table', type=Path, metavar='TABLE', help='text, one row a sample')
     parser.add_argument(
