@@ -1,37 +1,43 @@
 """One set of effects for several recordings of a rig, and the sets with one effect more.
 
-The sum of all scores decides, each recording with parameters of its own.
+The sum of all scores decides; all recordings are fitted together, see `shared_fit`.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.effects import CATALOGUE
-from endoscope_explain.agreement import agreed_parameters, in_line, must_agree
 from endoscope_explain.compose import searchable_effects
 from endoscope_explain.fit import Fit, JointModel
-from endoscope_explain.given_physics import settled
 from endoscope_explain.glance import Glance, glance
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.parallel_fits import parallel_fits
-from endoscope_explain.rank import Look, polish
+from endoscope_explain.rank import polish
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.score import score
 from endoscope_explain.screen import Promise, promises, unexplained
+from endoscope_explain.shared_fit import fit_together, with_common_numbers
 from endoscope_explain.whiteness import is_noise
 
 Array = NDArray[np.float64]
 Anchors = tuple[Fit, ...]
+Numbers = tuple[Array, Array, Array, float]
+"""Of a fit: coordinates, residuals, derivative, cost."""
+Begun = tuple[list[JointModel], list[Array]]
+"""Models of all recordings, and the coordinates at which their fit begins."""
 Variant = tuple[str, tuple[float, ...]]
 """An effect, and what it acts on or which of its forms it has, which no shape of a tube changes."""
 
+LIKE_TIME = DEPENDS_ON_TIME | {'wire_creep'}
+"""Effects that a motion made only once does not tell from a change with time: wires that go on
+stretching for seconds look like a sensor that drifts."""
 STARTS = 2
 """Starting points of an effect that get a cheap fit."""
 POLISHED_FIRST, POLISHED = 6, 3
-"""Effects that are fitted fully to all recordings, beside no other one and beside others."""
+"""Effects that are fitted to all recordings, beside no other one and beside others."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +89,18 @@ def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
     for variant in sorted(glances, key=lambda v: _logarithm_of_costs(choice, glances[v])):
         variants.setdefault(variant[0], variant)
     promising = list(variants.values())[: POLISHED if choice.effects else POLISHED_FIRST]
+    begun = [_begun(choice, variant[0], glances[variant]) for variant in promising]
+    fitted = _side_by_side(begun, jobs, rough=True)
     return sorted(
-        (_grown(choice, v[0], glances[v], jobs) for v in promising), key=SharedChoice.total
+        (
+            SharedChoice(
+                choice.joint,
+                (*choice.effects, variant[0]),
+                tuple((Fit(m, *n),) for m, n in zip(models, numbers, strict=True)),
+            )
+            for variant, (models, _), numbers in zip(promising, begun, fitted, strict=True)
+        ),
+        key=SharedChoice.total,
     )
 
 
@@ -95,7 +111,7 @@ def _glances(choice: SharedChoice, jobs: int) -> dict[Variant, list[Glance | Non
     tasks = [
         (e, n)
         for e in searchable_effects()
-        if e not in choice.effects and (repeated or e not in DEPENDS_ON_TIME)
+        if e not in choice.effects and (repeated or e not in LIKE_TIME)
         for n in range(len(recordings))
     ]
     left = [unexplained(anchors[0]) for anchors in recordings]
@@ -132,69 +148,56 @@ def _logarithm_of_costs(choice: SharedChoice, glances: list[Glance | None]) -> f
     )
 
 
-def _grown(
-    choice: SharedChoice, effect_id: str, glances: list[Glance | None], jobs: int
-) -> SharedChoice:
-    """All recordings with one more effect; a recording that has no use for it stays as it is."""
-    wanted = [n for n, item in enumerate(glances) if item is not None]
-    begun = [
-        item.look(anchors, choice.effects)
-        for anchors, item in zip(choice.recordings, glances, strict=True)
-        if item is not None
-    ]
-    fits = parallel_fits(lambda i: _separate(begun[i]), [item.model for item in begun], jobs)
-    if must_agree(effect_id) and fits:
-        agreed = agreed_parameters(fits, effect_id)
-        held = [in_line(f, effect_id, agreed) for f in fits]
-        fits = parallel_fits(lambda i: settled(*held[i]), [model for model, _ in held], jobs)
-    recordings = list(choice.recordings)
-    for n, f in zip(wanted, fits, strict=True):
-        recordings[n] = (f,)
-    return SharedChoice(choice.joint, (*choice.effects, effect_id), tuple(recordings))
+def _begun(choice: SharedChoice, effect_id: str, glances: list[Glance | None]) -> Begun:
+    """Models of all recordings with one more effect, and where their fit begins.
+
+    A recording that has no use for the effect stays without it.
+    """
+    models, starts = [], []
+    for anchors, item in zip(choice.recordings, glances, strict=True):
+        found = anchors[0] if item is None else polish(item.look(anchors, choice.effects))
+        models.append(found.model)
+        starts.append(found.theta)
+    return models, starts
 
 
-def _separate(item: Look) -> Fit:
-    begun = polish(item)
-    return settled(begun.model, begun.theta)
+def settled_together(choices: Sequence[SharedChoice], jobs: int) -> list[SharedChoice]:
+    """Choices fitted until nothing moves any more, also from where all recordings are alike.
 
-
-def with_borrowed_numbers(choice: SharedChoice, jobs: int) -> SharedChoice:
-    """Each recording fitted once more from the neighbour whose numbers suit it best.
-
-    The numbers of one rig in two shapes are alike, and a fit by itself may lie in a worse valley.
+    A fit by itself may lie in another valley than those of the same rig in other shapes.
 
     Parameters
     ----------
-    choice : SharedChoice
+    choices : sequence of SharedChoice
     jobs : int
         Processes side by side.
 
     Returns
     -------
-    SharedChoice
-        Each recording as given where that was no better.
+    list of SharedChoice
+        Best first.
     """
-    recordings = choice.recordings
-    begun = [
-        min(
-            (
-                _moved_to(anchors[0], other[0])
-                for m, other in enumerate(recordings)
-                if m != n and len(other[0].theta) == len(anchors[0].theta)
-            ),
-            key=lambda b: float(np.sum(b[0].residuals(b[1]) ** 2)),
-            default=(anchors[0].model, anchors[0].theta),
-        )
-        for n, anchors in enumerate(recordings)
-    ]
-    fits = parallel_fits(lambda i: settled(*begun[i]), [model for model, _ in begun], jobs)
-    best = tuple(
-        (other,) if score(other) < score(anchors[0]) else anchors
-        for anchors, other in zip(recordings, fits, strict=True)
-    )
-    return replace(choice, recordings=best)
+    tasks = []
+    for choice in choices:
+        own = [anchors[0] for anchors in choice.recordings]
+        models = [f.model for f in own]
+        for starts in ([f.theta for f in own], with_common_numbers(own)):
+            tasks.append((choice, models, starts))
+    fitted = _side_by_side([(models, starts) for _, models, starts in tasks], jobs, rough=False)
+    best: dict[frozenset[str], SharedChoice] = {}
+    for (choice, models, _), numbers in zip(tasks, fitted, strict=True):
+        recordings = tuple((Fit(m, *n),) for m, n in zip(models, numbers, strict=True))
+        found = replace(choice, recordings=recordings)
+        key = frozenset(choice.effects)
+        best[key] = min(best.get(key, found), found, key=SharedChoice.total)
+    return sorted(best.values(), key=SharedChoice.total)
 
 
-def _moved_to(own: Fit, other: Fit) -> tuple[JointModel, Array]:
-    """Another recording's physics, with its numbers, on one's own recording."""
-    return replace(other.model, observation=own.model.observation), other.theta
+def _side_by_side(begun: Sequence[Begun], jobs: int, *, rough: bool) -> list[list[Numbers]]:
+    """Numbers of the fits of each task; the recordings do not travel between processes."""
+
+    def numbers(task: Begun) -> list[Numbers]:
+        fits = fit_together(*task, rough=rough)
+        return [(f.theta, f.residuals, f.jacobian, f.cost) for f in fits]
+
+    return parallel_map(numbers, begun, jobs)

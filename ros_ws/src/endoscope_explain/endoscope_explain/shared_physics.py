@@ -2,7 +2,7 @@
 
 A rig whose tube is bent differently from one recording to the next keeps its physics, and only its
 parameters change. Explained one by one, two recordings may well be given different names for the
-same misfit; the effects are therefore chosen by the sum of all scores, and fitted one by one.
+same misfit; the effects are therefore chosen by the sum of all scores, and fitted together.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,9 +18,10 @@ from endoscope_explain.pipeline import JointsDifferError, Sources, read_inputs
 from endoscope_explain.shared_choice import (
     Anchors,
     SharedChoice,
-    with_borrowed_numbers,
+    settled_together,
     with_one_more,
 )
+from endoscope_explain.shared_fit import told_alone
 
 BEAM = 3
 """Choices of effects that are gone on with."""
@@ -103,10 +104,10 @@ def shared_effects(
     for joint in recordings[0]:
         nominal = SharedChoice(joint, (), tuple(anchors[joint] for anchors in recordings))
         chosen = _searched(nominal, most_effects, jobs, tell)
-        for physics, anchors in zip(given, chosen.recordings, strict=True):
-            flags = anchors[0].model.flags
-            own = tuple(e for e in chosen.effects if flags[CATALOGUE[e].flag])
-            physics[joint] = without_recording(own, anchors[0])
+        alone = told_alone([anchors[0] for anchors in chosen.recordings])
+        for physics, found in zip(given, alone, strict=True):
+            own = tuple(e for e in chosen.effects if found.model.flags[CATALOGUE[e].flag])
+            physics[joint] = without_recording(own, found)
     return list(given)
 
 
@@ -126,7 +127,7 @@ def _searched(
                 key = frozenset(found.effects)
                 grown[key] = min(found, grown.get(key, found), key=SharedChoice.total)
         chosen = sorted(grown.values(), key=SharedChoice.total)[:BEAM]
-        beam = sorted((with_borrowed_numbers(c, jobs) for c in chosen), key=SharedChoice.total)
+        beam = settled_together(chosen, jobs)
         fall = best.fall_to(beam[0]) if beam else 0.0
         if fall < LEAST_FALL:
             break

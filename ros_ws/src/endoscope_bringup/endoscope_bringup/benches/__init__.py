@@ -5,6 +5,7 @@ BENCHES: tuple[str, ...] = (
     'recorder',
     'explain',
     'closed_loop',
+    'real_rig',
     'simulate',
     'compensation',
     'papers',
