@@ -195,7 +195,8 @@ def _worst(decisions: list[Decision]) -> int | None:
 
 def _siblings(tried: JointSearch) -> tuple[str, ...]:
     """Effects that alone came nearest."""
-    return tuple(c.effects[0] for c in tried.levels[0][:SIBLINGS]) if tried.levels else ()
+    tried_alone = [c.effects[0] for level in tried.levels[:1] for c in level if c.effects]
+    return tuple(dict.fromkeys(tried_alone))[:SIBLINGS]
 
 
 def _is_enough(observations: tuple[JointObservation, ...]) -> bool:

@@ -6,7 +6,11 @@ from endoscope_core.effects import CATALOGUE
 from endoscope_core.plant import EffectSpec
 from endoscope_explain.anchoring import anchored
 from endoscope_explain.explain_recording import explain_recording
+from endoscope_explain.explanation import Verdict
+from endoscope_explain.fit import fit
+from endoscope_explain.given_physics import without_recording
 from endoscope_explain.observation import observe
+from endoscope_explain.screen import with_effect
 from endoscope_explain.shared_physics import shared_effects
 
 GAIN = 0.9
@@ -64,3 +68,15 @@ def test_a_recording_is_explained_by_the_physics_it_is_given(one_joint, recordin
         assert named['gravity']['moment_nm'].value == pytest.approx(moment, rel=0.05)
         assert named['load_cell_gain']['gain'].value == pytest.approx(GAIN, abs=0.005)
         assert explanation.adequate
+
+
+def test_one_effect_that_does_not_explain_a_recording_is_its_only_sibling(one_joint, recordings):
+    plant = one_joint.rig()
+    observations = observe(recordings[0], plant)
+    _, ((refitted, _),) = anchored(recordings[0], observations, plant, 0.5, 1)
+    model = with_effect(refitted.model, 'cogging', {})
+    given = without_recording(('cogging',), fit(model, model.begun_at(refitted.theta)))
+    explanation = explain_recording(recordings[0], plant, band=0.5, given={'bend_x': given})
+    assert explanation.verdict is Verdict.UNKNOWN_PHYSICS
+    assert explanation.unknown is not None
+    assert explanation.unknown.siblings == ('cogging',)
