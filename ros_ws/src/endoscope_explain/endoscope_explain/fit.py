@@ -104,6 +104,10 @@ class JointModel:
         """Inverse spreads."""
         return np.array([1.0 / item.spread for item in self.free])
 
+    def cost(self, residuals: Array, theta: Array) -> float:
+        """Half squares of residuals at the coordinates `theta`, prior included."""
+        return 0.5 * float(residuals @ residuals + np.sum(self.prior(theta) ** 2))
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -162,6 +166,20 @@ def jacobian(model: JointModel, theta: Array, at: Array, columns: list[int] | No
         step = step if theta[c] + step <= high[c] else -step
         moved[c] = max(theta[c] + step, low[c])
         result[:, i] = (model.residuals(moved) - at) / (moved[c] - theta[c])
+    return result
+
+
+def central_jacobian(model: JointModel, theta: Array, step: float) -> Array:
+    """Central difference quotients (size, n) of the residuals at `theta`, by `step` at least."""
+    low, high = model.bounds()
+    result = np.empty((model.observation.size, len(theta)))
+    for k, item in enumerate(model.free):
+        reach = max(step, model.step) * (1.0 if item.logarithmic else 2.0)
+        below, above = theta.copy(), theta.copy()
+        below[k] = max(theta[k] - reach, low[k])
+        above[k] = min(theta[k] + reach, high[k])
+        moved = model.residuals(above) - model.residuals(below)
+        result[:, k] = moved / (above[k] - below[k])
     return result
 
 

@@ -78,10 +78,7 @@ def _quasi_newton(
     low, high = model.bounds()
     weight = model.prior_weight()
 
-    def cost_of(values: Array, at: Array) -> float:
-        return 0.5 * float(values @ values + np.sum(model.prior(at) ** 2))
-
-    cost = cost_of(residuals, theta)
+    cost = model.cost(residuals, theta)
     damping = 1e-3
     for _ in range(steps):
         normal = derivative.T @ derivative + np.diag(weight**2)
@@ -93,7 +90,7 @@ def _quasi_newton(
             break
         trial = model.residuals(theta + step)
         derivative += np.outer((trial - residuals - derivative @ step) / length, step)
-        trial_cost = cost_of(trial, theta + step)
+        trial_cost = model.cost(trial, theta + step)
         if trial_cost < cost:
             theta, residuals, cost = theta + step, trial, trial_cost
             damping = max(damping / 5.0, 1e-6)

@@ -38,8 +38,7 @@ def robustly_refitted(found: Fit) -> Fit:
     """
     for _ in range(PASSES):
         found = fit(found.model, found.theta, weight=_weights(found), iterations=STEPS)
-    prior = found.model.prior(found.theta)
-    return replace(found, cost=0.5 * float(found.residuals @ found.residuals + prior @ prior))
+    return replace(found, cost=found.model.cost(found.residuals, found.theta))
 
 
 def _weights(found: Fit) -> Array:

@@ -24,8 +24,6 @@ from endoscope_explain.whiteness import is_noise
 
 Array = NDArray[np.float64]
 Anchors = tuple[Fit, ...]
-Numbers = tuple[Array, Array, Array, float]
-"""Of a fit: coordinates, residuals, derivative, cost."""
 Begun = tuple[list[JointModel], list[Array]]
 """Models of all recordings, and the coordinates at which their fit begins."""
 Variant = tuple[str, tuple[float, ...]]
@@ -93,12 +91,8 @@ def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
     fitted = _side_by_side(begun, jobs, rough=True)
     return sorted(
         (
-            SharedChoice(
-                choice.joint,
-                (*choice.effects, variant[0]),
-                tuple((Fit(m, *n),) for m, n in zip(models, numbers, strict=True)),
-            )
-            for variant, (models, _), numbers in zip(promising, begun, fitted, strict=True)
+            SharedChoice(choice.joint, (*choice.effects, variant[0]), recordings)
+            for variant, recordings in zip(promising, fitted, strict=True)
         ),
         key=SharedChoice.total,
     )
@@ -177,27 +171,29 @@ def settled_together(choices: Sequence[SharedChoice], jobs: int) -> list[SharedC
     list of SharedChoice
         Best first.
     """
-    tasks = []
+    twice: list[SharedChoice] = []
+    begun: list[Begun] = []
     for choice in choices:
         own = [anchors[0] for anchors in choice.recordings]
-        models = [f.model for f in own]
         for starts in ([f.theta for f in own], with_common_numbers(own)):
-            tasks.append((choice, models, starts))
-    fitted = _side_by_side([(models, starts) for _, models, starts in tasks], jobs, rough=False)
+            twice.append(choice)
+            begun.append(([f.model for f in own], starts))
     best: dict[frozenset[str], SharedChoice] = {}
-    for (choice, models, _), numbers in zip(tasks, fitted, strict=True):
-        recordings = tuple((Fit(m, *n),) for m, n in zip(models, numbers, strict=True))
+    for choice, recordings in zip(twice, _side_by_side(begun, jobs, rough=False), strict=True):
         found = replace(choice, recordings=recordings)
         key = frozenset(choice.effects)
         best[key] = min(best.get(key, found), found, key=SharedChoice.total)
     return sorted(best.values(), key=SharedChoice.total)
 
 
-def _side_by_side(begun: Sequence[Begun], jobs: int, *, rough: bool) -> list[list[Numbers]]:
-    """Numbers of the fits of each task; the recordings do not travel between processes."""
+def _side_by_side(begun: Sequence[Begun], jobs: int, *, rough: bool) -> list[tuple[Anchors, ...]]:
+    """Fits of each task; only their numbers travel between processes, not the recordings."""
 
-    def numbers(task: Begun) -> list[Numbers]:
+    def numbers(task: Begun) -> list[tuple[Array, Array, Array, float]]:
         fits = fit_together(*task, rough=rough)
         return [(f.theta, f.residuals, f.jacobian, f.cost) for f in fits]
 
-    return parallel_map(numbers, begun, jobs)
+    return [
+        tuple((Fit(model, *n),) for model, n in zip(models, found, strict=True))
+        for (models, _), found in zip(begun, parallel_map(numbers, begun, jobs), strict=True)
+    ]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.effects import CATALOGUE, Stage
 from endoscope_core.effects.slots import NOMINAL_KEYS, START_FRICTION
-from endoscope_explain.fit import STEP, Fit, JointModel, bounded_step
+from endoscope_explain.fit import STEP, Fit, JointModel, bounded_step, central_jacobian
 from endoscope_explain.free_parameters import LEAD, FreeParameter
 
 Array = NDArray[np.float64]
@@ -27,13 +27,12 @@ SPREAD = 0.1
 FIRST_SPREAD = 0.5
 """Scatter that is allowed at first, so that a recording finds its way to the others."""
 
-OF_A_DEVICE = frozenset({Stage.ACTUATOR, Stage.SENSING})
 _OF_A_DEVICE = frozenset(
-    {LEAD, *(NOMINAL_KEYS.index(key) for key in ('motor_bandwidth', 'motor_damping_ratio'))}
+    NOMINAL_KEYS.index(key) for key in ('motor_bandwidth', 'motor_damping_ratio')
 ) | {
     place
     for definition in CATALOGUE.values()
-    if definition.stage in OF_A_DEVICE
+    if definition.stage in (Stage.ACTUATOR, Stage.SENSING)
     for place in definition.places
 }
 _OF_A_SHAPE = frozenset(
@@ -121,24 +120,12 @@ def fit_together(
     else:
         whole = _descend(models, layout, whole, FIRST_SPREAD, ON_THE_WAY)
         whole = _descend(models, layout, whole, SPREAD, THOROUGH)
-    derivatives = _derivatives(models, layout, whole, STEP)
-    fits = []
-    for model, columns, (residuals, jacobian) in zip(
-        models, layout.columns, derivatives, strict=True
-    ):
-        theta = whole[columns]
-        prior = model.prior(theta)
-        cost = 0.5 * float(residuals @ residuals + prior @ prior)
-        fits.append(Fit(model, theta, residuals, jacobian, cost))
-    return fits
+    return _fits(models, layout, whole, STEP)
 
 
 def with_common_numbers(fits: Sequence[Fit]) -> list[Array]:
     """Coordinates of each recording with pooled ones at the median of all recordings."""
-    layout = _layout([f.model for f in fits])
-    whole = np.zeros(len(layout.low))
-    for found, columns in zip(fits, layout.columns, strict=True):
-        whole[columns] = found.theta
+    layout, whole = _laid_out(fits)
     for pool in layout.pools:
         whole[pool] = np.median(whole[pool])
     return [whole[columns] for columns in layout.columns]
@@ -157,38 +144,33 @@ def told_alone(fits: Sequence[Fit]) -> list[Fit]:
     list of Fit
         Devices are held as found; a pooled parameter has the others' mean and scatter for a prior.
     """
-    layout = _layout([f.model for f in fits])
-    whole = np.zeros(len(layout.low))
-    for found, columns in zip(fits, layout.columns, strict=True):
-        whole[columns] = found.theta
-    mean = whole.copy()
-    for pool in layout.pools:
-        mean[pool] = np.mean(whole[pool])
-    pooled = np.isin(np.arange(len(whole)), np.concatenate([*layout.pools, np.zeros(0)]))
+    layout, whole = _laid_out(fits)
+    means = {int(place): float(np.mean(whole[pool])) for pool in layout.pools for place in pool}
     alone = []
     for found, columns in zip(fits, layout.columns, strict=True):
         model = found.model
         base, _ = model.packed(found.theta)
-        kept = [k for k, item in enumerate(model.free) if item.index not in _HELD]
-        free = tuple(
-            _drawn_to(model.free[k], float(mean[columns[k]]))
-            if pooled[columns[k]]
-            else model.free[k]
-            for k in kept
-        )
+        kept = [k for k, item in enumerate(model.free) if item.index not in _OF_A_DEVICE]
+        free = tuple(_drawn_to(model.free[k], means.get(int(columns[k]))) for k in kept)
         told = replace(model, base=base, free=free)
         theta = found.theta[kept]
-        prior = told.prior(theta)
-        cost = 0.5 * float(found.residuals @ found.residuals + prior @ prior)
+        cost = told.cost(found.residuals, theta)
         alone.append(Fit(told, theta, found.residuals, found.jacobian[:, kept], cost))
     return alone
 
 
-_HELD = _OF_A_DEVICE - {LEAD}
+def _laid_out(fits: Sequence[Fit]) -> tuple[_Layout, Array]:
+    layout = _layout([f.model for f in fits])
+    whole = np.zeros(len(layout.low))
+    for found, columns in zip(fits, layout.columns, strict=True):
+        whole[columns] = found.theta
+    return layout, whole
 
 
-def _drawn_to(item: FreeParameter, mean: float) -> FreeParameter:
-    """The parameter with the prior that it has, times that of the other recordings."""
+def _drawn_to(item: FreeParameter, mean: float | None) -> FreeParameter:
+    """The parameter with the prior that it has, times that of the other recordings if any."""
+    if mean is None:
+        return item
     own = 0.0 if math.isinf(item.spread) else item.spread**-2
     others = SPREAD**-2
     return replace(
@@ -215,7 +197,7 @@ def _layout(models: Sequence[JointModel]) -> _Layout:
             low.append(float(lowest[k]))
             high.append(float(highest[k]))
             own.append(place)
-            if item.index in _OF_A_DEVICE:
+            if item.index == LEAD or item.index in _OF_A_DEVICE:
                 tied[item.index] = place
             elif item.index not in _OF_A_SHAPE:
                 pools.setdefault(item.index, []).append(place)
@@ -237,19 +219,19 @@ def _descend(
 ) -> Array:
     """Levenberg-Marquardt on all coordinates; a longer difference step where it does not go on."""
 
-    def cost_of(residuals: Sequence[Array], at: Array) -> float:
-        squares = sum(float(r @ r) for r in residuals)
+    def cost_of(at: Array) -> float:
+        cost = 0.0
         for model, columns in zip(models, layout.columns, strict=True):
-            squares += float(np.sum(model.prior(at[columns]) ** 2))
+            cost += model.cost(model.residuals(at[columns]), at[columns])
         for pool in layout.pools:
-            squares += float(np.sum((at[pool] - np.mean(at[pool])) ** 2)) / spread**2
-        return 0.5 * squares
+            cost += 0.5 * float(np.sum((at[pool] - np.mean(at[pool])) ** 2)) / spread**2
+        return cost
 
-    cost = cost_of(_residuals(models, layout, whole), whole)
+    cost = cost_of(whole)
     damping, steps = 1e-4, effort.steps
     for _ in range(effort.iterations):
-        derivatives = _derivatives(models, layout, whole, steps[0])
-        normal, gradient = _normal_equations(models, layout, whole, derivatives, spread)
+        fits = _fits(models, layout, whole, steps[0])
+        normal, gradient = _normal_equations(fits, layout, whole, spread)
         scale = np.maximum(np.diag(normal), 1e-9)
         before = cost
         damping = min(damping, 1e-2)
@@ -258,7 +240,7 @@ def _descend(
                 normal + damping * np.diag(scale), gradient, whole, layout.low, layout.high
             )
             trial = whole + step
-            trial_cost = cost_of(_residuals(models, layout, trial), trial)
+            trial_cost = cost_of(trial)
             if trial_cost < cost:
                 whole, cost = trial, trial_cost
                 damping = max(damping / 10.0, 1e-7)
@@ -271,46 +253,28 @@ def _descend(
     return whole
 
 
-def _residuals(models: Sequence[JointModel], layout: _Layout, whole: Array) -> list[Array]:
-    return [m.residuals(whole[c]) for m, c in zip(models, layout.columns, strict=True)]
-
-
-def _derivatives(
-    models: Sequence[JointModel], layout: _Layout, whole: Array, step: float
-) -> list[tuple[Array, Array]]:
-    """Residuals and their central difference quotients, recording by recording."""
-    found = []
+def _fits(models: Sequence[JointModel], layout: _Layout, whole: Array, step: float) -> list[Fit]:
+    """Each recording at its part of the coordinates, with its derivative by differences."""
+    fits = []
     for model, columns in zip(models, layout.columns, strict=True):
         theta = whole[columns]
-        low, high = model.bounds()
-        at = model.residuals(theta)
-        result = np.empty((len(at), len(theta)))
-        for k, item in enumerate(model.free):
-            reach = max(step, model.step) * (1.0 if item.logarithmic else 2.0)
-            below, above = theta.copy(), theta.copy()
-            below[k] = max(theta[k] - reach, low[k])
-            above[k] = min(theta[k] + reach, high[k])
-            moved = model.residuals(above) - model.residuals(below)
-            result[:, k] = moved / (above[k] - below[k])
-        found.append((at, result))
-    return found
+        residuals = model.residuals(theta)
+        derivative = central_jacobian(model, theta, step)
+        fits.append(Fit(model, theta, residuals, derivative, model.cost(residuals, theta)))
+    return fits
 
 
 def _normal_equations(
-    models: Sequence[JointModel],
-    layout: _Layout,
-    whole: Array,
-    derivatives: Sequence[tuple[Array, Array]],
-    spread: float,
+    fits: Sequence[Fit], layout: _Layout, whole: Array, spread: float
 ) -> tuple[Array, Array]:
     normal = np.zeros((len(whole), len(whole)))
     gradient = np.zeros(len(whole))
-    for model, columns, (residuals, jacobian) in zip(
-        models, layout.columns, derivatives, strict=True
-    ):
-        weight = model.prior_weight()
-        normal[np.ix_(columns, columns)] += jacobian.T @ jacobian + np.diag(weight**2)
-        gradient[columns] += jacobian.T @ residuals + weight * model.prior(whole[columns])
+    for found, columns in zip(fits, layout.columns, strict=True):
+        weight = found.model.prior_weight()
+        derivative = found.jacobian
+        normal[np.ix_(columns, columns)] += derivative.T @ derivative + np.diag(weight**2)
+        gradient[columns] += derivative.T @ found.residuals
+        gradient[columns] += weight * found.model.prior(found.theta)
     for pool in layout.pools:
         together = (np.eye(len(pool)) - 1.0 / len(pool)) / spread**2
         normal[np.ix_(pool, pool)] += together

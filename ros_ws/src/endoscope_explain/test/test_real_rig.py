@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from endoscope_bags import open_bag
+from endoscope_core.trials.real_recordings import CYCLE_S
 from endoscope_explain.benchmark.real_rig import (
     ARC,
-    CYCLE_S,
     MODELS,
     PLANT,
     models_of_the_angle,

@@ -28,7 +28,8 @@ from endoscope_core.metrics.tension_loop import tension_loop_width
 
 Array = NDArray[np.float64]
 
-_CYCLE = 2.0 * np.pi
+CYCLE_S = 2.0 * np.pi
+"""Seconds of one cycle, and its phase: the motion is a sine of 1 rad/s."""
 _SETTLED = (0.5 * np.pi, 2.5 * np.pi)
 _PHASE, _DESIRED, _ACTUAL, _POSITIVE, _NEGATIVE = 0, 1, 3, 4, 5
 
@@ -107,7 +108,7 @@ def real_recordings() -> list[RealRecording]:
 
 def fit_first_cycle(recording: RealRecording, model: str, seed: int) -> ModelFit:
     """A model of the first cycle."""
-    first = recording.within(0.0, _CYCLE)
+    first = recording.within(0.0, CYCLE_S)
     return fit_model([closed_cycle(recording.desired[first], recording.actual[first])], seed, model)
 
 
@@ -119,8 +120,8 @@ def models_on_real_recordings(
     for recording in recordings:
         error = fit_first_cycle(recording, model, seed).predict(recording.desired)
         error = error - recording.actual
-        first = recording.within(0.0, _CYCLE)
-        second = recording.within(_CYCLE, 2.0 * _CYCLE)
+        first = recording.within(0.0, CYCLE_S)
+        second = recording.within(CYCLE_S, 2.0 * CYCLE_S)
         found[recording.bend] = tuple(
             float(np.sqrt(np.mean(error[part] ** 2))) for part in (first, second)
         )
@@ -170,7 +171,7 @@ def left_one_out(recordings: Sequence[RealRecording], model: str, seed: int) -> 
             model,
             [TableEntry(s, fits[r.bend], str(r.bend)) for r, s in zip(others, sizes, strict=True)],
         )
-        settled = left_out.within(_SETTLED[0], 2.0 * _CYCLE)
+        settled = left_out.within(_SETTLED[0], 2.0 * CYCLE_S)
         error = left_out.actual[settled] - left_out.desired[settled]
         left: float | None
         try:

@@ -19,7 +19,7 @@ from endoscope_core.effects import CATALOGUE
 from endoscope_core.effects.slots import NOMINAL_KEYS
 from endoscope_core.plant import PlantDescription, SensorParameters
 from endoscope_core.plant.parameters import JointParameters
-from endoscope_core.trials.real_recordings import RealRecording, fit_first_cycle
+from endoscope_core.trials.real_recordings import CYCLE_S, RealRecording, fit_first_cycle
 from endoscope_explain.anchoring import anchored
 from endoscope_explain.fit import Fit, JointModel
 from endoscope_explain.given_physics import GivenPhysics
@@ -33,7 +33,6 @@ from endoscope_explain.recording.series import MOTOR
 Array = NDArray[np.float64]
 
 JOINT = 'bend_x'
-CYCLE_S = 2.0 * np.pi
 ARC = 2.0
 """Bending angle of an arc by the angle of its chord."""
 PLANT = PlantDescription(
