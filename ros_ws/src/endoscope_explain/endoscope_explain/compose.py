@@ -119,7 +119,7 @@ def nominal_anchors(
 
 
 def grow(
-    parents: Sequence[Parent], effect_ids: Sequence[str], jobs: int, polished: int
+    parents: Sequence[Parent], effect_ids: Sequence[str], jobs: int, most: int
 ) -> list[Composition]:
     """Compositions with one more effect than their parents, the most promising ones refitted.
 
@@ -130,7 +130,7 @@ def grow(
     effect_ids : sequence of str
     jobs : int
         Processes side by side.
-    polished : int
+    most : int
         How many to fit fully, at most, over all parents.
 
     Returns
@@ -147,13 +147,13 @@ def grow(
         looks.sort(key=lambda item: set(item.effects) != promised)
     grown: list[Composition] = []
     batch = max(jobs, 2)
-    while looks and len(grown) < polished:
+    while looks and len(grown) < most:
         best = min((c.fit.cost for c in grown), default=float('inf'))
         now = [item for item in looks[:batch] if item.cost < WORTH_POLISHING * best]
         looks = looks[batch:]
         if not now:
             break
-        grown += _polished(now, jobs)
+        grown += polished(now, jobs)
     return sorted(grown, key=lambda c: c.score)
 
 
@@ -203,6 +203,7 @@ def _looks(
     return sorted(best.values(), key=lambda item: item.cost)
 
 
-def _polished(looks: Sequence[Look], jobs: int) -> list[Composition]:
+def polished(looks: Sequence[Look], jobs: int) -> list[Composition]:
+    """Full fits of what was looked at, in the same order, with `jobs` processes side by side."""
     fits = parallel_fits(lambda i: polish(looks[i]), [item.model for item in looks], jobs)
     return [Composition(item.effects, f, score(f)) for item, f in zip(looks, fits, strict=True)]

@@ -17,6 +17,9 @@ ONSET = 'time_s'
 COARSE_S = 0.5
 FINE_S = 0.1
 FINE_REACH_S = 0.6
+RISE = 'duration_s'
+"""Name of the parameters that say how long it took to begin."""
+SHORT_S = 0.02
 REFIT_STEPS = 6
 
 
@@ -39,6 +42,31 @@ def redated(found: Fit) -> Fit:
             dated = item.value(float(found.theta[place]))
             near = dated + np.arange(-FINE_REACH_S, FINE_REACH_S + 0.5 * FINE_S, FINE_S)
             found = _better(found, place, near[(near > 0.0) & (near < end)])
+            found = _sharpened(found, place)
+    return found
+
+
+def _sharpened(found: Fit, place: int) -> Fit:
+    """Look whether what a fit has rise slowly rose at once.
+
+    The true instant and a slow rise around a later one are two valleys: in between, a joint held by
+    friction moves at the wrong time.
+    """
+    free = found.model.free
+    names = [item.name for item in free]
+    if RISE not in names:
+        return found
+    rise_place = names.index(RISE)
+    rise = free[rise_place].value(float(found.theta[rise_place]))
+    dated = free[place].value(float(found.theta[place]))
+    if rise <= SHORT_S or dated > found.model.observation.duration:
+        return found
+    for time in (dated - 0.5 * rise, dated):
+        theta = found.theta.copy()
+        theta[place] = free[place].coordinate(time)
+        theta[rise_place] = free[rise_place].coordinate(SHORT_S)
+        other = fit(found.model, theta, iterations=REFIT_STEPS)
+        found = other if other.cost < found.cost else found
     return found
 
 

@@ -13,6 +13,7 @@ from endoscope_explain.fit import Fit
 from endoscope_explain.many_starts import RUGGED, from_many_starts
 from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.reconsider import reconsidered
+from endoscope_explain.refit_from_description import from_description
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.robust_refit import robustly_refitted
 from endoscope_explain.score import NEARLY_NOISE, score
@@ -82,9 +83,11 @@ def search(
         effects = tuple(e for e in effects if e not in DEPENDS_ON_TIME)
     parents: list[Parent] = [(nominal, anchors)]
     for level in range(depth):
-        polished = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
-        grown = grow(parents, effects, jobs, polished)
-        if level > 0 and grown and grown[0].above_noise() > NEARLY_NOISE:
+        most = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
+        grown = grow(parents, effects, jobs, most)
+        if level > 0 and _may_be_led_astray(grown):
+            grown = list(_sorted(grown, from_description(grown, anchors[1], jobs)))
+        if level > 0 and _may_be_led_astray(grown):
             grown = list(_sorted(grown, _grown_robustly(parents, effects, jobs)))
         if grown and grown[0].effects == (RUGGED,) and not is_noise(grown[0].fit):
             grown[0] = from_many_starts(grown[0], anchors[1], jobs)
@@ -105,14 +108,20 @@ def search(
     return JointSearch(nominal, tuple(levels))
 
 
+def _may_be_led_astray(grown: Sequence[Composition]) -> bool:
+    """Return whether much is left, and not by slips, whose instants are nobody's to explain."""
+    return (
+        bool(grown)
+        and grown[0].above_noise() > NEARLY_NOISE
+        and not slips(grown[0].fit.model.observation)
+    )
+
+
 def _grown_robustly(
     parents: Sequence[Parent], effects: Sequence[str], jobs: int
 ) -> list[Composition]:
-    """Add to what the parents say of the larger part of the motion.
-
-    Not where wires stick and slip: the instants of the slips are nobody's to explain.
-    """
-    chosen = [c for c, _ in parents if not slips(c.fit.model.observation)]
+    """Add to what the parents say of the larger part of the motion."""
+    chosen = [c for c, _ in parents]
     fits = parallel_fits(
         lambda i: robustly_refitted(chosen[i].fit), [c.fit.model for c in chosen], jobs
     )

@@ -7,19 +7,22 @@ import pytest
 
 from endoscope_core.effects import CATALOGUE
 from endoscope_core.plant import EffectSpec
-from endoscope_explain.compose import nominal_anchors
+from endoscope_explain.compose import Composition, nominal_anchors
 from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.fit import fit
 from endoscope_explain.observation import observe
 from endoscope_explain.onset_scan import redated
+from endoscope_explain.refit_from_description import from_description
 from endoscope_explain.robust_refit import robustly_refitted
+from endoscope_explain.score import score
 from endoscope_explain.screen import promises, unexplained, with_effect
+from endoscope_explain.whiteness import is_noise
 
 
-def anchors(one_joint, effect_id, parameters):
-    """Nominal plant, refitted and as described, of a rig that has an effect."""
+def anchors(one_joint, effect_id, parameters, *others):
+    """Nominal plant, refitted and as described, of a rig that has an effect, and `others`."""
     plant = one_joint.rig()
-    true = one_joint.rig(EffectSpec(effect_id, 'bend_x', parameters))
+    true = one_joint.rig(EffectSpec(effect_id, 'bend_x', parameters), *others)
     (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
     return nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
 
@@ -34,6 +37,16 @@ def test_a_load_that_was_dated_seconds_late_is_dated_again(one_joint):
     assert abs(late.model.packed(late.theta)[0][first + 1] - 3.2) > 1.0
     assert dated[first + 1] == pytest.approx(3.2, abs=0.05)
     assert dated[first] == pytest.approx(0.004, rel=0.03)
+
+
+def test_a_load_that_came_at_once_in_motion_is_not_left_rising_slowly(one_joint):
+    load = {'moment_nm': -0.008, 'time_s': 4.1, 'duration_s': 0.03}
+    refitted, described = anchors(one_joint, 'external_load', load)
+    slow = {**load, 'time_s': 4.19, 'duration_s': 0.17}
+    model = with_effect(refitted.model, 'external_load', slow)
+    rising = fit(model, model.begun_at(described.theta), iterations=10)
+    assert not is_noise(rising)
+    assert is_noise(redated(rising))
 
 
 def test_a_load_after_the_end_has_no_other_date(one_joint):
@@ -70,3 +83,25 @@ def test_what_a_stop_does_beyond_an_angle_bends_no_parameters_of_a_robust_fit(on
     assert np.abs(refitted.theta - true.theta)[nominal].max() > 0.1
     assert np.abs(robust.theta - true.theta)[nominal].max() < 0.03
     assert robust.cost > refitted.cost
+
+
+def test_two_effects_are_found_from_the_described_plant_with_the_other_choice(one_joint):
+    refitted, described = anchors(
+        one_joint,
+        'rate_limit',
+        {'limit_rad_per_s': 1.5, 'of_command': 0.0},
+        EffectSpec('transport_delay', 'bend_x', {'delay_s': 0.037}),
+    )
+    limited = with_effect(refitted.model, 'rate_limit', {'limit_rad_per_s': 1.5, 'of_command': 1.0})
+    first = fit(limited, limited.begun_at(refitted.theta), iterations=10)
+    late = with_effect(limited, 'transport_delay', {'delay_s': 0.03})
+    both = fit(late, late.begun_at(first.theta), iterations=10)
+    effects = ('rate_limit', 'transport_delay')
+    found = from_description([Composition(effects, both, score(both))], described, 1)
+    best = min(found, key=lambda c: c.score)
+    values, _ = best.fit.model.packed(best.fit.theta)
+    assert not is_noise(both)
+    assert is_noise(best.fit)
+    assert values[CATALOGUE['rate_limit'].first_parameter + 1] == 0.0
+    delay = values[CATALOGUE['transport_delay'].first_parameter]
+    assert delay == pytest.approx(0.037, rel=0.03)
