@@ -18,8 +18,10 @@ ADDED_SHARE = 0.25
 """Share of the fall so far that a second effect must bring: less is an error of form. Third ones
 and more are looked for only where they were asked for."""
 ADDED_SHARE_TO_NOISE = 0.08
-"""The same where only noise, or no more score than noise has, is left then: no error of form looks
-just like another effect."""
+"""The same where hardly more than noise is left then: no error of form looks just like another
+effect."""
+HARDLY_MORE = 0.1
+"""Share of what the first effect left above noise up to which that is so."""
 EXPLAINED = 0.68
 """Share of the misfit's logarithm that the catalogue must explain to be called adequate."""
 BARELY = 0.2
@@ -171,7 +173,8 @@ def _better(
 ) -> Composition | None:
     so_far = nominal.score - chosen.score
     alike = [c for c in level if is_noise(c.fit)]
-    like_noise = alike or any(c.above_noise() < 0.0 for c in level)
+    left = HARDLY_MORE * chosen.above_noise() if chosen.effects else 0.0
+    like_noise = alike or any(c.above_noise() < left for c in level)
     share = ADDED_SHARE_TO_NOISE if like_noise else ADDED_SHARE
     if len(chosen.effects) > 1:
         share = 0.0

@@ -14,7 +14,7 @@ DEFINITION = define(
     'Mechatronics 24, 2014; dead zone: Agrawal, Peine, Yao, IEEE Trans. Robot. 26(6), 2010',
     parameters=(
         EffectParameter('length_m', 'm', 0.0, 0.02, 0.0035, off=0.0, starts=(0.0, 0.0028, 0.0045)),
-        EffectParameter('dead_zone_m', 'm', 0.0, 5e-3, 0.0, starts=(0.0, 5e-4)),
+        EffectParameter('dead_zone_m', 'm', 0.0, 5e-3, 0.0, starts=(0.0, 5e-5, 5e-4)),
         EffectParameter('sharpness', '-', 1.0, 10.0, 3.0),
     ),
 )

@@ -1,8 +1,17 @@
-"""What is said of two joints that one tracker reads."""
+"""What is said of a joint's compositions, and of two joints that one tracker reads."""
 
 from types import SimpleNamespace
 
-from endoscope_explain.decision import Decision, with_devices_agreed
+import numpy as np
+import pytest
+
+from endoscope_explain.compose import Composition, nominal_model
+from endoscope_explain.decision import Decision, decide, with_devices_agreed
+from endoscope_explain.evaluate import packed_joint
+from endoscope_explain.fit import Fit
+from endoscope_explain.observation import observe
+from endoscope_explain.score import score
+from endoscope_explain.search import JointSearch
 
 
 def composition(*effects):
@@ -44,3 +53,41 @@ def test_nothing_spreads_from_a_joint_that_is_itself_in_doubt():
         decided('joint_inertia', ('tracker_delay',)),
     ]
     assert with_devices_agreed(searches, decisions) == decisions
+
+
+@pytest.fixture
+def leaving(one_joint):
+    """Makes a composition from what it leaves of the angle and of all else, in noise units."""
+    plant = one_joint.rig()
+    (observation,) = observe(one_joint.record(plant, one_joint.motion()), plant)
+    model = nominal_model(observation, *packed_joint(plant, 'bend_x'))
+    theta = np.array([item.mean for item in model.free])
+
+    def made(effects, angle, others):
+        residuals = np.concatenate(
+            [
+                np.full(part.stop - part.start, angle if c.quantity == 'bending' else others)
+                for c, part in zip(observation.channels, observation.slices(), strict=True)
+            ]
+        )
+        fit = Fit(model, theta, residuals, np.empty(0), model.cost(residuals, theta))
+        return Composition(effects, fit, score(fit))
+
+    return made
+
+
+@pytest.mark.parametrize(
+    ('left', 'named'),
+    [(1.2, ('joint_inertia', 'tracker_drift')), (2.0, ('joint_inertia',))],
+)
+def test_a_small_second_effect_is_named_where_it_leaves_hardly_more_than_noise(
+    leaving, left, named
+):
+    search = JointSearch(
+        leaving((), 1e3, 1e3),
+        (
+            (leaving(('joint_inertia',), 17.0, 0.9),),
+            (leaving(('joint_inertia', 'tracker_drift'), left, 0.9),),
+        ),
+    )
+    assert decide(search).chosen.effects == named

@@ -75,6 +75,13 @@ def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(one_j
     assert gains[min(gains)] < 0.5 * found[0].gain
 
 
+def test_a_small_dead_zone_promises_most_at_a_small_start(one_joint):
+    _, described = anchors(one_joint, 'wire_slack', {'length_m': 0.0, 'dead_zone_m': 4e-5})
+    best, second, *_ = promises(unexplained(described), 'wire_slack')
+    assert best.start['dead_zone_m'] < 2e-4
+    assert best.gain > 2.0 * second.gain
+
+
 def test_what_a_stop_does_beyond_an_angle_bends_no_parameters_of_a_robust_fit(one_joint):
     refitted, true = anchors(one_joint, 'joint_stop', {'angle_rad': 0.6, 'stiffness': 0.15})
     robust = robustly_refitted(refitted)
