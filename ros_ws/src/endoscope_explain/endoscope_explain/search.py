@@ -13,7 +13,7 @@ from endoscope_explain.fit import Fit
 from endoscope_explain.many_starts import RUGGED, from_many_starts
 from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.reconsider import reconsidered
-from endoscope_explain.refit_from_description import from_description
+from endoscope_explain.refit_from_description import from_description, promised_by_description
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.robust_refit import robustly_refitted
 from endoscope_explain.score import NEARLY_NOISE, score
@@ -85,6 +85,9 @@ def search(
     for level in range(depth):
         most = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
         grown = grow(parents, effects, jobs, most)
+        if level == 0 and _may_be_led_astray(grown):
+            promised = promised_by_description(anchors[1], effects, jobs)
+            grown = list(_sorted(grown, promised))
         if level > 0 and _may_be_led_astray(grown):
             grown = list(_sorted(grown, from_description(grown, anchors[1], jobs)))
         if level > 0 and _may_be_led_astray(grown):

@@ -7,12 +7,12 @@ import pytest
 
 from endoscope_core.effects import CATALOGUE
 from endoscope_core.plant import EffectSpec
-from endoscope_explain.compose import Composition, nominal_anchors
+from endoscope_explain.compose import Composition, nominal_anchors, nominal_model
 from endoscope_explain.evaluate import packed_joint
-from endoscope_explain.fit import fit
+from endoscope_explain.fit import fit, jacobian
 from endoscope_explain.observation import observe
 from endoscope_explain.onset_scan import redated
-from endoscope_explain.refit_from_description import from_description
+from endoscope_explain.refit_from_description import from_description, promised_by_description
 from endoscope_explain.robust_refit import robustly_refitted
 from endoscope_explain.score import score
 from endoscope_explain.screen import promises, unexplained, with_effect
@@ -112,3 +112,27 @@ def test_two_effects_are_found_from_the_described_plant_with_the_other_choice(on
     assert values[CATALOGUE['rate_limit'].first_parameter + 1] == 0.0
     delay = values[CATALOGUE['transport_delay'].first_parameter]
     assert delay == pytest.approx(0.037, rel=0.03)
+
+
+def test_a_torque_limit_is_found_from_the_described_plant(one_joint):
+    refitted, described = anchors(one_joint, 'torque_limit', {'limit_nm': 0.0505, 'droop': 1e-3})
+    found = promised_by_description(described, ('torque_limit', 'gear_backlash', 'cogging'), 1)
+    best = min(found, key=lambda c: c.score)
+    assert not is_noise(refitted)
+    assert best.effects == ('torque_limit',)
+    assert is_noise(best.fit)
+
+
+def test_a_number_that_may_hardly_move_has_a_derivative_over_a_wide_step(one_joint):
+    plant = one_joint.rig()
+    true = one_joint.rig(EffectSpec('stribeck_friction', 'bend_x', {'rise': 0.5}))
+    (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
+    narrow = nominal_model(observation, *packed_joint(plant, 'bend_x'), band=0.03)
+    start = {'rise': 0.5, 'stribeck_speed': 2e-3, 'lagging': 1.0}
+    model = with_effect(narrow, 'stribeck_friction', start)
+    low, high = model.bounds()
+    theta = np.clip(model.begun_at(low[: len(narrow.free)]), low, high)
+    derivative = jacobian(model, theta, model.residuals(theta))
+    assert (high - low)[0] < model.step
+    assert np.all(np.isfinite(derivative))
+    assert np.any(derivative[:, 0] != 0.0)
