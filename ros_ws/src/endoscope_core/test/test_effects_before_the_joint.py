@@ -372,6 +372,21 @@ def test_a_chain_that_turns_is_integrated_alike_with_few_and_many_substeps():
     assert np.abs(few - many).max() < 1e-3
 
 
+@pytest.mark.parametrize('nodes', [2, 4, 8])
+def test_a_wire_in_a_chain_creeps_under_the_mean_of_its_tensions(nodes):
+    held = step_command(2.4, rise=1000)
+    creep = ('wire_creep', {'compliance_ratio': 0.6, 'time_constant_s': 0.5, 'slow_share': 0.0})
+    chain = ('distributed_friction', {'share': 1.0, 'nodes': nodes, 'free_end': 0.5 / nodes})
+
+    def lost(*sheath):
+        stiff, soft = (answer(held, *sheath, *own).tension[-1, 0, 0] for own in ((), (creep,)))
+        return stiff - soft
+
+    # Behind the friction the joint's end of the wire has less tension than at rest, and would make
+    # the whole wire shorter.
+    assert 0.5 * lost() < lost(chain) < lost()
+
+
 def test_distributed_friction_lets_the_joint_wait_for_the_sliding_front():
     def moves_at(*effects):
         bending = answer(step_command(0.4, rise=2000), *effects).bending[:, 0]

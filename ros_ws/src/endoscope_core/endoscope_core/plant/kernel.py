@@ -251,7 +251,12 @@ def advance_tick(
         if chained:
             sheath_chain.follow(state, p, shake, wire_step, r * mean_dq * dt)
         if on[wire_creep.ON]:
-            wire_creep.advance(state, p, ta - pretension, tb - pretension, dt)
+            mean_a, mean_b = ta, tb
+            if chained:
+                # Each piece creeps under its own tension, the whole wire under their mean.
+                mean_a, _ = wire_tension(p, on, pretension, stretch - state[wire_creep.CREEP_A])
+                mean_b, _ = wire_tension(p, on, pretension, -stretch - state[wire_creep.CREEP_B])
+            wire_creep.advance(state, p, mean_a - pretension, mean_b - pretension, dt)
         if on[friction_run_in.ON]:
             friction_run_in.advance(state, slid)
         if lagging:
