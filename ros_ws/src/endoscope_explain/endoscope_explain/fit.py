@@ -165,7 +165,7 @@ def jacobian(model: JointModel, theta: Array, at: Array, columns: list[int] | No
         step = model.step if model.free[c].logarithmic else 2.0 * model.step
         step = min(step, 0.5 * (high[c] - low[c]))
         step = step if theta[c] + step <= high[c] else -step
-        moved[c] = max(theta[c] + step, low[c])
+        moved[c] += step
         result[:, i] = (model.residuals(moved) - at) / (moved[c] - theta[c])
     return result
 

@@ -124,11 +124,10 @@ def _grown_robustly(
     parents: Sequence[Parent], effects: Sequence[str], jobs: int
 ) -> list[Composition]:
     """Add to what the parents say of the larger part of the motion."""
-    chosen = [c for c, _ in parents]
     fits = parallel_fits(
-        lambda i: robustly_refitted(chosen[i].fit), [c.fit.model for c in chosen], jobs
+        lambda i: robustly_refitted(parents[i][0].fit), [c.fit.model for c, _ in parents], jobs
     )
-    robust = [(c, (found,)) for c, found in zip(chosen, fits, strict=True)]
+    robust = [(c, (found,)) for (c, _), found in zip(parents, fits, strict=True)]
     return grow(robust, effects, jobs, PAIRS_POLISHED)
 
 
