@@ -7,6 +7,7 @@ import numpy as np
 from endoscope_core.effects import CATALOGUE, Stage
 from endoscope_core.effects.slots import START_FRICTION
 from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription
+from endoscope_explain.compose import Composition
 from endoscope_explain.decision import Decision
 from endoscope_explain.explanation import (
     Candidate,
@@ -147,6 +148,11 @@ def plant_of(
     return replace(plant, joints=joints, effects=tuple(specs))
 
 
+def refitted(tried: JointSearch, decision: Decision) -> Composition:
+    """The nominal plant of a joint: beyond its band where that is all that was chosen."""
+    return tried.nominal if decision.chosen.effects else decision.chosen
+
+
 def ladder(
     anchors: list[tuple[Fit, Fit]], searches: list[JointSearch], decisions: list[Decision]
 ) -> dict[str, dict[str, ChannelFit]]:
@@ -156,7 +162,7 @@ def ladder(
         observation = described.model.observation
         judged, _ = held_out_masks(observation)
         rungs['nominal'] |= on_samples(observation, described.residuals, judged)
-        rungs['refitted'] |= held_out_fit(tried.nominal.fit)
+        rungs['refitted'] |= held_out_fit(refitted(tried, decision).fit)
         rungs['augmented'] |= (
             held_out_fit(decision.chosen.fit)
             if decision.chosen.effects

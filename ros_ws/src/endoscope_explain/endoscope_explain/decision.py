@@ -81,6 +81,8 @@ def decide(search: JointSearch) -> Decision:
         and (nominal.score - chosen.score < BARELY * above)
     ):
         chosen = nominal
+    if search.beyond is not None and _does_as_much(search.beyond, chosen):
+        chosen = search.beyond
     left = chosen.above_noise()
     explained = 1.0 if above <= 0.0 or is_noise(chosen.fit) else 1.0 - left / above
     adequate = (
@@ -166,6 +168,13 @@ def _score(composition: Composition) -> float:
 def _likelihood(composition: Composition) -> float:
     """Half deviance under the known noise: right where nothing but noise is left."""
     return composition.fit.cost + PARAMETER_PRICE * len(composition.fit.theta)
+
+
+def _does_as_much(beyond: Composition, chosen: Composition) -> bool:
+    """Return whether nominal numbers beyond their band do what the chosen plant does."""
+    if is_noise(chosen.fit):
+        return is_noise(beyond.fit) and _likelihood(beyond) < _likelihood(chosen) + NAMED
+    return beyond.score < chosen.score + (NAMED if chosen.effects else -NAMED)
 
 
 def _better(

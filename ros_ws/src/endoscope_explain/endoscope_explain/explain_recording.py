@@ -14,6 +14,7 @@ from endoscope_explain.conclusions import (
     ladder,
     named,
     plant_of,
+    refitted,
     start_friction,
     verdict_of,
 )
@@ -136,7 +137,11 @@ def explain_recording(
             for o, d in pairs
         },
         plant,
-        plant_of(well, [s.nominal.fit for s in searches], [() for _ in searches]),
+        plant_of(
+            well,
+            [refitted(s, d).fit for s, d in zip(searches, decisions, strict=True)],
+            [() for _ in searches],
+        ),
         plant_of(well, [d.chosen.fit for d in decisions], [d.chosen.effects for d in decisions]),
         ladder(anchors, searches, decisions),
         candidates(observations, searches),

@@ -1,8 +1,9 @@
 """Which effects a joint's recording shows: nominal refit, singles, and a beam of more."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from endoscope_explain.beyond_band import beyond_band, leans
 from endoscope_explain.compose import (
     Composition,
     Parent,
@@ -40,14 +41,19 @@ class JointSearch:
         No effect added.
     levels : tuple of tuple of Composition
         Compositions of one, two, ... effects, each best first.
+    beyond : Composition, optional
+        No effect added, with nominal numbers that may leave their band, where the best composition
+        leans on its end.
     """
 
     nominal: Composition
     levels: tuple[tuple[Composition, ...], ...]
+    beyond: Composition | None = None
 
     def tried(self) -> list[Composition]:
-        """Return all compositions, the nominal one first."""
-        return [self.nominal, *(c for level in self.levels for c in level)]
+        """Return all compositions, those without effects first."""
+        alone = [self.nominal] if self.beyond is None else [self.nominal, self.beyond]
+        return [*alone, *(c for level in self.levels for c in level)]
 
 
 def search(
@@ -81,6 +87,7 @@ def search(
     effects = tuple(e for e in searchable_effects() if e not in known)
     if not motion_repeats(anchors[0].model.observation):
         effects = tuple(e for e in effects if e not in DEPENDS_ON_TIME)
+    beyond = None
     parents: list[Parent] = [(nominal, anchors)]
     for level in range(depth):
         most = SINGLES_POLISHED if level == 0 else PAIRS_POLISHED
@@ -97,9 +104,12 @@ def search(
         if grown:
             grown[0] = with_counted_numbers(grown[0], jobs)
         levels.append(tuple(grown))
+        if beyond is None and leans(min((nominal, *grown), key=lambda c: c.score).fit):
+            beyond = beyond_band(nominal)
         if (
             not grown
             or is_noise(grown[0].fit)
+            or (beyond is not None and is_noise(beyond.fit))
             or (grown[0].score > nominal.score - HOPELESS * (nominal.score - grown[0].floor()))
         ):
             break
@@ -108,7 +118,21 @@ def search(
     if len(levels) == 2 and levels[1]:
         singles, pairs = reconsidered(nominal, levels[1][0], effects, jobs)
         levels = [_sorted(levels[0], singles), _sorted(levels[1], pairs)]
-    return JointSearch(nominal, tuple(levels))
+    if beyond is not None and not any(is_noise(c.fit) for c in levels[-1][:1]):
+        levels[0] = _sorted(levels[0], _grown_beyond(beyond, anchors[1], effects, jobs))
+    return JointSearch(nominal, tuple(levels), beyond)
+
+
+def _grown_beyond(
+    beyond: Composition, described: Fit, effects: Sequence[str], jobs: int
+) -> list[Composition]:
+    """Single effects beside nominal numbers that may leave their band.
+
+    They are believed only where nothing but noise is left.
+    """
+    anchors = (beyond.fit, replace(described, model=beyond.fit.model))
+    grown = grow([(beyond, anchors)], effects, jobs, SINGLES_POLISHED)
+    return [c for c in grown if is_noise(c.fit)]
 
 
 def _may_be_led_astray(grown: Sequence[Composition]) -> bool:

@@ -91,3 +91,18 @@ def test_a_small_second_effect_is_named_where_it_leaves_hardly_more_than_noise(
         ),
     )
     assert decide(search).chosen.effects == named
+
+
+def test_an_effect_that_does_no_more_than_a_number_beyond_its_band_explains_nothing(leaving):
+    nominal, creeping = leaving((), 17.0, 17.0), leaving(('wire_creep',), 2.0, 2.0)
+    assert decide(JointSearch(nominal, ((creeping,),))).adequate
+    decision = decide(JointSearch(nominal, ((creeping,),), leaving((), 1.9, 1.9)))
+    assert decision.chosen.effects == ()
+    assert not decision.adequate
+
+
+def test_an_effect_that_does_more_than_numbers_beyond_their_band_is_named(leaving):
+    nominal, creeping = leaving((), 17.0, 17.0), leaving(('wire_creep',), 0.9, 0.9)
+    decision = decide(JointSearch(nominal, ((creeping,),), leaving((), 1.9, 1.9)))
+    assert decision.chosen.effects == ('wire_creep',)
+    assert decision.adequate

@@ -33,6 +33,34 @@ def test_other_parameters_are_found_and_no_effect_is_named(one_joint):
         assert estimate.in_band
 
 
+def test_a_number_far_from_its_description_is_no_physics(one_joint):
+    true = one_joint.rig(wire_stiffness=1300.0)
+    explanation = explain_recording(
+        one_joint.record(true, one_joint.motion()), one_joint.rig(), jobs=2
+    )
+    assert explanation.verdict is Verdict.PARAMETERS_DIFFER
+    assert explanation.effects == ()
+    estimate = explanation.parameters['bend_x']['wire_stiffness']
+    assert estimate.value == pytest.approx(1300.0, rel=0.01)
+    assert not estimate.in_band
+    assert explanation.refitted.joints['bend_x'].wire_stiffness == estimate.value
+    assert max(fit.ratio for fit in explanation.fit['refitted'].values()) < 1.3
+
+
+def test_an_effect_beside_a_number_far_from_its_description_is_named(one_joint):
+    friction = EffectSpec('viscous_friction', 'bend_x', {'coefficient': 200.0})
+    true = one_joint.rig(friction, wire_stiffness=1300.0)
+    explanation = explain_recording(
+        one_joint.record(true, one_joint.motion()), one_joint.rig(), jobs=2
+    )
+    assert explanation.verdict is Verdict.MISSING_PHYSICS
+    assert [e.id for e in explanation.effects] == ['viscous_friction']
+    found = explanation.effects[0].parameters['coefficient'].value
+    assert found == pytest.approx(200.0, rel=0.05)
+    estimate = explanation.parameters['bend_x']['wire_stiffness']
+    assert estimate.value == pytest.approx(1300.0, rel=0.01)
+
+
 @pytest.mark.parametrize(
     ('effect_id', 'parameters', 'verdict'),
     [

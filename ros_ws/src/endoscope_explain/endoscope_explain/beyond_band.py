@@ -1,0 +1,49 @@
+"""Nominal numbers beyond their band, where what was fitted leans on its end.
+
+A rig that is described wrongly by a third lacks no physics. Within its band no refit shows that,
+and an effect that can do a wrong number's work would be named for it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from endoscope_explain.compose import Composition
+from endoscope_explain.fit import Fit, fit
+from endoscope_explain.free_parameters import FITTED_NOMINAL, FreeParameter
+from endoscope_explain.score import score
+
+FURTHEST = 4.0
+"""Factor by which a description may be wrong, either way."""
+ITERATIONS = 20
+AT_THE_END = 1e-3
+"""Relative distance from the end of a band within which a number leans on it."""
+
+
+def leans(fit: Fit) -> bool:
+    """Return whether a fit holds a nominal number at an end of its band."""
+    return any(
+        item.name in FITTED_NOMINAL
+        and min(theta - item.coordinate(item.low), item.coordinate(item.high) - theta) < AT_THE_END
+        for item, theta in zip(fit.model.free, fit.theta, strict=True)
+    )
+
+
+def beyond_band(composition: Composition) -> Composition:
+    """Refit a composition with nominal numbers that may leave their band.
+
+    The priors stay, so that a number far from its description has its price.
+    """
+    model = composition.fit.model
+    model = replace(model, free=tuple(_widened(item) for item in model.free))
+    found = fit(model, composition.fit.theta, iterations=ITERATIONS)
+    return Composition(composition.effects, found, score(found))
+
+
+def _widened(item: FreeParameter) -> FreeParameter:
+    if item.name not in FITTED_NOMINAL:
+        return item
+    described = float(np.exp(item.mean))
+    return replace(
+        item, low=min(item.low, described / FURTHEST), high=max(item.high, described * FURTHEST)
+    )
