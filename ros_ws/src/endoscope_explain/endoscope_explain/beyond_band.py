@@ -40,6 +40,12 @@ def beyond_band(composition: Composition) -> Composition:
     return Composition(composition.effects, found, score(found))
 
 
+def leaves_band_of(fit: Fit, nominal: Fit) -> bool:
+    """Return whether all nominal numbers of a fit may leave the band that a nominal fit has."""
+    pairs = zip(fit.model.free, nominal.model.free, strict=False)
+    return all(a != b for a, b in pairs if a.name in FITTED_NOMINAL)
+
+
 def _widened(item: FreeParameter) -> FreeParameter:
     if item.name not in FITTED_NOMINAL:
         return item

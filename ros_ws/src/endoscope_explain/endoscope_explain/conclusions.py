@@ -7,6 +7,7 @@ import numpy as np
 from endoscope_core.effects import CATALOGUE, Stage
 from endoscope_core.effects.slots import START_FRICTION
 from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription
+from endoscope_explain.beyond_band import leaves_band_of
 from endoscope_explain.compose import Composition
 from endoscope_explain.decision import Decision
 from endoscope_explain.explanation import (
@@ -180,9 +181,11 @@ def candidates(
         for c in tried.tried():
             found.append(
                 Candidate(
-                    tuple((effect_id, observation.joint) for effect_id in c.effects),
+                    observation.joint,
+                    c.effects,
                     c.score,
                     misfit(c.fit).total / observation.size,
+                    leaves_band_of(c.fit, tried.nominal.fit),
                 )
             )
     return tuple(sorted(found, key=lambda c: c.score))

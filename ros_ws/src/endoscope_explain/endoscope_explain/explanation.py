@@ -120,16 +120,21 @@ class Candidate:
 
     Attributes
     ----------
-    effects : tuple of (id, joint)
+    joint : str
+    effects : tuple of str
     score : float
         Penalised half deviance in noise units; smaller is better.
     misfit : float
         Mean squared residual in noise units over all channels; 1 is noise alone.
+    beyond_band : bool
+        Whether nominal numbers were let leave their band.
     """
 
-    effects: tuple[tuple[str, str], ...]
+    joint: str
+    effects: tuple[str, ...]
     score: float
     misfit: float
+    beyond_band: bool = False
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,26 @@ import numpy as np
 import pytest
 
 from endoscope_explain.case import NextExperiment
-from endoscope_explain.explanation import Candidate, Estimate, UnknownTerm, Verdict
+from endoscope_explain.explanation import (
+    Candidate,
+    Estimate,
+    NominalEstimate,
+    UnknownTerm,
+    Verdict,
+)
 from endoscope_explain.report.chain_drawing import STAGES, chain_svg
+from endoscope_explain.report.figures.ladder import parameters_figure
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.sentences import HEADLINES, verdict_sentence
 
 
 @pytest.fixture(scope='module')
 def page(stribeck_case):
-    ranked = (Candidate((('stribeck_friction', 'bend_x'),), 10.0, 1.0), Candidate((), 90.0, 9.0))
+    ranked = (
+        Candidate('bend_x', ('stribeck_friction',), 10.0, 1.0),
+        Candidate('bend_x', (), 60.0, 6.0, True),
+        Candidate('bend_x', (), 90.0, 9.0),
+    )
     explanation = dataclasses.replace(stribeck_case.explanation, candidates=ranked)
     return html_page(dataclasses.replace(stribeck_case, explanation=explanation))
 
@@ -31,7 +42,7 @@ def test_a_page_says_what_was_left_out_and_where(page):
     assert 'The simulation leaves out physics' in text
     assert 'stribeck_friction on bend_x, 97 %' in text
     assert 'cannot tell it from viscous_friction' in ' '.join(text.split())
-    assert 'nominal, refitted' in text
+    assert 'nominal, refitted beyond the band 60.0 50.0' in ' '.join(text.split())
 
 
 def test_every_drawing_is_whole(page):
@@ -47,6 +58,26 @@ def test_only_the_guilty_stage_is_marked():
     assert all(title in drawing for title in ('Servo', 'Bending joint', 'Recording'))
     assert chain_svg({}).count('#8c1d18') == 0
     assert len(STAGES) == 6
+
+
+def test_findings_of_neighbouring_stages_do_not_overlap():
+    drawing = chain_svg({s: ['parameters differ (bend_x)'] for s in ('transmission', 'joint')})
+    assert drawing.count('>parameters differ<') == drawing.count('>(bend_x)<') == 2
+
+
+def test_every_parameter_of_every_joint_is_within_its_figure():
+    def estimate(value):
+        return NominalEstimate(value, value, value, 'N', 1.0, value < 1.15)
+
+    drawing = ET.fromstring(
+        parameters_figure({'bend_x': {'a': estimate(1.1)}, 'bend_y': {'a': estimate(2.0)}})
+    )
+    text = ET.tostring(drawing, encoding='unicode')
+    assert text.count('#b3261e') > 0
+    width = float(drawing.get('viewBox').split()[2])
+    markers = [e for e in drawing.iter() if e.tag.endswith('}use') and 'b3261e' in str(e.attrib)]
+    assert markers
+    assert all(0.0 < float(e.get('x')) < width for e in markers)
 
 
 @pytest.mark.parametrize('verdict', list(Verdict))

@@ -14,6 +14,8 @@ TITLES = {
 }
 BOX, GAP, HEIGHT, TOP = 138, 26, 62, 8
 LINE = 15
+FITS = 22
+"""Letters of a finding that fit between those of the neighbouring stages."""
 
 
 def chain_svg(guilty: Mapping[str, Sequence[str]]) -> str:
@@ -30,7 +32,8 @@ def chain_svg(guilty: Mapping[str, Sequence[str]]) -> str:
         SVG.
     """
     width = len(STAGES) * BOX + (len(STAGES) - 1) * GAP + 4
-    below = max((len(words) for words in guilty.values()), default=0) * LINE + 10
+    lines = {stage: _lines(words) for stage, words in guilty.items()}
+    below = max((len(words) for words in lines.values()), default=0) * LINE + 10
     parts = [
         (
             f'<svg viewBox="0 0 {width} {TOP + HEIGHT + below}" role="img" '
@@ -44,7 +47,7 @@ def chain_svg(guilty: Mapping[str, Sequence[str]]) -> str:
     ]
     for index, stage in enumerate(STAGES):
         x = 2 + index * (BOX + GAP)
-        parts.append(_box(stage, x, guilty.get(stage)))
+        parts.append(_box(stage, x, lines.get(stage)))
         if index:
             y = TOP + HEIGHT / 2
             parts.append(
@@ -52,6 +55,15 @@ def chain_svg(guilty: Mapping[str, Sequence[str]]) -> str:
                 'stroke-width="1.6" marker-end="url(#tip)"/>'
             )
     return ''.join(parts) + '</svg>'
+
+
+def _lines(words: Sequence[str]) -> list[str]:
+    """Findings with the joint on a line of its own where both are too long for one."""
+    lines = []
+    for text in words:
+        finding, bracket, joint = text.partition(' (')
+        lines += [text] if len(text) <= FITS else [finding, bracket.strip() + joint]
+    return lines
 
 
 def _box(stage: str, x: float, words: Sequence[str] | None) -> str:

@@ -209,17 +209,23 @@ def _table(title: str, ladder: Ladder, units: Mapping[str, str]) -> dict[str, An
     return {'title': title, 'rungs': [SHORT_TITLES[r] for r in rungs], 'rows': rows}
 
 
-def _candidates(case: ExplainedCase, most: int = 6) -> list[dict[str, str]]:
-    ranked = case.explanation.candidates[:most]
-    return [
-        {
-            'name': ' + '.join(f'{i} ({j})' for i, j in c.effects) or 'nominal, refitted',
-            'score': f'{c.score:.1f}',
-            'behind': f'{c.score - ranked[0].score:.1f}',
-            'misfit': f'{np.sqrt(c.misfit):.2f}',
-        }
-        for c in ranked
-    ]
+def _candidates(case: ExplainedCase, most: int = 4) -> list[dict[str, str]]:
+    """The best of each joint: scores of two joints have nothing to do with each other."""
+    rows = []
+    for joint in case.recording.joints:
+        ranked = [c for c in case.explanation.candidates if c.joint == joint][:most]
+        rows += [
+            {
+                'joint': joint,
+                'name': (' + '.join(c.effects) or 'nominal, refitted')
+                + (' beyond the band' if c.beyond_band else ''),
+                'score': f'{c.score:.1f}',
+                'behind': f'{c.score - ranked[0].score:.1f}',
+                'misfit': f'{np.sqrt(c.misfit):.2f}',
+            }
+            for c in ranked
+        ]
+    return rows
 
 
 def _ranked(distances: Mapping[str, float]) -> list[tuple[str, float]]:

@@ -107,6 +107,6 @@ def parameters_figure(parameters: Mapping[str, Mapping[str, NominalEstimate]]) -
             axis.set_yticks(range(len(names)), list(reversed(names)))
             axis.set_title(joint)
             axis.set_xlabel('fitted / described')
-            low, high = axis.get_xlim()
-            axis.set_xlim(min(low, 0.8), max(high, 1.2))
+        low, high = axes[0].get_xlim()
+        axes[0].set_xlim(min(low, 0.8), max(high, 1.2))
         return svg(figure)
