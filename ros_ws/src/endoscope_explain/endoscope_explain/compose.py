@@ -16,6 +16,7 @@ from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.rank import Look, polish
 from endoscope_explain.score import FLOOR_PER_PARAMETER, score
 from endoscope_explain.screen import Promise, promises, unexplained
+from endoscope_explain.whiteness import is_noise
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -29,6 +30,8 @@ LOOKED_AT_TWICE = 4
 """Effects of these that get one from their second best start as well."""
 LEAST_GAIN = 5.0
 """Predicted fall of the half deviance below which an effect is not looked at."""
+FINISHED = 20
+"""Further steps of a nominal refit that may be on its way to noise."""
 WORTH_POLISHING = 5.0
 """A look is worth a full fit while its cost is below this multiple of the best full fit's."""
 NOISE_ALONE = 1.15
@@ -115,7 +118,12 @@ def nominal_anchors(
         jacobian(model, theta, residuals),
         0.5 * float(residuals @ residuals),
     )
-    return fit(model, theta, known_jacobian=described.jacobian), described
+    refitted = fit(model, theta, known_jacobian=described.jacobian)
+    if is_noise(refitted):
+        return refitted, described
+    # On to the end only where no physics is missing: it would bend the parameters ever further.
+    finished = fit(model, refitted.theta, iterations=FINISHED, known_jacobian=refitted.jacobian)
+    return finished if is_noise(finished) else refitted, described
 
 
 def grow(

@@ -136,3 +136,25 @@ def test_a_number_that_may_hardly_move_has_a_derivative_over_a_wide_step(one_joi
     assert (high - low)[0] < model.step
     assert np.all(np.isfinite(derivative))
     assert np.any(derivative[:, 0] != 0.0)
+
+
+def test_a_nominal_refit_on_its_way_to_noise_is_finished(one_joint):
+    far = one_joint.rig(
+        pretension=5.2816,
+        wire_stiffness=1836.5,
+        capstan_exponent=1.0271,
+        presliding_distance=0.0001049,
+        joint_stiffness=0.0030263,
+        joint_damping=0.0003301,
+        joint_friction=0.0039849,
+        joint_presliding=0.0198657,
+        motor_bandwidth=56.073,
+        motor_damping_ratio=0.81739,
+    )
+    (observation,) = observe(one_joint.record(far, one_joint.motion()), one_joint.rig())
+    packed = packed_joint(one_joint.rig(), 'bend_x')
+    model = nominal_model(observation, *packed)
+    described = np.array([item.mean for item in model.free])
+    assert not is_noise(fit(model, described))
+    refitted, _ = nominal_anchors(observation, *packed)
+    assert is_noise(refitted)
