@@ -118,19 +118,27 @@ def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescrip
 def reading_lead(observations: tuple[JointObservation, ...], outputs: Array) -> float:
     """Estimate by how much of a tick readings are younger than their stamps.
 
-    From the motor's angle, which moves fast and is read without noise; 0 where it was not
+    From the angle of a motor, which moves fast and is read without noise: of that one which is
+    predicted best, as another one's parameters may never have been learnt; 0 where none was
     recorded.
     """
-    numerator = denominator = 0.0
+    best, lead = np.inf, 0.0
     for observation, out in zip(observations, outputs, strict=True):
         for channel in observation.channels:
             if channel.quantity != 'shaft_position':
                 continue
             late, early = channel.predicted(out, 0.0), channel.predicted(out, 1.0)
             weight = 1.0 / channel.noise**2
-            numerator += float(np.sum(weight * (early - late) * (channel.value - late)))
-            denominator += float(np.sum(weight * (early - late) ** 2))
-    return float(np.clip(numerator / denominator, 0.0, 1.0)) if denominator > 0 else 0.0
+            denominator = float(np.sum(weight * (early - late) ** 2))
+            if denominator == 0.0:
+                continue
+            share = float(np.sum(weight * (early - late) * (channel.value - late))) / denominator
+            share = min(max(share, 0.0), 1.0)
+            left = channel.value - late - share * (early - late)
+            misfit = float(np.mean(weight * left**2))
+            if misfit < best:
+                best, lead = misfit, share
+    return lead
 
 
 def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> RecordedView:

@@ -3,9 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from endoscope_core.plant import PlantDescription
+from endoscope_core.plant.parameters import JointParameters
 from endoscope_explain.evaluate import packed_joint, residuals, simulate_joint
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.observation import observe
+from endoscope_explain.predicted_signals import reading_lead, simulate_rig
 from endoscope_explain.unresolved import fast_scatter
 
 
@@ -76,3 +79,18 @@ def test_scatter_is_found_where_the_wire_slips_and_only_there(one_joint):
     scatter = fast_scatter(values, 0.02)
     assert np.all(scatter[:1700] == 0.0)
     assert np.all(scatter[2200:2800] > 0.1)
+
+
+def test_when_readings_were_taken_is_told_by_the_motor_that_is_predicted_best(one_joint):
+    known = PlantDescription(joints={'bend_x': JointParameters(), 'bend_y': JointParameters()})
+    command = np.stack([one_joint.motion(), 0.5 * one_joint.motion()], axis=1)
+    recording = one_joint.record(known, command)
+    slower = replace(known.joints['bend_y'], motor_bandwidth=54.0)
+    half = replace(known, joints={**known.joints, 'bend_y': slower})
+
+    def lead(plant):
+        observations = observe(recording, plant)
+        return reading_lead(observations, simulate_rig(observations, plant))
+
+    assert lead(half) == pytest.approx(lead(known), abs=0.02)
+    assert lead(replace(half, joints={'bend_x': slower, 'bend_y': slower})) > lead(known) + 0.5
