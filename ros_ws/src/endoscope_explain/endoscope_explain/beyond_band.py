@@ -20,13 +20,12 @@ AT_THE_END = 1e-3
 """Relative distance from the end of a band within which a number leans on it."""
 
 
-def leans(fit: Fit) -> bool:
+def leans(fitted: Fit) -> bool:
     """Return whether a fit holds a nominal number at an end of its band."""
-    return any(
-        item.name in FITTED_NOMINAL
-        and min(theta - item.coordinate(item.low), item.coordinate(item.high) - theta) < AT_THE_END
-        for item, theta in zip(fit.model.free, fit.theta, strict=True)
-    )
+    low, high = fitted.model.bounds()
+    at_the_end = np.minimum(fitted.theta - low, high - fitted.theta) < AT_THE_END
+    free = fitted.model.free
+    return any(e and i.name in FITTED_NOMINAL for e, i in zip(at_the_end, free, strict=True))
 
 
 def beyond_band(composition: Composition) -> Composition:
@@ -40,9 +39,9 @@ def beyond_band(composition: Composition) -> Composition:
     return Composition(composition.effects, found, score(found))
 
 
-def leaves_band_of(fit: Fit, nominal: Fit) -> bool:
+def leaves_band_of(fitted: Fit, nominal: Fit) -> bool:
     """Return whether all nominal numbers of a fit may leave the band that a nominal fit has."""
-    pairs = zip(fit.model.free, nominal.model.free, strict=False)
+    pairs = zip(fitted.model.free, nominal.model.free, strict=False)
     return all(a != b for a, b in pairs if a.name in FITTED_NOMINAL)
 
 
