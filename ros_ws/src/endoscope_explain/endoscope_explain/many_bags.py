@@ -3,15 +3,15 @@
 import csv
 import io
 import json
-import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from endoscope_core.atomic_output import atomic_directory, require_free_directory
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.worker_pool import worker_pool
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
 from endoscope_explain.report.writing import REPORT_JSON, write_report
@@ -232,8 +232,7 @@ def _write(reported: Reported, folder: Path) -> None:
 
 
 def _here(sources: Sequence[Sources], jobs: int) -> Iterator[tuple[int, Reported]]:
-    context = multiprocessing.get_context('spawn')
-    with ProcessPoolExecutor(min(jobs, len(sources)), mp_context=context) as pool:
+    with worker_pool(min(jobs, len(sources))) as pool:
         futures = {pool.submit(explain_one, one): i for i, one in enumerate(sources)}
         for future in as_completed(futures):
             yield futures[future], future.result()

@@ -5,11 +5,9 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 from endoscope_bringup.demo.analysis import analyse
@@ -18,6 +16,7 @@ from endoscope_bringup.demo.procedure import TUBES, Tube
 from endoscope_bringup.demo.results import DemoResults
 from endoscope_bringup.demo.run_tube import TubeRecording, run_tube
 from endoscope_core.atomic_output import write_text
+from endoscope_core.worker_pool import worker_pool
 
 REPORT = 'report.html'
 FIGURES = 'figures.json'
@@ -105,7 +104,7 @@ def _run_tubes(
     procedure = partial(run_tube, folder=folder, seed=seed, real_time=real_time, progress=progress)
     if real_time or len(tubes) == 1:
         return [procedure(tube, domain=here) for tube in tubes]
-    with ProcessPoolExecutor(len(tubes), mp_context=get_context('spawn')) as pool:
+    with worker_pool(len(tubes)) as pool:
         runs = [
             pool.submit(procedure, tube, domain=(here + n) % DOMAINS)
             for n, tube in enumerate(tubes)

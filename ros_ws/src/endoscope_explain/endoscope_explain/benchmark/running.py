@@ -1,10 +1,9 @@
 """Draw concealed cases, explain them, and only then open what was concealed."""
 
 import json
-import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from endoscope_core.plant import PlantDescription, load_plant
 from endoscope_core.plant.on_stamps import AnswerStamps, answer_commands
+from endoscope_core.worker_pool import worker_pool
 from endoscope_explain.benchmark.outcome import Named, Outcome
 from endoscope_explain.benchmark.peers import name_with_peers
 from endoscope_explain.case import ExplainedCase
@@ -186,16 +186,14 @@ def run_cases(
     Yields
     ------
     Outcome
-        As they are done. An error in a case ends the run; what has not begun is not begun any more.
+        As they are done. An error in a case ends the run; what is not done then is given up.
     """
-    context = multiprocessing.get_context('spawn')
-    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
+    with worker_pool(jobs) as pool:
         futures = {pool.submit(run_case, task): task for task in tasks}
         for done, future in enumerate(as_completed(futures), 1):
             error = future.exception()
             if error is not None:
                 error.add_note(f'in the case of seed {futures[future].request.seed}')
-                pool.shutdown(cancel_futures=True)
                 raise error
             outcome = future.result()
             tell(done, outcome)
