@@ -7,13 +7,16 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from typing import Literal
 
 _PR_SET_PDEATHSIG = 1
 
 
 @contextmanager
-def worker_pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """Fresh processes that end with the block or with the process that started them.
+def worker_pool(
+    jobs: int, start: Literal['spawn', 'fork'] = 'spawn'
+) -> Iterator[ProcessPoolExecutor]:
+    """Processes that end with the block or with the process that started them.
 
     An executor of its own, left by an error or a signal, would first do every task that was
     submitted, and workers of a killed process would go on with theirs, each for minutes.
@@ -22,6 +25,8 @@ def worker_pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
     ----------
     jobs : int
         Number of processes.
+    start : str
+        Whether they are fresh or forked.
 
     Yields
     ------
@@ -29,8 +34,8 @@ def worker_pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
         Left without an error, it waits for its tasks; otherwise they are given up.
     """
     before = set(multiprocessing.active_children())
-    context = multiprocessing.get_context('spawn')
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_end_with_parent)
+    context = multiprocessing.get_context(start)
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_follow_parent)
     try:
         yield pool
     except BaseException:
@@ -41,7 +46,9 @@ def worker_pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
     pool.shutdown()
 
 
-def _end_with_parent() -> None:
-    """Ask the kernel for SIGTERM when the process that started this one ends: prctl(2)."""
+def _follow_parent() -> None:
+    """Leave what Ctrl-C means to the parent, and end when it ends: prctl(2)."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if sys.platform == 'linux':
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -1,10 +1,10 @@
 """The same function on many tasks, side by side on a few processes."""
 
-import multiprocessing
-import signal
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any
+
+from endoscope_core.worker_pool import worker_pool
 
 _function: Callable[[Any], Any] | None = None
 
@@ -35,20 +35,10 @@ def parallel_map[Task, Result](
         return [function(task) for task in tasks]
     _function = function
     try:
-        context = multiprocessing.get_context('fork')
-        with context.Pool(min(jobs, len(tasks)), _end_on_sigterm) as pool:
-            results = pool.map(_call, tasks, chunksize=1)
-            # Leaving the block terminates: a worker that is still starting under the handler of
-            # its parent can miss that, and would be waited for without end.
-            pool.close()
-            pool.join()
-            return results
+        with worker_pool(min(jobs, len(tasks)), 'fork') as pool:
+            return list(pool.map(_call, tasks))
     finally:
         _function = None
-
-
-def _end_on_sigterm() -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def _call(task: Any) -> Any:
