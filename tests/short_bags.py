@@ -1,9 +1,11 @@
 """Short recordings of one joint of a simulated rig, written as bags."""
 
 import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endoscope_bags import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
@@ -14,6 +16,8 @@ from endoscope_core.plant import (
     SensorModel,
     simulate,
 )
+
+Stamps = NDArray[np.int64]
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 PLANT = PlantDescription(joints={'bend_x': JointParameters()})
@@ -31,6 +35,8 @@ def write_short_bag(
     seed: int = 1,
     leave_out: str = '',
     spoil: float | None = None,
+    restamped: Mapping[str, Callable[[Stamps], Stamps]] | None = None,
+    rigs: Sequence[str] = ('rig',),
 ) -> Path:
     """Write a recording of a sweep and some steps.
 
@@ -47,7 +53,12 @@ def write_short_bag(
         Topic that is not written.
     spoil : float, optional
         Written in place of one reading of the tracker.
+    restamped : mapping of topic to callable, optional
+        What its stamps become in ns; receipt stays as it is.
+    rigs : sequence of str
+        Namespaces that the same is written under.
     """
+    restamped = restamped or {}
     time = np.arange(0.0, duration, 1e-3)
     angle = np.where(
         time < 0.7 * duration, 0.9 * np.sin(2.2 * time), 0.4 * np.sign(np.sin(6.0 * time))
@@ -80,8 +91,12 @@ def write_short_bag(
         bag.write_streams(
             [
                 MessageStream(
-                    f'/rig/{topic}', JOINT_STATE, encode_joint_states(names, at, **values), at
+                    f'/{rig}/{topic}',
+                    JOINT_STATE,
+                    encode_joint_states(names, restamped.get(topic, lambda s: s)(at), **values),
+                    at,
                 )
+                for rig in rigs
                 for topic, (names, at, values) in quantities.items()
                 if topic != leave_out
             ]

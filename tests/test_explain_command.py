@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from distributed import LocalCluster
 from short_bags import PLANT, one_joint, write_short_bag
 
 from endoscope_bringup import cli
-from endoscope_core.plant import EffectSpec, load_plant, save_plant
+from endoscope_core.plant import EffectSpec, JointParameters, load_plant, save_plant
 
 
 @pytest.fixture(scope='module')
@@ -88,6 +89,13 @@ def test_many_bags_have_one_report_each_and_one_table(rig, tmp_path, capsys):
     assert exponents == pytest.approx([0.9, 0.9], rel=0.05)
 
 
+def test_a_bag_that_cannot_tell_costs_the_others_nothing(rig, tmp_path):
+    brief = write_short_bag(tmp_path / 'brief', duration=1.0)
+    assert explain(rig, tmp_path / 'out', rig / 'sound', brief, '--quick') == 0
+    assert summary(tmp_path / 'out') == {'sound': 'consistent', 'brief': 'insufficient_data'}
+    assert (tmp_path / 'out' / 'brief' / 'report.html').is_file()
+
+
 def test_sound_recordings_of_one_rig_share_no_missing_physics(rig, tmp_path, capsys):
     write_short_bag(tmp_path / 'other' / 'sound', seed=5)
     bags = (rig / 'sound', tmp_path / 'other' / 'sound')
@@ -137,8 +145,14 @@ def test_a_lacking_topic_is_named(rig, tmp_path, capsys, topic):
 def test_a_reading_that_is_not_finite_is_named(rig, tmp_path, capsys, value):
     bag = write_short_bag(tmp_path / 'bag', spoil=value)
     message = refused(capsys, rig, tmp_path / 'out', bag)
-    assert 'slave/measured_js' in message
+    assert f'{bag}: topic /rig/slave/measured_js' in message
     assert 'bend_x' in message
+
+
+def test_the_second_recording_is_named_where_it_is_the_bad_one(rig, tmp_path, capsys):
+    bad = write_short_bag(tmp_path / 'bad', spoil=np.nan)
+    message = refused(capsys, rig, tmp_path / 'out', rig / 'sound', '--validate', bad)
+    assert str(bad) in message
 
 
 def test_a_cut_bag_is_refused(rig, tmp_path, capsys):
@@ -171,11 +185,41 @@ def test_one_bad_bag_among_good_ones_is_refused_before_any_work(rig, tmp_path, c
     assert 'bad' in message
 
 
+def test_of_two_rigs_in_a_bag_one_has_to_be_chosen(rig, tmp_path, capsys):
+    both = write_short_bag(tmp_path / 'both', rigs=('left', 'right'))
+    assert 'give the namespace' in refused(capsys, rig, tmp_path / 'out', both)
+    for namespace in ('right', '/left'):
+        assert (
+            explain(rig, tmp_path / namespace[-4:], both, '--namespace', namespace, '--quick') == 0
+        )
+
+
+def test_joints_that_were_not_recorded_stay_in_the_plant_as_described(tmp_path):
+    load = EffectSpec('external_load', 'bend_y', {'moment_nm': 0.002, 'time_s': 1.0})
+    joints = {**PLANT.joints, 'bend_y': JointParameters(pretension=4.5)}
+    described = replace(PLANT, joints=joints, effects=(load,))
+    save_plant(described, tmp_path / 'plant.yaml')
+    bag = write_short_bag(tmp_path / 'bag')
+    assert explain(tmp_path, tmp_path / 'out', bag, '--quick') == 0
+    improved = load_plant(tmp_path / 'out' / 'plant.yaml')
+    assert list(improved.joints) == ['bend_x', 'bend_y']
+    assert improved.joints['bend_y'] == joints['bend_y']
+    assert improved.effects == described.effects
+
+
 def test_a_folder_that_holds_something_is_left_alone(rig, tmp_path, capsys):
     (tmp_path / 'kept.txt').write_text('mine')
     assert explain(rig, tmp_path, rig / 'sound') == 2
     assert 'not empty' in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ['kept.txt']
+
+
+def test_a_place_that_takes_nothing_is_refused_before_any_work(rig, tmp_path, capsys):
+    (tmp_path / 'file').write_text('mine')
+    assert explain(rig, tmp_path / 'file' / 'out', rig / 'sound') == 2
+    printed = capsys.readouterr()
+    assert f'{tmp_path / "file"} is a file' in printed.err
+    assert printed.out == ''
 
 
 def test_a_cluster_that_is_not_there_is_named(rig, tmp_path, capsys):

@@ -1,6 +1,7 @@
 """Reading recordings: `open_bag`, and what one can ask of what it returns."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,17 @@ class _Rows:
 
     scan: McapScan
     index: IntArray
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Put the recording's path before an error that knows only the topic."""
+    try:
+        yield
+    except BagError as error:
+        if str(path) in str(error):
+            raise
+        raise type(error)(f'{path}: {error}') from error
 
 
 class Recording:
@@ -119,7 +131,7 @@ class Recording:
         suffix
             Relative name, for example ``'motor/measured_js'``, or a full one with leading slash.
         namespace
-            Only this namespace, for example ``'/endoscope'``.
+            Only this namespace, for example ``'/endoscope'``; the first slash may be left out.
 
         Raises
         ------
@@ -145,7 +157,8 @@ class Recording:
     def _matches(self, suffix: str, namespace: str | None) -> list[str]:
         relative = suffix.strip('/')
         if suffix.startswith('/') or namespace is not None:
-            wanted = f'{(namespace or "").rstrip("/")}/{relative}'
+            within = (namespace or '').strip('/')
+            wanted = f'/{within}/{relative}' if within else f'/{relative}'
             names = [wanted] if wanted in self.topics else []
         else:
             names = [n for n in self.topics if ('/' + n.lstrip('/')).endswith('/' + relative)]
@@ -181,19 +194,21 @@ class Recording:
         NonFiniteError
             A number is NaN or infinite.
         """
-        topic = self._typed(suffix, namespace, JOINT_STATE)
-        series = decode_joint_states(topic, self.payloads(topic), *self.times(topic))
-        if order == 'stamp':
-            series = series.ordered(np.argsort(series.stamp_ns, kind='stable'))
-        elif order != 'recorded':
+        if order not in ('stamp', 'recorded'):
             raise ValueError(f"order is 'stamp' or 'recorded', not {order!r}")
-        series.check_finite(finite)
+        topic = self._typed(suffix, namespace, JOINT_STATE)
+        with _naming(self.path):
+            series = decode_joint_states(topic, self.payloads(topic), *self.times(topic))
+            if order == 'stamp':
+                series = series.ordered(np.argsort(series.stamp_ns, kind='stable'))
+            series.check_finite(finite)
         return series
 
     def poses(self, suffix: str, *, namespace: str | None = None) -> PoseSeries:
         """Return all messages of a PoseStamped topic as arrays, as recorded; errors as above."""
         topic = self._typed(suffix, namespace, POSE_STAMPED)
-        return decode_poses(topic, self.payloads(topic), *self.times(topic))
+        with _naming(self.path):
+            return decode_poses(topic, self.payloads(topic), *self.times(topic))
 
     def _typed(self, suffix: str, namespace: str | None, kind: str) -> str:
         topic = self.find(suffix, namespace)

@@ -138,6 +138,15 @@ def test_noise_is_reproducible_and_as_large_as_the_sensors_say(recorded, plant_f
     assert SensorModel(PlantDescription().sensors, 3).tension(clean).shape == clean.shape
 
 
+@pytest.mark.parametrize('seed', ['-1', 'one', '1.5'])
+def test_what_is_no_seed_is_refused(recorded, plant_file, tmp_path, capsys, seed):
+    with pytest.raises(SystemExit) as refusal:
+        run(plant_file, recorded, tmp_path / 'answer', '--noise', seed)
+    assert refusal.value.code == 2
+    assert f"'{seed}' is no seed" in capsys.readouterr().err
+    assert not (tmp_path / 'answer').exists()
+
+
 @pytest.mark.parametrize(
     ('text', 'named'),
     [

@@ -3,11 +3,18 @@
 import os
 import secrets
 import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from endoscope_core.errors import EndoscopeError
+
+
+class OutputPlaceError(EndoscopeError, OSError):
+    """Nothing can be written where an output should go to."""
+
+    __str__ = Exception.__str__
 
 
 class OutputExistsError(EndoscopeError, FileExistsError):
@@ -86,13 +93,25 @@ def require_free_directory(path: str | Path) -> None:
     ------
     OutputExistsError
         `path` is a file or a folder with something in it.
+    OutputPlaceError
+        The folder that it would be made in takes nothing.
     """
-    target = Path(path)
+    target = Path(path).absolute()
     if target.is_dir():
         if any(target.iterdir()):
             raise OutputExistsError(f'{target} is not empty: remove it or name another folder')
     elif target.exists():
         raise OutputExistsError(f'{target} is a file: name a folder')
+    place = next(parent for parent in target.parents if parent.exists())
+    if not place.is_dir():
+        raise OutputPlaceError(f'{target} cannot be made: {place} is a file')
+    try:
+        with tempfile.TemporaryDirectory(prefix='.partial-', dir=place):
+            pass
+    except OSError as error:
+        raise OutputPlaceError(
+            f'{target} cannot be made: {place} takes nothing ({error.strerror})'
+        ) from error
 
 
 def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:

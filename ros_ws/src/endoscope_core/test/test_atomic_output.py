@@ -6,6 +6,7 @@ import pytest
 
 from endoscope_core.atomic_output import (
     OutputExistsError,
+    OutputPlaceError,
     atomic_directory,
     atomic_file,
     require_free_directory,
@@ -83,3 +84,12 @@ def test_taken_folder_is_refused_and_kept(tmp_path: Path) -> None:
     with pytest.raises(OutputExistsError, match='is a file'):
         require_free_directory(tmp_path / 'kept')
     assert (tmp_path / 'kept').read_text() == 'x'
+
+
+def test_a_folder_that_nothing_can_be_made_in_is_refused_beforehand(tmp_path: Path) -> None:
+    (tmp_path / 'file').touch()
+    for place in (tmp_path / 'file' / 'out', Path('/proc/out')):
+        with pytest.raises(OutputPlaceError, match=f'{place} cannot be made'):
+            require_free_directory(place)
+    require_free_directory(tmp_path / 'new' / 'newer')
+    assert [path.name for path in tmp_path.iterdir()] == ['file']

@@ -144,7 +144,7 @@ class UnknownTerm:
     Attributes
     ----------
     joint, node : str
-        Where it acts; the node is `command`, `stretch` or `moment`.
+        Where it acts; the node is one of `latent_library.NODES`.
     unit : str
         Unit of the term.
     expression : str

@@ -192,7 +192,7 @@ def summary_table(reports: Mapping[str, Reported]) -> str:
                 content['verdict'],
                 ' '.join(f'{e["id"]}@{e["joint"]}' for e in effects),
                 ' '.join(f'{e["probability"]:.3f}' for e in effects),
-                *(f'{_worst(content["fit"][rung]):.2f}' for rung in ('nominal', 'augmented')),
+                *(_worst(content['fit'][rung]) for rung in ('nominal', 'augmented')),
                 f'{content["runtime_s"]:.1f}',
             ]
         )
@@ -222,8 +222,10 @@ def parameter_table(reports: Mapping[str, Reported]) -> str:
     return text.getvalue()
 
 
-def _worst(rung: Mapping[str, Mapping[str, float]]) -> float:
-    return max(fit['rmse_over_noise'] for fit in rung.values())
+def _worst(rung: Mapping[str, Mapping[str, float]]) -> str:
+    # Where the rig moved too little to tell, nothing was fitted.
+    ratios = [fit['rmse_over_noise'] for fit in rung.values()]
+    return f'{max(ratios):.2f}' if ratios else ''
 
 
 def _write(reported: Reported, folder: Path) -> None:

@@ -25,7 +25,12 @@ from endoscope_explain.locate.locating import (
     locate_unknown,
 )
 from endoscope_explain.next_experiment.proposal import propose
-from endoscope_explain.recording import Recording, plant_of_joints, recording_from_bag
+from endoscope_explain.recording import (
+    Recording,
+    plant_of_joints,
+    recording_from_bag,
+    with_unrecorded,
+)
 from endoscope_explain.search import MOST_EFFECTS
 
 Progress = Callable[[str], None]
@@ -58,6 +63,8 @@ class Sources:
         Whether the wires were tightened from the motor's side before the recording.
     given : mapping of joint to GivenPhysics, or None
         The physics of each joint, if it is not to be searched.
+    namespace : str or None
+        Of the rig's topics, where a bag has several rigs.
     """
 
     bag: Path
@@ -70,6 +77,7 @@ class Sources:
     most_effects: int = MOST_EFFECTS
     tightened: bool = False
     given: GivenJoints | None = None
+    namespace: str | None = None
 
 
 @dataclass(frozen=True)
@@ -78,8 +86,10 @@ class Inputs:
 
     Attributes
     ----------
+    described : PlantDescription
+        As given.
     plant : PlantDescription
-        With the recorded joints only.
+        The same with the recorded joints only.
     audit : AuditReport
     baseline, validation : Recording or None
         As audited.
@@ -91,6 +101,7 @@ class Inputs:
         As in `Sources`.
     """
 
+    described: PlantDescription
     plant: PlantDescription
     audit: AuditReport
     baseline: Recording | None
@@ -121,13 +132,14 @@ def read_inputs(sources: Sources) -> Inputs:
     BagError
         If a recording cannot be used; the message names it.
     """
-    raw = recording_from_bag(sources.bag, sources.plant, without=sources.without)
+    waived, namespace = sources.without, sources.namespace
+    raw = recording_from_bag(sources.bag, sources.plant, without=waived, namespace=namespace)
     plant = plant_of_joints(sources.plant, raw.joints)
 
     def second(path: Path | None) -> Recording | None:
         if path is None:
             return None
-        other = recording_from_bag(path, plant, without=sources.without)
+        other = recording_from_bag(path, plant, without=waived, namespace=namespace)
         if other.joints != raw.joints:
             raise JointsDifferError(
                 f'{path}: has {", ".join(other.joints)}, but {sources.bag} has '
@@ -136,6 +148,7 @@ def read_inputs(sources: Sources) -> Inputs:
         return audit_recording(other, plant).recording
 
     return Inputs(
+        sources.plant,
         plant,
         audit_recording(raw, plant),
         second(sources.baseline),
@@ -201,7 +214,7 @@ def explain_case(
         combined_verdict(explanation, audit),
         combined_effects(explanation, audit),
         (),
-        plant,
+        with_unrecorded(plant, inputs.described),
         {},
         validation_name='' if inputs.validation is None else inputs.validation.name,
         baseline_name='' if inputs.baseline is None else inputs.baseline.name,

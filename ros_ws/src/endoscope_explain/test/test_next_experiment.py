@@ -12,6 +12,16 @@ from endoscope_explain.next_experiment.proposal import propose
 from endoscope_explain.next_experiment.waveforms import family
 
 PLANT = PlantDescription()
+RIVALLED = NamedEffect(
+    'transport_delay',
+    'bend_x',
+    str(CATALOGUE['transport_delay'].stage),
+    0.5,
+    '',
+    '',
+    {},
+    ('actuator_lag',),
+)
 
 
 def with_effect(effect_id, **parameters):
@@ -56,23 +66,20 @@ def test_a_motion_beyond_what_the_rig_has_been_through_is_not_safe(motions):
 def test_the_proposal_names_its_rivals_and_the_best_motion(record):
     plant = with_effect('transport_delay', delay_s=0.03)
     recording = record(plant, duration=6.0)
-    effect = NamedEffect(
-        'transport_delay',
-        'bend_x',
-        str(CATALOGUE['transport_delay'].stage),
-        0.5,
-        '',
-        '',
-        {},
-        ('actuator_lag',),
-    )
-    proposed = propose(recording, plant, effect)
+    proposed = propose(recording, plant, RIVALLED)
     assert proposed.separates == ('transport_delay', 'actuator_lag')
     assert proposed.distances[proposed.waveform] == max(proposed.distances.values())
     assert proposed.joints == ('bend_x', 'bend_y')
     command = np.array(proposed.command)
     assert command.shape == (len(proposed.time), 2)
     assert not command[:, 1].any()
+
+
+def test_where_no_motion_is_safe_none_is_proposed(record):
+    plant = with_effect('transport_delay', delay_s=0.03)
+    recording = record(plant, duration=6.0)
+    weak = dataclasses.replace(recording.tension, values=0.2 * recording.tension.values)
+    assert propose(dataclasses.replace(recording, tension=weak), plant, RIVALLED) is None
 
 
 def test_without_a_rival_there_is_nothing_to_separate(record):

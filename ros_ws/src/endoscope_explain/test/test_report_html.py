@@ -87,6 +87,16 @@ def test_every_verdict_has_its_sentence(stribeck_case, verdict):
     assert verdict_sentence(case).endswith('.')
 
 
+@pytest.mark.parametrize(('explained', 'offered'), [(0.9, True), (1e-4, False)])
+def test_a_formula_that_explains_nothing_is_not_offered(stribeck_case, explained, offered):
+    term = UnknownTerm('bend_x', 'moment', 'N m', 'a q**2', {}, (), explained, *[np.zeros(2)] * 3)
+    explanation = dataclasses.replace(stribeck_case.explanation, unknown=term)
+    case = dataclasses.replace(
+        stribeck_case, explanation=explanation, verdict=Verdict.UNKNOWN_PHYSICS
+    )
+    assert ('a q**2' in verdict_sentence(case)) == offered
+
+
 def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case):
     time = np.linspace(0.0, 10.0, 200)
     term = UnknownTerm(

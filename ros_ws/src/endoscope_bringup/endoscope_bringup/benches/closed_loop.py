@@ -4,6 +4,8 @@ import argparse
 from importlib.resources import files
 from pathlib import Path
 
+from endoscope_bringup.seed_argument import seed
+
 EFFECTS = (
     'friction_asymmetry',
     'wire_stiffening',
@@ -29,7 +31,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--effect', action='append', metavar='ID', help='conceal this one only (may be repeated)'
     )
-    parser.add_argument('--seed', type=int, default=1, help='chooses the slaves (1)')
+    parser.add_argument('--seed', type=seed, default=1, help='chooses the slaves (1)')
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from endoscope_bringup.benches.inference_time import inference_time
+from endoscope_bringup.seed_argument import seed
 
 if TYPE_CHECKING:
     from endoscope_core.trials.unseen_tube_trial import UnseenTubeTrial
@@ -23,7 +24,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         '60 sin(t).',
     )
     parser.add_argument('--tubes', type=int, default=10, metavar='N', help='number of tubes (10)')
-    parser.add_argument('--seed', type=int, default=1, help='chooses the tubes (1)')
+    parser.add_argument('--seed', type=seed, default=1, help='chooses the tubes (1)')
 
 
 def run(args: argparse.Namespace) -> int:

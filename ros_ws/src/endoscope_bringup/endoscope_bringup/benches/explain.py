@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from endoscope_bringup.seed_argument import seed
+
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `explain`."""
@@ -14,7 +16,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'pysindy, pyoperon and forward selection. Exits 1 if a figure is missed.',
     )
     parser.add_argument('--cases', type=int, default=20, metavar='N', help='number of cases (20)')
-    parser.add_argument('--seed', type=int, default=1, metavar='S', help='chooses the cases (1)')
+    parser.add_argument('--seed', type=seed, default=1, metavar='S', help='chooses the cases (1)')
     parser.add_argument('--jobs', type=int, default=2, metavar='N', help='processes (2)')
     parser.add_argument('--no-peers', action='store_true', help='leave out the peers')
     parser.add_argument(

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from endoscope_bringup.benches.papers_tables import TABLES
+from endoscope_bringup.seed_argument import seed
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -16,7 +17,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         description='Measures what the two papers report, on tube configurations that nothing '
         'was fitted on, and prints it beside their figures. Exits 1 if an aim is missed.',
     )
-    parser.add_argument('--seed', type=int, default=1, help='chooses tubes, rigs and noise (1)')
+    parser.add_argument('--seed', type=seed, default=1, help='chooses tubes, rigs and noise (1)')
     parser.add_argument(
         '--tubes', type=int, default=5, metavar='N', help='tube configurations of each row (5)'
     )

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from endoscope_bringup.seed_argument import seed
+
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `dataset`."""
@@ -15,7 +17,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--out', type=Path, required=True, metavar='DIR', help='new or empty folder'
     )
-    parser.add_argument('--seed', type=int, default=7, help='the same seed, the same data set (7)')
+    parser.add_argument('--seed', type=seed, default=7, help='the same seed, the same data set (7)')
     parser.add_argument(
         '--per-class', type=int, default=30, metavar='N', help='recordings of each class (30)'
     )

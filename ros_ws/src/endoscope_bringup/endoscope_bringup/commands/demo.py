@@ -5,6 +5,8 @@ import time
 from functools import partial
 from pathlib import Path
 
+from endoscope_bringup.seed_argument import seed
+
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `demo`."""
@@ -21,7 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         metavar='DIR',
         help='folder for bags and report, empty or not yet there; default bags/demo-DATE-TIME',
     )
-    parser.add_argument('--seed', type=int, default=1, help='of the noise; default %(default)s')
+    parser.add_argument('--seed', type=seed, default=1, help='of the noise; default %(default)s')
     parser.add_argument(
         '--tube',
         choices=('descending', 'transverse', 'both'),

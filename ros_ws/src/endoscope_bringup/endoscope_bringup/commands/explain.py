@@ -53,6 +53,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='a topic that may be missing',
     )
     parser.add_argument(
+        '--namespace', metavar='NS', help="of the rig's topics, where a bag has several rigs"
+    )
+    parser.add_argument(
         '--band',
         type=_positive_share,
         default=0.15,
@@ -111,6 +114,7 @@ def run(args: argparse.Namespace) -> int:
             args.band,
             args.effects,
             args.tightened,
+            namespace=args.namespace,
         )
         for bag, second in zip(args.bags, _seconds(args), strict=True)
     ]

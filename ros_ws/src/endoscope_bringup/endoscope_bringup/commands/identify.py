@@ -5,6 +5,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from endoscope_bringup.seed_argument import seed
+
 if TYPE_CHECKING:
     from endoscope_core.hysteresis.inverse import HysteresisParameters
     from endoscope_core.identification import Recording
@@ -41,7 +43,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='updated table to which the calibration in BAG is added; made if it is not there',
     )
     parser.add_argument('--out', type=Path, metavar='FILE', help='JSON file to write')
-    parser.add_argument('--seed', type=int, default=0, help='of the search (0)')
+    parser.add_argument('--seed', type=seed, default=0, help='of the search (0)')
     parser.add_argument(
         '--gear',
         type=float,

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from endoscope_bringup.seed_argument import seed
+
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `simulate`."""
@@ -31,7 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--noise',
-        type=int,
+        type=seed,
         metavar='SEED',
         help="add the sensors' noise and resolution, reproducibly",
     )

@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from endoscope_bringup.seed_argument import seed
+
 if TYPE_CHECKING:
     from endoscope_core.dataset import CalibrationDataset
 
@@ -33,7 +35,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='size: regresses the backlash size with an interval, and refuses what it does not '
         "know; cnn: the first paper's 1D-CNN, for the sinusoid only (size)",
     )
-    parser.add_argument('--seed', type=int, default=0, help='of weights, batches and folds (0)')
+    parser.add_argument('--seed', type=seed, default=0, help='of weights, batches and folds (0)')
     parser.add_argument(
         '--folds', type=int, default=5, metavar='K', help='of the cross-validation (5)'
     )

@@ -50,7 +50,7 @@ def propose(
     Returns
     -------
     NextExperiment or None
-        None where there is no rival that could be fitted, or no motion separates them.
+        None where there is no rival that could be fitted, or no motion is safe for all of them.
     """
     plants = {effect.id: plant} | {
         rival: fitted
@@ -60,6 +60,8 @@ def propose(
     if len(plants) < 2:
         return None
     motions = safe_family(recording, list(plants.values()), effect.joint)
+    if not motions:
+        return None
 
     def smallest(waveform: Waveform) -> float:
         imagined = {name: imagine(p, waveform) for name, p in plants.items()}

@@ -21,6 +21,7 @@ from endoscope_explain.recording.series import (
     Series,
 )
 from endoscope_explain.recording.signals import motor_name, wire_names
+from endoscope_explain.recording.usable_stamps import require_common_time, without_stray
 
 WAIVABLE = (MOTOR,)
 """Topics that analysis can do without where the caller says so."""
@@ -60,6 +61,7 @@ def recording_from_bag(
     ------
     BagError
         Any of endoscope_bags: the bag is cut, empty, lacks a topic or every joint, holds NaN ...
+        Also if its stamps cannot be used.
     """
     bag = open_bag(path)
     lacking = [t for t in (WIRES, BENDING, MOTOR) if not bag.has(t, namespace)]
@@ -74,6 +76,8 @@ def recording_from_bag(
         if len(series) < 2:
             raise TooShortError(f'{path}: topic {series.topic} holds {len(series)} message')
         series.require(quantity)
+        series, left_out = without_stray(series)
+        notes.extend([left_out] if left_out else [])
         return series
 
     if bag.has(COMMAND, namespace):
@@ -106,6 +110,7 @@ def recording_from_bag(
         raise MissingJointError(f'{path}: no joint is complete: ' + '; '.join(notes))
 
     every = [s for s in (command, wires, bending, motor) if s is not None]
+    require_common_time(path, every)
     origin_ns = min(int(s.stamp_ns.min()) for s in every)
 
     def series(topic: str, source: JointStateSeries, names: Sequence[str], key: str) -> Series:
@@ -152,6 +157,15 @@ def plant_of_joints(plant: PlantDescription, joints: Sequence[str]) -> PlantDesc
         plant,
         joints={name: plant.joints[name] for name in joints},
         effects=tuple(e for e in plant.effects if e.joint in joints),
+    )
+
+
+def with_unrecorded(plant: PlantDescription, described: PlantDescription) -> PlantDescription:
+    """Return a plant of the recorded joints with the others as they are described."""
+    return replace(
+        plant,
+        joints={name: plant.joints.get(name, joint) for name, joint in described.joints.items()},
+        effects=plant.effects + tuple(e for e in described.effects if e.joint not in plant.joints),
     )
 
 

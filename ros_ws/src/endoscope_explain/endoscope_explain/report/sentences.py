@@ -15,6 +15,9 @@ HEADLINES = {
     Verdict.INSUFFICIENT_DATA: 'The recording cannot tell',
 }
 
+LEAST_EXPLAINED = 0.05
+"""A formula that takes away less of the misfit than this is not offered as what acts."""
+
 
 def worst_ratio(ladder: Ladder, rung: str) -> float:
     """Return the largest rmse / noise of any signal on a rung."""
@@ -66,6 +69,11 @@ def _unknown(case: ExplainedCase, better: str) -> str:
     term = case.explanation.unknown
     if term is None:
         return f'A significant mismatch remains that no effect of the catalogue explains; {better}.'
+    if term.explained < LEAST_EXPLAINED:
+        return (
+            f'A significant mismatch of {term.joint} remains that neither an effect of the '
+            f'catalogue nor any formula of the states that was tried explains; {better}.'
+        )
     siblings = f', nearest to {" and ".join(term.siblings[:2])}' if term.siblings else ''
     return (
         f'No effect of the catalogue explains what acts on the {term.node} of {term.joint}; '

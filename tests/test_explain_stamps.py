@@ -1,0 +1,63 @@
+"""Recordings whose header stamps are those of no clock or of another one."""
+
+import json
+
+import numpy as np
+import pytest
+from short_bags import PLANT, write_short_bag
+
+from endoscope_bringup import cli
+from endoscope_core.plant import save_plant
+
+
+@pytest.fixture
+def explain(tmp_path, capsys):
+    save_plant(PLANT, tmp_path / 'plant.yaml')
+
+    def explain(restamped):
+        bag = write_short_bag(tmp_path / 'bag', restamped=restamped)
+        plant, out = tmp_path / 'plant.yaml', tmp_path / 'out'
+        words = ['explain', str(bag), '--plant', str(plant), '--out', str(out), '--quick']
+        return cli.main(words), capsys.readouterr()
+
+    return explain
+
+
+TOPICS = ['slave/measured_js', 'wires/measured_js', 'motor/measured_js', 'motor/servo_jp']
+
+
+@pytest.mark.parametrize('topic', TOPICS)
+@pytest.mark.parametrize('stamp', [0, 1_700_000_001_000_000_000])
+def test_a_topic_of_one_stamp_is_refused(explain, tmp_path, topic, stamp):
+    status, printed = explain({topic: lambda stamps: np.full_like(stamps, stamp)})
+    assert status == 2
+    assert printed.err.count('\n') == 1
+    assert f'/rig/{topic} are stamped {stamp * 1e-9:.3f} s' in printed.err
+    assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.parametrize('topic', TOPICS)
+@pytest.mark.parametrize('offset_s', [3600, -1_699_999_000])
+def test_clocks_without_a_common_time_are_refused(explain, tmp_path, topic, offset_s):
+    status, printed = explain({topic: lambda stamps: stamps + offset_s * 10**9})
+    assert status == 2
+    assert printed.err.count('\n') == 1
+    assert f'/rig/{topic}' in printed.err
+    assert 'by one clock' in printed.err
+    assert not (tmp_path / 'out').exists()
+
+
+def first_two_zero(stamps):
+    return np.where(np.arange(len(stamps)) < 2, 0, stamps)
+
+
+@pytest.mark.parametrize('topic', TOPICS)
+def test_stray_stamps_are_left_out_and_noted(explain, tmp_path, topic):
+    """A driver that publishes before its clock is set."""
+    status, printed = explain({topic: first_two_zero})
+    assert status == 0
+    assert f'/rig/{topic} are left out' in printed.out
+    assert '2 of ' in printed.out
+    if topic != 'motor/servo_jp':  # the rig moves from the first command on, which is lost
+        report = json.loads((tmp_path / 'out' / 'report.json').read_text())
+        assert report['verdict'] == 'consistent'
