@@ -100,6 +100,28 @@ def test_a_frozen_cell_is_found_and_not_judged(sound):
     assert report.recording.tension.valid.sum() == values.size - 399
 
 
+def test_a_motor_that_repeats_an_old_position_is_found_and_not_judged(sound):
+    values = sound.shaft_position.values.copy()
+    values[3000:3400, 0] = values[3000, 0]
+    position = changed(sound.shaft_position, values=values)
+    report = audit_recording(sound.with_series({'shaft_position': position}), PLANT)
+    (finding,) = report.findings
+    assert finding.id == 'held_samples'
+    assert finding.signals == ('motor/measured_js:motor_x.position',)
+    for series in (report.recording.shaft_velocity, report.recording.shaft_position):
+        assert not series.valid[3001:3400, 0].any()
+        # The reading may have stood there just before.
+        assert 0 <= series.valid.size - 399 - series.valid.sum() <= 5
+
+
+def test_a_motor_that_rests_is_no_fault(sound):
+    position = sound.shaft_position
+    rest = np.searchsorted(position.time, [3.0, 3.5])
+    at = np.r_[: rest[0], np.full(500, rest[0]), rest[0] : len(position.time) - 500]
+    resting = changed(position, values=position.values[at])
+    assert 'held_samples' not in named(sound.with_series({'shaft_position': resting}))
+
+
 def test_a_coarse_tracker_that_stands_still_with_the_rig_is_no_fault(sound):
     coarse = np.round(sound.bending.values / 0.03) * 0.03
     assert named(sound.with_series({'bending': changed(sound.bending, values=coarse)})) == {}

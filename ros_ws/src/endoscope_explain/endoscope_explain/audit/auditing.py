@@ -6,7 +6,7 @@ import numpy as np
 
 from endoscope_core.plant import PlantDescription, SensorParameters
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
-from endoscope_explain.audit.held_samples import held, held_finding
+from endoscope_explain.audit.held_samples import held, held_before_jump, held_finding
 from endoscope_explain.audit.outliers import find_outliers, motor_travel, outlier_finding
 from endoscope_explain.audit.receipt_clock import (
     clock_skew_from_receipt,
@@ -45,6 +45,7 @@ def audit_recording(recording: Recording, plant: PlantDescription) -> AuditRepor
     recording = _on_ordered_stamps(recording, findings)
     recording = _on_one_clock(recording, findings)
     recording = _without_commandless_times(recording, findings)
+    recording = _audited_motor(recording, plant.sensors, findings)
     recording = replace(
         recording,
         tension=_audited_tension(recording, plant.sensors, findings),
@@ -113,6 +114,29 @@ def _unknown_command(
         if np.abs(after - before).max() > 2.0 * usual:
             unknown.append((a, b))
     return unknown
+
+
+def _audited_motor(
+    recording: Recording, sensors: SensorParameters, findings: list[Finding]
+) -> Recording:
+    position = recording.shaft_position
+    if position is None:
+        return recording
+    interval = usual_interval(position.time)
+    held_at = np.zeros(position.valid.shape, bool)
+    for j, joint in enumerate(recording.joints):
+        repeated = held_before_jump(
+            position.time, position.values[:, j], 2.0 * np.pi / sensors.encoder_counts
+        )
+        if repeated.any():
+            signal = signal_name('shaft_position', joint)
+            findings.append(
+                held_finding(joint, signal, position.topic, position.time, repeated, interval)
+            )
+        held_at[:, j] = repeated
+    motor = {n: s for n, s in recording.measured().items() if s.topic == position.topic}
+    # Position, velocity and effort of the motor come in the same messages.
+    return recording.with_series({name: s.without(held_at) for name, s in motor.items()})
 
 
 def _audited_tension(

@@ -13,6 +13,9 @@ Indices = NDArray[np.int64]
 COARSE = 0.1
 """Share of repeated readings from which on a sensor is coarser than its noise."""
 COARSE_HOLD_S = 1.0
+JUMP = 5.0
+"""Usual large steps that a reading jumps by when it was held before."""
+JUMP_HOLD_S = 0.02
 
 
 def runs_of_equal(values: Array) -> tuple[Indices, Indices]:
@@ -63,6 +66,41 @@ def held(values: Array, noise: float, resolution: float, interval: float) -> tup
         if length >= bound:
             repeated[start + 1 : start + length] = True
     return repeated, period
+
+
+def held_before_jump(time: Array, values: Array, resolution: float) -> Mask:
+    """Find a noiseless sensor's samples that stand still until the reading jumps.
+
+    A rig that rests starts to move by small steps; a source that repeated an old sample comes back
+    where the rig has gone in the meantime.
+
+    Parameters
+    ----------
+    time : array (N,)
+        Increasing stamps in s.
+    values : array (N,)
+    resolution : float
+        Step of the sensor, in the values' unit.
+
+    Returns
+    -------
+    array (N,) of bool
+        All but the first sample of every such run.
+    """
+    repeated = np.zeros(len(values), bool)
+    interval, step = np.diff(time), np.abs(np.diff(values))
+    usual = float(np.median(interval))
+    moving = step[step > 0.0]
+    if not len(moving):
+        return repeated
+    jump = JUMP * max(resolution, float(np.quantile(moving, 0.99)))
+    for start, length in zip(*runs_of_equal(values), strict=True):
+        end = start + length - 1
+        if end == len(step) or time[end] - time[start] < max(JUMP_HOLD_S, 4.0 * usual):
+            continue
+        if step[end] > jump and interval[end] < 2.5 * usual:
+            repeated[start + 1 : end + 1] = True
+    return repeated
 
 
 def held_finding(
