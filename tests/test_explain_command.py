@@ -188,10 +188,7 @@ def test_one_bad_bag_among_good_ones_is_refused_before_any_work(rig, tmp_path, c
 def test_of_two_rigs_in_a_bag_one_has_to_be_chosen(rig, tmp_path, capsys):
     both = write_short_bag(tmp_path / 'both', rigs=('left', 'right'))
     assert 'give the namespace' in refused(capsys, rig, tmp_path / 'out', both)
-    for namespace in ('right', '/left'):
-        assert (
-            explain(rig, tmp_path / namespace[-4:], both, '--namespace', namespace, '--quick') == 0
-        )
+    assert explain(rig, tmp_path / 'out', both, '--namespace', 'right', '--quick') == 0
 
 
 def test_joints_that_were_not_recorded_stay_in_the_plant_as_described(tmp_path):

@@ -245,7 +245,7 @@ def _on_dask(sources: Sequence[Sources], address: str) -> Iterator[tuple[int, Re
     from distributed import as_completed as dask_completed
 
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=5)
     except (OSError, ValueError) as error:
         raise ClusterError(f'no Dask scheduler at {address}: {error}') from error
     with client:

@@ -51,7 +51,7 @@ def test_an_effect_beside_a_number_far_from_its_description_is_named(one_joint):
     friction = EffectSpec('viscous_friction', 'bend_x', {'coefficient': 200.0})
     true = one_joint.rig(friction, wire_stiffness=1300.0)
     explanation = explain_recording(
-        one_joint.record(true, one_joint.motion()), one_joint.rig(), jobs=2
+        one_joint.record(true, one_joint.motion(8.0)), one_joint.rig(), jobs=2
     )
     assert explanation.verdict is Verdict.MISSING_PHYSICS
     assert [e.id for e in explanation.effects] == ['viscous_friction']
@@ -92,7 +92,7 @@ def test_physics_outside_the_catalogue_is_unknown_and_given_as_a_formula(monkeyp
     from endoscope_core.plant import simulator
     from endoscope_core.plant.kernel import IN_PUSH_MOMENT, OUT_JOINT
 
-    command = one_joint.motion()
+    command = one_joint.motion(8.0)
     nominal = one_joint.record(one_joint.rig(), command)
     bump_at = 0.3
     run = simulator.run_joints
@@ -146,7 +146,7 @@ def test_sticking_and_slipping_is_fitted_from_many_starts(one_joint):
         'bend_x',
         {'rise': 0.6, 'stribeck_speed': 1.4e-3, 'tail': 1.0, 'lagging': 1.0, 'memory_s': 1e-3},
     )
-    recording = one_joint.record(one_joint.rig(slipping), one_joint.motion())
+    recording = one_joint.record(one_joint.rig(slipping), one_joint.motion(8.0))
     explanation = explain_recording(recording, one_joint.rig(), jobs=2)
     assert [e.id for e in explanation.effects] == ['stribeck_friction']
     found = explanation.effects[0].parameters
@@ -186,7 +186,7 @@ def test_more_than_two_effects_are_found_where_they_are_asked_for(one_joint):
         EffectSpec('load_cell_gain', 'bend_x', {'gain': 0.85, 'wire': 1.0}),
         EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.5, 'stiffness': 0.2}),
     )
-    recording = one_joint.record(one_joint.rig(*effects), one_joint.motion(7.0))
+    recording = one_joint.record(one_joint.rig(*effects), one_joint.motion(5.5))
     two = explain_recording(recording, one_joint.rig(), jobs=2)
     three = explain_recording(recording, one_joint.rig(), most_effects=3, jobs=2)
     assert len(two.effects) <= 2
@@ -197,7 +197,7 @@ def test_a_joint_moved_by_another_one_that_is_not_nominal_either(one_joint):
     stopped = EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.4, 'stiffness': 0.2})
     coupled = EffectSpec('cross_coupling', 'bend_y', {'moment_per_rad': -0.01})
     described = PlantDescription()
-    motion = np.column_stack([one_joint.motion(8.0), 0.7 * one_joint.motion(8.0)[::-1]])
+    motion = np.column_stack([one_joint.motion(6.0), 0.7 * one_joint.motion(6.0)[::-1]])
     motion -= motion[0]
     recording = one_joint.record(replace(described, effects=(stopped, coupled)), motion)
     explanation = explain_recording(recording, described, jobs=2)
