@@ -88,8 +88,6 @@ class Inputs:
     ----------
     described : PlantDescription
         As given.
-    plant : PlantDescription
-        The same with the recorded joints only.
     audit : AuditReport
     baseline, validation : Recording or None
         As audited.
@@ -102,7 +100,6 @@ class Inputs:
     """
 
     described: PlantDescription
-    plant: PlantDescription
     audit: AuditReport
     baseline: Recording | None
     validation: Recording | None
@@ -110,6 +107,11 @@ class Inputs:
     most_effects: int = MOST_EFFECTS
     tightened: bool = False
     given: GivenJoints | None = None
+
+    @property
+    def plant(self) -> PlantDescription:
+        """Return the plant as described, with the recorded joints only."""
+        return plant_of_joints(self.described, self.audit.recording.joints)
 
 
 class JointsDifferError(BagError):
@@ -132,14 +134,17 @@ def read_inputs(sources: Sources) -> Inputs:
     BagError
         If a recording cannot be used; the message names it.
     """
-    waived, namespace = sources.without, sources.namespace
-    raw = recording_from_bag(sources.bag, sources.plant, without=waived, namespace=namespace)
+
+    def read(path: Path, plant: PlantDescription) -> Recording:
+        return recording_from_bag(path, plant, without=sources.without, namespace=sources.namespace)
+
+    raw = read(sources.bag, sources.plant)
     plant = plant_of_joints(sources.plant, raw.joints)
 
     def second(path: Path | None) -> Recording | None:
         if path is None:
             return None
-        other = recording_from_bag(path, plant, without=waived, namespace=namespace)
+        other = read(path, plant)
         if other.joints != raw.joints:
             raise JointsDifferError(
                 f'{path}: has {", ".join(other.joints)}, but {sources.bag} has '
@@ -149,7 +154,6 @@ def read_inputs(sources: Sources) -> Inputs:
 
     return Inputs(
         sources.plant,
-        plant,
         audit_recording(raw, plant),
         second(sources.baseline),
         second(sources.validate),

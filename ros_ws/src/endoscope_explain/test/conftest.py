@@ -98,5 +98,5 @@ def stribeck_case(stribeck_recording):
         augmented,
         {name: rung(recorded, name) for name in ('nominal', 'refitted', 'augmented')},
     )
-    inputs = Inputs(plant, plant, audit, None, None)
+    inputs = Inputs(plant, audit, None, None)
     return explain_case(inputs, lambda *_, **__: explanation, extras=False)

@@ -6,7 +6,7 @@ import numpy as np
 
 from endoscope_core.plant import PlantDescription, SensorParameters
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
-from endoscope_explain.audit.held_samples import held, held_before_jump, held_finding
+from endoscope_explain.audit.held_samples import held, held_before_jump, held_findings
 from endoscope_explain.audit.outliers import find_outliers, motor_travel, outlier_finding
 from endoscope_explain.audit.receipt_clock import (
     clock_skew_from_receipt,
@@ -122,17 +122,13 @@ def _audited_motor(
     position = recording.shaft_position
     if position is None:
         return recording
-    interval = usual_interval(position.time)
     held_at = np.zeros(position.valid.shape, bool)
     for j, joint in enumerate(recording.joints):
         repeated = held_before_jump(
             position.time, position.values[:, j], 2.0 * np.pi / sensors.encoder_counts
         )
-        if repeated.any():
-            signal = signal_name('shaft_position', joint)
-            findings.append(
-                held_finding(joint, signal, position.topic, position.time, repeated, interval)
-            )
+        signal = signal_name('shaft_position', joint)
+        findings += held_findings(joint, signal, position.time, repeated)
         held_at[:, j] = repeated
     motor = {n: s for n, s in recording.measured().items() if s.topic == position.topic}
     # Position, velocity and effort of the motor come in the same messages.
@@ -168,10 +164,7 @@ def _audited_tension(
                 values, sensors.load_cell_noise, sensors.load_cell_resolution, interval
             )
             repeated &= ~at_limit
-            if repeated.any():
-                findings.append(
-                    held_finding(joint, signal, series.topic, series.time, repeated, interval)
-                )
+            findings += held_findings(joint, signal, series.time, repeated)
             wrong[:, j, wire] = at_limit | repeated
     return series.without(wrong)
 
@@ -188,10 +181,7 @@ def _audited_bending(
         signal = signal_name('bending', joint)
         values = series.values[:, j]
         repeated, _ = held(values, plant.sensors.tracker_noise, 0.0, interval)
-        if repeated.any():
-            findings.append(
-                held_finding(joint, signal, series.topic, series.time, repeated, interval)
-            )
+        findings += held_findings(joint, signal, series.time, repeated)
         travel = motor_travel(
             series.time, motor.time, motor.values[:, j] / plant.joints[joint].gear, 3.0 * interval
         )

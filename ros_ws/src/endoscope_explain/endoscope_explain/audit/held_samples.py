@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.audit.finding import Finding, Severity
+from endoscope_explain.audit.stamps import GAP_FACTOR, usual_interval
 from endoscope_explain.recording.series import Array, Mask
 
 Indices = NDArray[np.int64]
@@ -88,39 +89,40 @@ def held_before_jump(time: Array, values: Array, resolution: float) -> Mask:
         All but the first sample of every such run.
     """
     repeated = np.zeros(len(values), bool)
-    interval, step = np.diff(time), np.abs(np.diff(values))
-    usual = float(np.median(interval))
-    moving = step[step > 0.0]
-    if not len(moving):
+    usual = usual_interval(time)
+    starts, lengths = runs_of_equal(values)
+    ends = starts[1:] - 1
+    step = np.abs(np.diff(values))[ends]
+    if not len(step):
         return repeated
-    jump = JUMP * max(resolution, float(np.quantile(moving, 0.99)))
-    for start, length in zip(*runs_of_equal(values), strict=True):
-        end = start + length - 1
-        if end == len(step) or time[end] - time[start] < max(JUMP_HOLD_S, 4.0 * usual):
-            continue
-        if step[end] > jump and interval[end] < 2.5 * usual:
-            repeated[start + 1 : end + 1] = True
+    long = time[ends] - time[starts[:-1]] >= max(JUMP_HOLD_S, 4.0 * usual)
+    jumps = step > JUMP * max(resolution, float(np.quantile(step, 0.99)))
+    whole = np.diff(time)[ends] < GAP_FACTOR * usual
+    for run in np.flatnonzero(long & jumps & whole):
+        repeated[starts[run] + 1 : starts[run] + lengths[run]] = True
     return repeated
 
 
-def held_finding(
-    joint: str, signal: str, topic: str, time: Array, repeated: Mask, interval: float
-) -> Finding:
-    """Describe the repeated samples of one signal; a note while they are few."""
+def held_findings(joint: str, signal: str, time: Array, repeated: Mask) -> list[Finding]:
+    """Describe the repeated samples of one signal, if any; a note while they are few."""
+    if not repeated.any():
+        return []
     starts = np.flatnonzero(repeated & ~np.r_[False, repeated[:-1]])
     ends = np.flatnonzero(repeated & ~np.r_[repeated[1:], False])
     spans = tuple((float(time[a - 1]), float(time[b])) for a, b in zip(starts, ends, strict=True))
     longest = max(b - a for a, b in spans)
-    severity = Severity.FAULT if longest > max(0.05, 4 * interval) else Severity.NOTE
-    return Finding(
-        'held_samples',
-        severity,
-        joint,
-        'recording',
-        (signal,),
-        spans,
-        f'{signal} stands still for up to {longest:.3f} s (first from {spans[0][0]:.3f} s), which '
-        'its noise does not allow: the source repeated an old sample',
-        'repeated samples are not judged',
-        evidence={'count': float(repeated.sum()), 'longest_s': longest},
-    )
+    severity = Severity.FAULT if longest > max(0.05, 4 * usual_interval(time)) else Severity.NOTE
+    return [
+        Finding(
+            'held_samples',
+            severity,
+            joint,
+            'recording',
+            (signal,),
+            spans,
+            f'{signal} stands still for up to {longest:.3f} s (first from {spans[0][0]:.3f} s), '
+            'which its noise does not allow: the source repeated an old sample',
+            'repeated samples are not judged',
+            evidence={'count': float(repeated.sum()), 'longest_s': longest},
+        )
+    ]

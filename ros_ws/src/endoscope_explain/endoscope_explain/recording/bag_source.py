@@ -77,7 +77,7 @@ def recording_from_bag(
             raise TooShortError(f'{path}: topic {series.topic} holds {len(series)} message')
         series.require(quantity)
         series, left_out = without_stray(series)
-        notes.extend([left_out] if left_out else [])
+        notes.extend(left_out)
         return series
 
     if bag.has(COMMAND, namespace):

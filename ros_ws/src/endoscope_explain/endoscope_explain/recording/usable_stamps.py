@@ -15,7 +15,7 @@ class UnusableStampsError(BagError):
     """The stamps of a topic say nothing about when its messages were made."""
 
 
-def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, str]:
+def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, list[str]]:
     """Leave out messages whose stamp is far from when they were received, unlike the others'.
 
     Parameters
@@ -26,19 +26,19 @@ def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, str]:
     Returns
     -------
     JointStateSeries
-    str
+    list of str
         What was left out, in words; empty where nothing was.
     """
     delay = series.log_ns - series.stamp_ns
     far = np.abs(delay - np.median(delay)) > STRAY_NS
     if not far.any() or np.ptp(series.stamp_ns) <= np.ptp(series.log_ns) + STRAY_NS:
-        return series, ''
+        return series, []
     seconds = int(series.stamp_ns[far][0]) * 1e-9
     note = (
         f'{int(far.sum())} of {len(series)} messages of {series.topic} are left out: their stamps '
         f'are far from when they were received (the first is stamped {seconds:.3f} s)'
     )
-    return series.ordered(np.flatnonzero(~far)), note
+    return series.ordered(np.flatnonzero(~far)), [note]
 
 
 def require_common_time(path: object, topics: Sequence[JointStateSeries]) -> None:
