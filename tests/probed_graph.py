@@ -5,10 +5,10 @@ from collections import defaultdict
 from diagnostic_msgs.msg import DiagnosticArray
 from probed_runtime import ProbedRuntime
 from rclpy.parameter import Parameter
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 
 from endoscope_nodes.matching import all_matched
-from endoscope_nodes.names import OPERATING_STATE, STATE_COMMAND
+from endoscope_nodes.names import MOTION_SESSION, OPERATING_STATE, STATE_COMMAND
 from endoscope_nodes.qos import EVENT, RESULT
 from endoscope_nodes.runtime import Runtime
 
@@ -27,6 +27,8 @@ class ProbedGraph(ProbedRuntime):
         By name.
     states
         Operating states, as they were told.
+    session
+        Motion session that is open; empty where none is.
     diagnostics
         Statuses of each subcomponent, by its name.
     """
@@ -39,12 +41,17 @@ class ProbedGraph(ProbedRuntime):
         self.probe.create_subscription(
             String, OPERATING_STATE, lambda m: self.states.append(m.data), RESULT
         )
+        self.session = ''
+        self.probe.create_subscription(Header, MOTION_SESSION, self._note_session, EVENT)
         self.diagnostics = defaultdict(list)
         self.probe.create_subscription(DiagnosticArray, '/diagnostics', self._note, EVENT)
 
+    def _note_session(self, message: Header) -> None:
+        self.session = message.frame_id
+
     def _note(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            self.diagnostics[status.name].append(status)
+            self.diagnostics[status.name.removeprefix('/endoscope/')].append(status)
 
     @property
     def state(self) -> str:

@@ -17,6 +17,7 @@ from endoscope_nodes.runtime import Runtime
 
 PATIENCE_S = 120.0
 LONGEST_CALIBRATION_S = 13
+FACTORIES = (*SLAVE_NODES, *CONTROL_NODES)
 
 
 class SimulatedGraph(ProbedGraph):
@@ -30,18 +31,21 @@ class SimulatedGraph(ProbedGraph):
         Node factories to add.
     overrides
         Parameter values by node name.
+    rig
+        What stands on the table, instead of the shipped one.
     """
 
-    def __init__(self, *, without=(), extra=(), overrides=None) -> None:
+    def __init__(self, *, without=(), extra=(), overrides=None, rig=None) -> None:
         self.domain = private_domain()
         runtime = Runtime(
             args=['--ros-args', '-p', 'use_sim_time:=true', '--log-level', 'fatal'],
             context=Context(),
             domain_id=self.domain,
             overrides=overrides,
+            rig=rig,
         )
         for factory in (*SLAVE_NODES, *CONTROL_NODES, *extra, ConductorNode):
-            if factory.__module__.rpartition('.')[2].removesuffix('_node') not in without:
+            if node_name(factory) not in without:
                 runtime.add(factory)
         runtime.check_parameters()
         super().__init__(runtime, PATIENCE_S)
@@ -109,8 +113,24 @@ class SimulatedGraph(ProbedGraph):
         assert status.level == b'\x00', status.message
         return {v.key: v.value for v in status.values}
 
+    @property
+    def cause(self) -> str:
+        """Why the slave is in FAULT."""
+        return self.nodes['supervisor'].machine.cause
+
     def kill(self, name: str) -> None:
         """Let a node vanish without a last word, as SIGKILL does."""
         node = self.nodes.pop(name)
         node.close = lambda: None
         self.runtime.remove(node)
+
+    def start(self, name: str) -> None:
+        """Start a node that was killed anew."""
+        factory = next(f for f in FACTORIES if node_name(f) == name)
+        self.nodes[name] = self.runtime.add(factory)
+        self.connect()
+
+
+def node_name(factory: type) -> str:
+    """Name of the node that a class makes, by its module."""
+    return factory.__module__.rpartition('.')[2].removesuffix('_node')

@@ -25,7 +25,7 @@ from endoscope_core.classifier.classification import (
 from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.control import PhysicalParameters
 from endoscope_core.identification.plant_fit import PlantFitError, plants_of_calibration
-from endoscope_core.safety import OperatingState, StateCommand, TensionGuard
+from endoscope_core.safety import StateCommand, TensionGuard
 from endoscope_core.signals import CALIBRATION_MOTIONS, SINUSOID, calibration_motion
 from endoscope_nodes.calibration_result import (
     aborted_result,
@@ -34,19 +34,13 @@ from endoscope_nodes.calibration_result import (
 )
 from endoscope_nodes.diagnostics import ERROR, OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.joint_stream import (
-    JointPublisher,
-    JointSample,
-    JointSubscription,
-    LatestJointState,
-)
+from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
     JOINTS,
     MOTOR_MEASURED,
-    MOTORS,
     SLAVE_MEASURED,
     STATE_COMMAND,
     WIRES,
@@ -55,9 +49,8 @@ from endoscope_nodes.names import (
 from endoscope_nodes.parameters import parameter
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
-from endoscope_nodes.state_watch import StateWatch
-from endoscope_nodes.stream_watch import StreamWatch
 from endoscope_nodes.ticker import TICK_NS
+from endoscope_nodes.watches import MeasuredPose, SessionWatch, StreamWatch
 
 _Judgement = tuple[ClassificationResult, tuple[PhysicalParameters, ...]]
 
@@ -81,21 +74,10 @@ class CalibrationParameters:
         'whether to identify the plant of each joint from the tensions too, which the physical '
         'modes of the compensator can be selected by; takes some seconds more of computing',
     )
-    gear: float = parameter(0.5, 'shaft angle for one radian at the joint', low=0.01, high=100.0)
     return_speed: float = parameter(
         1.0, 'largest speed on the way to zero', unit='rad/s', low=0.01, high=10.0
     )
     rest: float = parameter(0.5, 'rest at zero before the motion', unit='s', low=0.0, high=60.0)
-    tension_ceiling: float = parameter(
-        55.0, 'tension of a wire at which calibration is aborted', unit='N', low=0.1, high=500.0
-    )
-    stream_timeout: float = parameter(
-        0.1,
-        'silence of motors or load cells at which calibration is aborted',
-        unit='s',
-        low=0.005,
-        high=10.0,
-    )
 
 
 class CalibrationNode(EndoscopeNode):
@@ -111,7 +93,7 @@ class CalibrationNode(EndoscopeNode):
         super().__init__('calibration', runtime)
         p = self.parameters(CalibrationParameters)
         self._settings = p
-        self._timeout_ns = round(p.stream_timeout * 1e9)
+        self._timeout_ns = self.rig.timeouts.stream_ns
         self._motion = calibration_motion(p.motion)
         self._classifier, self._no_classifier = self._load_classifier(p.weights)
         self._thread = None if self.ticker.simulated else ThreadPoolExecutor(1)
@@ -124,16 +106,13 @@ class CalibrationNode(EndoscopeNode):
         self._aborts = 0
         self._refused = 0
         self._last = ''
-        self._guard = TensionGuard(WIRES, p.tension_ceiling)
+        self._guard = TensionGuard(WIRES, self.rig.tension.calibration_ceiling)
         self._commands = JointPublisher(
             self, CALIBRATION_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
         )
         self._results = self.create_publisher(DiagnosticArray, CALIBRATION_RESULT, RESULT)
-        self._state = StateWatch(self, self.ticker, self._on_state)
-        self._motors = StreamWatch(self.ticker, MOTOR_MEASURED)
-        self._shafts = LatestJointState(
-            self, MOTOR_MEASURED, MOTORS, SENSOR_ASKED, self._motors.note
-        )
+        self._session = SessionWatch(self, None, self._on_leave)
+        self._pose = MeasuredPose(self)
         self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
         JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
         JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_bending, SENSOR_ASKED)
@@ -177,14 +156,14 @@ class CalibrationNode(EndoscopeNode):
             return f'busy: {self._run.step}'
         if self._no_classifier and not homing:
             return self._no_classifier
-        if not self._state.enabled:
-            return f'the slave is {self._state.state}; it has to be ENABLED'
-        trouble = self._trouble()
-        shafts = self._shafts.read()
-        if trouble or shafts is None or len(shafts.position) != len(MOTORS):
-            return trouble or f'{MOTOR_MEASURED} has no position'
+        if not self._session.name:
+            return 'no motion session is open: the slave has to be ENABLED'
+        trouble, shafts = self._trouble(), self._pose.shafts()
+        if trouble or shafts is None:
+            return trouble
+        self._commands.session = self._session.name
         self._run = CalibrationRun(
-            [x / self._settings.gear for x in shafts.position],
+            [x / self.rig.joints.gear for x in shafts],
             len(WIRES),
             TICK_NS,
             self._settings.return_speed,
@@ -201,15 +180,12 @@ class CalibrationNode(EndoscopeNode):
     def _trouble(self) -> str:
         if self._guard.trouble:
             return self._guard.trouble
-        for stream in (self._motors, self._wires):
-            trouble = stream.trouble(self._timeout_ns)
-            if trouble:
-                return trouble
-        return ''
+        if self._pose.shafts() is None:
+            return f'{MOTOR_MEASURED} is silent or not finite'
+        return self._wires.trouble(self._timeout_ns)
 
-    def _on_state(self, state: OperatingState) -> None:
-        if self._run is not None and state is not OperatingState.ENABLED:
-            self._abort(f'the slave became {state}')
+    def _on_leave(self) -> None:
+        self._abort('the motion session has ended')
 
     def _on_wires(self, sample: JointSample) -> None:
         if len(sample.effort) != len(WIRES):
@@ -227,7 +203,7 @@ class CalibrationNode(EndoscopeNode):
         run = self._run
         if run is None:
             return
-        trouble = self._trouble() or ('' if self._state.enabled else 'the supervisor is silent')
+        trouble = self._trouble()
         if trouble:
             self._abort(trouble)
             return
@@ -289,7 +265,7 @@ class CalibrationNode(EndoscopeNode):
         if run.record is not None and self._motion.name == SINUSOID:
             backlash = self._bending.backlash_size(run.record.start_ns)
         now = self.ticker.now_ns()
-        self._results.publish(
+        self._publish(
             successful_result(now, verdict, backlash, (now - self._began_ns) * 1e-9, plants)
         )
         self._run = None
@@ -303,7 +279,11 @@ class CalibrationNode(EndoscopeNode):
         self._last = reason
         self.get_logger().error(f'{reason}; the motion is not compensated')
         now = self.ticker.now_ns()
-        self._results.publish(refused_result(now, reason, (now - self._began_ns) * 1e-9))
+        self._publish(refused_result(now, reason, (now - self._began_ns) * 1e-9))
+
+    def _publish(self, result: DiagnosticArray) -> None:
+        result.header.frame_id = self._commands.session
+        self._results.publish(result)
 
     def _abort(self, reason: str) -> None:
         run, self._run = self._run, None
@@ -314,7 +294,7 @@ class CalibrationNode(EndoscopeNode):
         self.get_logger().error(self._last)
         if not self._homing:
             now = self.ticker.now_ns()
-            self._results.publish(
+            self._publish(
                 aborted_result(now, reason, str(run.step), (now - self._began_ns) * 1e-9)
             )
 

@@ -1,5 +1,7 @@
 """Turns desired bending into motor commands that make up for the hysteresis."""
 
+from typing import Any
+
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
@@ -13,19 +15,12 @@ from endoscope_core.control import (
 )
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.law_choice import BY_CLASS, CalibrationFindings, LawChoice
-from endoscope_core.safety import CommandGate, CommandLimits, Refusal
+from endoscope_core.safety import CommandGate, CommandLimits, MotionLimits, MotionShaper, Refusal
 from endoscope_nodes.calibration_result import findings_of, is_of_no_class
-from endoscope_nodes.clutch_watch import ClutchWatch
-from endoscope_nodes.command_report import CommandReport
 from endoscope_nodes.compensator_parameters import CompensatorParameters
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report, status
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.joint_stream import (
-    JointPublisher,
-    JointSample,
-    JointSubscription,
-    LatestJointState,
-)
+from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
     CALIBRATION_RESULT,
@@ -33,14 +28,20 @@ from endoscope_nodes.names import (
     CORRECTION,
     JOINTS,
     MOTOR_COMMAND,
-    MOTOR_MEASURED,
     MOTORS,
     SLAVE_COMMAND,
-    SLAVE_MEASURED,
 )
-from endoscope_nodes.qos import COMMAND, RESULT, SENSOR_ASKED
+from endoscope_nodes.qos import COMMAND, RESULT
 from endoscope_nodes.runtime import Runtime, run_nodes
-from endoscope_nodes.state_watch import StateWatch
+from endoscope_nodes.ticker import TICK_S
+from endoscope_nodes.watches import (
+    TURN_S,
+    ClutchWatch,
+    CommandReport,
+    MeasuredPose,
+    SessionWatch,
+    rivals,
+)
 
 CONSOLE = 'console'
 CALIBRATION = 'calibration'
@@ -53,72 +54,80 @@ _ANY_CLASS = CalibrationFindings(class_deg=70)
 class CompensatorNode(EndoscopeNode):
     """The only publisher of ``motor/servo_jp``.
 
-    Calibration goes before the console while its commands are fresh, and passes uncompensated.
-    Whatever changes, source, model, parameters or feedback, the motors go on from what was put out
-    before, or after a pause from where they are.
+    It obeys commands and corrections of the motion session that it takes part in, each from one
+    sender.  Calibration goes before the console while its commands are fresh, and passes
+    uncompensated.  Every stream begins at the measured pose, and the motors go on from where they
+    are, whatever changes: source, model, parameters or feedback.  A console that falls silent while
+    the clutch is held ends the session.
     """
 
     def __init__(self, runtime: Runtime) -> None:
         super().__init__('compensator', runtime)
         p = self.parameters(CompensatorParameters, self._on_parameters)
         self._settings = p
-        self.gate = CommandGate(self._limits(p.command_timeout, p.max_step))
-        # A calibration begins wherever the shafts are.
-        self.calibration_gate = CommandGate(
-            self._limits(p.calibration_timeout, 2.0 * p.joint_limit)
+        facts, motors = self.rig.joints, self.rig.motors
+        timeout_ns = self.rig.timeouts.command_ns
+        self.gate = CommandGate(
+            CommandLimits(facts.reach, facts.speed, facts.entry_step, timeout_ns)
         )
-        self._feedforward = Feedforward(len(JOINTS), FeedforwardSettings(lead=p.lead))
+        self.calibration_gate = CommandGate(
+            CommandLimits(facts.drive, facts.speed, facts.entry_step, timeout_ns)
+        )
+        self.correction_gate = CommandGate(
+            CommandLimits(facts.correction, motors.speed / facts.gear, facts.correction, timeout_ns)
+        )
+        reach = (facts.drive * facts.gear,) * len(MOTORS)
+        self.shaper = MotionShaper(
+            MotionLimits(
+                tuple(-x for x in reach), reach, motors.speed, motors.acceleration, motors.step
+            )
+        )
+        self._feedforward = Feedforward(
+            len(JOINTS), FeedforwardSettings(lead=p.lead, speed_limit=motors.speed / facts.gear)
+        )
         self._passing = Feedforward(len(JOINTS))
         self._choice = LawChoice(len(JOINTS), p.parameter_sets, p.table)
         self._trouble = self._load()
         self.findings: CalibrationFindings | None = None
-        self._measurement: JointSample | None = None
+        self._found: CalibrationFindings | None = None
+        self._news = False
+        self._calibrated_in = ''
+        self._learnt_ns = 0
         self._source = NOBODY
         self._last_stamp_ns = 0
         self._drive_before = _NOTHING
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
-        self._saturated = 0
         self._state_is_news = True
         self._motors = JointPublisher(self, MOTOR_COMMAND, MOTORS, ('position',), COMMAND)
         self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
-        self._state = StateWatch(self, self.ticker, lambda _: self._start_anew())
-        self._clutch = ClutchWatch(self, self.ticker)
-        self._shafts = LatestJointState(self, MOTOR_MEASURED, MOTORS, SENSOR_ASKED)
-        JointSubscription(
-            self,
-            CALIBRATION_COMMAND,
-            JOINTS,
-            self._on_calibration,
-            COMMAND,
-            exact=True,
-            on_malformed=self._on_malformed,
+        self._session = SessionWatch(self, self._start_anew, self._start_anew)
+        self._clutch = ClutchWatch(self)
+        self._pose = MeasuredPose(self)
+        self._calibration_in = self._listen(
+            CALIBRATION_COMMAND, self._on_calibration, self.calibration_gate
         )
-        JointSubscription(
-            self,
-            SLAVE_COMMAND,
-            JOINTS,
-            self._on_console,
-            COMMAND,
-            exact=True,
-            on_malformed=self._on_malformed,
+        self._console_in = self._listen(SLAVE_COMMAND, self._on_console, self.gate)
+        self._correction_in = self._listen(CORRECTION, self._on_correction, self.correction_gate)
+        self._results = self.create_subscription(
+            DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
         )
-        JointSubscription(self, CORRECTION, JOINTS, self._on_correction, COMMAND)
-        JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_measured, SENSOR_ASKED)
-        self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
         self.diagnostics.add('commands', CommandReport(self.gate))
         self.diagnostics.add('calibration commands', CommandReport(self.calibration_gate))
+        self.diagnostics.add('corrections', CommandReport(self.correction_gate))
         self.diagnostics.add('output', self._report)
+        self.ticker.every(TURN_S, self._watch_console)
         self.ticker.every(0.1, self._publish_state)
 
-    def _limits(self, timeout: float, max_step: float) -> CommandLimits:
-        reach = (self._settings.joint_limit,) * len(JOINTS)
-        return CommandLimits(
-            tuple(-x for x in reach),
-            reach,
-            self._settings.max_speed,
-            max_step,
-            round(timeout * 1e9),
+    def _listen(self, topic: str, callback: Any, gate: CommandGate) -> JointSubscription:
+        return JointSubscription(
+            self,
+            topic,
+            JOINTS,
+            callback,
+            COMMAND,
+            exact=True,
+            on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
         )
 
     def _on_parameters(self, parameters: CompensatorParameters) -> None:
@@ -127,8 +136,20 @@ class CompensatorNode(EndoscopeNode):
 
     def _on_result(self, message: DiagnosticArray) -> None:
         found = findings_of(message)
-        if found is not None or is_of_no_class(message):
-            self.findings = found
+        if found is None and not is_of_no_class(message):
+            return
+        crowd = rivals(self, self._results)
+        if crowd or not self._calibrated_in or message.header.frame_id != self._calibrated_in:
+            why = crowd or f'it is of {message.header.frame_id or "no session"}'
+            self.get_logger().warning(f'{CALIBRATION_RESULT} is not taken: {why}')
+            return
+        self._found, self._news = found, True
+
+    def _take_news(self) -> None:
+        """Put a new calibration in force: only where nothing moves."""
+        if self._news:
+            self._news = False
+            self.findings = self._found
             self._select_law()
 
     def _load(self) -> str:
@@ -163,85 +184,125 @@ class CompensatorNode(EndoscopeNode):
         self._state_is_news = True
 
     def _start_anew(self) -> None:
-        self.gate.reset()
-        self.calibration_gate.reset()
+        for gate in (self.gate, self.calibration_gate, self.correction_gate):
+            gate.reset()
+        self._corrections = (None, None)
         self._source = NOBODY
+        self._motors.session = self._session.name
 
-    def _on_malformed(self, reason: str) -> None:
-        self.gate.refuse(Refusal.MALFORMED, reason)
+    def _watch_console(self) -> None:
+        now = self.ticker.monotonic_ns()
+        if self._source == CONSOLE and not self.gate.is_fresh(now):
+            self._source = NOBODY
+            if self._clutch.held:
+                said = f' ({self.gate.last_reason})' if self.gate.last_reason else ''
+                self._session.leave(f'{SLAVE_COMMAND} ended while the clutch was held{said}')
+        elif self._source == CALIBRATION and not self.calibration_gate.is_fresh(now):
+            self._source = NOBODY
+        if self._source == NOBODY:
+            self._take_news()
 
-    def _on_measured(self, sample: JointSample) -> None:
-        if len(sample.position) == len(JOINTS):
-            self._measurement = sample
+    def _may_pass(
+        self, sample: JointSample, stream: JointSubscription, gate: CommandGate
+    ) -> bool:
+        """Whether a message is of the open session and of the one sender of its topic."""
+        if not self._session.belongs(sample):
+            gate.refuse(Refusal.SESSION, sample.session or 'none named')
+            return False
+        crowd = rivals(self, stream.subscription)
+        if crowd:
+            gate.refuse(Refusal.SENDER, crowd)
+            self._session.leave(crowd)
+        return not crowd
 
     def _learn(self, stamp_ns: int) -> None:
         """Give a measurement from before this command to the law, once."""
-        sample = self._measurement
-        if sample is None or sample.stamp_ns >= stamp_ns:
+        sample = self._pose.tracked
+        if sample is None or not self._learnt_ns < sample.stamp_ns < stamp_ns:
             return
-        self._measurement = None
-        if np.isfinite(sample.position).all():
-            self._feedforward.measure((stamp_ns - sample.stamp_ns) * 1e-9, sample.position)
+        self._learnt_ns = sample.stamp_ns
+        self._feedforward.measure((stamp_ns - sample.stamp_ns) * 1e-9, sample.position)
 
     def _on_correction(self, sample: JointSample) -> None:
-        self._corrections = (self._corrections[1], sample)
+        if not self._may_pass(sample, self._correction_in, self.correction_gate):
+            return
+        now = self.ticker.monotonic_ns()
+        if self.correction_gate.check(sample.stamp_ns, sample.position, now, _NOTHING) is None:
+            self._corrections = (self._corrections[1], sample)
 
     def _on_console(self, sample: JointSample) -> None:
         now = self.ticker.monotonic_ns()
-        if not self._state.enabled:
-            self.gate.refuse(Refusal.NOT_ENABLED)
+        if not self._may_pass(sample, self._console_in, self.gate):
             return
         if self.calibration_gate.is_fresh(now):
             return
         if not self._clutch.held:
             self.gate.refuse(Refusal.CLUTCH)
             return
-        if self.gate.check(sample.stamp_ns, sample.position, sample.velocity, now) is not None:
+        crowd = rivals(self, self._clutch.subscription)
+        if crowd:
+            self.gate.refuse(Refusal.SENDER, crowd)
+            self._session.leave(crowd)
             return
-        dt = self._take_over(CONSOLE, sample.stamp_ns)
+        bending = self._pose.bending()
+        dt = self._obey(CONSOLE, self.gate, sample, bending)
+        if dt is None:
+            return
         correction = self._correction(sample.stamp_ns)
-        if dt is None or (correction is None and self._corrected):
+        if dt == 0.0 or (correction is None and self._corrected):
             self._corrected = False
             self._feedforward.rebase(
                 self._drive_before - (_NOTHING if correction is None else correction)
             )
+        if self._news and not any(sample.velocity):
+            self._take_news()
         self._learn(sample.stamp_ns)
         velocity = sample.velocity or (0.0,) * len(JOINTS)
-        drive = self._feedforward.step(sample.position, velocity, dt or 1e-3)
+        drive = self._feedforward.step(sample.position, velocity, dt or TICK_S)
         if correction is not None:
             self._corrected = True
             drive = drive + correction
-        self._put_out(sample.stamp_ns, drive)
+        self._put_out(sample.stamp_ns, drive, dt or TICK_S)
 
     def _on_calibration(self, sample: JointSample) -> None:
-        now = self.ticker.monotonic_ns()
-        if not self._state.enabled:
-            self.calibration_gate.refuse(Refusal.NOT_ENABLED)
+        if not self._may_pass(sample, self._calibration_in, self.calibration_gate):
             return
-        if (
-            self.calibration_gate.check(sample.stamp_ns, sample.position, sample.velocity, now)
-            is not None
-        ):
-            return
-        dt = self._take_over(CALIBRATION, sample.stamp_ns)
+        shafts = self._pose.shafts()
+        start = None if shafts is None else tuple(x / self.rig.joints.gear for x in shafts)
+        dt = self._obey(CALIBRATION, self.calibration_gate, sample, start)
         if dt is None:
+            return
+        self._calibrated_in = self._session.name
+        if dt == 0.0:
             self._passing.rebase(self._drive_before)
         velocity = sample.velocity or (0.0,) * len(JOINTS)
-        self._put_out(sample.stamp_ns, self._passing.step(sample.position, velocity, dt or 1e-3))
+        drive = self._passing.step(sample.position, velocity, dt or TICK_S)
+        self._put_out(sample.stamp_ns, drive, dt or TICK_S)
 
-    def _take_over(self, source: str, stamp_ns: int) -> float | None:
-        """Seconds since the command before, None if this one is the first of its source."""
-        dt = (stamp_ns - self._last_stamp_ns) * 1e-9
-        self._last_stamp_ns = stamp_ns
-        paused = not 0.0 < dt <= self._settings.command_timeout or self._source == NOBODY
-        if not paused and source == self._source:
-            return dt
+    def _obey(
+        self,
+        source: str,
+        gate: CommandGate,
+        sample: JointSample,
+        measured: tuple[float, ...] | None,
+    ) -> float | None:
+        """Seconds since the command before; 0 for the first of a stream, None if it is refused."""
+        now = self.ticker.monotonic_ns()
+        shafts = self._pose.shafts()
+        if measured is None or shafts is None:
+            gate.refuse(Refusal.STEP, 'no measured position')
+            return None
+        goes_on = source == self._source and gate.is_fresh(now)
+        if gate.check(sample.stamp_ns, sample.position, now, measured, sample.velocity) is not None:
+            return None
+        dt = (sample.stamp_ns - self._last_stamp_ns) * 1e-9
+        self._last_stamp_ns = sample.stamp_ns
         self._source = source
-        if paused:
-            shafts = self._shafts.read()
-            if shafts is not None and shafts.position:
-                self._drive_before = np.array(shafts.position) / self._settings.gear
-        return None
+        if goes_on and dt > 0.0:
+            return dt
+        self._drive_before = np.array(shafts) / self.rig.joints.gear
+        self.shaper.restart(shafts)
+        return 0.0
 
     def _correction(self, stamp_ns: int) -> np.ndarray | None:
         """Newest correction from before this command: which one must not depend on chance.
@@ -252,20 +313,14 @@ class CompensatorNode(EndoscopeNode):
             return None
         for sample in reversed(self._corrections):
             if sample is not None and sample.stamp_ns < stamp_ns:
-                age = (stamp_ns - sample.stamp_ns) * 1e-9
-                correction = np.array(sample.position)
-                if age > self._settings.command_timeout or not np.isfinite(correction).all():
-                    return None
-                return correction if correction.shape == _NOTHING.shape else None
+                fresh = (stamp_ns - sample.stamp_ns) <= self.rig.timeouts.command_ns
+                return np.array(sample.position) if fresh else None
         return None
 
-    def _put_out(self, stamp_ns: int, drive: np.ndarray) -> None:
-        limit = self._settings.drive_limit
-        self._drive_before = drive
-        shafts = (drive * self._settings.gear).tolist()
-        if max(shafts) > limit * self._settings.gear or min(shafts) < -limit * self._settings.gear:
-            self._saturated += 1
-            shafts = (np.clip(drive, -limit, limit) * self._settings.gear).tolist()
+    def _put_out(self, stamp_ns: int, drive: np.ndarray, dt: float) -> None:
+        gear = self.rig.joints.gear
+        shafts = self.shaper.shape((drive * gear).tolist(), dt)
+        self._drive_before = np.array(shafts) / gear
         self._motors.publish(stamp_ns, *shafts)
 
     def _publish_state(self) -> None:
@@ -279,7 +334,7 @@ class CompensatorNode(EndoscopeNode):
             'wanted_mode': self._settings.mode,
             'selected_by': self._settings.selected_by,
             'lead': self._settings.lead,
-            'gear': self._settings.gear,
+            'gear': self.rig.joints.gear,
         }
         if self.findings is not None and self.findings.class_deg is not None:
             values['class_deg'] = self.findings.class_deg
@@ -309,7 +364,7 @@ class CompensatorNode(EndoscopeNode):
                 'source': self._source,
                 'published': self._motors.count,
                 'corrected': self._corrected,
-                'saturated': self._saturated,
+                'bounded': self.shaper.bounded,
                 'learnt': ' '.join(
                     f'{learnt.joint.capstan_exponent:.3f}' for learnt in self._feedforward.learnt
                 ),

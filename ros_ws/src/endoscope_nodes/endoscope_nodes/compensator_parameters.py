@@ -41,31 +41,3 @@ class CompensatorParameters:
         low=0.0,
         high=0.5,
     )
-    gear: float = parameter(0.5, 'shaft angle for one radian at the joint', low=0.01, high=100.0)
-    joint_limit: float = parameter(
-        1.75, 'largest desired bending obeyed, either way', unit='rad', low=0.1, high=3.1
-    )
-    drive_limit: float = parameter(
-        3.0,
-        'largest joint-equivalent motor angle put out, either way',
-        unit='rad',
-        low=0.1,
-        high=10.0,
-    )
-    max_speed: float = parameter(30.0, 'largest speed between two commands', unit='rad/s', low=0.0)
-    max_step: float = parameter(
-        0.5,
-        'largest distance of the first command after a pause from the last one obeyed',
-        unit='rad',
-        low=0.0,
-    )
-    command_timeout: float = parameter(
-        0.1, 'a command or correction older than this is not obeyed', unit='s', low=0.001, high=1.0
-    )
-    calibration_timeout: float = parameter(
-        0.05,
-        'silence after which calibration no longer goes before the console',
-        unit='s',
-        low=0.001,
-        high=1.0,
-    )

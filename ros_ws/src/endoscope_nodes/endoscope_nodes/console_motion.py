@@ -1,16 +1,21 @@
 """Commands that the console plays: a named motion or a file, sampled once, read tick by tick."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.signals import Motion, motion_by_name, move
+from endoscope_core.signals import motion_by_name, move
 from endoscope_core.signals.command_file import read_command_file
 from endoscope_nodes.names import JOINTS
 
 Array = NDArray[np.float64]
+
+# A minimum-jerk move peaks at 1.875 times its mean speed.
+_PEAK_OF_MEAN = 1.875
+_SHORTEST_S = 0.2
 
 
 class SampledMotion:
@@ -19,35 +24,38 @@ class SampledMotion:
     Parameters
     ----------
     angle, velocity
-        rad and rad/s, shape (N, J), one row a tick.
+        rad and rad/s, shape (N, J), one row a tick; NaN for a joint that stays where it is.
     """
 
     def __init__(self, angle: Array, velocity: Array) -> None:
-        self._rows: list[list[float]] = np.hstack([angle, velocity]).tolist()
+        self._angle: list[list[float]] = angle.tolist()
+        self._velocity: list[list[float]] = velocity.tolist()
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return len(self._angle)
 
-    def row(self, tick: int) -> list[float]:
-        """Angles, then velocities, at a tick; the last row beyond the end."""
-        return self._rows[min(tick, len(self._rows) - 1)]
+    def at(self, tick: int, stay: Sequence[float]) -> tuple[list[float], list[float]]:
+        """Angles and velocities at a tick; the last row beyond the end.
+
+        Parameters
+        ----------
+        stay
+            Where joints are that do not move, rad, shape (J,).
+        """
+        row = min(tick, len(self._angle) - 1)
+        angle = [s if math.isnan(a) else a for a, s in zip(self._angle[row], stay, strict=True)]
+        return angle, [0.0 if math.isnan(v) else v for v in self._velocity[row]]
 
 
-def sample_motion(
-    name: str, joints: tuple[str, ...], start: tuple[float, ...], tick: float, approach_speed: float
-) -> SampledMotion:
-    """Sample a named motion for some of the joints, with an approach from where they are.
+def sample_motion(name: str, joints: Sequence[str], tick: float) -> SampledMotion:
+    """Sample a named motion for some of the joints.
 
     Parameters
     ----------
     joints
         Those that move; the others stay where they are.
-    start
-        Commanded angles now, rad, shape (J,).
     tick
         In s.
-    approach_speed
-        Largest speed in rad/s on the way to the motion's first angle.
 
     Raises
     ------
@@ -56,26 +64,17 @@ def sample_motion(
     """
     motion = motion_by_name(name)
     time = np.arange(round(motion.duration / tick) + 1) * tick
-    angle, velocity = _columns(motion, time)
+    angle = np.full((len(time), len(JOINTS)), np.nan)
+    velocity = np.full_like(angle, np.nan)
     for column, joint in enumerate(JOINTS):
-        if joint not in joints:
-            angle[:, column] = start[column]
-            velocity[:, column] = 0.0
-    return _with_approach(angle, velocity, start, tick, approach_speed)
-
-
-def _columns(motion: Motion, time: NDArray[np.floating]) -> tuple[Array, Array]:
-    angle = np.zeros((len(time), len(JOINTS)))
-    velocity = np.zeros_like(angle)
-    for column, joint in enumerate(JOINTS):
-        if joint in motion.joints:
+        if joint in joints and joint in motion.joints:
             angle[:, column], velocity[:, column] = motion.joints[joint](time)
-    return angle, velocity
+        elif joint in joints:
+            angle[:, column] = velocity[:, column] = 0.0
+    return SampledMotion(angle, velocity)
 
 
-def load_command_file(
-    path: Path, start: tuple[float, ...], tick: float, approach_speed: float
-) -> SampledMotion:
+def load_command_file(path: Path, tick: float) -> SampledMotion:
     """Sample a command file, interpolating between its rows.
 
     Raises
@@ -89,19 +88,25 @@ def load_command_file(
     angle = np.stack([np.interp(time, table.time, column) for column in table.angle.T], axis=1)
     velocity = np.gradient(angle, tick, axis=0) if len(time) > 1 else np.zeros_like(angle)
     velocity[-1] = 0.0
-    return _with_approach(angle, velocity, start, tick, approach_speed)
+    return SampledMotion(angle, velocity)
 
 
-def _with_approach(
-    angle: Array, velocity: Array, start: tuple[float, ...], tick: float, speed: float
+def approach(
+    start: Sequence[float], end: Sequence[float], speed: float, tick: float
 ) -> SampledMotion:
-    distance = float(np.max(np.abs(angle[0] - np.asarray(start))))
-    if distance == 0.0:
-        return SampledMotion(angle, velocity)
-    # The peak speed of a minimum-jerk move is 1.875 times its mean.
-    duration = max(0.2, 1.875 * distance / speed)
+    """A minimum-jerk motion of all joints from one pose to another.
+
+    Parameters
+    ----------
+    start, end
+        rad, shape (J,).
+    speed
+        Largest speed in rad/s.
+    tick
+        In s.
+    """
+    distance = float(np.max(np.abs(np.subtract(end, start))))
+    duration = max(_SHORTEST_S, _PEAK_OF_MEAN * distance / speed)
     time = np.arange(math.ceil(duration / tick)) * tick
-    legs = [move(a, float(b), duration)(time) for a, b in zip(start, angle[0], strict=True)]
-    approach = np.stack([leg[0] for leg in legs], axis=1)
-    approach_velocity = np.stack([leg[1] for leg in legs], axis=1)
-    return SampledMotion(np.vstack([approach, angle]), np.vstack([approach_velocity, velocity]))
+    legs = [move(a, b, duration)(time) for a, b in zip(start, end, strict=True)]
+    return SampledMotion(*(np.stack([leg[k] for leg in legs], axis=1) for k in (0, 1)))

@@ -1,30 +1,42 @@
 """The operator's side: plays a motion, or follows the handle while the clutch is held."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from sensor_msgs.msg import Joy
+from rclpy.publisher import Publisher
+from sensor_msgs.msg import JointState, Joy
 
-from endoscope_core.safety import ClutchFollower
+from endoscope_core.safety import ClutchFollower, MotionLimits, MotionShaper
 from endoscope_core.signals import MOTIONS
 from endoscope_core.signals.command_file import CommandFileError
-from endoscope_nodes.clutch_watch import ClutchWatch
 from endoscope_nodes.console_motion import (
     SampledMotion,
+    approach,
     load_command_file,
     sample_motion,
 )
 from endoscope_nodes.diagnostics import OK, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
-from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MASTER_MEASURED, SLAVE_COMMAND
+from endoscope_nodes.names import (
+    CALIBRATION_COMMAND,
+    JOINTS,
+    MASTER_CLUTCH,
+    MASTER_MEASURED,
+    SLAVE_COMMAND,
+)
 from endoscope_nodes.parameters import ParameterError, parameter
 from endoscope_nodes.qos import COMMAND, EVENT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
-from endoscope_nodes.state_watch import StateWatch
-from endoscope_nodes.ticker import TICK_NS
-
-HANDLE_TIMEOUT_NS = 100_000_000
+from endoscope_nodes.ticker import TICK_S
+from endoscope_nodes.watches import (
+    ClutchWatch,
+    MeasuredPose,
+    SessionWatch,
+    StreamWatch,
+    rivals,
+)
 
 
 @dataclass(frozen=True)
@@ -56,41 +68,60 @@ class ConsoleParameters:
         low=0.01,
         high=10.0,
     )
-    joint_limit: float = parameter(
-        1.75,
-        'bending at which following the handle ends, either way',
-        unit='rad',
-        low=0.1,
-        high=3.1,
-    )
 
 
 class ConsoleNode(EndoscopeNode):
     """Publishes ``slave/servo_jp`` at 1 kHz, and ``master/clutch`` while it plays.
 
-    A motion runs while the slave is enabled, stands still while it is not, and is held at its end.
-    Following, commands go out only while the clutch is held and both clutch and handle are alive;
-    each engagement begins where the last command was.
+    It moves the slave only in a motion session, and every time from the measured pose: a motion is
+    approached from there, goes on where it stood still, and is held at its end; a handle is
+    followed from there whenever the clutch is engaged or the handle was silent. While a
+    calibration or a way home has the slave, the console rests. With source ``none`` it leaves both
+    topics to somebody else.
     """
 
     def __init__(self, runtime: Runtime) -> None:
         super().__init__('console', runtime)
-        self._command = [0.0] * (2 * len(JOINTS))
         self._played: SampledMotion | None = None
         self._next = 0
+        self._approach: SampledMotion | None = None
+        self._approached = 0
+        self._stay: tuple[float, ...] = ()
+        self._moving = False
         self._clutch_said = False
         self._handle: JointSample | None = None
-        self._handle_ns = -HANDLE_TIMEOUT_NS
-        self._settings = self.parameters(ConsoleParameters, self._on_parameters, self._load)
-        limits = (self._settings.joint_limit,) * len(JOINTS)
-        self._follower = ClutchFollower(self._settings.scale, [-limit for limit in limits], limits)
-        self._commands = JointPublisher(
-            self, SLAVE_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
+        self._handle_ns = 0
+        self._unusable = ''
+        self._unusables = 0
+        facts, timeouts = self.rig.joints, self.rig.timeouts
+        self._handle_timeout_ns = round(timeouts.handle * 1e9)
+        reach = (facts.reach,) * len(JOINTS)
+        low = tuple(-x for x in reach)
+        self._playing_shaper = MotionShaper(
+            MotionLimits(low, reach, facts.speed, facts.acceleration, facts.entry_step)
         )
-        self._clutch_out = self.create_publisher(Joy, MASTER_CLUTCH, EVENT)
-        self._state = StateWatch(self, self.ticker)
-        JointSubscription(self, MASTER_MEASURED, JOINTS, self._on_handle, SENSOR_ASKED)
-        self._clutch = ClutchWatch(self, self.ticker)
+        self._hand_shaper = MotionShaper(
+            MotionLimits(low, reach, facts.hand_speed, facts.acceleration, facts.entry_step)
+        )
+        self._settings = self.parameters(ConsoleParameters, self._on_parameters, self._load)
+        self._follower = ClutchFollower(self._settings.scale, low, reach)
+        self._commands: JointPublisher | None = None
+        self._clutch_out: Publisher | None = None
+        self._session = SessionWatch(self, self._rest, self._rest)
+        self._pose = MeasuredPose(self)
+        self._calibration = StreamWatch(self.ticker, CALIBRATION_COMMAND)
+        self.create_subscription(
+            JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True
+        )
+        self._handle_in = JointSubscription(
+            self,
+            MASTER_MEASURED,
+            JOINTS,
+            self._on_handle,
+            SENSOR_ASKED,
+            on_malformed=self._on_unusable,
+        )
+        self._clutch = ClutchWatch(self)
         self._on_parameters(self._settings)
         self.diagnostics.add('commands', self._report)
         self.ticker.every(0.1, self._repeat_clutch)
@@ -102,86 +133,158 @@ class ConsoleNode(EndoscopeNode):
         return self._played is not None and self._next >= len(self._played)
 
     def _load(self, parameters: ConsoleParameters) -> SampledMotion | None:
-        here = tuple(self._command[: len(JOINTS)])
-        tick = TICK_NS * 1e-9
         if parameters.source == 'motion':
-            return sample_motion(
-                parameters.motion, parameters.joints, here, tick, parameters.approach_speed
-            )
+            return sample_motion(parameters.motion, parameters.joints, TICK_S)
         if parameters.source == 'file':
             try:
-                return load_command_file(
-                    Path(parameters.command_file), here, tick, parameters.approach_speed
-                )
+                return load_command_file(Path(parameters.command_file), TICK_S)
             except CommandFileError as error:
                 raise ParameterError(f"console: parameter 'command_file': {error}") from error
         return None
 
     def _on_parameters(self, parameters: ConsoleParameters) -> None:
         self._settings = parameters
+        self._rest()
         self._next = 0
         self._played = self._load(parameters)
+        self._own_topics()
+
+    def _own_topics(self) -> None:
+        """Be a sender only of what the source asks for: another one may be the sender then."""
+        if self._commands is None and self._settings.source != 'none':
+            self._commands = JointPublisher(
+                self, SLAVE_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
+            )
+            self._commands.session = self._session.name
+        elif self._commands is not None and self._settings.source == 'none':
+            self._commands.close()
+            self._commands = None
+        if self._clutch_out is None and self._played is not None:
+            self._clutch_out = self.create_publisher(Joy, MASTER_CLUTCH, EVENT)
+        elif self._clutch_out is not None and self._played is None:
+            self.destroy_publisher(self._clutch_out)
+            self._clutch_out = None
 
     def _on_handle(self, sample: JointSample) -> None:
-        if sample.position:
-            self._handle = sample
-            self._handle_ns = self.ticker.monotonic_ns()
+        if not sample.position or not all(map(math.isfinite, sample.position)):
+            self._on_unusable('has a position that is not finite')
+            return
+        crowd = rivals(self, self._handle_in.subscription)
+        if crowd:
+            self._session.leave(crowd)
+            return
+        self._handle = sample
+        self._handle_ns = self.ticker.monotonic_ns()
 
-    @property
-    def _playing(self) -> bool:
-        return self._played is not None and self._state.enabled
+    def _on_unusable(self, reason: str) -> None:
+        self._unusables += 1
+        self._unusable = reason
+
+    def _rest(self) -> None:
+        """Stop moving: whatever comes next begins at the measured pose."""
+        self._moving = False
+        self._follower.release()
+        if self._commands is not None:
+            self._commands.session = self._session.name
+        if self._clutch_said:
+            self._publish_clutch(self.ticker.now_ns())
 
     def _repeat_clutch(self) -> None:
-        if self._played is not None and self.ticker.now_ns():
+        if self.ticker.now_ns():
             self._publish_clutch(self.ticker.now_ns())
 
     def _publish_clutch(self, stamp_ns: int) -> None:
-        self._clutch_said = self._playing
+        if self._clutch_out is None:
+            return
+        self._clutch_said = self._moving
         message = Joy(buttons=[int(self._clutch_said)])
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
         self._clutch_out.publish(message)
 
-    def _on_tick(self, stamp_ns: int, periods: int) -> None:
-        if self._playing != self._clutch_said:
-            self._publish_clutch(stamp_ns)
-        if self._played is not None:
-            if self._state.enabled:
-                self._command = self._played.row(self._next)
-                self._next += periods
-            else:
-                self._command = [*self._command[: len(JOINTS)], *(0.0,) * len(JOINTS)]
-            self._commands.publish(stamp_ns, *self._command)
-        elif self._settings.source == 'master':
-            self._follow(stamp_ns, periods)
+    @property
+    def _may_move(self) -> bool:
+        return bool(self._session.name) and bool(
+            self._calibration.trouble(self.rig.timeouts.command_ns)
+        )
 
-    def _follow(self, stamp_ns: int, periods: int) -> None:
-        now = self.ticker.monotonic_ns()
-        held = self._clutch.held
-        alive = self._handle is not None and now - self._handle_ns <= HANDLE_TIMEOUT_NS
-        if not (held and alive and self._state.enabled) or self._handle is None:
+    def _on_tick(self, stamp_ns: int, periods: int) -> None:
+        self._session.turn()
+        if self._commands is None:
+            return
+        if not self._may_move:
+            if self._moving or self._follower.engaged:
+                self._rest()
+        elif self._played is not None:
+            self._play(self._commands, self._played, stamp_ns, periods)
+        else:
+            self._follow(self._commands, stamp_ns, periods)
+
+    def _play(
+        self, commands: JointPublisher, motion: SampledMotion, stamp_ns: int, periods: int
+    ) -> None:
+        if not self._moving:
+            pose = self._pose.bending()
+            if pose is None:
+                return
+            self._stay = pose
+            self._approach = approach(
+                pose, motion.at(self._next, pose)[0], self._settings.approach_speed, TICK_S
+            )
+            self._approached = 0
+            self._playing_shaper.restart(pose)
+            self._moving = True
+            self._publish_clutch(stamp_ns)
+        if self._approach is not None and self._approached < len(self._approach):
+            angle, velocity = self._approach.at(self._approached, self._stay)
+            self._approached += periods
+        else:
+            angle, velocity = motion.at(self._next, self._stay)
+            self._next += periods
+        shaped = self._playing_shaper.shape(angle, periods * TICK_S)
+        as_asked = all(abs(a - b) < 1e-9 for a, b in zip(angle, shaped, strict=True))
+        commands.publish(
+            stamp_ns, *shaped, *(velocity if as_asked else self._playing_shaper.velocity)
+        )
+
+    def _follow(self, commands: JointPublisher, stamp_ns: int, periods: int) -> None:
+        if not self._clutch.held or self._handle is None:
             self._follower.release()
             return
-        before = self._command[: len(JOINTS)]
-        if not self._follower.engaged:
+        alive = self.ticker.monotonic_ns() - self._handle_ns <= self._handle_timeout_ns
+        if not alive:
+            self._follower.release()
+        elif not self._follower.engaged:
+            pose = self._pose.bending()
+            if pose is None:
+                return
             self._follower.scale = self._settings.scale
-            self._follower.engage(self._handle.position, before)
-        position = self._follower.follow(self._handle.position)
-        dt = periods * TICK_NS * 1e-9
-        self._command = [*position, *((p - b) / dt for p, b in zip(position, before, strict=True))]
-        self._commands.publish(stamp_ns, *self._command)
+            self._follower.engage(self._handle.position, pose)
+            self._hand_shaper.restart(pose)
+        if alive:
+            target = self._follower.follow(self._handle.position)
+        elif self._hand_shaper.position:
+            target = self._hand_shaper.position
+        else:
+            return
+        shaped = self._hand_shaper.shape(target, periods * TICK_S)
+        commands.publish(stamp_ns, *shaped, *self._hand_shaper.velocity)
 
     def _report(self) -> Report:
         source = self._settings.source
         values: dict[str, object] = {
             'source': source,
-            'published': self._commands.count,
+            'published': self._commands.count if self._commands is not None else 0,
             'clutch held': self._clutch.held,
             'following': self._follower.engaged,
+            'unusable handle messages': self._unusables,
         }
         if self._played is not None:
-            values['progress [s]'] = min(self._next, len(self._played)) * 1e-3
-            values['length [s]'] = len(self._played) * 1e-3
+            values['progress [s]'] = min(self._next, len(self._played)) * TICK_S
+            values['length [s]'] = len(self._played) * TICK_S
             return OK, 'finished' if self.finished else 'playing', values
+        if self._unusable:
+            unusable, self._unusable = self._unusable, ''
+            return WARN, f'{MASTER_MEASURED} {unusable}', values
         if source == 'master' and self._handle is None:
             return WARN, f'{MASTER_MEASURED} has not been received', values
         return OK, source, values

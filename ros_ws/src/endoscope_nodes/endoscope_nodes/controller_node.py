@@ -11,9 +11,8 @@ from endoscope_core.control import (
     RecursiveHysteresisController,
     TrackerMeasurement,
 )
-from endoscope_core.safety import CommandGate, CommandLimits, OperatingState, Refusal
+from endoscope_core.safety import CommandGate, CommandLimits, Refusal
 from endoscope_nodes.calibration_result import class_of
-from endoscope_nodes.command_report import CommandReport
 from endoscope_nodes.diagnostics import OK, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
@@ -26,10 +25,9 @@ from endoscope_nodes.names import (
     SLAVE_MEASURED,
 )
 from endoscope_nodes.parameters import parameter
-from endoscope_nodes.qos import COMMAND, RESULT, SENSOR_ASKED
+from endoscope_nodes.qos import COMMAND, RESULT
 from endoscope_nodes.runtime import Runtime, run_nodes
-from endoscope_nodes.state_watch import StateWatch
-from endoscope_nodes.stream_watch import StreamWatch
+from endoscope_nodes.watches import CommandReport, MeasuredPose, SessionWatch, StreamWatch, rivals
 
 Controller = AdaptiveBacklashController | RecursiveHysteresisController
 LAWS: dict[str, type[Controller]] = {
@@ -64,22 +62,6 @@ class ControllerParameters:
     fade_time: float = parameter(
         1.0, 'time from no correction to the whole and back', unit='s', low=0.05, high=30.0
     )
-    joint_limit: float = parameter(
-        1.75, 'largest desired bending followed, either way', unit='rad', low=0.1, high=3.1
-    )
-    max_speed: float = parameter(30.0, 'largest speed between two commands', unit='rad/s', low=0.0)
-    max_step: float = parameter(
-        0.5,
-        'largest distance of the first command after a pause from the last one followed',
-        unit='rad',
-        low=0.0,
-    )
-    command_timeout: float = parameter(
-        0.1, 'a command older than this is not followed', unit='s', low=0.001, high=1.0
-    )
-    calibration_timeout: float = parameter(
-        0.05, 'silence after which a calibration counts as over', unit='s', low=0.001, high=1.0
-    )
 
 
 class ControllerNode(EndoscopeNode):
@@ -97,35 +79,29 @@ class ControllerNode(EndoscopeNode):
         self.controller = self._new_controller()
         # Loads what is compiled now: the first command must not wait for it.
         AdaptiveBacklashController(len(JOINTS)).step(0.0, _NOTHING, _NOTHING)
-        reach = (p.joint_limit,) * len(JOINTS)
+        facts, self._timeout_ns = self.rig.joints, self.rig.timeouts.command_ns
         self._gate = CommandGate(
-            CommandLimits(
-                tuple(-x for x in reach),
-                reach,
-                p.max_speed,
-                p.max_step,
-                round(p.command_timeout * 1e9),
-            )
+            CommandLimits(facts.reach, facts.speed, facts.entry_step, self._timeout_ns)
         )
-        self._measurement: JointSample | None = None
+        self._used_ns = 0
         self._last_stamp_ns = 0
         self._forget = False
         self._corrections = JointPublisher(self, CORRECTION, JOINTS, ('position',), COMMAND)
-        self._state = StateWatch(self, self.ticker, self._on_state)
+        self._session = SessionWatch(self, self._start_anew, self._start_anew)
+        self._pose = MeasuredPose(self)
         self._calibration = StreamWatch(self.ticker, CALIBRATION_COMMAND)
         self.create_subscription(
             JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True
         )
-        JointSubscription(
+        self._commands = JointSubscription(
             self,
             SLAVE_COMMAND,
             JOINTS,
             self._on_command,
             COMMAND,
             exact=True,
-            on_malformed=self._on_malformed,
+            on_malformed=lambda reason: self._gate.refuse(Refusal.MALFORMED, reason),
         )
-        JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_measured, SENSOR_ASKED)
         self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
         self.diagnostics.add('commands', CommandReport(self._gate))
         self.diagnostics.add('feedback', self._report)
@@ -140,30 +116,36 @@ class ControllerNode(EndoscopeNode):
     def _on_parameters(self, parameters: ControllerParameters) -> None:
         self._settings = parameters
 
-    def _on_state(self, state: OperatingState) -> None:
-        if state is OperatingState.ENABLED:
-            self._gate.reset()
-
-    def _on_malformed(self, reason: str) -> None:
-        self._gate.refuse(Refusal.MALFORMED, reason)
+    def _start_anew(self) -> None:
+        self._gate.reset()
+        self.controller.restart()
+        self._last_stamp_ns = 0
+        self._corrections.session = self._session.name
 
     def _on_result(self, message: DiagnosticArray) -> None:
         self._forget = self._forget or class_of(message) is not None
 
-    def _on_measured(self, sample: JointSample) -> None:
-        if len(sample.position) == len(JOINTS):
-            self._measurement = sample
-
     def _on_command(self, sample: JointSample) -> None:
         now = self.ticker.monotonic_ns()
-        if not self._state.enabled:
-            self._gate.refuse(Refusal.NOT_ENABLED)
+        if not self._session.belongs(sample):
+            self._gate.refuse(Refusal.SESSION, sample.session or 'none named')
             return
-        if self._gate.check(sample.stamp_ns, sample.position, sample.velocity, now) is not None:
+        crowd = rivals(self, self._commands.subscription)
+        if crowd:
+            self._gate.refuse(Refusal.SENDER, crowd)
             return
-        if sample.stamp_ns <= self._last_stamp_ns:
-            self._gate.refuse(Refusal.STAMP, 'older than before the last pause')
+        bending = self._pose.bending()
+        if bending is None:
+            self._gate.refuse(Refusal.STEP, 'no measured position')
             return
+        entering = not self._gate.is_fresh(now)
+        if (
+            self._gate.check(sample.stamp_ns, sample.position, now, bending, sample.velocity)
+            is not None
+        ):
+            return
+        if entering:
+            self.controller.restart()
         self._last_stamp_ns = sample.stamp_ns
         self._choose_whether_to_act()
         velocity = sample.velocity or (0.0,) * len(JOINTS)
@@ -173,8 +155,7 @@ class ControllerNode(EndoscopeNode):
         self._corrections.publish(sample.stamp_ns, *correction.tolist())
 
     def _choose_whether_to_act(self) -> None:
-        timeout = round(self._settings.calibration_timeout * 1e9)
-        calibrating = not self._calibration.trouble(timeout)
+        calibrating = not self._calibration.trouble(self._timeout_ns)
         changing = self._settings.law != self._law
         if changing and self.controller.weight == 0.0:
             self._law, changing = self._settings.law, False
@@ -189,10 +170,10 @@ class ControllerNode(EndoscopeNode):
 
     def _fresh(self, stamp_ns: int) -> TrackerMeasurement | None:
         """A measurement from before this command that has not been used yet."""
-        sample = self._measurement
-        if sample is None or sample.stamp_ns >= stamp_ns:
+        sample = self._pose.tracked
+        if sample is None or not self._used_ns < sample.stamp_ns < stamp_ns:
             return None
-        self._measurement = None
+        self._used_ns = sample.stamp_ns
         return TrackerMeasurement(sample.stamp_ns * 1e-9, np.array(sample.position))
 
     def _report(self) -> Report:

@@ -1,4 +1,8 @@
-"""Health of a node on ``/diagnostics``, once a second (REP-107: ``node: subcomponent``)."""
+"""Health of a node on ``/diagnostics``, once a second (REP-107: ``node: subcomponent``).
+
+The topic is one for all rigs of a domain, so a node's name stands there with its namespace:
+``/endoscope/motor_driver: device``.
+"""
 
 from collections.abc import Callable, Mapping
 
@@ -40,7 +44,7 @@ class Diagnostics:
     Parameters
     ----------
     node
-        Its name is the first half of every status name.
+        Its name, with namespace, is the first half of every status name.
     ticker
         Gives the pace and the stamps.
     """
@@ -53,8 +57,8 @@ class Diagnostics:
         ticker.every(1.0, self.publish)
 
     def add(self, subcomponent: str, report: Callable[[], Report], hardware_id: str = '') -> None:
-        """Have ``report() -> (level, message, values)`` published as ``node: subcomponent``."""
-        name = f'{self._node.get_name()}: {subcomponent}'
+        """Have ``report() -> (level, message, values)`` published for a subcomponent."""
+        name = f'{self._node.get_fully_qualified_name()}: {subcomponent}'
         self._reports.append((name, hardware_id, report))
 
     def publish(self) -> None:

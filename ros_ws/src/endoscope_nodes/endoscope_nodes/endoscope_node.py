@@ -28,6 +28,8 @@ class EndoscopeNode(Node):
     ----------
     ticker
         The beat and the time that all nodes of the process share.
+    rig
+        What stands on the table, the same for all nodes of the process.
     diagnostics
         Reports published on ``/diagnostics``.
     exit_code
@@ -43,6 +45,7 @@ class EndoscopeNode(Node):
         )
         self.exit_code = 0
         self.ticker = runtime.ticker_of(self)
+        self.rig = runtime.rig
         self.diagnostics = Diagnostics(self, self.ticker)
 
     def parameters[P](

@@ -21,6 +21,8 @@ from endoscope_bags.errors import MalformedMessageError
 _SECOND = 1_000_000_000
 # Four bytes are never equal to five.
 _NOT_LEARNT = (0, 4, bytes(5))
+# A hundred joints with long names; whatever is larger is not looked at.
+LARGEST_BYTES = 16_384
 _STAMP_END = 12
 
 
@@ -33,12 +35,15 @@ class JointSample(NamedTuple):
         Header stamp in ns.
     position, velocity, effort
         rad, rad/s, N m (N for wires); empty where the message has none.
+    session
+        Frame of the header: for commands, the motion session that they belong to.
     """
 
     stamp_ns: int
     position: tuple[float, ...]
     velocity: tuple[float, ...]
     effort: tuple[float, ...]
+    session: str = ''
 
 
 class JointPublisher:
@@ -55,16 +60,35 @@ class JointPublisher:
     def __init__(
         self, node: Node, topic: str, names: Sequence[str], fields: Sequence[str], qos: QoSProfile
     ) -> None:
-        zeros: dict[str, Any] = dict.fromkeys(fields, [0.0] * len(names))
-        self._message = bytearray(encode_joint_state(names, 0, **zeros))
-        columns = joint_state_layout(bytes(self._message)).columns
-        n = len(names)
-        self._pack = struct.Struct(f'<{n}d').pack_into
-        starts = [columns[field][0] for field in QUANTITIES if field in fields]
-        self._parts = [(start, slice(k * n, k * n + n)) for k, start in enumerate(starts)]
+        self._names, self._fields = names, fields
+        self._pack = struct.Struct(f'<{len(names)}d').pack_into
         self._stamp = struct.Struct('<iI')
+        self._node = node
         self._publisher = node.create_publisher(JointState, topic, qos)
         self.count = 0
+        self._session = ''
+        self._lay_out()
+
+    @property
+    def session(self) -> str:
+        """Frame of the messages: the motion session of commands."""
+        return self._session
+
+    @session.setter
+    def session(self, name: str) -> None:
+        if name != self._session:
+            self._session = name
+            self._lay_out()
+
+    def _lay_out(self) -> None:
+        n = len(self._names)
+        zeros: dict[str, Any] = dict.fromkeys(self._fields, [0.0] * n)
+        self._message = bytearray(
+            encode_joint_state(self._names, 0, frame_id=self._session, **zeros)
+        )
+        columns = joint_state_layout(bytes(self._message)).columns
+        starts = [columns[field][0] for field in QUANTITIES if field in self._fields]
+        self._parts = [(start, slice(k * n, k * n + n)) for k, start in enumerate(starts)]
 
     def publish(self, stamp_ns: int, *values: float) -> None:
         """Publish one message: the J numbers of the first field, then those of the next."""
@@ -74,6 +98,10 @@ class JointPublisher:
             self._pack(self._message, start, *values[part])
         self._publisher.publish(bytes(self._message))
         self.count += 1
+
+    def close(self) -> None:
+        """Leave the topic to another sender."""
+        self._node.destroy_publisher(self._publisher)
 
 
 class JointReader:
@@ -94,6 +122,7 @@ class JointReader:
         self._struct = struct.Struct('<iI')
         self._slices: list[slice] = []
         self._pick: list[int] | None = None
+        self._session = ''
 
     def read(self, data: bytes) -> JointSample:
         """Read one message.
@@ -101,8 +130,12 @@ class JointReader:
         Raises
         ------
         MalformedMessageError
-            Not a JointState, or not of the joints asked for.
+            Not a JointState, of an absurd size, or not of the joints asked for.
         """
+        if len(data) > LARGEST_BYTES:
+            raise MalformedMessageError(
+                f'has {len(data)} bytes; at most {LARGEST_BYTES} are read'
+            )
         for start, stop, expected in self._spans:
             if data[start:stop] != expected:
                 self._learn(data)
@@ -111,7 +144,7 @@ class JointReader:
         fields = [values[part] for part in self._slices]
         if self._pick is not None:
             fields = [tuple(f[i] for i in self._pick) if f else f for f in fields]
-        return JointSample(values[0] * _SECOND + values[1], *fields)
+        return JointSample(values[0] * _SECOND + values[1], *fields, self._session)
 
     def _learn(self, data: bytes) -> None:
         self._spans = [_NOT_LEARNT]
@@ -122,6 +155,7 @@ class JointReader:
                 f'is for {", ".join(layout.names) or "no joint"} instead of '
                 f'{", ".join(self._names)}'
             )
+        self._session = layout.frame_id
         n = len(layout.names)
         present = [layout.columns[q][0] if q in layout.columns else None for q in QUANTITIES]
         starts = [start for start in present if start is not None]
@@ -157,6 +191,8 @@ class JointSubscription:
     ----------
     malformed
         How many messages were unreadable or of other joints.
+    subscription
+        The subscription of rclpy.
     """
 
     def __init__(
@@ -174,7 +210,9 @@ class JointSubscription:
         self._reader = JointReader(names, exact)
         self._callback = callback
         self._on_malformed = on_malformed
-        node.create_subscription(JointState, topic, self._receive, qos, raw=True)
+        self.subscription = node.create_subscription(
+            JointState, topic, self._receive, qos, raw=True
+        )
 
     def _receive(self, data: bytes) -> None:
         try:
@@ -185,43 +223,6 @@ class JointSubscription:
                 self._on_malformed(str(error))
             return
         self._callback(sample)
-
-
-class LatestJointState:
-    """Keeps the newest message of a topic and reads it only when it is wanted.
-
-    Parameters
-    ----------
-    on_message
-        Called at each message.
-    """
-
-    def __init__(
-        self,
-        node: Node,
-        topic: str,
-        names: Sequence[str],
-        qos: QoSProfile,
-        on_message: Callable[[], None] | None = None,
-    ) -> None:
-        self._on_message = on_message
-        self._reader = JointReader(names)
-        self._data: bytes | None = None
-        node.create_subscription(JointState, topic, self._keep, qos, raw=True)
-
-    def _keep(self, data: bytes) -> None:
-        self._data = data
-        if self._on_message is not None:
-            self._on_message()
-
-    def read(self) -> JointSample | None:
-        """Read the newest message, or None while there is none of these joints."""
-        if self._data is None:
-            return None
-        try:
-            return self._reader.read(self._data)
-        except MalformedMessageError:
-            return None
 
 
 def _values_format(starts: Sequence[int], count: int) -> tuple[str, int]:

@@ -1,15 +1,21 @@
-"""Drives the motor shafts, and is the simulated slave where there is no hardware."""
+"""Drives the motor shafts: the simulated slave or a bus of servos, the same node for both."""
 
 from collections import deque
 from dataclasses import dataclass
 
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from endoscope_core.safety import CommandGate, CommandLimits, OperatingState, Refusal
+from endoscope_core.safety import (
+    CommandLimits,
+    MotionLimits,
+    OperatingState,
+    Refusal,
+    ShaftMotion,
+)
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
-from endoscope_devices.motor_device import DeviceError, MotorDevice, MotorReading
+from endoscope_devices.motor_device import DeviceError, MotorDevice
 from endoscope_devices.simulated_slave import SimulatedSlave
-from endoscope_nodes.command_report import CommandReport
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.dynamixel_parameters import DynamixelParameters, build_motors
 from endoscope_nodes.endoscope_node import EndoscopeNode
@@ -27,9 +33,10 @@ from endoscope_nodes.names import (
 )
 from endoscope_nodes.parameters import ParameterError, parameter
 from endoscope_nodes.plant_parameter import load_plant_parameter
-from endoscope_nodes.qos import COMMAND, LOCK_STEP, SENSOR_OFFERED
+from endoscope_nodes.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
-from endoscope_nodes.state_watch import StateWatch
+from endoscope_nodes.ticker import TICK_S
+from endoscope_nodes.watches import CommandReport, SessionWatch, rivals
 
 
 @dataclass(frozen=True)
@@ -41,47 +48,31 @@ class MotorDriverParameters:
         '', 'plant.yaml of the simulated slave; empty for the nominal plant'
     )
     seed: int = parameter(1, 'seed of the simulated sensor noise', low=0)
-    shaft_limit: float = parameter(
-        1.6, 'largest shaft angle obeyed, either way', unit='rad', low=0.0, high=20.0
-    )
-    max_speed: float = parameter(
-        40.0, 'largest speed of the shaft between two commands', unit='rad/s', low=0.0
-    )
-    max_step: float = parameter(
-        0.1, 'largest distance of the first command from the measured position', unit='rad', low=0.0
-    )
-    command_timeout: float = parameter(
-        0.1,
-        'a command older than this is not obeyed, and without a newer one the measured '
-        'position is held',
-        unit='s',
-        low=0.001,
-        high=1.0,
-    )
 
 
 class MotorDriverNode(EndoscopeNode):
     """Obeys ``motor/servo_jp`` as far as it is safe, and publishes what the shafts do.
 
-    Every tick the newest obeyed command goes to the device and its reading is published.  Without
-    fresh commands, and in any state but ``ENABLED``, the position measured at that moment is held;
-    only ``DISABLED`` lets the shafts go.  After a trouble of the device nothing moves until the
-    slave is enabled anew.  The simulated slave also publishes the noise-free tensions and angles
-    that the simulated load cells and tracker read.
+    A command is obeyed while it belongs to the motion session that the node takes part in, has one
+    sender and passes the gate; what it asks for goes through the motion shaper.  Every tick the
+    shaped goal goes to the device and its reading is published.  Without fresh commands, and
+    outside of a session, the shafts go to the position measured at that moment and hold it; only
+    ``DISABLED`` lets them go.  The simulated slave also publishes the noise-free tensions and
+    angles that the simulated load cells and tracker read.
     """
 
     def __init__(self, runtime: Runtime) -> None:
         super().__init__('motor_driver', runtime)
         p = self._settings = self.parameters(MotorDriverParameters)
         bus = self.parameters(DynamixelParameters)
-        self.gate = CommandGate(
-            CommandLimits(
-                (-p.shaft_limit,) * 2,
-                (p.shaft_limit,) * 2,
-                p.max_speed,
-                p.max_step,
-                round(p.command_timeout * 1e9),
-            )
+        facts, timeout_ns = self.rig.motors, self.rig.timeouts.command_ns
+        # The allowance of the gate holds for the time of receipt, which jitters, and the shaper
+        # bounds what it lets pass.
+        commands = CommandLimits(facts.reach, 1.25 * facts.speed, facts.entry_step, timeout_ns)
+        reach = (facts.reach,) * len(MOTORS)
+        low = tuple(-x for x in reach)
+        self.motion = ShaftMotion(
+            commands, MotionLimits(low, reach, facts.speed, facts.acceleration, facts.step)
         )
         self._slave = self._simulated() if p.device == 'simulated' else None
         self._device: MotorDevice = self._slave or self._dynamixel(bus)
@@ -90,10 +81,6 @@ class MotorDriverNode(EndoscopeNode):
         except DeviceError as error:
             raise ParameterError(f'motor_driver: {error}') from error
         self._trouble = ''
-        self._goal: tuple[float, ...] = (0.0,) * len(MOTORS)
-        self._reading: MotorReading | None = None
-        self._holding = True
-        self._holds = 0
         self.latency_ns: deque[int] = deque(maxlen=1000)
         self._measured = JointPublisher(
             self, MOTOR_MEASURED, MOTORS, ('position', 'velocity', 'effort'), SENSOR_OFFERED
@@ -103,17 +90,21 @@ class MotorDriverNode(EndoscopeNode):
             self._bending = JointPublisher(
                 self, SIMULATED_BENDING, JOINTS, ('position',), LOCK_STEP
             )
-        self._state = StateWatch(self, self.ticker, self._on_state)
-        JointSubscription(
+        self._state = ''
+        self._session = SessionWatch(
+            self, lambda: self._device.set_torque(True), self._let_go, self.motion.session
+        )
+        self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
+        self._commands = JointSubscription(
             self,
             MOTOR_COMMAND,
             MOTORS,
             self._on_command,
             COMMAND,
             exact=True,
-            on_malformed=self._on_malformed,
+            on_malformed=lambda reason: self.motion.gate.refuse(Refusal.MALFORMED, reason),
         )
-        self.diagnostics.add('commands', CommandReport(self.gate))
+        self.diagnostics.add('commands', CommandReport(self.motion.gate))
         self.diagnostics.add('device', self._report_device, p.device)
         self.ticker.add(self._on_tick)
 
@@ -127,67 +118,49 @@ class MotorDriverNode(EndoscopeNode):
             raise ParameterError(
                 "motor_driver: parameter 'use_sim_time' is true; real servos live in real time"
             )
-        motors = build_motors(parameters, MOTORS, self._settings.command_timeout)
+        motors = build_motors(parameters, MOTORS, self.rig.timeouts.command)
         self.create_service(Trigger, MOTOR_REBOOT, lambda _, answer: self._reboot(motors, answer))
         return motors
 
     def _reboot(self, motors: DynamixelMotors, answer: Trigger.Response) -> Trigger.Response:
-        answer.success = not self._state.enabled
+        answer.success = not self._session.name
         answer.message = 'not while the slave is enabled'
         if answer.success:
             motors.reboot()
             answer.message = 'the servos restart without torque and are set up anew'
         return answer
 
-    def _on_state(self, state: OperatingState) -> None:
-        self._hold()
-        if self._reading is not None:
-            self._goal = self._reading.position
-        if state is OperatingState.ENABLED:
-            self.gate.reset()
-            self._device.set_torque(True)
-        elif state is OperatingState.DISABLED:
+    def _on_state(self, message: String) -> None:
+        self._state = message.data
+        self._let_go()
+
+    def _let_go(self) -> None:
+        # Switching torque off needs no more than somebody's word, switching it on needs a session.
+        if self._state == OperatingState.DISABLED and not self._session.name:
             self._device.set_torque(False)
 
-    def _hold(self) -> None:
-        if not self._holding and self._reading is not None:
-            self._goal = self._reading.position
-            self._holds += 1
-        self._holding = True
-
-    def _on_malformed(self, reason: str) -> None:
-        self.gate.refuse(Refusal.MALFORMED, reason)
-
-    @property
-    def _may_move(self) -> bool:
-        return self._state.enabled and not self._state.interrupted
-
     def _on_command(self, sample: JointSample) -> None:
-        if not self._may_move:
-            self.gate.refuse(Refusal.NOT_ENABLED)
-            return
-        held = self._goal if self._reading is None else self._reading.position
-        if (
-            self.gate.check(
-                sample.stamp_ns, sample.position, sample.velocity, self.ticker.monotonic_ns(), held
-            )
-            is None
-        ):
-            self._goal = sample.position
-            self._holding = False
-            if not self.ticker.simulated:
-                self.latency_ns.append(self.ticker.now_ns() - sample.stamp_ns)
+        refusal = self.motion.command(
+            sample.session,
+            sample.stamp_ns,
+            sample.position,
+            sample.velocity,
+            self.ticker.monotonic_ns(),
+            rivals(self, self._commands.subscription),
+        )
+        if refusal is Refusal.SENDER:
+            self._session.turn()
+        elif refusal is None and not self.ticker.simulated:
+            self.latency_ns.append(self.ticker.now_ns() - sample.stamp_ns)
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         self._notice_trouble()
-        if not self._holding and not (
-            self.gate.is_fresh(self.ticker.monotonic_ns()) and self._may_move
-        ):
-            self._hold()
-        reading = self._device.exchange(self._goal, periods)
+        goal = self.motion.turn(self.ticker.monotonic_ns(), periods * TICK_S)
+        self._session.turn()
+        reading = self._device.exchange(goal or (0.0,) * len(MOTORS), periods)
         if reading is None:
             return
-        self._reading = reading
+        self.motion.measure(reading.position)
         if self._slave is None:
             stamp_ns = self.ticker.now_ns() - round(reading.age * 1e9)
         self._measured.publish(stamp_ns, *reading.position, *reading.velocity, *reading.effort)
@@ -197,28 +170,24 @@ class MotorDriverNode(EndoscopeNode):
 
     def _notice_trouble(self) -> None:
         """Tell a trouble of the device in the tick in which it comes or goes."""
-        trouble = self._trouble_now()
+        trouble = self._device.trouble()
         if bool(trouble) != bool(self._trouble):
             self._trouble = trouble
             if trouble:
                 self.get_logger().error(trouble)
-                self._hold()
+                self.motion.hold()
             self.diagnostics.publish()
 
-    def _trouble_now(self) -> str:
-        if self._state.interrupted:
-            return f'{OPERATING_STATE} had been silent: give enable anew'
-        return self._device.trouble()
-
     def _report_device(self) -> Report:
-        trouble = self._trouble_now()
+        trouble = self._device.trouble()
         values = self._device.health()
         values |= {
             'ticks': self.ticker.ticks,
             'missed ticks': self.ticker.missed,
             'published': self._measured.count,
-            'times held': self._holds,
-            'holding': self._holding,
+            'times held': self.motion.holds,
+            'holding': self.motion.holding,
+            'commands bounded': self.motion.shaper.bounded,
         }
         if self.latency_ns:
             ordered = sorted(self.latency_ns)
@@ -226,9 +195,9 @@ class MotorDriverNode(EndoscopeNode):
             values['command latency p99 [ms]'] = ordered[len(ordered) * 99 // 100] * 1e-6
         if trouble:
             return ERROR, trouble, values
-        if self._reading is None:
+        if not self.motion.goal:
             return WARN, 'no reading yet', values
-        return OK, 'holding' if self._holding else 'following commands', values
+        return OK, 'holding' if self.motion.holding else 'following commands', values
 
     def close(self) -> None:
         """Let go of the device."""

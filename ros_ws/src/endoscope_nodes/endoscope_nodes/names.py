@@ -19,6 +19,24 @@ MOTOR_REBOOT = 'motor/reboot'
 WIRES_MEASURED = 'wires/measured_js'
 TRACKER_POSE = 'tracker/measured_cp'
 OPERATING_STATE = 'slave/operating_state'
+MOTION_SESSION = 'slave/motion_session'
 STATE_COMMAND = 'slave/state_command'
 SIMULATED_WIRES = 'simulation/wires'
 SIMULATED_BENDING = 'simulation/bending'
+
+# Each has one sender while the slave is enabled: whoever else speaks there is a fault.
+SOLE_SENDER = (
+    MASTER_MEASURED,
+    MASTER_CLUTCH,
+    SLAVE_COMMAND,
+    SLAVE_MEASURED,
+    CALIBRATION_COMMAND,
+    CALIBRATION_RESULT,
+    CORRECTION,
+    COMPENSATOR_STATE,
+    MOTOR_COMMAND,
+    MOTOR_MEASURED,
+    WIRES_MEASURED,
+    OPERATING_STATE,
+    MOTION_SESSION,
+)

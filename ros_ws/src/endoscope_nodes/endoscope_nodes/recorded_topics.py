@@ -8,7 +8,7 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import JointState, Joy
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 
 from endoscope_bags.errors import UnknownTypeError
 from endoscope_bags.qos_profile import QosProfile
@@ -26,6 +26,7 @@ INTERFACE_TOPICS: dict[str, tuple[type, QoSProfile]] = {
     'calibration/result': (DiagnosticArray, RESULT),
     'compensator/state': (DiagnosticArray, RESULT),
     'slave/operating_state': (String, RESULT),
+    'slave/motion_session': (Header, EVENT),
     'slave/state_command': (String, EVENT),
     '/diagnostics': (DiagnosticArray, EVENT),
 }

@@ -21,6 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.rig import Rig, RigFileError, load_rig
 from endoscope_nodes.discovery import stay_on_this_machine
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.matching import all_matched
@@ -49,6 +50,9 @@ class BeatParameters:
     tick_rate: int = parameter(
         1000, 'beats of this process in real time; a divisor of 1000', unit='Hz', low=10, high=1000
     )
+    rig_file: str = parameter(
+        '', 'rig.yaml with gear, limits and time-outs; what it does not say is as shipped'
+    )
 
 
 N = TypeVar('N', bound=EndoscopeNode)
@@ -67,6 +71,8 @@ class Runtime(ClosedOnExit):
         ROS domain; by default that of the environment.
     overrides
         Parameter values by node name; they win over the command line's.
+    rig
+        What stands on the table; by default as the parameter `rig_file` of the first node says.
 
     Raises
     ------
@@ -86,6 +92,7 @@ class Runtime(ClosedOnExit):
         context: Context | None = None,
         domain_id: int | None = None,
         overrides: Mapping[str, Mapping[str, object]] | None = None,
+        rig: Rig | None = None,
     ) -> None:
         self.context = rclpy.get_default_context() if context is None else context
         stay_on_this_machine()
@@ -101,6 +108,7 @@ class Runtime(ClosedOnExit):
         self.executor = EventsExecutor(context=self.context)
         self.nodes: list[EndoscopeNode] = []
         self._ticker: Ticker | None = None
+        self._rig = rig
         self._overrides = overrides or {}
         self._exit_codes: list[int] = []
         self._stop = Future()
@@ -139,7 +147,7 @@ class Runtime(ClosedOnExit):
         """
         simulated = node.get_parameter('use_sim_time').value is True
         if self._ticker is None:
-            self._ticker = Ticker(node, simulated, self._stride_of(node))
+            self._ticker = Ticker(node, simulated, self._stride_and_rig(node))
         if self._ticker.simulated != simulated:
             raise ParameterError(
                 f"{node.get_name()}: parameter 'use_sim_time' differs from that "
@@ -150,14 +158,26 @@ class Runtime(ClosedOnExit):
             node._time_source.detach_node()
         return self._ticker
 
-    @staticmethod
-    def _stride_of(node: EndoscopeNode) -> int:
-        rate = declare_parameters(node, BeatParameters).tick_rate
+    def _stride_and_rig(self, node: EndoscopeNode) -> int:
+        given = declare_parameters(node, BeatParameters)
+        rate = given.tick_rate
         if 1000 % rate:
             raise ParameterError(
                 f"{node.get_name()}: parameter 'tick_rate' is {rate}; give a rate that divides 1000"
             )
+        if self._rig is None:
+            try:
+                self._rig = load_rig(given.rig_file or None)
+            except RigFileError as error:
+                raise ParameterError(f"{node.get_name()}: parameter 'rig_file': {error}") from error
         return 1000 // rate
+
+    @property
+    def rig(self) -> Rig:
+        """What stands on the table; it is known once a node has been added."""
+        if self._rig is None:
+            raise RuntimeError('no node has been added yet')
+        return self._rig
 
     @property
     def ticker(self) -> Ticker:

@@ -1,63 +1,52 @@
-"""Decides in which operating state the slave is, and watches what must not go wrong."""
+"""Decides in which state the slave is, opens motion sessions, watches what may go wrong."""
 
 import math
-from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.time import Time
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 
 from endoscope_core.safety import OperatingState, OperatingStateMachine, TensionGuard
+from endoscope_core.safety.motion_session import HEARTBEAT_S
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointSample, JointSubscription
 from endoscope_nodes.names import (
+    MOTION_SESSION,
     MOTOR_MEASURED,
     OPERATING_STATE,
+    SOLE_SENDER,
     STATE_COMMAND,
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.parameters import parameter
 from endoscope_nodes.qos import EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
-from endoscope_nodes.stream_watch import StreamWatch
+from endoscope_nodes.watches import SESSION_REPORT, StreamWatch, senders_in_words
 
 # Subcomponents whose errors forbid motion; their nodes tell them at once.
-_VITAL = frozenset(('motor_driver: device', 'load_cells: cells'))
-
-
-@dataclass(frozen=True)
-class SupervisorParameters:
-    """Parameters of the supervisor."""
-
-    tension_ceiling: float = parameter(
-        60.0, 'tension of a wire at which the slave goes to FAULT', unit='N', low=0.1, high=500.0
-    )
-    stream_timeout: float = parameter(
-        0.25,
-        'silence of motors or load cells at which the slave goes to FAULT',
-        unit='s',
-        low=0.005,
-        high=10.0,
-    )
-    check_period: float = parameter(
-        0.02, 'how often silence is looked for', unit='s', low=0.001, high=1.0
-    )
+_VITAL = ('motor_driver: device', 'load_cells: cells')
 
 
 class SupervisorNode(EndoscopeNode):
-    """Publishes ``slave/operating_state``, obeys ``slave/state_command``."""
+    """Publishes ``slave/operating_state`` and ``slave/motion_session``, obeys state commands.
+
+    An ``enable`` opens a motion session, whose name it repeats at 20 Hz; a fault, ``disable`` and
+    ``pause`` end it.  Faults are a wire over its ceiling, silent motors or load cells, an error of
+    a vital device, a node that has left the session, and a second sender on a topic that has one.
+    """
 
     def __init__(self, runtime: Runtime) -> None:
         super().__init__('supervisor', runtime)
-        p = self.parameters(SupervisorParameters)
-        self._timeout_ns = round(p.stream_timeout * 1e9)
+        self._timeout_ns = self.rig.timeouts.stream_ns
         self.machine = OperatingStateMachine()
-        self._guard = TensionGuard(WIRES, p.tension_ceiling)
+        self._guard = TensionGuard(WIRES, self.rig.tension.ceiling)
         self._last_refusal = ''
-        self._said: OperatingState | None = None
+        self._own = f'{self.get_namespace().rstrip("/")}/'
+        self._watched = [self.resolve_topic_name(topic) for topic in SOLE_SENDER]
         self._states = self.create_publisher(String, OPERATING_STATE, RESULT)
+        self._sessions = self.create_publisher(Header, MOTION_SESSION, EVENT)
         self._motor = StreamWatch(self.ticker, MOTOR_MEASURED)
         self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
         self.create_subscription(
@@ -67,62 +56,66 @@ class SupervisorNode(EndoscopeNode):
         self.create_subscription(String, STATE_COMMAND, self._on_command, EVENT)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, EVENT)
         self.diagnostics.add('operating state', self._report)
-        self.ticker.every(p.check_period, self._check_streams)
-        self.ticker.every(1.0, self._publish)
-        self._check_streams()
+        self.ticker.every(HEARTBEAT_S, self._beat)
+        self._check()
+
+    def _beat(self) -> None:
+        self._check()
+        self._publish()
 
     def _publish(self) -> None:
-        self._said = self.machine.state
-        self._states.publish(String(data=str(self._said)))
+        now = self.ticker.now_ns()
+        if not now:
+            return
+        self._states.publish(String(data=str(self.machine.state)))
+        self._sessions.publish(
+            Header(stamp=Time(nanoseconds=now).to_msg(), frame_id=self.machine.session)
+        )
 
     def _on_command(self, message: String) -> None:
         before = self.machine.state
-        answer = self.machine.command(message.data)
+        answer = self.machine.command(message.data, self.ticker.now_ns())
         if not answer.accepted:
             self._last_refusal = answer.reason
             self.get_logger().warning(answer.reason)
         elif self.machine.state != before:
             self._last_refusal = ''
-            self.get_logger().info(f'{before} -> {self.machine.state}')
+            self.get_logger().info(f'{before} -> {self.machine.state} {self.machine.session}')
             self._publish()
 
     def _on_wires(self, sample: JointSample) -> None:
         self._wires.note()
         tension = sample.effort or (math.nan,) * len(WIRES)
-        trouble = self._guard.update(tension)
-        if trouble:
-            self._report_cause('tension', trouble)
-        else:
-            self.machine.clear_cause('tension')
+        self._note('tension', self._guard.update(tension))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name not in _VITAL:
+            if not status.name.startswith(self._own):
                 continue
-            if status.level == ERROR:
-                self._report_cause(status.name, f'{status.name}: {status.message}')
-            else:
-                self.machine.clear_cause(status.name)
+            name = status.name.removeprefix(self._own)
+            if name in _VITAL or name.endswith(f': {SESSION_REPORT}'):
+                wrong = status.level == ERROR
+                self._note(status.name, f'{name}: {status.message}' if wrong else '')
 
-    def _check_streams(self) -> None:
+    def _check(self) -> None:
         for watch in (self._motor, self._wires):
-            trouble = watch.trouble(self._timeout_ns)
-            if trouble:
-                self._report_cause(watch.topic, trouble)
-            else:
-                self.machine.clear_cause(watch.topic)
-        if self._said is None and self.ticker.now_ns():
-            self._publish()
+            self._note(watch.topic, watch.trouble(self._timeout_ns))
+        for topic in self._watched:
+            crowded = self.count_publishers(topic) > 1
+            self._note(f'senders of {topic}', senders_in_words(self, topic) if crowded else '')
 
-    def _report_cause(self, name: str, description: str) -> None:
-        if self.machine.report_cause(name, description):
-            self.get_logger().error(f'{OperatingState.FAULT}: {description}')
+    def _note(self, name: str, trouble: str) -> None:
+        if not trouble:
+            self.machine.clear_cause(name)
+        elif self.machine.report_cause(name, trouble):
+            self.get_logger().error(f'{OperatingState.FAULT}: {trouble}')
             self._publish()
 
     def _report(self) -> Report:
         machine = self.machine
         values: dict[str, object] = {
             'state': machine.state,
+            'session': machine.session,
             'cause': machine.cause,
             'present causes': '; '.join(machine.present_causes.values()),
             'last refusal': self._last_refusal,
@@ -136,7 +129,7 @@ class SupervisorNode(EndoscopeNode):
 
     def close(self) -> None:
         """Say that the slave is no longer supervised."""
-        self.machine.command('disable')
+        self.machine.command('disable', self.ticker.now_ns())
         self._publish()
 
 

@@ -12,10 +12,12 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from endoscope_nodes.qos import CLOCK_ASKED
 
 TICK_NS = 1_000_000
+TICK_S = TICK_NS * 1e-9
 TickCallback = Callable[[int, int], None]
 
 _STAMP = struct.Struct('<iI')
 _SLOW_NS = 20_000_000
+_USUAL_DELAY_NS = 5_000_000
 
 
 class Ticker:
@@ -39,6 +41,9 @@ class Ticker:
     ----------
     ticks, missed
         Beats delivered, and beats that were due but came too late to be told from the next.
+    late_ns
+        Time that this process was not run though a beat was due, so far, in ns; delays of up to
+        5 ms, which every desktop kernel makes, do not count.
     """
 
     def __init__(self, node: Node, simulated: bool, stride: int = 1) -> None:
@@ -47,6 +52,8 @@ class Ticker:
         self._stride = 1 if simulated else stride
         self.ticks = 0
         self.missed = 0
+        self.late_ns = 0
+        self._slow_ns = 0
         self._listeners: tuple[TickCallback, ...] = ()
         self._periodic: list[_Periodic] = []
         self._sim_ns = 0
@@ -82,10 +89,13 @@ class Ticker:
             )
 
     def forget(self, owners: Sequence[object]) -> None:
-        """Stop calling the methods of these objects."""
+        """Stop calling the methods of these objects, and of what belongs to them as `_node`."""
 
         def kept(callback: object) -> bool:
-            return not any(getattr(callback, '__self__', None) is owner for owner in owners)
+            whose = getattr(callback, '__self__', None)
+            return not any(
+                whose is owner or getattr(whose, '_node', None) is owner for owner in owners
+            )
 
         self._listeners = tuple(x for x in self._listeners if kept(x))
         for item in self._periodic:
@@ -112,6 +122,7 @@ class Ticker:
         if beats <= 0:
             return
         periods = beats * self._stride
+        self._note_delay((periods - self._stride) * TICK_NS)
         self._last_ns += periods * TICK_NS
         self._beat(self._last_ns + self._offset_ns, periods)
 
@@ -133,7 +144,15 @@ class Ticker:
         self._call_periodic(stamp)
 
     def _on_slow_timer(self) -> None:
-        self._call_periodic(time.monotonic_ns())
+        now = time.monotonic_ns()
+        before, self._slow_ns = self._slow_ns, now
+        if before and not self._timer_started:
+            self._note_delay(now - before - _SLOW_NS)
+        self._call_periodic(now)
+
+    def _note_delay(self, delay_ns: int) -> None:
+        if delay_ns > _USUAL_DELAY_NS:
+            self.late_ns += delay_ns
 
     def _call_periodic(self, now_ns: int) -> None:
         for item in tuple(self._periodic):

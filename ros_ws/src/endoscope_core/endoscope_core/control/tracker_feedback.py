@@ -162,6 +162,11 @@ class TrackerFeedback[Law: JointLaw]:
         """
         self._laws = [self._new_law() for _ in range(self._joints)]
 
+    def restart(self) -> None:
+        """Begin a new stream of desired angles; what has been learnt stays."""
+        self._history.clear()
+        self._last_stamp = -math.inf
+
     def tracker_fresh(self, time: float) -> bool:
         """Whether the last accepted measurement is recent enough at `time` (s)."""
         return time - self._last_stamp <= self._stale_after

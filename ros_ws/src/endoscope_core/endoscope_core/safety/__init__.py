@@ -1,13 +1,16 @@
-"""What stands between a command and motion: states, gates, guards and clutch."""
+"""What stands between a command and motion: states, sessions, gates, guards and the shaper."""
 
 from endoscope_core.safety.clutch_follower import ClutchFollower
 from endoscope_core.safety.command_gate import CommandGate, CommandLimits, Refusal
+from endoscope_core.safety.motion_session import MotionSession
+from endoscope_core.safety.motion_shaper import MotionLimits, MotionShaper
 from endoscope_core.safety.operating_state import (
     Answer,
     OperatingState,
     OperatingStateMachine,
     StateCommand,
 )
+from endoscope_core.safety.shaft_motion import ShaftMotion
 from endoscope_core.safety.tension_guard import TensionGuard
 
 __all__ = [
@@ -15,9 +18,13 @@ __all__ = [
     'ClutchFollower',
     'CommandGate',
     'CommandLimits',
+    'MotionLimits',
+    'MotionSession',
+    'MotionShaper',
     'OperatingState',
     'OperatingStateMachine',
     'Refusal',
+    'ShaftMotion',
     'StateCommand',
     'TensionGuard',
 ]

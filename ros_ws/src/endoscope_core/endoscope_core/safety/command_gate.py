@@ -5,23 +5,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-_NS = 1e-9
-# How much longer than between their receipts the time between the stamps of two commands may be.
-_JITTER_NS = 20_000_000
+_S_PER_NS = 1e-9
+# A reader that comes late takes several commands at once: what a stream may save up for that.
+_JITTER_S = 0.02
 
 
 class Refusal(StrEnum):
     """Why a command is not obeyed."""
 
     NOT_ENABLED = 'not enabled'
+    SESSION = 'not of this motion session'
+    SENDER = 'more than one sender'
     CLUTCH = 'clutch not held'
     MALFORMED = 'malformed'
     NOT_FINITE = 'not finite'
     STAMP = 'stamp not increasing'
+    FUTURE = 'stamped in the future'
     LATE = 'late'
     RANGE = 'out of range'
     RATE = 'too fast'
-    STEP = 'too far from the held position'
+    STEP = 'too far from the measured position'
 
 
 @dataclass(frozen=True)
@@ -30,18 +33,17 @@ class CommandLimits:
 
     Attributes
     ----------
-    low, high
-        Allowed positions in rad, shape (J,).
+    reach
+        Largest position in rad, either way.
     max_speed
-        Largest speed between two commands in rad/s.
+        Largest speed in rad/s.
     max_step
-        Largest distance in rad between the held position and the first command of a stream.
+        Largest distance in rad between the measured position and the first command of a stream.
     max_age_ns
-        A command that reached us later than this is refused; a stream that pauses longer is stale.
+        A command that reached us later than this is refused; a stream that pauses longer has ended.
     """
 
-    low: tuple[float, ...]
-    high: tuple[float, ...]
+    reach: float
     max_speed: float
     max_step: float
     max_age_ns: int = 100_000_000
@@ -52,7 +54,12 @@ class CommandGate:
 
     Age is measured by the receiver's monotonic clock.  The sender's clock may have any offset:
     the smallest difference between receipt and stamp so far is taken for it (with 0.1 % of the
-    receiver's time for drift), and a command that took longer than that by ``max_age_ns`` is late.
+    receiver's time for drift).  A command that took longer than that by ``max_age_ns`` is late, and
+    one that took so much less is stamped in the future.  Where the first two commands of a stream
+    do not agree, the first one's stamp is taken for the wrong one.
+
+    Speed is judged by an allowance of travel, which grows by ``max_speed`` with the receiver's time
+    and is spent by every command obeyed: stamps cannot stretch it, and it can be spent only once.
 
     Parameters
     ----------
@@ -74,19 +81,21 @@ class CommandGate:
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
         self.accepted = 0
         self.last_reason = ''
-        self._ranges = tuple(zip(limits.low, limits.high, strict=True))
         self._position: tuple[float, ...] = ()
         self._stamp_ns = 0
         self._offset_ns: int | None = None
         self._offset_at_ns = 0
         self._received_ns: int | None = None
+        self._allowance = 0.0
+        self._alone = True
 
     def reset(self) -> None:
-        """Forget the stream so far, as when motion is enabled anew; counts stay."""
+        """Forget the stream so far, as when a motion session begins; counts stay."""
         self._position = ()
         self._stamp_ns = 0
         self._offset_ns = None
         self._received_ns = None
+        self._alone = True
 
     def refuse(self, refusal: Refusal, words: str = '') -> Refusal:
         """Count a refusal that was found elsewhere."""
@@ -98,9 +107,9 @@ class CommandGate:
         self,
         stamp_ns: int,
         position: Sequence[float],
-        velocity: Sequence[float],
         received_ns: int,
-        held: Sequence[float] | None = None,
+        measured: Sequence[float],
+        velocity: Sequence[float] = (),
     ) -> Refusal | None:
         """Judge one command.
 
@@ -112,40 +121,34 @@ class CommandGate:
             rad and rad/s, shape (J,); ``velocity`` may be empty.
         received_ns
             Local monotonic time of receipt in ns.
-        held
-            Position in rad that is held now, shape (J,); the first command of a stream is compared
-            with it. By default the last command obeyed, and none after a reset.
+        measured
+            Measured position in rad, shape (J,), which the first command of a stream is compared
+            with.
 
         Returns
         -------
         Refusal or None
             Why it is refused, or None if it is to be obeyed.
         """
-        if len(position) != len(self._ranges):
+        if len(position) != len(measured):
             return self.refuse(Refusal.MALFORMED, f'{len(position)} positions')
+        for value in (*position, *velocity):
+            if not math.isfinite(value):
+                return self.refuse(Refusal.NOT_FINITE, str(value))
+        limits = self.limits
         for value in position:
-            if not math.isfinite(value):
-                return self.refuse(Refusal.NOT_FINITE, f'position {value}')
-        for value in velocity:
-            if not math.isfinite(value):
-                return self.refuse(Refusal.NOT_FINITE, f'velocity {value}')
-        if stamp_ns <= self._stamp_ns:
-            return self.refuse(Refusal.STAMP, f'{stamp_ns} after {self._stamp_ns}')
-        late_ns = self._lateness_ns(stamp_ns, received_ns)
-        if late_ns > self.limits.max_age_ns:
-            return self.refuse(Refusal.LATE, f'by {late_ns * 1e-6:.1f} ms')
-        for value, (low, high) in zip(position, self._ranges, strict=True):
-            if not low <= value <= high:
-                return self.refuse(Refusal.RANGE, f'{value:.4g} outside {low:.4g} to {high:.4g}')
-        streaming = self._received_ns is not None and (
-            received_ns - self._received_ns <= self.limits.max_age_ns
-        )
-        if streaming:
-            refusal = self._check_rate(stamp_ns, position, received_ns)
-        else:
-            refusal = self._check_step(position, self._position if held is None else held)
+            if abs(value) > limits.reach:
+                return self.refuse(Refusal.RANGE, f'{value:.4g} rad beyond {limits.reach:.4g}')
+        refusal = self._check_stamp(stamp_ns, received_ns)
         if refusal is not None:
             return refusal
+        if self.is_fresh(received_ns):
+            refusal = self._check_speed(position, received_ns)
+        else:
+            refusal = self._check_entry(position, measured)
+        if refusal is not None:
+            return refusal
+        self._alone = self._received_ns is None
         self._position = tuple(position)
         self._stamp_ns = stamp_ns
         self._received_ns = received_ns
@@ -158,30 +161,44 @@ class CommandGate:
             now_ns - self._received_ns <= self.limits.max_age_ns
         )
 
-    def _lateness_ns(self, stamp_ns: int, received_ns: int) -> int:
+    def _check_stamp(self, stamp_ns: int, received_ns: int) -> Refusal | None:
+        tolerance = self.limits.max_age_ns
         difference = received_ns - stamp_ns
-        if self._offset_ns is None:
-            self._offset_ns = difference
-        else:
+        if self._offset_ns is not None:
             drift = max(0, received_ns - self._offset_at_ns) // 1000
-            self._offset_ns = min(self._offset_ns + drift, difference)
+            late_ns = difference - self._offset_ns - drift
+            if self._alone and abs(late_ns) > tolerance:
+                self._offset_ns = None
+            elif stamp_ns <= self._stamp_ns:
+                return self.refuse(Refusal.STAMP, f'{stamp_ns} after {self._stamp_ns}')
+            elif late_ns > tolerance:
+                return self.refuse(Refusal.LATE, f'by {late_ns * 1e-6:.1f} ms')
+            elif late_ns < -tolerance:
+                return self.refuse(Refusal.FUTURE, f'by {-late_ns * 1e-6:.1f} ms')
+            else:
+                difference = min(self._offset_ns + drift, difference)
+        self._offset_ns = difference
         self._offset_at_ns = received_ns
-        return difference - self._offset_ns
-
-    def _check_rate(
-        self, stamp_ns: int, position: Sequence[float], received_ns: int
-    ) -> Refusal | None:
-        # The sender's stamps alone would let it jump as far as it likes to date a command ahead.
-        waited_ns = received_ns - (self._received_ns or 0) + _JITTER_NS
-        elapsed = min(stamp_ns - self._stamp_ns, waited_ns) * _NS
-        for value, before in zip(position, self._position, strict=True):
-            if abs(value - before) > self.limits.max_speed * elapsed:
-                return self.refuse(Refusal.RATE, f'{abs(value - before) / elapsed:.4g} rad/s')
         return None
 
-    def _check_step(self, position: Sequence[float], held: Sequence[float]) -> Refusal | None:
-        # Nothing is held before the first command.
-        for value, here in zip(position, held, strict=False):
-            if abs(value - here) > self.limits.max_step:
-                return self.refuse(Refusal.STEP, f'{abs(value - here):.4g} rad')
+    def _check_speed(self, position: Sequence[float], received_ns: int) -> Refusal | None:
+        limits = self.limits
+        elapsed = (received_ns - (self._received_ns or 0)) * _S_PER_NS
+        allowance = self._allowance + limits.max_speed * elapsed
+        travel = max(abs(a - b) for a, b in zip(position, self._position, strict=True))
+        if travel > allowance:
+            return self.refuse(
+                Refusal.RATE, f'{travel:.4g} rad where {allowance:.4g} rad were allowed'
+            )
+        # What is saved up beyond the jitter of a reader would let a stream leap.
+        self._allowance = min(allowance - travel, limits.max_speed * _JITTER_S)
+        return None
+
+    def _check_entry(
+        self, position: Sequence[float], measured: Sequence[float]
+    ) -> Refusal | None:
+        step = max(abs(a - b) for a, b in zip(position, measured, strict=True))
+        if step > self.limits.max_step:
+            return self.refuse(Refusal.STEP, f'{step:.4g} rad from where it is')
+        self._allowance = self.limits.max_speed * _JITTER_S
         return None

@@ -1,4 +1,4 @@
-"""Operating states of the slave by CRTK, with a fault that latches.
+"""Operating states of the slave by CRTK, with a fault that latches, and its motion sessions.
 
 States and commands follow the Collaborative Robotics Toolkit (Su et al., IEEE IRC 2020):
 ``DISABLED``, ``ENABLED``, ``PAUSED``, ``FAULT`` and ``enable``, ``disable``, ``pause``, ``resume``,
@@ -7,6 +7,8 @@ States and commands follow the Collaborative Robotics Toolkit (Su et al., IEEE I
 
 from dataclasses import dataclass
 from enum import StrEnum
+
+_NS_PER_MS = 1_000_000
 
 
 class OperatingState(StrEnum):
@@ -46,7 +48,7 @@ class Answer:
 
 _ALLOWED = {
     StateCommand.ENABLE: {OperatingState.DISABLED, OperatingState.FAULT, OperatingState.ENABLED},
-    StateCommand.DISABLE: {OperatingState.DISABLED, OperatingState.ENABLED, OperatingState.PAUSED},
+    StateCommand.DISABLE: set(OperatingState),
     StateCommand.PAUSE: {OperatingState.ENABLED, OperatingState.PAUSED},
     StateCommand.RESUME: {OperatingState.PAUSED, OperatingState.ENABLED},
     StateCommand.HOME: {OperatingState.ENABLED},
@@ -61,22 +63,28 @@ _LEADS_TO = {
 
 
 class OperatingStateMachine:
-    """The one place that decides in which state the slave is.
+    """The one place that decides in which state the slave is, and under which session it moves.
 
-    A fault latches: it stays after its cause has gone, and only an explicit ``enable`` ends it,
-    which is refused while any cause is present.  Nothing else ever leads to ``ENABLED``.
+    A fault latches: it stays after its cause has gone, and only an explicit ``enable`` or
+    ``disable`` ends it; ``enable`` and ``resume`` are refused while any cause is present.  Torque
+    can be switched off in every state.  Nothing but ``enable`` and ``resume`` leads to ``ENABLED``,
+    and each time one of them does, a new motion session is opened; it ends with the state.
 
     Attributes
     ----------
     state
         The state now.
+    session
+        Name of the motion session; empty in every state but ``ENABLED``.
     cause
         Why it is ``FAULT``: the first cause; empty otherwise.
     """
 
     def __init__(self) -> None:
         self.state = OperatingState.DISABLED
+        self.session = ''
         self.cause = ''
+        self._number = 0
         self._present: dict[str, str] = {}
 
     @property
@@ -84,13 +92,16 @@ class OperatingStateMachine:
         """Conditions that forbid motion now: name to description."""
         return dict(self._present)
 
-    def command(self, text: str) -> Answer:
+    def command(self, text: str, now_ns: int) -> Answer:
         """Carry out a command, or say why not.
 
         Parameters
         ----------
         text
             One of :class:`StateCommand`; anything else is refused.
+        now_ns
+            Time in ns, of which a session takes its number: in ms, and larger than the last, so
+            that no session of this or a former supervisor is ever named again.
         """
         try:
             command = StateCommand(text)
@@ -100,11 +111,18 @@ class OperatingStateMachine:
         if self.state not in _ALLOWED[command]:
             extra = f' ({self.cause}); use enable once the cause is gone' if self.cause else ''
             return Answer(False, f"'{command}' is not possible in {self.state}{extra}")
-        if command is StateCommand.ENABLE and self._present:
+        if command is StateCommand.HOME:
+            return Answer(True)
+        state = _LEADS_TO[command]
+        if state is OperatingState.ENABLED and self._present:
             return Answer(False, 'not enabled: ' + '; '.join(self._present.values()))
-        if command is not StateCommand.HOME:
-            self.state = _LEADS_TO[command]
-            self.cause = ''
+        if state is not OperatingState.ENABLED:
+            self.session = ''
+        elif not self.session:
+            self._number = max(self._number + 1, now_ns // _NS_PER_MS)
+            self.session = f'session-{self._number}'
+        self.state = state
+        self.cause = ''
         return Answer(True)
 
     def report_cause(self, name: str, description: str) -> bool:
@@ -125,10 +143,11 @@ class OperatingStateMachine:
         self._present[name] = description
         if self.state in (OperatingState.ENABLED, OperatingState.PAUSED):
             self.state = OperatingState.FAULT
+            self.session = ''
             self.cause = description
             return True
         return False
 
     def clear_cause(self, name: str) -> None:
-        """Note that a condition is gone; a fault stays until ``enable``."""
+        """Note that a condition is gone; a fault stays until ``enable`` or ``disable``."""
         self._present.pop(name, None)

@@ -1,0 +1,230 @@
+"""rig.yaml: gear, limits and time-outs of a rig, said once for every node."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from endoscope_core.effects import nearest
+from endoscope_core.errors import EndoscopeError
+
+SHIPPED = Path(__file__).with_name('rig.yaml')
+
+
+class RigFileError(EndoscopeError, ValueError):
+    """A rig file that cannot be used; the message names the file, the key and what to do."""
+
+
+def _fact(low: float, high: float) -> Any:
+    return field(metadata={'low': low, 'high': high})
+
+
+@dataclass(frozen=True)
+class JointFacts:
+    """What is the same for every joint of the bending section.
+
+    Attributes
+    ----------
+    gear
+        Shaft angle for one radian at the joint.
+    reach
+        Largest desired bending in rad, either way.
+    drive
+        Largest joint-equivalent motor angle in rad, either way; what compensation adds to the
+        desired bending has its place between the two.
+    correction
+        Largest correction by feedback in rad, either way.
+    speed, acceleration
+        Largest of a desired angle, in rad/s and rad/s^2.
+    hand_speed
+        Largest speed in rad/s of a joint that follows the handle.
+    entry_step
+        Largest distance in rad from the measured pose to the first command of a stream.
+    """
+
+    gear: float = _fact(0.01, 100.0)
+    reach: float = _fact(0.1, 3.1)
+    drive: float = _fact(0.1, 10.0)
+    correction: float = _fact(0.0, 3.1)
+    speed: float = _fact(0.01, 100.0)
+    acceleration: float = _fact(0.1, 1e4)
+    hand_speed: float = _fact(0.01, 20.0)
+    entry_step: float = _fact(0.001, 1.0)
+
+
+@dataclass(frozen=True)
+class MotorFacts:
+    """What is the same for every motor shaft.
+
+    Attributes
+    ----------
+    reach
+        Largest shaft angle in rad, either way.
+    speed, acceleration
+        Largest of a shaft, in rad/s and rad/s^2.
+    step
+        Largest distance in rad of two goals that follow each other.
+    entry_step
+        Largest distance in rad from the measured position to the first command of a stream.
+    """
+
+    reach: float = _fact(0.01, 20.0)
+    speed: float = _fact(0.01, 100.0)
+    acceleration: float = _fact(0.1, 1e5)
+    step: float = _fact(1e-4, 1.0)
+    entry_step: float = _fact(0.001, 1.0)
+
+
+@dataclass(frozen=True)
+class Timeouts:
+    """How long something may be silent, in s.
+
+    Attributes
+    ----------
+    command
+        A command older than this is not obeyed, and a stream that pauses longer has ended.
+    stream
+        Silence of motors or load cells at which the slave goes to FAULT.
+    handle
+        Silence of the handle after which it counts as released.
+    """
+
+    command: float = _fact(0.001, 1.0)
+    stream: float = _fact(0.005, 10.0)
+    handle: float = _fact(0.01, 1.0)
+
+    @property
+    def command_ns(self) -> int:
+        """`command` in ns."""
+        return round(self.command * 1e9)
+
+    @property
+    def stream_ns(self) -> int:
+        """`stream` in ns."""
+        return round(self.stream * 1e9)
+
+
+@dataclass(frozen=True)
+class TensionFacts:
+    """Tensions of a wire in N.
+
+    Attributes
+    ----------
+    ceiling
+        At which the slave goes to FAULT.
+    calibration_ceiling
+        At which a calibration is aborted.
+    """
+
+    ceiling: float = _fact(0.1, 500.0)
+    calibration_ceiling: float = _fact(0.1, 500.0)
+
+
+@dataclass(frozen=True)
+class HandleFacts:
+    """The console's handle.
+
+    Attributes
+    ----------
+    resolution
+        One count of its encoders in rad.
+    """
+
+    resolution: float = _fact(0.0, 0.1)
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig; see the classes of its parts.
+
+    Raises
+    ------
+    ValueError
+        If `drive` times gear is beyond the reach of a shaft.
+    """
+
+    joints: JointFacts
+    motors: MotorFacts
+    timeouts: Timeouts
+    tension: TensionFacts
+    handle: HandleFacts
+
+    def __post_init__(self) -> None:
+        shaft = self.joints.drive * self.joints.gear
+        if shaft > self.motors.reach:
+            raise ValueError(
+                f'joints.drive times gear is {shaft:g} rad of the shaft, beyond motors.reach '
+                f'{self.motors.reach:g}'
+            )
+
+
+def load_rig(path: str | Path | None = None) -> Rig:
+    """Read a rig.yaml; what it does not say is as in the one that is shipped.
+
+    Parameters
+    ----------
+    path
+        The file; the shipped one by default.
+
+    Raises
+    ------
+    RigFileError
+        It cannot be read, has an unknown key, or a value out of range.
+    """
+    own = {} if path is None or not str(path) else _content(Path(path))
+    shipped = _content(SHIPPED)
+    parts = {f.name: f.type for f in fields(Rig)}
+    _check_keys(own, parts, f'rig file {path}')
+    try:
+        return Rig(
+            **{
+                name: _part(kind, shipped[name], own.get(name), f'rig file {path}: {name}')
+                for name, kind in parts.items()
+            }
+        )
+    except RigFileError:
+        raise
+    except ValueError as error:
+        raise RigFileError(f'rig file {path}: {error}') from error
+
+
+def _content(path: Path) -> Mapping[str, Any]:
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except OSError as error:
+        raise RigFileError(f'cannot read rig file {path}: {error.strerror}') from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise RigFileError(f'{path} is not YAML: {" ".join(str(error).split())}') from error
+    if not isinstance(content, Mapping):
+        raise RigFileError(f'rig file {path} has to be a mapping')
+    return content
+
+
+def _part(kind: Any, shipped: Mapping[str, Any], own: Any, where: str) -> Any:
+    if own is None:
+        own = {}
+    if not isinstance(own, Mapping):
+        raise RigFileError(f'{where} has to be a mapping, not {own!r}')
+    known = {f.name: f.metadata for f in fields(kind)}
+    _check_keys(own, known, where)
+    values = {}
+    for name, bounds in known.items():
+        value = own.get(name, shipped[name])
+        low, high = bounds['low'], bounds['high']
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise RigFileError(f'{where}.{name} is {value!r}: give a number')
+        if not (math.isfinite(value) and low <= value <= high):
+            raise RigFileError(
+                f'{where}.{name} is {value!r}: give a number from {low:g} to {high:g}'
+            )
+        values[name] = float(value)
+    return kind(**values)
+
+
+def _check_keys(given: Mapping[str, Any], known: Mapping[str, Any], where: str) -> None:
+    for key in given:
+        if key not in known:
+            raise RigFileError(f'{where}: unknown key {key}: {nearest(str(key), tuple(known))}')

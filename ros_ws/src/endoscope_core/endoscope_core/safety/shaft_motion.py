@@ -1,0 +1,155 @@
+"""What the motor driver lets the shafts do: session, gate and shaper over one stream of goals."""
+
+from collections.abc import Sequence
+
+from endoscope_core.safety.command_gate import CommandGate, CommandLimits, Refusal
+from endoscope_core.safety.motion_session import MotionSession
+from endoscope_core.safety.motion_shaper import MotionLimits, MotionShaper
+
+_NS = 1e-9
+_FIRST_PERIOD_S = 1e-3
+
+
+class ShaftMotion:
+    """Gives the goal of the shafts in every tick, whatever the commands are.
+
+    The goal moves in three cases only: under commands of the session that the driver takes part in;
+    to the position measured when those ended, within the bounds of the shaper; and, when a session
+    begins, to the position measured then, which is where the shafts are.
+
+    Parameters
+    ----------
+    commands
+        What a command may ask for.
+    limits
+        What the motion keeps to.
+
+    Attributes
+    ----------
+    session
+        The driver's part in motion sessions.
+    gate
+        Judges the commands, and counts.
+    shaper
+        Bounds what they ask for.
+    holds
+        How often commands have ended and the measured position was held.
+    """
+
+    def __init__(self, commands: CommandLimits, limits: MotionLimits) -> None:
+        self.session = MotionSession()
+        self.gate = CommandGate(commands)
+        self.shaper = MotionShaper(limits)
+        self.holds = 0
+        self._entered = ''
+        self._measured: tuple[float, ...] = ()
+        self._held: tuple[float, ...] = ()
+        self._goal: tuple[float, ...] = ()
+        self._stamp_ns = 0
+
+    @property
+    def goal(self) -> tuple[float, ...]:
+        """Goal of the shafts in rad, shape (J,); empty before the first reading."""
+        return self._goal
+
+    @property
+    def holding(self) -> bool:
+        """Whether a measured position is held instead of commands followed."""
+        return bool(self._held)
+
+    def measure(self, position: Sequence[float]) -> None:
+        """Take a reading of the shafts in rad, shape (J,)."""
+        self._measured = tuple(position)
+        if not self._goal:
+            self._begin()
+
+    def command(
+        self,
+        session: str,
+        stamp_ns: int,
+        position: Sequence[float],
+        velocity: Sequence[float],
+        now_ns: int,
+        doubt: str = '',
+    ) -> Refusal | None:
+        """Take a command, or say why not.
+
+        Parameters
+        ----------
+        session
+            Motion session that it names.
+        stamp_ns, position, velocity
+            Its stamp in ns, rad and rad/s; see `CommandGate.check`.
+        now_ns
+            Local monotonic time of receipt in ns.
+        doubt
+            Why it may not be the compensator's, as with two senders; ends the session.
+        """
+        self._notice_session()
+        if not self.session.belongs(session):
+            return self.gate.refuse(Refusal.SESSION, session or 'none named')
+        if doubt:
+            self.leave(doubt)
+            return self.gate.refuse(Refusal.SENDER, doubt)
+        if not self._measured:
+            return self.gate.refuse(Refusal.STEP, 'no measured position yet')
+        streaming = self.gate.is_fresh(now_ns)
+        refusal = self.gate.check(stamp_ns, position, now_ns, self._measured, velocity)
+        if refusal is not None:
+            return refusal
+        period = (stamp_ns - self._stamp_ns) * _NS
+        self._stamp_ns = stamp_ns
+        if self._held or not streaming:
+            self._begin()
+            period = _FIRST_PERIOD_S
+        self._held = ()
+        self._goal = self.shaper.shape(position, period)
+        return None
+
+    def turn(self, now_ns: int, period: float) -> tuple[float, ...]:
+        """Goal for this tick in rad, shape (J,); empty before the first reading.
+
+        Parameters
+        ----------
+        now_ns
+            Local monotonic time in ns.
+        period
+            s since the tick before.
+        """
+        self.session.beat(now_ns)
+        self._notice_session()
+        if not self._goal:
+            return ()
+        if not self._held and not self.gate.is_fresh(now_ns):
+            self.hold()
+        if self._held:
+            self._goal = self.shaper.shape(self._held, period)
+        return self._goal
+
+    def leave(self, reason: str) -> None:
+        """End the driver's part in the session, and hold."""
+        self.session.leave(reason)
+        self._notice_session()
+
+    def hold(self) -> None:
+        """Go to where the shafts are now, and stay there."""
+        if not self._held:
+            self.holds += 1
+        self._held = self._measured
+
+    def _notice_session(self) -> None:
+        if self.session.name == self._entered:
+            return
+        self._entered = self.session.name
+        self.gate.reset()
+        if not self._goal:
+            return
+        if self._entered:
+            self._begin()
+        else:
+            self.hold()
+
+    def _begin(self) -> None:
+        """Start from rest where the shafts are."""
+        self.shaper.restart(self._measured)
+        self._goal = self._held = self._measured

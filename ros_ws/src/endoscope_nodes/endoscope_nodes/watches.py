@@ -1,0 +1,279 @@
+"""What a node watches to know whether it may move the slave: session, senders, clutch, streams."""
+
+import math
+from collections.abc import Callable
+
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import JointState, Joy
+from std_msgs.msg import Header
+
+from endoscope_bags.errors import MalformedMessageError
+from endoscope_core.safety import CommandGate, MotionSession
+from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report
+from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.joint_stream import JointReader, JointSample
+from endoscope_nodes.names import (
+    JOINTS,
+    MASTER_CLUTCH,
+    MOTION_SESSION,
+    MOTOR_MEASURED,
+    MOTORS,
+    SLAVE_MEASURED,
+)
+from endoscope_nodes.qos import EVENT, SENSOR_ASKED
+from endoscope_nodes.ticker import Ticker
+
+SESSION_REPORT = 'motion session'
+TURN_S = 0.04
+
+# The clutch is repeated at 10 Hz; three missed repetitions mean that the console is gone.
+CLUTCH_TIMEOUT_NS = 350_000_000
+# At 40 Hz, three missed frames mean that the tracker has lost its sensor.
+TRACKER_TIMEOUT_NS = 100_000_000
+
+
+def rivals(node: EndoscopeNode, subscription: Subscription) -> str:
+    """Say who else sends on a topic that has one sender; empty while there is but one.
+
+    A node killed without a last word counts until the middleware has given it up.
+    """
+    if subscription.get_publisher_count() <= 1:
+        return ''
+    return senders_in_words(node, subscription.topic_name)
+
+
+def senders_in_words(node: EndoscopeNode, topic: str) -> str:
+    """Name all senders of a topic in one line; empty where there are fewer than two."""
+    known = [
+        f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+        for info in node.get_publishers_info_by_topic(topic)
+    ]
+    if len(known) < 2:
+        return ''
+    relative = topic.removeprefix(f'{node.get_namespace()}/')
+    return f'{relative} has {len(known)} senders: {" and ".join(sorted(known))}'
+
+
+class SessionWatch:
+    """A node's part in the motion sessions of the supervisor, told on `/diagnostics`.
+
+    Parameters
+    ----------
+    on_enter
+        Called when the node has entered a session.
+    on_leave
+        Called when it is in none any more.
+    session
+        Kept by somebody else; one of its own by default.
+    """
+
+    def __init__(
+        self,
+        node: EndoscopeNode,
+        on_enter: Callable[[], None] | None = None,
+        on_leave: Callable[[], None] | None = None,
+        session: MotionSession | None = None,
+    ) -> None:
+        self._node = node
+        self._session = session or MotionSession()
+        self._on_enter = on_enter
+        self._on_leave = on_leave
+        self._told = ('', '')
+        self._subscription = node.create_subscription(Header, MOTION_SESSION, self._hear, EVENT)
+        node.diagnostics.add(SESSION_REPORT, self._report)
+        node.ticker.every(TURN_S, self.turn)
+
+    @property
+    def name(self) -> str:
+        """Session that the node takes part in; empty while it must not move anything."""
+        return self._session.name
+
+    def belongs(self, sample: JointSample) -> bool:
+        """Whether a message is of the session that the node takes part in."""
+        return self._session.belongs(sample.session)
+
+    def leave(self, reason: str) -> None:
+        """End the node's part in the session, and say so at once: the slave goes to FAULT."""
+        self._session.leave(reason)
+        self._tell()
+
+    def turn(self) -> None:
+        """Take a turn of the node's loop; a node that beats calls this more often."""
+        self._session.beat(self._node.ticker.monotonic_ns())
+        self._tell()
+
+    def _hear(self, message: Header) -> None:
+        doubt = rivals(self._node, self._subscription)
+        now = self._node.ticker.monotonic_ns()
+        if self._session.hear(message.frame_id, now, doubt):
+            self._told = (self._session.name, '')
+            if self._on_enter is not None:
+                self._on_enter()
+            return
+        self._tell()
+
+    def _tell(self) -> None:
+        told = (self._session.name, self._session.trouble)
+        if told == self._told:
+            return
+        before, self._told = self._told, told
+        if before[0] and not told[0] and self._on_leave is not None:
+            self._on_leave()
+        if told[1]:
+            self._node.get_logger().error(told[1])
+        self._node.diagnostics.publish()
+
+    def _report(self) -> Report:
+        session = self._session
+        return (
+            (ERROR, session.trouble, {})
+            if session.trouble
+            else (OK, session.name or 'none', {})
+        )
+
+
+class ClutchWatch:
+    """The clutch as last heard; silence counts as released.
+
+    Attributes
+    ----------
+    subscription
+        Of the clutch, by which its senders are told.
+    """
+
+    def __init__(self, node: EndoscopeNode) -> None:
+        self._ticker = node.ticker
+        self._pressed = False
+        self._heard_ns = 0
+        self.subscription = node.create_subscription(Joy, MASTER_CLUTCH, self._receive, EVENT)
+
+    def _receive(self, message: Joy) -> None:
+        self._pressed = bool(message.buttons) and message.buttons[0] == 1
+        self._heard_ns = self._ticker.monotonic_ns()
+
+    @property
+    def held(self) -> bool:
+        """Whether the clutch is held now, and was heard of lately."""
+        return self._pressed and self._ticker.monotonic_ns() - self._heard_ns <= CLUTCH_TIMEOUT_NS
+
+
+class StreamWatch:
+    """Whether a topic is alive, as far as this process listened to it.
+
+    A loop that came late has heard nothing meanwhile: its delay is not taken for silence, up to
+    once the time allowed, and is told beside it.
+
+    Parameters
+    ----------
+    ticker
+        Gives the time.
+    topic
+        Name for its troubles.
+    """
+
+    def __init__(self, ticker: Ticker, topic: str) -> None:
+        self.topic = topic
+        self._ticker = ticker
+        self._heard_ns: int | None = None
+        self._late_ns = 0
+
+    def note(self, _: object = None) -> None:
+        """Take the topic as heard now; fit to be the callback of a raw subscription."""
+        self._heard_ns = self._ticker.monotonic_ns()
+        self._late_ns = self._ticker.late_ns
+
+    def trouble(self, timeout_ns: int) -> str:
+        """Say what is wrong with the stream; empty if it was heard within ``timeout_ns``."""
+        if self._heard_ns is None:
+            return f'{self.topic} has not been received'
+        age = self._ticker.monotonic_ns() - self._heard_ns
+        deaf = self._ticker.late_ns - self._late_ns
+        if age - min(deaf, timeout_ns) <= timeout_ns:
+            return ''
+        late = f', {deaf * 1e-6:.0f} ms of which this process was not run itself' if deaf else ''
+        return f'{self.topic} has been silent for {age * 1e-6:.0f} ms{late}'
+
+
+class MeasuredPose:
+    """Where shafts and bending section are: what whoever enters a session starts from.
+
+    The bending is that of the tracker while it is fresh, and else what the shafts would have bent
+    it to without any loss.
+
+    Attributes
+    ----------
+    tracked
+        Newest bending angles of the tracker; None before the first.
+    """
+
+    def __init__(self, node: EndoscopeNode) -> None:
+        self._ticker = node.ticker
+        self._gear = node.rig.joints.gear
+        self._timeout_ns = node.rig.timeouts.stream_ns
+        self._shafts_reader = JointReader(MOTORS)
+        self._shafts: tuple[bytes, int] | None = None
+        self._joints_reader = JointReader(JOINTS)
+        self.tracked: JointSample | None = None
+        self._tracked_ns = 0
+        node.create_subscription(
+            JointState, MOTOR_MEASURED, self._keep_shafts, SENSOR_ASKED, raw=True
+        )
+        node.create_subscription(
+            JointState, SLAVE_MEASURED, self._keep_bending, SENSOR_ASKED, raw=True
+        )
+
+    def _keep_shafts(self, data: bytes) -> None:
+        self._shafts = (data, self._ticker.monotonic_ns())
+
+    def _keep_bending(self, data: bytes) -> None:
+        sample = _read(self._joints_reader, data)
+        if sample is not None:
+            self.tracked, self._tracked_ns = sample, self._ticker.monotonic_ns()
+
+    def shafts(self) -> tuple[float, ...] | None:
+        """Shaft angles in rad, shape (J,); None while none were read lately."""
+        if self._shafts is None or self._silent(self._shafts[1], self._timeout_ns):
+            return None
+        sample = _read(self._shafts_reader, self._shafts[0])
+        return None if sample is None else sample.position
+
+    def bending(self) -> tuple[float, ...] | None:
+        """Bending angles in rad, shape (J,); None while neither tracker nor shafts are known."""
+        if self.tracked is not None and not self._silent(self._tracked_ns, TRACKER_TIMEOUT_NS):
+            return self.tracked.position
+        shafts = self.shafts()
+        return None if shafts is None else tuple(x / self._gear for x in shafts)
+
+    def _silent(self, heard_ns: int, timeout_ns: int) -> bool:
+        return self._ticker.monotonic_ns() - heard_ns > timeout_ns
+
+
+def _read(reader: JointReader, data: bytes) -> JointSample | None:
+    try:
+        sample = reader.read(data)
+    except MalformedMessageError:
+        return None
+    return sample if sample.position and all(map(math.isfinite, sample.position)) else None
+
+
+class CommandReport:
+    """What a command gate did, as a diagnostic report.
+
+    Refusals since the last report are told from old ones, so that a warning ends when its cause
+    does.
+    """
+
+    def __init__(self, gate: CommandGate) -> None:
+        self._gate = gate
+        self._reported = 0
+
+    def __call__(self) -> Report:
+        """Report counts; a warning if anything was refused since the last report."""
+        gate = self._gate
+        values: dict[str, object] = {'accepted': gate.accepted}
+        values |= {f'refused: {reason}': count for reason, count in gate.refused.items()}
+        total = sum(gate.refused.values())
+        fresh, self._reported = total - self._reported, total
+        if fresh:
+            return WARN, f'{fresh} commands refused, last: {gate.last_reason}', values
+        return OK, 'commands in order', values
