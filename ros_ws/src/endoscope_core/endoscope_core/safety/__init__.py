@@ -2,6 +2,7 @@
 
 from endoscope_core.safety.clutch_follower import ClutchFollower
 from endoscope_core.safety.command_gate import CommandGate, CommandLimits, Refusal
+from endoscope_core.safety.motion_shaper import MotionLimits, MotionShaper
 from endoscope_core.safety.operating_state import (
     Answer,
     OperatingState,
@@ -15,6 +16,8 @@ __all__ = [
     'ClutchFollower',
     'CommandGate',
     'CommandLimits',
+    'MotionLimits',
+    'MotionShaper',
     'OperatingState',
     'OperatingStateMachine',
     'Refusal',

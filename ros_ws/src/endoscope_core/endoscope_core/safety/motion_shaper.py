@@ -1,0 +1,227 @@
+"""Bounds position, speed, acceleration and step of a motion, whatever is asked for.
+
+Once its target has been reached, a motion within the bounds passes unchanged and undelayed; any
+other becomes the nearest one that keeps to the bounds.  It is trapezoidal in speed (Biagiotti and
+Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, section 3.2), found tick by
+tick from the target of now, for nothing is known of the next one.
+
+The bounds hold for every sequence of targets and periods because of one invariant, ``v**2 / (2 a)``
+left to the end of the range: a joint that brakes with ``a`` from speed ``v`` in periods of any
+length goes ``sum(v_k dt_k)``, a lower sum of the integral ``v**2 / (2 a)``.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """What a motion of J joints keeps to.
+
+    Attributes
+    ----------
+    low, high
+        Range of positions in rad, shape (J,).
+    speed
+        rad/s.
+    acceleration
+        rad/s^2: the speed changes by no more than this times the period.
+    step
+        Greatest change of position from one call to the next, in rad.
+
+    Raises
+    ------
+    ValueError
+        If a range is empty or a bound is not positive and finite.
+    """
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    speed: float
+    acceleration: float
+    step: float
+
+    def __post_init__(self) -> None:
+        for low, high in zip(self.low, self.high, strict=True):
+            if not (math.isfinite(low) and math.isfinite(high) and low < high):
+                raise ValueError(f'the range {low:g} to {high:g} rad is empty or not finite')
+        for name in ('speed', 'acceleration', 'step'):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f'{name} = {value} must be positive and finite')
+
+    @property
+    def longest_period(self) -> float:
+        """Time in s in which the greatest speed makes the greatest step; a longer one is a stall."""
+        return self.step / self.speed
+
+
+class MotionShaper:
+    """Turns targets into a motion within the limits.
+
+    Call :meth:`shape` once for each accepted target with the time between the *stamps* of this one
+    and the one before: by arrival, jitter would look like acceleration.  :meth:`hold` brakes.
+
+    A period longer than :attr:`MotionLimits.longest_period` is a stall: nothing was commanded
+    meanwhile, so that the joint stands where it was sent last, and the motion starts from rest.
+
+    Parameters
+    ----------
+    limits
+        What the motion keeps to.
+
+    Attributes
+    ----------
+    bounded
+        Number of calls of :meth:`shape` whose target was not reached within the limits.
+    """
+
+    def __init__(self, limits: MotionLimits) -> None:
+        self.limits = limits
+        self.bounded = 0
+        self._ranges = tuple(zip(limits.low, limits.high, strict=True))
+        self._position: tuple[float, ...] = ()
+        self._velocity: tuple[float, ...] = (0.0,) * len(self._ranges)
+        self._target: tuple[float, ...] | None = None
+
+    @property
+    def position(self) -> tuple[float, ...]:
+        """Where the motion is in rad, shape (J,); empty before the first restart."""
+        return self._position
+
+    @property
+    def velocity(self) -> tuple[float, ...]:
+        """Its velocity in rad/s over the last period, shape (J,)."""
+        return self._velocity
+
+    def restart(self, position: Sequence[float]) -> None:
+        """Begin at rest where the joints are, in rad, shape (J,).
+
+        A start beyond the range is taken as it is; from there the motion only leads back.
+
+        Raises
+        ------
+        ValueError
+            If the position has another size or is not finite; nothing changes then.
+        """
+        self._position = self._checked('position', position)
+        self._velocity = (0.0,) * len(self._position)
+        self._target = None
+
+    def shape(self, target: Sequence[float], period: float) -> tuple[float, ...]:
+        """Next position on the way to a target.
+
+        Parameters
+        ----------
+        target
+            rad, shape (J,).
+        period
+            s since the call before, positive.
+
+        Returns
+        -------
+        tuple of float, shape (J,)
+            rad.
+
+        Raises
+        ------
+        RuntimeError
+            There was no :meth:`restart`.
+        ValueError
+            If the target has another size or is not finite, or the period is not positive; nothing
+            changes then.
+        """
+        goals = self._checked('target', target)
+        dt = self._begin_period(period)
+        befores = self._position if self._target is None else self._target
+        moves = [
+            self._approach(*joint, dt)
+            for joint in zip(
+                goals, befores, self._position, self._velocity, self._ranges, strict=True
+            )
+        ]
+        self._position = tuple(position for position, _ in moves)
+        self._velocity = tuple(velocity for _, velocity in moves)
+        self._target = goals
+        tolerance = 1e-6 * self.limits.step
+        if any(abs(g - p) > tolerance for g, p in zip(goals, self._position, strict=True)):
+            self.bounded += 1
+        return self._position
+
+    def hold(self, period: float) -> tuple[float, ...]:
+        """Next position while braking to rest, in rad, shape (J,).
+
+        Parameters
+        ----------
+        period
+            s since the call before, positive.
+
+        Raises
+        ------
+        RuntimeError
+            There was no :meth:`restart`.
+        ValueError
+            If the period is not positive and finite; nothing changes then.
+        """
+        dt = self._begin_period(period)
+        change = self.limits.acceleration * dt
+        self._velocity = tuple(v - min(change, max(-change, v)) for v in self._velocity)
+        self._position = tuple(
+            p + v * dt for p, v in zip(self._position, self._velocity, strict=True)
+        )
+        self._target = None
+        return self._position
+
+    def _begin_period(self, period: float) -> float:
+        if not self._position:
+            raise RuntimeError('the motion has no start: call restart first')
+        if not (math.isfinite(period) and period > 0.0):
+            raise ValueError(f'period = {period} s must be positive and finite')
+        longest = self.limits.longest_period
+        if period > longest:
+            self._velocity = (0.0,) * len(self._velocity)
+            self._target = None
+            return longest
+        return period
+
+    def _approach(
+        self,
+        goal: float,
+        before: float,
+        position: float,
+        velocity: float,
+        reach: tuple[float, float],
+        dt: float,
+    ) -> tuple[float, float]:
+        """Position and velocity of one joint after the period."""
+        limits = self.limits
+        own = (goal - before) / dt
+        if abs(own) > limits.speed:
+            own, before = 0.0, goal
+        left = before - position
+        low, high = reach
+        wanted = own + math.copysign(self._stoppable(abs(left), dt), left)
+        wanted = min(wanted, limits.speed, self._stoppable(high - position, dt))
+        wanted = max(wanted, -limits.speed, -self._stoppable(position - low, dt))
+        change = limits.acceleration * dt
+        wanted = min(velocity + change, max(velocity - change, wanted))
+        moved = position + wanted * dt
+        # Rounding alone may lead over the end of the range.
+        return min(max(high, position), max(min(low, position), moved)), wanted
+
+    def _stoppable(self, way: float, dt: float) -> float:
+        """Greatest speed for this period from which braking after it ends within `way`, rad/s.
+
+        The positive root of ``v dt + v**2 / (2 a) = way``.
+        """
+        if way <= 0.0:
+            return 0.0
+        a = self.limits.acceleration
+        return 2.0 * way / (dt + math.sqrt(dt * dt + 2.0 * way / a))
+
+    def _checked(self, name: str, values: Sequence[float]) -> tuple[float, ...]:
+        numbers = tuple(float(value) for value in values)
+        if len(numbers) != len(self._ranges) or not all(map(math.isfinite, numbers)):
+            raise ValueError(f'{name} must be {len(self._ranges)} finite numbers, not {numbers}')
+        return numbers
