@@ -53,7 +53,7 @@ class MotionLimits:
 
     @property
     def longest_period(self) -> float:
-        """Time in s in which the greatest speed makes the greatest step; a longer one is a stall."""
+        """Time in s in which the greatest speed makes the greatest step; more is a stall."""
         return self.step / self.speed
 
 
