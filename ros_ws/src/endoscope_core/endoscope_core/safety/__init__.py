@@ -1,6 +1,5 @@
-"""What stands between a command and motion: states, gates, guards and clutch."""
+"""What stands between a command and motion: states, gates, guards and shaped motion."""
 
-from endoscope_core.safety.clutch_follower import ClutchFollower
 from endoscope_core.safety.command_gate import CommandGate, CommandLimits, Refusal
 from endoscope_core.safety.motion_shaper import MotionLimits, MotionShaper
 from endoscope_core.safety.operating_state import (
@@ -13,7 +12,6 @@ from endoscope_core.safety.tension_guard import TensionGuard
 
 __all__ = [
     'Answer',
-    'ClutchFollower',
     'CommandGate',
     'CommandLimits',
     'MotionLimits',
