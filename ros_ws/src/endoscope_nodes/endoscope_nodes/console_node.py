@@ -1,13 +1,14 @@
 """The operator's side: plays a motion, or follows the handle while the clutch is held."""
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState, Joy
 
-from endoscope_core.safety import ClutchFollower, MotionLimits, MotionShaper
+from endoscope_core.control import Handle, HandleRefusal, HandleSettings
+from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.signals import MOTIONS
 from endoscope_core.signals.command_file import CommandFileError
 from endoscope_nodes.console_motion import (
@@ -89,12 +90,8 @@ class ConsoleNode(EndoscopeNode):
         self._stay: tuple[float, ...] = ()
         self._moving = False
         self._clutch_said = False
-        self._handle: JointSample | None = None
-        self._handle_ns = 0
-        self._unusable = ''
-        self._unusables = 0
-        facts, timeouts = self.rig.joints, self.rig.timeouts
-        self._handle_timeout_ns = round(timeouts.handle * 1e9)
+        self._refused_before = 0
+        facts = self.rig.joints
         reach = (facts.reach,) * len(JOINTS)
         low = tuple(-x for x in reach)
         self._playing_shaper = MotionShaper(
@@ -104,7 +101,12 @@ class ConsoleNode(EndoscopeNode):
             MotionLimits(low, reach, facts.hand_speed, facts.acceleration, facts.entry_step)
         )
         self._settings = self.parameters(ConsoleParameters, self._on_parameters, self._load)
-        self._follower = ClutchFollower(self._settings.scale, low, reach)
+        self._handle = Handle(
+            low,
+            reach,
+            self._settings.scale,
+            HandleSettings(self.rig.handle.resolution, timeout=self.rig.timeouts.handle),
+        )
         self._commands: JointPublisher | None = None
         self._clutch_out: Publisher | None = None
         self._session = SessionWatch(self, self._rest, self._rest)
@@ -119,7 +121,7 @@ class ConsoleNode(EndoscopeNode):
             JOINTS,
             self._on_handle,
             SENSOR_ASKED,
-            on_malformed=self._on_unusable,
+            on_malformed=lambda reason: self._handle.refuse(HandleRefusal.MALFORMED, reason),
         )
         self._clutch = ClutchWatch(self)
         self._on_parameters(self._settings)
@@ -166,24 +168,16 @@ class ConsoleNode(EndoscopeNode):
             self._clutch_out = None
 
     def _on_handle(self, sample: JointSample) -> None:
-        if not sample.position or not all(map(math.isfinite, sample.position)):
-            self._on_unusable('has a position that is not finite')
-            return
         crowd = rivals(self, self._handle_in.subscription)
         if crowd:
             self._session.leave(crowd)
             return
-        self._handle = sample
-        self._handle_ns = self.ticker.monotonic_ns()
-
-    def _on_unusable(self, reason: str) -> None:
-        self._unusables += 1
-        self._unusable = reason
+        self._handle.take(sample.stamp_ns, sample.position, self.ticker.monotonic_ns())
 
     def _rest(self) -> None:
         """Stop moving: whatever comes next begins at the measured pose."""
         self._moving = False
-        self._follower.release()
+        self._handle.release()
         if self._commands is not None:
             self._commands.session = self._session.name
         if self._clutch_said:
@@ -209,15 +203,16 @@ class ConsoleNode(EndoscopeNode):
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         self._session.turn()
+        followed = self._handle.follow(self.ticker.monotonic_ns())
         if self._commands is None:
             return
         if not self._may_move:
-            if self._moving or self._follower.engaged:
+            if self._moving:
                 self._rest()
         elif self._played is not None:
             self._play(self._commands, self._played, stamp_ns, periods)
         else:
-            self._follow(self._commands, stamp_ns, periods)
+            self._follow(self._commands, followed, stamp_ns, periods)
 
     def _play(
         self, commands: JointPublisher, motion: SampledMotion, stamp_ns: int, periods: int
@@ -240,53 +235,68 @@ class ConsoleNode(EndoscopeNode):
         else:
             angle, velocity = motion.at(self._next, self._stay)
             self._next += periods
-        shaped = self._playing_shaper.shape(angle, periods * TICK_S)
-        as_asked = all(abs(a - b) < 1e-9 for a, b in zip(angle, shaped, strict=True))
-        commands.publish(
-            stamp_ns, *shaped, *(velocity if as_asked else self._playing_shaper.velocity)
-        )
+        self._publish(commands, self._playing_shaper, angle, velocity, stamp_ns, periods)
 
-    def _follow(self, commands: JointPublisher, stamp_ns: int, periods: int) -> None:
-        if not self._clutch.held or self._handle is None:
-            self._follower.release()
+    def _follow(
+        self,
+        commands: JointPublisher,
+        followed: tuple[tuple[float, ...], tuple[float, ...]] | None,
+        stamp_ns: int,
+        periods: int,
+    ) -> None:
+        if not self._clutch.held:
+            self._moving = False
+            self._handle.release()
             return
-        alive = self.ticker.monotonic_ns() - self._handle_ns <= self._handle_timeout_ns
-        if not alive:
-            self._follower.release()
-        elif not self._follower.engaged:
+        if followed is None and self._handle.alive(self.ticker.monotonic_ns()):
             pose = self._pose.bending()
             if pose is None:
                 return
-            self._follower.scale = self._settings.scale
-            self._follower.engage(self._handle.position, pose)
+            self._handle.scale = self._settings.scale
+            self._handle.engage(pose)
             self._hand_shaper.restart(pose)
-        if alive:
-            target = self._follower.follow(self._handle.position)
-        elif self._hand_shaper.position:
-            target = self._hand_shaper.position
-        else:
+            self._moving = True
+            followed = pose, (0.0,) * len(JOINTS)
+        if not self._moving:
             return
-        shaped = self._hand_shaper.shape(target, periods * TICK_S)
-        commands.publish(stamp_ns, *shaped, *self._hand_shaper.velocity)
+        # While the handle is silent and the clutch still held, the slave is told to stay.
+        target, velocity = followed or (self._hand_shaper.position, (0.0,) * len(JOINTS))
+        self._publish(commands, self._hand_shaper, target, velocity, stamp_ns, periods)
+
+    @staticmethod
+    def _publish(
+        commands: JointPublisher,
+        shaper: MotionShaper,
+        angle: Sequence[float],
+        velocity: Sequence[float],
+        stamp_ns: int,
+        periods: int,
+    ) -> None:
+        shaped = shaper.shape(angle, periods * TICK_S)
+        as_asked = all(abs(a - b) < 1e-9 for a, b in zip(angle, shaped, strict=True))
+        commands.publish(stamp_ns, *shaped, *(velocity if as_asked else shaper.velocity))
 
     def _report(self) -> Report:
-        source = self._settings.source
+        source, handle = self._settings.source, self._handle
         values: dict[str, object] = {
             'source': source,
             'published': self._commands.count if self._commands is not None else 0,
             'clutch held': self._clutch.held,
-            'following': self._follower.engaged,
-            'unusable handle messages': self._unusables,
+            'following': handle.engaged,
+            'lag [s]': handle.lag,
         }
+        values |= {f'handle refused: {reason}': n for reason, n in handle.refused.items()}
+        refused = sum(handle.refused.values())
+        fresh, self._refused_before = refused - self._refused_before, refused
+        if fresh:
+            said = f'{fresh} messages of {MASTER_MEASURED} refused, last: {handle.last_reason}'
+            return WARN, said, values
         if self._played is not None:
             values['progress [s]'] = min(self._next, len(self._played)) * TICK_S
             values['length [s]'] = len(self._played) * TICK_S
             return OK, 'finished' if self.finished else 'playing', values
-        if self._unusable:
-            unusable, self._unusable = self._unusable, ''
-            return WARN, f'{MASTER_MEASURED} {unusable}', values
-        if source == 'master' and self._handle is None:
-            return WARN, f'{MASTER_MEASURED} has not been received', values
+        if source == 'master' and not handle.alive(self.ticker.monotonic_ns()):
+            return WARN, f'{MASTER_MEASURED} is silent', values
         return OK, source, values
 
 

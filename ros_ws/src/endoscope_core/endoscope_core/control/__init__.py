@@ -1,4 +1,4 @@
-"""Compensation laws: feed-forward and feedback."""
+"""From a hand to a command: what is desired, feed-forward and feedback."""
 
 from endoscope_core.control.adaptive_backlash import AdaptiveBacklashController
 from endoscope_core.control.adaptive_backlash_law import AdaptiveBacklashSettings
@@ -11,6 +11,7 @@ from endoscope_core.control.feedforward import (
     FeedforwardLaw,
     FeedforwardSettings,
 )
+from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
 from endoscope_core.control.physical_inverse import PhysicalInverse, PhysicalInverseSettings
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
@@ -30,6 +31,9 @@ __all__ = [
     'Feedforward',
     'FeedforwardLaw',
     'FeedforwardSettings',
+    'Handle',
+    'HandleRefusal',
+    'HandleSettings',
     'PhysicalInverse',
     'PhysicalInverseSettings',
     'PhysicalParameters',

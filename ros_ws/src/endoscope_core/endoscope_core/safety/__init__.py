@@ -1,6 +1,5 @@
 """What stands between a command and motion: states, sessions, gates, guards and the shaper."""
 
-from endoscope_core.safety.clutch_follower import ClutchFollower
 from endoscope_core.safety.command_gate import CommandGate, CommandLimits, Refusal
 from endoscope_core.safety.motion_session import MotionSession
 from endoscope_core.safety.motion_shaper import MotionLimits, MotionShaper
@@ -15,7 +14,6 @@ from endoscope_core.safety.tension_guard import TensionGuard
 
 __all__ = [
     'Answer',
-    'ClutchFollower',
     'CommandGate',
     'CommandLimits',
     'MotionLimits',

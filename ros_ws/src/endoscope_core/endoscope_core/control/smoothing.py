@@ -1,0 +1,65 @@
+"""What makes a motion of measured or commanded samples quiet at rest and smooth on the way."""
+
+from __future__ import annotations
+
+import math
+
+COUNT = 2.0 * math.pi / 4096.0
+"""Angle in rad between two neighbouring counts of a 12-bit encoder, as handles have it."""
+
+
+class Play:
+    """Follows a value as soon as it leaves a band around the last one.
+
+    Noise within the band stays without any effect, and a motion one way comes out as a motion one
+    way. What comes out is never further from the value than half the band (Visintin, Differential
+    Models of Hysteresis, 1994, section III.2).
+
+    Parameters
+    ----------
+    half_width : float
+        Half the band, in the unit of the value.
+    value : float
+        To begin with.
+    """
+
+    def __init__(self, half_width: float, value: float) -> None:
+        self._half_width = half_width
+        self.value = value
+
+    def follow(self, value: float) -> float:
+        """What comes out for a new value."""
+        half = self._half_width
+        self.value = min(max(self.value, value - half), value + half)
+        return self.value
+
+
+class SmoothFollower:
+    """Critically damped second-order low-pass, position and velocity at once.
+
+    ``p'' = w**2 (u - p) - 2 w p'``, solved exactly for an input `u` that is held for a period of
+    any length. A steady motion is followed ``2 / w`` late. The impulse response, ``w**2 t`` times
+    ``exp(-w t)``, is nowhere negative: a motion one way comes out as a motion one way, and a step
+    is approached without overshoot.
+
+    Parameters
+    ----------
+    bandwidth : float
+        `w` in rad/s; half the power is left at ``0.64 w``.
+    position : float
+        To begin with, at rest.
+    """
+
+    def __init__(self, bandwidth: float, position: float) -> None:
+        self._bandwidth = bandwidth
+        self.position = position
+        self.velocity = 0.0
+
+    def follow(self, value: float, dt: float) -> None:
+        """Go on for `dt` s towards a value."""
+        w = self._bandwidth
+        away = self.position - value
+        slope = self.velocity + w * away
+        decay = math.exp(-w * dt)
+        self.position = value + (away + slope * dt) * decay
+        self.velocity = (self.velocity - w * slope * dt) * decay
