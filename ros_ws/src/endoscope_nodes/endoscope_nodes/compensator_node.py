@@ -252,7 +252,8 @@ class CompensatorNode(EndoscopeNode):
         if dt == 0.0 or (correction is None and self._corrected):
             self._corrected = False
             self._feedforward.rebase(
-                self._drive_before - (_NOTHING if correction is None else correction)
+                self._drive_before - (_NOTHING if correction is None else correction),
+                sample.position if dt == 0.0 else None,
             )
         if self._news and not any(sample.velocity):
             self._take_news()
@@ -274,7 +275,7 @@ class CompensatorNode(EndoscopeNode):
             return
         self._calibrated_in = self._session.name
         if dt == 0.0:
-            self._passing.rebase(self._drive_before)
+            self._passing.rebase(self._drive_before, sample.position)
         velocity = sample.velocity or (0.0,) * len(JOINTS)
         drive = self._passing.step(sample.position, velocity, dt or TICK_S)
         self._put_out(sample.stamp_ns, drive, dt or TICK_S)

@@ -249,7 +249,8 @@ class ConsoleNode(EndoscopeNode):
             self._handle.release()
             return
         if followed is None and self._handle.alive(self.ticker.monotonic_ns()):
-            pose = self._pose.bending()
+            # A handle that was silent while the slave was told to stay is taken up from there.
+            pose = self._hand_shaper.position if self._moving else self._pose.bending()
             if pose is None:
                 return
             self._handle.scale = self._settings.scale

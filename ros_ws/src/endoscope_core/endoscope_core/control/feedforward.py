@@ -175,15 +175,27 @@ class Feedforward:
             joint.wanted = joint.inverse.begin(before, joint.desired, joint.velocity, joint.command)
             joint.offset = joint.command - joint.wanted
 
-    def rebase(self, command: Vector) -> None:
+    def rebase(self, command: Vector, desired: Vector | None = None) -> None:
         """Go on from this command (J,) in rad, sent by someone else meanwhile, without a jump.
+
+        Parameters
+        ----------
+        command
+            rad, shape (J,).
+        desired
+            Desired angle in rad, shape (J,), that a new stream begins at, at rest; by default the
+            stream goes on.
 
         Raises
         ------
         ValueError
-            If the command has another size or is not finite.
+            If an angle has another size or is not finite.
         """
         start = self._checked('command', command)
+        if desired is not None:
+            begin = self._checked('desired', desired)
+            for joint, angle in zip(self._joints, begin, strict=False):
+                joint.desired, joint.velocity = angle, 0.0
         if not self._joints:
             self._start = start
             return
