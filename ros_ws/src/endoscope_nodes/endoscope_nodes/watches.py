@@ -90,6 +90,8 @@ class SessionWatch:
 
     def belongs(self, sample: JointSample) -> bool:
         """Whether a message is of the session that the node takes part in."""
+        # After a standstill a message may come before the next turn does.
+        self.turn()
         return self._session.belongs(sample.session)
 
     def leave(self, reason: str) -> None:

@@ -47,7 +47,8 @@ class MotionSession:
         self.trouble = ''
         self._silence_ns = silence_ns
         self._stall_ns = stall_ns
-        # None until the first heartbeat: a session that is open by then was opened before our time.
+        # None until the first heartbeat and after one in doubt: a session that is open by then was
+        # not opened before our ears.
         self._open: str | None = None
         self._heard_ns = 0
         self._beat_ns: int | None = None
@@ -70,18 +71,19 @@ class MotionSession:
         bool
             Whether the node has entered a session: it starts from the measured pose.
         """
+        if doubt:
+            self.leave(doubt)
+            self._open = None
+            return False
         self._heard_ns = now_ns
         self._lenience_ns = _LENIENCE_NS
         before, self._open = self._open, name
-        if doubt:
-            self.leave(doubt)
-            return False
         if name == before:
             return False
-        self.name = self.trouble = ''
         if name and before is None:
-            self.trouble = f'started while {name} was open: give enable anew'
+            self.trouble = self.trouble or f'was not there when {name} was opened: give enable anew'
             return False
+        self.trouble = ''
         self.name = name
         return bool(name)
 

@@ -85,6 +85,8 @@ class ShaftMotion:
         doubt
             Why it may not be the compensator's, as with two senders; ends the session.
         """
+        # After a standstill a command may come before the next tick does.
+        self.session.beat(now_ns)
         self._notice_session()
         if not self.session.belongs(session):
             return self.gate.refuse(Refusal.SESSION, session or 'none named')

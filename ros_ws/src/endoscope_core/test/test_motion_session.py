@@ -1,0 +1,344 @@
+"""Sessions and what the driver makes of them: no motion without an enable, no step beyond the bound."""
+
+import math
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, rule
+
+from endoscope_core.safety import (
+    CommandLimits,
+    MotionLimits,
+    MotionSession,
+    OperatingStateMachine,
+    Refusal,
+    ShaftMotion,
+)
+
+MS = 1_000_000
+SPEED, STEP = 5.0, 0.1
+COMMANDS = CommandLimits(1.6, 1.25 * SPEED, 0.1)
+LIMITS = MotionLimits((-1.6, -1.6), (1.6, 1.6), SPEED, 250.0, STEP)
+
+
+def joined(name='session-2'):
+    session = MotionSession()
+    session.hear('', 0)
+    session.beat(0)
+    session.hear(name, 10 * MS)
+    session.beat(10 * MS)
+    return session
+
+
+def test_who_hears_a_session_being_opened_takes_part():
+    assert joined().name == 'session-2'
+    assert joined().belongs('session-2')
+    assert not joined().belongs('session-1')
+    assert not joined().belongs('')
+
+
+def test_who_starts_while_a_session_is_open_does_not():
+    session = MotionSession()
+    assert not session.hear('session-2', 0)
+    assert session.name == ''
+    assert 'was not there when session-2 was opened' in session.trouble
+    assert not session.hear('session-2', 50 * MS)
+    session.hear('', 100 * MS)
+    assert session.trouble == ''
+    assert session.hear('session-3', 150 * MS)
+
+
+def test_a_session_that_was_left_is_not_entered_again():
+    session = joined()
+    session.leave('no handle')
+    assert not session.hear('session-2', 50 * MS)
+    assert session.name == ''
+    assert 'no handle; give enable anew' in session.trouble
+    assert session.hear('session-3', 100 * MS)
+
+
+def test_a_silent_supervisor_ends_it_within_a_fifth_of_a_second():
+    session = joined()
+    left = next(t for t in range(11, 1000) if not _beaten(session, t * MS).name)
+    assert 150 <= left - 10 <= 200
+    assert 'silent' in session.trouble
+
+
+def _beaten(session, now):
+    session.beat(now)
+    return session
+
+
+def test_what_a_late_loop_did_not_hear_is_no_silence():
+    session = joined()
+    for turn in range(1, 20):
+        now = (10 + 90 * turn) * MS
+        session.beat(now)
+        assert session.name
+        session.hear('session-2', now)
+
+
+def test_a_loop_that_stood_still_leaves():
+    session = joined()
+    session.beat(111 * MS)
+    assert session.name == ''
+    assert 'stood still for 101 ms' in session.trouble
+
+
+def test_a_heartbeat_that_may_be_somebody_elses_ends_it():
+    session = joined()
+    session.hear('session-2', 20 * MS, 'slave/motion_session has 2 senders')
+    assert session.name == ''
+    assert '2 senders' in session.trouble
+    assert not session.hear('session-9', 30 * MS, 'slave/motion_session has 2 senders')
+    assert not session.hear('session-2', 40 * MS)
+    assert session.name == ''
+    assert '2 senders' in session.trouble
+    session.hear('', 50 * MS)
+    assert session.trouble == ''
+    assert session.hear('session-10', 60 * MS)
+
+
+def test_every_enable_names_a_session_that_never_was():
+    machine, names = OperatingStateMachine(), []
+    for _ in range(3):
+        machine.command('enable', 7_000 * MS)
+        names.append(machine.session)
+        machine.command('disable', 7_000 * MS)
+        assert machine.session == ''
+    later = OperatingStateMachine()
+    later.command('enable', 7_010 * MS)
+    assert [*names, later.session] == [f'session-{n}' for n in (7000, 7001, 7002, 7010)]
+
+
+def test_enabling_again_keeps_the_session_and_a_fault_ends_it():
+    machine = OperatingStateMachine()
+    machine.command('enable', 1_000 * MS)
+    machine.command('enable', 2_000 * MS)
+    assert machine.session == 'session-1000'
+    machine.report_cause('heat', 'too hot')
+    assert machine.session == ''
+
+
+def test_shafts_start_where_they_are_and_stop_where_they_are():
+    motion = ShaftMotion(COMMANDS, LIMITS)
+    motion.measure((0.4, -0.2))
+    motion.session.hear('', 0)
+    motion.session.hear('session-1', MS)
+    assert motion.turn(2 * MS, 1e-3) == (0.4, -0.2)
+    assert motion.command('session-1', MS, (0.45, -0.2), (), 2 * MS) is None
+    assert motion.goal == pytest.approx((0.4, -0.2), abs=SPEED * 1e-3)
+    for t in range(3, 300):
+        motion.turn(t * MS, 1e-3)
+        motion.session.hear('session-1', t * MS)
+    assert motion.holding
+    assert motion.goal == pytest.approx((0.4, -0.2))
+
+
+class AnyInterleaving(RuleBasedStateMachine):
+    """Supervisor, compensator, driver and shafts, and whatever may happen to them.
+
+    What may move the shafts is kept beside, by the rule alone: `word` is the session that an
+    operator's last word opened, and `valid` that session for the driver of now: it heard it being
+    opened, and has neither stood still nor missed the supervisor since.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self.now = 10_000
+        self.supervisor = OperatingStateMachine()
+        self.stalled = {'supervisor': 0, 'compensator': 0, 'driver': 0}
+        self.shaft = [0.3, -0.2]
+        self.sent = []
+        self.clutch = False
+        self.way = 0.0
+        self.speed = 0.0
+        self.word = ''
+        self.start_compensator()
+        self.start_driver()
+        self.run(100)
+
+    def start_compensator(self):
+        self.compensator = MotionSession()
+        self.origin = None
+
+    def start_driver(self):
+        self.driver = ShaftMotion(COMMANDS, LIMITS)
+        self.turned = self.obeyed = self.heard_at = self.now
+        self.valid, self.heard = '', None
+
+    def run(self, milliseconds):
+        for _ in range(milliseconds):
+            self.now += 1
+            awake = {who: self.now >= until for who, until in self.stalled.items()}
+            if self.supervisor is not None and awake['supervisor'] and self.now % 50 == 0:
+                self.heartbeat(self.supervisor.session)
+            if awake['compensator']:
+                self.compensate()
+            if awake['driver']:
+                self.drive()
+
+    def heartbeat(self, name, doubt=''):
+        ns = self.now * MS
+        if self.now >= self.stalled['compensator']:
+            self.compensator.hear(name, ns, doubt)
+        if self.now < self.stalled['driver']:
+            return
+        self.driver.session.hear(name, ns, doubt)
+        if doubt:
+            self.valid = ''
+            return
+        self.heard_at = self.now
+        if self.word != self.heard:
+            self.valid = self.word if self.heard is not None else ''
+            self.heard = self.word
+
+    def compensate(self):
+        self.compensator.beat(self.now * MS)
+        if not self.compensator.name or not self.clutch:
+            self.origin = None
+            return
+        if self.origin is None:
+            self.origin, self.way = tuple(self.shaft), 0.0
+        self.way += 1e-3 * self.speed
+        self.send(self.compensator.name, [max(-1.6, min(1.6, x + self.way)) for x in self.origin])
+
+    def send(self, session, position, ahead_ms=0, doubt=''):
+        stamp = (self.now + ahead_ms) * MS
+        self.sent.append((session, stamp, tuple(position)))
+        if self.now < self.stalled['driver']:
+            return
+        self.notice_what_ends_the_word()
+        before, measured, now = self.driver.goal, tuple(self.shaft), self.now * MS
+        if self.driver.command(session, stamp, tuple(position), (), now, doubt) is None:
+            assert session, 'a command of no session was obeyed'
+            assert session == self.valid, 'a command was obeyed on nobody\'s word'
+            assert not doubt
+            self.obeyed = self.now
+            self.judge(before, measured, max(1, self.now - self.turned))
+
+    def notice_what_ends_the_word(self):
+        if self.now - self.turned > 100 or self.now - self.heard_at > 200:
+            self.valid = ''
+
+    def drive(self):
+        self.notice_what_ends_the_word()
+        period, self.turned = self.now - self.turned, self.now
+        before, measured = self.driver.goal, tuple(self.shaft)
+        goal = self.driver.turn(self.now * MS, period * 1e-3)
+        self.judge(before, measured, period)
+        if self.now - self.obeyed > 101 and goal:
+            assert self.driver.holding, 'nobody commands, and the shafts are not held'
+        if goal:
+            blend = 1.0 - math.exp(-period / 30.0)
+            self.shaft = [x + blend * (g - x) for x, g in zip(self.shaft, goal, strict=True)]
+        self.driver.measure(self.shaft)
+
+    def judge(self, before, measured, period):
+        """The goal goes no faster than the bound, unless to where the shafts are."""
+        if before and before != self.driver.goal:
+            bound = min(STEP, SPEED * period * 1e-3) + 1e-9
+            for old, new, here in zip(before, self.driver.goal, measured, strict=True):
+                assert abs(new - old) <= bound or abs(new - here) <= SPEED * 1e-3 + 1e-9
+
+    @rule(speed=st.sampled_from([0.0, 0.2, -1.0, 3.0]), ms=st.sampled_from([1, 30, 200]))
+    def into_motion(self, speed, ms):
+        """Bring everything to where there is something to lose."""
+        self.supervisor = self.supervisor or OperatingStateMachine()
+        self.stalled = dict.fromkeys(self.stalled, 0)
+        self.run(60)
+        if not self.word:
+            self.supervisor.command('disable', self.now * MS)
+            self.supervisor.command('enable', self.now * MS)
+            self.word = self.supervisor.session
+        self.speed, self.clutch = speed, True
+        self.run(60 + ms)
+
+    @rule(ms=st.integers(1, 400))
+    def time_goes_on(self, ms):
+        self.run(ms)
+
+    @rule(command=st.sampled_from(['enable', 'enable', 'disable', 'pause', 'resume', 'home', 'go']))
+    def operator(self, command):
+        if self.supervisor is not None and self.supervisor.command(command, self.now * MS).accepted:
+            if command in ('enable', 'resume'):
+                self.word = self.supervisor.session
+            elif command in ('disable', 'pause'):
+                self.word = ''
+        self.run(60)
+
+    @rule(speed=st.floats(-8.0, 8.0), held=st.sampled_from([True, True, False]))
+    def hand(self, speed, held):
+        self.speed, self.clutch = speed, held
+        self.run(50)
+
+    @rule()
+    def fault(self):
+        self.word = ''
+        if self.supervisor is not None:
+            self.supervisor.report_cause('x', 'x')
+            self.supervisor.clear_cause('x')
+        self.run(10)
+
+    @rule(
+        who=st.sampled_from(['supervisor', 'compensator', 'driver']),
+        ms=st.sampled_from([20, 90, 110, 140, 210, 2000]),
+        then=st.sampled_from([0, 10, 2100]),
+    )
+    def stall(self, who, ms, then):
+        self.stalled[who] = self.now + ms
+        self.run(then and ms + then)
+
+    @rule()
+    def kill_supervisor(self):
+        self.supervisor = None
+        self.word = ''
+
+    @rule()
+    def restart_supervisor(self):
+        self.supervisor = OperatingStateMachine()
+        self.word = ''
+
+    @rule()
+    def restart_compensator(self):
+        self.start_compensator()
+
+    @rule()
+    def restart_driver(self):
+        self.start_driver()
+
+    @rule(position=st.floats(-1e9, 1e9) | st.sampled_from([math.nan, math.inf, 0.5]))
+    def rival(self, position):
+        self.valid = ''
+        self.send(self.driver.session.name, (position, position), doubt='2 senders')
+
+    @rule(position=st.floats(-2.0, 2.0), ahead=st.sampled_from([0, -500, 20, 10_000, 31_536_000_000]))
+    def leap(self, position, ahead):
+        self.send(self.compensator.name, (position, position), ahead)
+
+    @rule(which=st.integers(0, 10**6))
+    def late_message(self, which):
+        if self.sent:
+            session, stamp, position = self.sent[which % len(self.sent)]
+            self.send(session, position, stamp // MS - self.now)
+
+    @rule(name=st.sampled_from(['', 'session-1', 'session-99999']))
+    def rival_supervisor(self, name):
+        self.heartbeat(name, '2 senders')
+
+
+TestAnyInterleaving = AnyInterleaving.TestCase
+TestAnyInterleaving.settings = settings(max_examples=100, stateful_step_count=20, deadline=None)
+
+
+def test_refusals_are_counted_by_reason():
+    motion = ShaftMotion(COMMANDS, LIMITS)
+    motion.measure((0.0, 0.0))
+    assert motion.command('session-1', MS, (0.0, 0.0), (), MS) is Refusal.SESSION
+    motion.session.hear('', MS)
+    motion.session.hear('session-1', MS)
+    assert motion.command('', MS, (0.0, 0.0), (), MS) is Refusal.SESSION
+    assert motion.command('session-1', MS, (0.0, 0.0), (), MS, '2 senders') is Refusal.SENDER
+    assert motion.command('session-1', MS, (0.0, 0.0), (), MS) is Refusal.SESSION
+    assert motion.gate.refused[Refusal.SESSION] == 3
