@@ -75,15 +75,20 @@ class MotionSession:
         before, self._open = self._open, name
         if doubt:
             self.leave(doubt)
+            if name and not self.trouble:
+                self.trouble = f'not in {name}: {doubt}; give enable anew'
+            return False
+        if not name:
+            self.name = self.trouble = ''
             return False
         if name == before:
             return False
         self.name = self.trouble = ''
-        if name and before is None:
+        if before is None:
             self.trouble = f'started while {name} was open: give enable anew'
             return False
         self.name = name
-        return bool(name)
+        return True
 
     def beat(self, now_ns: int) -> None:
         """Take a turn of the node's own loop, and notice what has ended the session."""
