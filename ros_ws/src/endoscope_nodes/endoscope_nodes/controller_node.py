@@ -77,8 +77,10 @@ class ControllerNode(EndoscopeNode):
         self._settings = p
         self._law = p.law
         self.controller = self._new_controller()
-        # Loads what is compiled now: the first command must not wait for it.
-        AdaptiveBacklashController(len(JOINTS)).step(0.0, _NOTHING, _NOTHING)
+        # Loads what is compiled now, which the second step needs: no command must wait for it.
+        trial = AdaptiveBacklashController(len(JOINTS))
+        for time in (0.0, 1e-3):
+            trial.step(time, _NOTHING, _NOTHING)
         facts, self._timeout_ns = self.rig.joints, self.rig.timeouts.command_ns
         self._gate = CommandGate(
             CommandLimits(facts.reach, facts.speed, facts.entry_step, self._timeout_ns)

@@ -1,0 +1,230 @@
+"""The operator of a running graph: enables, moves the handle, and keeps what the slave did."""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState, Joy
+from std_msgs.msg import Header, String
+
+from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_nodes.discovery import stay_on_this_machine
+from endoscope_nodes.joint_stream import JointPublisher, JointReader, JointSample
+from endoscope_nodes.names import (
+    JOINTS,
+    MASTER_CLUTCH,
+    MASTER_MEASURED,
+    MOTION_SESSION,
+    MOTOR_COMMAND,
+    MOTOR_MEASURED,
+    MOTORS,
+    OPERATING_STATE,
+    SLAVE_COMMAND,
+    SLAVE_MEASURED,
+    STATE_COMMAND,
+)
+from endoscope_nodes.qos import COMMAND, EVENT, SENSOR_OFFERED
+from endoscope_nodes.raw_subscription import RawSubscription
+
+_DEEP = QoSProfile(
+    depth=5000,
+    history=HistoryPolicy.KEEP_LAST,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)
+_TURN_NS = 4_000_000
+_CLUTCH_TURNS = 25
+AMPLITUDE, RATE = 0.8, 1.5
+"""The hand swings by 0.8 rad at 1.5 rad/s: a shaft by 0.4 rad at up to 0.6 rad/s."""
+
+
+class Operator(ClosedOnExit):
+    """A handle of 250 Hz with its clutch, or an outside program that writes ``slave/servo_jp``.
+
+    Nothing is sent or heard but in :meth:`serve`; what was heard is judged by its stamps.
+
+    Parameters
+    ----------
+    domain
+        ROS domain.
+
+    Attributes
+    ----------
+    source
+        ``master``, ``outside``, or ``none`` where the console plays by itself.
+    clutch
+        Whether the hand holds it.
+    shafts, goals
+        What `motor/measured_js` and `motor/servo_jp` said.
+    sent
+        Commands sent to `slave/servo_jp`: session, stamp in ns, positions and velocities.
+    replays
+        Whether each command is followed by an old one, sent anew.
+    late_ns
+        How far stamps are behind.
+    states
+        Operating states with the time of receipt in ns.
+    session
+        Motion session as last heard.
+    lost
+        Messages that the recorder said it had lost.
+    """
+
+    def __init__(self, domain: int) -> None:
+        self.source = 'none'
+        self.clutch = True
+        self.shafts: list[JointSample] = []
+        self.goals: list[JointSample] = []
+        self.sent: list[tuple[str, int, tuple[float, ...]]] = []
+        self.replays = False
+        self.late_ns = 0
+        self.states: list[tuple[int, str]] = []
+        self.session = ''
+        self.values: dict[str, dict[str, str]] = {}
+        self.heard_ns: dict[str, int] = {}
+        self._bending: JointSample | None = None
+        self._turn = 0
+        self._phase = 0.0
+        self._anchor: tuple[float, ...] = ()
+        self._entered = ''
+        self._handle: JointPublisher | None = None
+        self._clutch: Any = None
+        self._context = Context()
+        stay_on_this_machine()
+        rclpy.init(args=[], context=self._context, domain_id=domain)
+        self.node = rclpy.create_node('operator', context=self._context, namespace='endoscope')
+        self._orders = self.node.create_publisher(String, STATE_COMMAND, EVENT)
+        motors, joints = JointReader(MOTORS), JointReader(JOINTS)
+        self._heard: list[tuple[RawSubscription, Callable[[bytes, int], object]]] = [
+            (self._listen(kind, topic), take)
+            for kind, topic, take in (
+                (JointState, MOTOR_MEASURED, lambda d, _: self.shafts.append(motors.read(d))),
+                (JointState, MOTOR_COMMAND, lambda d, _: self.goals.append(motors.read(d))),
+                (JointState, SLAVE_MEASURED, lambda d, _: self._note_bending(joints.read(d))),
+                (String, OPERATING_STATE, self._note_state),
+                (Header, MOTION_SESSION, self._note_session),
+                (DiagnosticArray, '/diagnostics', self._note_health),
+            )
+        ]
+
+    def _listen(self, kind: type, topic: str) -> RawSubscription:
+        return RawSubscription(self.node, kind, topic, _DEEP)
+
+    def _note_bending(self, sample: JointSample) -> None:
+        self._bending = sample
+
+    def _note_state(self, data: bytes, received_ns: int) -> None:
+        self.states.append((received_ns, deserialize_message(data, String).data))
+
+    def _note_session(self, data: bytes, _: int) -> None:
+        self.session = deserialize_message(data, Header).frame_id
+
+    def _note_health(self, data: bytes, received_ns: int) -> None:
+        for status in deserialize_message(data, DiagnosticArray).status:
+            name = status.name.removeprefix('/endoscope/')
+            self.values[name] = {v.key: v.value for v in status.values}
+            self.values[name]['message'] = status.message
+            self.heard_ns[name.partition(':')[0]] = received_ns
+
+    @property
+    def state(self) -> str:
+        """Operating state as last heard."""
+        return self.states[-1][1] if self.states else ''
+
+    @property
+    def cause(self) -> str:
+        """What the supervisor says is the matter."""
+        said = self.values.get('supervisor: operating state', {})
+        return said.get('cause') or said.get('present causes') or said.get('last refusal', '')
+
+    def order(self, text: str) -> None:
+        """Give a state command."""
+        self._orders.publish(String(data=text))
+
+    def use(self, source: str) -> None:
+        """Be the sender of what the source needs, and of nothing else."""
+        for publisher in (self._handle, self._clutch):
+            if publisher is not None and source != self.source:
+                publisher.close() if publisher is self._handle else publisher.destroy()
+        if source == self.source:
+            return
+        self.source = source
+        self._handle = self._clutch = None
+        if source == 'master':
+            self._handle = JointPublisher(
+                self.node, MASTER_MEASURED, JOINTS, ('position',), SENSOR_OFFERED
+            )
+        elif source == 'outside':
+            self._handle = JointPublisher(
+                self.node, SLAVE_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
+            )
+        if source != 'none':
+            self._clutch = self.node.create_publisher(Joy, MASTER_CLUTCH, EVENT)
+
+    def press(self, held: bool) -> None:
+        """Press the clutch or let go of it, and say so at once."""
+        self.clutch = held
+        if self._clutch is not None:
+            self._clutch.publish(Joy(buttons=[int(held)]))
+
+    def serve(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
+        """Move and listen for some time, or until something has come true; whether it has."""
+        end = time.monotonic_ns() + round(seconds * 1e9)
+        due = time.monotonic_ns()
+        while True:
+            self._send()
+            self._hear()
+            if until():
+                return True
+            now = time.monotonic_ns()
+            if now >= end:
+                return False
+            due = max(due + _TURN_NS, now)
+            time.sleep(min(due, end) * 1e-9 - now * 1e-9 if min(due, end) > now else 0.0)
+
+    def _send(self) -> None:
+        self._turn += 1
+        if self._clutch is not None and self._turn % _CLUTCH_TURNS == 0:
+            self._clutch.publish(Joy(buttons=[int(self.clutch)]))
+        if self._handle is None:
+            return
+        self._phase += RATE * _TURN_NS * 1e-9
+        stamp = time.time_ns() - self.late_ns
+        if self.source == 'master':
+            angle = AMPLITUDE * math.sin(self._phase)
+            self._handle.publish(stamp, angle, angle)
+            return
+        if self.session != self._entered:
+            # Whoever enters a session starts from the measured pose.
+            self._entered, self._phase = self.session, 0.0
+            self._anchor = self._bending.position if self._bending else ()
+        if not (self.session and self._anchor):
+            return
+        way = 0.5 * AMPLITUDE * (1.0 - math.cos(self._phase))
+        speed = 0.5 * AMPLITUDE * RATE * math.sin(self._phase)
+        angles = tuple(a + way for a in self._anchor)
+        self.sent.append((self.session, stamp, (*angles, speed, speed)))
+        for session, stamped, values in self.sent[-1:] + self._old():
+            self._handle.session = session
+            self._handle.publish(stamped, *values)
+
+    def _old(self) -> list[tuple[str, int, tuple[float, ...]]]:
+        return [self.sent[self._turn * 7919 % len(self.sent)]] if self.replays else []
+
+    def _hear(self) -> None:
+        for subscription, take in self._heard:
+            for data, info in subscription.take():
+                take(data, info['received_timestamp'])
+
+    def close(self) -> None:
+        """Leave the graph."""
+        for subscription, _ in self._heard:
+            subscription.close()
+        self.node.destroy_node()
+        self._context.shutdown()

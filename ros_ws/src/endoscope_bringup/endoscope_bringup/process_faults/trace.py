@@ -1,0 +1,104 @@
+"""What shafts and goals did around a fault, judged by their stamps."""
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.rig import MotorFacts
+from endoscope_nodes.joint_stream import JointSample
+
+STILL = 2.0 * 2.0 * np.pi / 4096
+"""Two counts of the encoder, in rad: what readings of a shaft at rest may differ by."""
+
+# The slowest motion of the bench leaves STILL within this, its reversals included.
+_WINDOW_NS = 300_000_000
+_STREAM_NS = 100_000_000
+_SPEED_NS = 10_000_000
+
+
+def goal_step(goals: Sequence[JointSample], motors: MotorFacts) -> tuple[float, float]:
+    """Largest step of goals that follow each other in a session, in rad, and what is over a bound.
+
+    Parameters
+    ----------
+    goals
+        In the order of their stamps.
+    motors
+        Their `speed` times the time between two stamps bounds a step.
+
+    Returns
+    -------
+    tuple of float
+        Largest step, and the largest step in parts of its bound.
+    """
+    largest, share = 0.0, 0.0
+    for before, after in itertools.pairwise(goals):
+        period = after.stamp_ns - before.stamp_ns
+        if before.session != after.session or not 0 < period <= _STREAM_NS:
+            continue
+        step = max(abs(a - b) for a, b in zip(after.position, before.position, strict=True))
+        largest = max(largest, step)
+        share = max(share, step / (motors.speed * period * 1e-9))
+    return largest, share
+
+
+class ShaftTrace:
+    """Readings of the shafts by stamp.
+
+    Parameters
+    ----------
+    samples
+        In the order of their stamps.
+    """
+
+    def __init__(self, samples: Sequence[JointSample]) -> None:
+        self._stamps = np.array([s.stamp_ns for s in samples], dtype=np.int64)
+        self._angles: NDArray[np.float64] = np.array([s.position for s in samples]).reshape(
+            len(samples), -1
+        )
+
+    def step(self, period_ns: int) -> float:
+        """Largest step in rad between readings at most this far apart."""
+        if len(self._stamps) < 2:
+            return 0.0
+        near = np.diff(self._stamps) <= period_ns
+        steps = np.abs(np.diff(self._angles, axis=0)).max(axis=1)
+        return float(steps[near].max(initial=0.0))
+
+    def speed(self) -> float:
+        """Largest mean speed in rad/s over 10 ms."""
+        ends = np.searchsorted(self._stamps, self._stamps + _SPEED_NS)
+        inside = np.flatnonzero(ends < len(self._stamps))
+        if not len(inside):
+            return 0.0
+        ends = ends[inside]
+        way = np.abs(self._angles[ends] - self._angles[inside]).max(axis=1)
+        took = (self._stamps[ends] - self._stamps[inside]) * 1e-9
+        return float((way / took).max())
+
+    def standstill(self, since_ns: int, until_ns: int) -> tuple[float | None, float]:
+        """When the shafts came to rest, and how far they went afterwards.
+
+        Parameters
+        ----------
+        since_ns, until_ns
+            Stamps of the fault and of the next enable.
+
+        Returns
+        -------
+        tuple
+            Seconds from ``since_ns`` to the first reading from which on the shafts stayed for 0.3
+            s, None if they never did; and the largest distance in rad from there until the enable.
+        """
+        inside = (self._stamps >= since_ns) & (self._stamps < until_ns)
+        stamps, angles = self._stamps[inside], self._angles[inside]
+        ends = np.searchsorted(stamps, stamps + _WINDOW_NS)
+        for k, end in enumerate(ends):
+            if end >= len(stamps):
+                break
+            if np.abs(angles[k:end] - angles[k]).max() <= STILL:
+                gone = float(np.abs(angles[k:] - angles[k]).max())
+                return float(stamps[k] - since_ns) * 1e-9, gone
+        return None, 0.0
