@@ -43,7 +43,7 @@ def test_without_a_model_the_desired_angle_passes():
 
 
 def test_without_lead_it_is_equation_5():
-    feedforward = Feedforward(1, FeedforwardSettings(lead=0.0, speed_limit=1e3))
+    feedforward = Feedforward(1, FeedforwardSettings(lead=0.0, speed_limit=1e3, dead_band=0.0))
     feedforward.select(FeedforwardLaw('bouc_wen', (LARGE,)))
     theta = np.sin(np.arange(0.0, 7.0, TICK))
     commands = [feedforward.step([x], [0.0], TICK)[0] for x in theta]
