@@ -74,6 +74,22 @@ def test_the_offset_of_a_switch_is_worked_off():
     np.testing.assert_allclose(run(switched, 1.0, 7.0)[-1], run(straight, 1.0, 7.0)[-1], atol=1e-3)
 
 
+def test_at_rest_a_switch_moves_nothing():
+    feedforward = Feedforward(2)
+    feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))
+    run(feedforward, 0.0, 1.0)
+    rest = desired_at(1.0), (0.0, 0.0), TICK
+    before = feedforward.step(*rest)
+    for change in (
+        lambda: feedforward.select(FeedforwardLaw('bouc_wen', (LARGE, SMALL))),
+        lambda: feedforward.select(NONE),
+        lambda: feedforward.rebase(before),
+    ):
+        change()
+        commands = np.array([feedforward.step(*rest) for _ in range(3000)])
+        assert np.max(np.abs(commands - before)) < 1e-12
+
+
 def test_it_goes_on_from_a_command_that_someone_else_sent():
     feedforward = Feedforward(2)
     feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))

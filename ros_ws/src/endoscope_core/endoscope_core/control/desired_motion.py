@@ -20,9 +20,15 @@ LONGEST_LEAD = 0.06
 AGREEMENT = COUNT / LONGEST_LEAD
 """By how much, in rad/s, a velocity may differ from the positions.
 
-One message that differs by `d` shows as half of that against the positions around it, where two
-velocities are averaged, and moves the angle that a law foresees by `LONGEST_LEAD` times `d`. The
-play of the laws takes up two counts, so that what is let through turns no direction round.
+What is let through moves the angle that a law foresees, `LONGEST_LEAD` times the velocity ahead, by
+one count at most; the laws' play takes up two.
+"""
+
+AGREEING = 3
+"""So many messages in a row must agree before a velocity is used.
+
+The velocity of a step of noise agrees with that step. Noise of one count either way spans two
+counts and can therefore make two equal steps in a row, but not three.
 """
 
 
@@ -34,6 +40,7 @@ class _Joint:
         self.smooth = SmoothFollower(BANDWIDTH, position)
         self.position = position
         self.said = velocity
+        self.agreeing = 0
 
     def follow(self, position: float, velocity: float | None, dt: float) -> None:
         moved = position - self.position
@@ -43,7 +50,10 @@ class _Joint:
         self.smooth.follow(quiet, dt)
         if velocity is None or said is None:
             return
-        if abs(0.5 * (velocity + said) * dt - moved) <= AGREEMENT * dt:
+        mean = moved / dt
+        agrees = max(abs(velocity - mean), abs(said - mean)) <= AGREEMENT
+        self.agreeing = self.agreeing + 1 if agrees else 0
+        if self.agreeing >= AGREEING:
             # From where the estimate would be, had the motion always been as fast: the next message
             # may be one whose velocity is not used.
             self.smooth.position = quiet - 2.0 * velocity / BANDWIDTH
@@ -54,18 +64,14 @@ class DesiredMotion:
     """Angles and velocities of J joints as the laws may have them.
 
     Angles are those of the messages but for a play of one count either way. A velocity is the
-    message's where the mean of two in a row agrees with the way between their positions
-    (`AGREEMENT`); elsewhere it is estimated from the positions, ``2 / BANDWIDTH`` = 33 ms late.
+    message's where it and the one before agree with the way between their positions (`AGREEMENT`),
+    for some messages in a row (`AGREEING`); elsewhere it is estimated from the positions,
+    ``2 / BANDWIDTH`` = 33 ms late.
 
     Parameters
     ----------
     joints : int
         Number of joints.
-
-    Attributes
-    ----------
-    disagreed : int
-        Messages whose velocity was not used.
     """
 
     def __init__(self, joints: int) -> None:
