@@ -43,7 +43,7 @@ def test_without_a_model_the_desired_angle_passes():
 
 
 def test_without_lead_it_is_equation_5():
-    feedforward = Feedforward(1, FeedforwardSettings(lead=0.0, speed_limit=1e3))
+    feedforward = Feedforward(1, FeedforwardSettings(lead=0.0, speed_limit=1e3, dead_band=0.0))
     feedforward.select(FeedforwardLaw('bouc_wen', (LARGE,)))
     theta = np.sin(np.arange(0.0, 7.0, TICK))
     commands = [feedforward.step([x], [0.0], TICK)[0] for x in theta]
@@ -72,6 +72,22 @@ def test_the_offset_of_a_switch_is_worked_off():
     switched.select(law)
     assert np.max(np.abs(switched.offset)) > 0.1
     np.testing.assert_allclose(run(switched, 1.0, 7.0)[-1], run(straight, 1.0, 7.0)[-1], atol=1e-3)
+
+
+def test_at_rest_a_switch_moves_nothing():
+    feedforward = Feedforward(2)
+    feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))
+    run(feedforward, 0.0, 1.0)
+    rest = desired_at(1.0), (0.0, 0.0), TICK
+    before = feedforward.step(*rest)
+    for change in (
+        lambda: feedforward.select(FeedforwardLaw('bouc_wen', (LARGE, SMALL))),
+        lambda: feedforward.select(NONE),
+        lambda: feedforward.rebase(before),
+    ):
+        change()
+        commands = np.array([feedforward.step(*rest) for _ in range(3000)])
+        assert np.max(np.abs(commands - before)) < 1e-12
 
 
 def test_it_goes_on_from_a_command_that_someone_else_sent():

@@ -3,6 +3,7 @@
 from endoscope_core.control.adaptive_backlash import AdaptiveBacklashController
 from endoscope_core.control.adaptive_backlash_law import AdaptiveBacklashSettings
 from endoscope_core.control.adaptive_physical_inverse import AdaptivePhysicalInverse
+from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import (
     ADAPTIVE_PHYSICAL,
     MODES,
@@ -28,6 +29,7 @@ __all__ = [
     'AdaptiveBacklashController',
     'AdaptiveBacklashSettings',
     'AdaptivePhysicalInverse',
+    'DesiredMotion',
     'Feedforward',
     'FeedforwardLaw',
     'FeedforwardSettings',

@@ -42,6 +42,7 @@ import math
 from dataclasses import dataclass
 
 from endoscope_core.control.law_settings import check_settings
+from endoscope_core.control.smoothing import COUNT
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,8 @@ class AdaptiveBacklashSettings:
     response_delay : float
         s from command to answer: the estimates learn from what was desired that long before the
         measurement.
+    dead_band : float
+        rad by which the foreseen angle may turn back without any effect, as in the feed-forward.
     """
 
     gain_rate: float = 1.0
@@ -94,6 +97,7 @@ class AdaptiveBacklashSettings:
     direction_travel: float = math.radians(1.0)
     lead: float = 0.06
     response_delay: float = 0.06
+    dead_band: float = 2.0 * COUNT
 
     def __post_init__(self) -> None:
         check_settings(

@@ -13,6 +13,7 @@ from endoscope_core.control.adaptive_physical_inverse import AdaptivePhysicalInv
 from endoscope_core.control.joint_inverse import HysteresisInverse, JointInverse, Passing
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.physical_parameters import PhysicalParameters
+from endoscope_core.control.smoothing import COUNT, worked_off
 from endoscope_core.hysteresis.inverse import MODELS, HysteresisParameters
 
 Vector = Sequence[float] | NDArray[np.float64]
@@ -81,11 +82,14 @@ class FeedforwardSettings:
         Greatest speed of the command in rad/s. A reversal at high acceleration asks for more; the
         motor could not follow it and a gate before the motor would refuse it.
     offset_rate : float
-        Greatest speed in rad/s at which the jump left by a switch is worked off.
+        Greatest speed in rad/s at which the jump left by a switch is worked off; never by more than
+        half of what the desired angle moves, so that nothing moves while it rests.
     offset_time : float
         Time constant in s of the last part of that.
     resting_travel : float
         rad over which the memory of the direction builds up in mode 'none'.
+    dead_band : float
+        rad by which the foreseen angle may turn back without any effect: two counts of an encoder.
     """
 
     lead: float = 0.06
@@ -93,6 +97,7 @@ class FeedforwardSettings:
     offset_rate: float = 0.5
     offset_time: float = 0.3
     resting_travel: float = math.radians(1.0)
+    dead_band: float = 2.0 * COUNT
 
     def __post_init__(self) -> None:
         if not (0.0 <= self.lead <= 0.5):
@@ -101,6 +106,8 @@ class FeedforwardSettings:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f'{name} = {value} must be positive and finite')
+        if not (math.isfinite(self.dead_band) and self.dead_band >= 0.0):
+            raise ValueError(f'dead_band = {self.dead_band} must be finite and not negative')
 
 
 @dataclass
@@ -113,6 +120,7 @@ class _Joint:
     wanted: float
     command: float
     offset: float = 0.0
+    rested: bool = True
 
 
 class Feedforward:
@@ -127,7 +135,8 @@ class Feedforward:
     Notes
     -----
     The difference between what the old law put out and what the new one wants becomes an offset
-    that is worked off at `offset_rate`. The command's speed is at most `speed_limit` in every mode.
+    that is worked off while the desired angle moves. The command's speed is at most `speed_limit`
+    in every mode.
     """
 
     def __init__(self, joints: int, settings: FeedforwardSettings | None = None) -> None:
@@ -243,6 +252,8 @@ class Feedforward:
     def measure(self, age: float, angle: Vector) -> None:
         """Let the modes that learn have bending angles (J,) in rad that held `age` s ago.
 
+        A joint that has rested since the last ones learns nothing: its command would move.
+
         Raises
         ------
         ValueError
@@ -250,14 +261,18 @@ class Feedforward:
         """
         angles = self._checked('angle', angle)
         for joint, measured in zip(self._joints, angles, strict=False):
-            if isinstance(joint.inverse, AdaptivePhysicalInverse):
+            if isinstance(joint.inverse, AdaptivePhysicalInverse) and not joint.rested:
                 joint.inverse.measured(age, measured)
+            joint.rested = True
 
     def _step(self, joint: _Joint, desired: float, velocity: float, dt: float) -> float:
         c = self.settings
+        travel = abs(desired - joint.desired)
+        joint.rested = joint.rested and travel == 0.0
         joint.wanted = joint.inverse.wanted(desired, velocity, dt)
         joint.desired, joint.velocity = desired, velocity
-        joint.offset -= _limit(joint.offset * min(1.0, dt / c.offset_time), c.offset_rate * dt)
+        most = min(c.offset_rate * dt, abs(joint.offset) * min(1.0, dt / c.offset_time))
+        joint.offset = worked_off(joint.offset, travel, most)
         joint.command += _limit(joint.wanted + joint.offset - joint.command, c.speed_limit * dt)
         joint.inverse.sent(joint.command, dt)
         return joint.command
@@ -276,7 +291,7 @@ class Feedforward:
             return Passing(self.settings.resting_travel)
         parameters = self.law.parameters[number]
         if not isinstance(parameters, PhysicalParameters):
-            return HysteresisInverse(parameters, self.settings.lead)
+            return HysteresisInverse(parameters, self.settings.lead, self.settings.dead_band)
         if self.law.mode == PHYSICAL:
             return PhysicalInverse(parameters)
         return AdaptivePhysicalInverse(parameters)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from endoscope_core.control.smoothing import Play
 from endoscope_core.hysteresis.dahl_kernel import dahl_step
 from endoscope_core.hysteresis.inverse import HysteresisParameters, inverse_of
 
@@ -72,11 +73,15 @@ class HysteresisInverse:
     parameters : HysteresisParameters
     lead : float
         s.
+    dead_band : float
+        rad by which the foreseen angle may turn back without any effect, half of it either way: the
+        lead makes a motion the other way of every slowing down, and the inverse amplifies it.
     """
 
-    def __init__(self, parameters: HysteresisParameters, lead: float) -> None:
+    def __init__(self, parameters: HysteresisParameters, lead: float, dead_band: float) -> None:
         self._parameters = parameters
         self._lead = lead
+        self._foreseen = Play(0.5 * dead_band, 0.0)
         self._inverse = inverse_of(parameters, 0.0, 0.0)
 
     @property
@@ -86,12 +91,13 @@ class HysteresisInverse:
 
     def begin(self, direction: float, desired: float, velocity: float, command: float) -> float:
         """Start with the memory that `direction` says."""
-        self._inverse = inverse_of(self._parameters, direction, desired + self._lead * velocity)
+        self._foreseen.value = desired + self._lead * velocity
+        self._inverse = inverse_of(self._parameters, direction, self._foreseen.value)
         return self._inverse.command()
 
     def wanted(self, desired: float, velocity: float, dt: float) -> float:
         """Command of the inverse."""
-        self._inverse.move_to(desired + self._lead * velocity)
+        self._inverse.move_to(self._foreseen.follow(desired + self._lead * velocity))
         return self._inverse.command()
 
     def sent(self, command: float, dt: float) -> None:

@@ -14,6 +14,7 @@ from endoscope_core.control.physical_inverse_law import (
     SENSE,
     SPEED_BEFORE,
     TARGET,
+    TURN,
     law_step,
 )
 from endoscope_core.control.physical_parameters import PhysicalParameters
@@ -194,6 +195,7 @@ class PhysicalInverse:
         self._memory[FORESEEN] = desired + self.servo_lag * velocity
         self._memory[JOINT_MEMORY] = direction
         self._memory[TARGET] = command
+        self._memory[TURN] = desired + self.settings.turn_lead * velocity
         return self._law(desired, velocity, 1e-3, self._memory.copy())
 
     def wanted(self, desired: float, velocity: float, dt: float) -> float:

@@ -28,6 +28,9 @@ point from the desired motion (`distance_to_reversal`), and as soon as what is l
 than what the release of the friction can carry (`reserve`), it lets the release do it. At the
 turning point `z` has all but changed sign, the dead zone is nearly crossed, and little is left to
 kick with. If the desired motion does not turn after all, the law goes back to pushing.
+
+A turning point is believed in once the speed has fallen by more than noise of one count can make it
+fall, or the angle in which it shows has come back by two counts.
 """
 
 from __future__ import annotations
@@ -35,6 +38,8 @@ from __future__ import annotations
 import math
 
 from endoscope_core.compiled import Array, compiled
+from endoscope_core.control.desired_motion import BANDWIDTH
+from endoscope_core.control.smoothing import COUNT
 from endoscope_core.effects import distributed_friction
 from endoscope_core.effects.distributed_friction import NODES
 from endoscope_core.effects.slots import (
@@ -59,11 +64,14 @@ from endoscope_core.effects.slots import (
     FORESEEN,
     JOINT_MEMORY,
     REFRAIN,
-) = range(9)
-MEMORY = 9
+    TURN,
+    FASTEST,
+) = range(11)
+MEMORY = 11
 """Places in the law's memory: direction, whether it releases, motor angle aimed at (rad), estimates
 of the desired acceleration and jerk, desired speed before, desired angle foreseen, joint friction
-state along the desired motion, s until the next release may begin."""
+state along the desired motion, s until the next release may begin, play of the angle in which a
+turning point shows, greatest desired speed in this direction."""
 
 _ACCELERATION_TIME = 0.03
 _JERK_TIME = 0.05
@@ -75,6 +83,12 @@ _GIVE_UP = 0.06
 _REFRAIN = 0.15
 _PUSH_THROUGH = 0.08
 _STILL = 1.0e-3
+_SPEED_NOISE = 4.0 / math.e * BANDWIDTH * COUNT
+"""By how much, in rad/s, the speed may fall although the motion does not slow down.
+
+An angle that is right to one count either way leaves in a velocity that `SmoothFollower` takes from
+it at most one count times the integral of ``|w**2 (1 - w t) exp(-w t)|``, ``2 w / e``, either way.
+"""
 
 
 @compiled
@@ -195,10 +209,18 @@ def law_step(
 
     sense = memory[SENSE]
     turning = speed + turn_lead * acceleration
-    if abs(turning) > _STILL and turning * sense <= 0.0:
+    ahead = angle + turn_lead * speed
+    turn = min(max(memory[TURN], ahead - COUNT), ahead + COUNT)
+    turned_back = (turn - memory[TURN]) * sense < 0.0
+    memory[TURN] = turn
+    memory[FASTEST] = max(memory[FASTEST], speed * sense)
+    slowed = memory[FASTEST] - speed * sense > _SPEED_NOISE
+    turns = sense == 0.0 or slowed or turned_back
+    if turns and abs(turning) > _STILL and turning * sense <= 0.0:
         sense = 1.0 if turning > 0.0 else -1.0
         memory[SENSE] = sense
         memory[RELEASING] = 0.0
+        memory[FASTEST] = speed * sense
     behind = (angle - model_tip) * sense
     if memory[RELEASING] > 0.5 and behind > _GIVE_UP:
         memory[RELEASING] = 0.0
@@ -209,7 +231,7 @@ def law_step(
         needed = min(1.0, max(0.0, behind / _PUSH_THROUGH))
         zj += (sense - zj) * needed
         target = foreseen + equilibrium_stretch(p, foreseen, speed_then, sense, zj)
-        if share > 0.0 and memory[REFRAIN] <= 0.0 and speed * sense > _STILL:
+        if slowed and share > 0.0 and memory[REFRAIN] <= 0.0 and speed * sense > _STILL:
             left = distance_to_reversal(speed, acceleration, memory[JERK])
             if left < share * reserve(p, angle, model_slide * sense, sense):
                 memory[RELEASING] = 1.0

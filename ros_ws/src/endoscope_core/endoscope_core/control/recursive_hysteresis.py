@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from endoscope_core.control.law_settings import check_settings
+from endoscope_core.control.smoothing import COUNT
 from endoscope_core.control.tracker_feedback import FADE_TIME, STALE_AFTER, TrackerFeedback
 
 
@@ -32,7 +33,7 @@ class RecursiveHysteresisSettings:
         Readings beyond three standard deviations in a row that tell of another tube.
     gain_limit, backlash_limit, offset_limit, output_limit : float
         Limits of the estimates and of the correction.
-    direction_travel, lead, response_delay : float
+    direction_travel, lead, response_delay, dead_band : float
         As in the adaptive law.
     """
 
@@ -51,6 +52,7 @@ class RecursiveHysteresisSettings:
     direction_travel: float = math.radians(1.0)
     lead: float = 0.06
     response_delay: float = 0.06
+    dead_band: float = 2.0 * COUNT
 
     def __post_init__(self) -> None:
         check_settings(

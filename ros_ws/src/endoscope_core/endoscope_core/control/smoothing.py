@@ -7,6 +7,13 @@ import math
 COUNT = 2.0 * math.pi / 4096.0
 """Angle in rad between two neighbouring counts of a 12-bit encoder, as handles have it."""
 
+SHARE_OF_TRAVEL = 0.5
+"""What a law may add of its own accord to each radian that the desired angle moves.
+
+Below 1, so that nothing that fades in or out, is worked off or was learnt turns the motion round
+that was asked for, and nothing moves while nothing is asked for.
+"""
+
 
 class Play:
     """Follows a value as soon as it leaves a band around the last one.
@@ -63,3 +70,20 @@ class SmoothFollower:
         decay = math.exp(-w * dt)
         self.position = value + (away + slope * dt) * decay
         self.velocity = (self.velocity - w * slope * dt) * decay
+
+
+def worked_off(value: float, travel: float, bound: float) -> float:
+    """What is left of a value of which each step takes off some, until nothing is left.
+
+    Parameters
+    ----------
+    value : float
+        rad.
+    travel : float
+        Way in rad, either way, that the desired angle has moved: `SHARE_OF_TRAVEL` of it is taken
+        off at most.
+    bound : float
+        Most in rad that may be taken off.
+    """
+    most = min(bound, SHARE_OF_TRAVEL * travel)
+    return value - min(most, max(-most, value))

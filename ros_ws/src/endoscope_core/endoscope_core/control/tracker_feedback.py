@@ -12,12 +12,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.control.smoothing import SHARE_OF_TRAVEL, Play, worked_off
 from endoscope_core.hysteresis.bouc_wen_kernel import bouc_wen_normalised_step
 
 Vector = Sequence[float] | NDArray[np.float64]
 
 STALE_AFTER = 0.15
 FADE_TIME = 1.0
+RATE = 0.5
+"""Greatest speed in rad/s at which what was learnt enters the correction."""
+
 HISTORY = 0.6
 
 
@@ -45,6 +49,11 @@ class FeedbackTiming(Protocol):
     @property
     def direction_travel(self) -> float:
         """Rad of desired motion over which the direction memory turns round."""
+        ...
+
+    @property
+    def dead_band(self) -> float:
+        """Rad by which the foreseen angle may turn back without any effect."""
         ...
 
     @property
@@ -86,13 +95,28 @@ class _Desired:
     correction: tuple[float, ...]
 
 
+@dataclass
+class _Output:
+    """How one joint's correction comes about: ``weight * raw + offset``, rad."""
+
+    raw: float = 0.0
+    weight: float = 0.0
+    offset: float = 0.0
+    rested: bool = True
+
+
 class TrackerFeedback[Law: JointLaw]:
     """A learning law on every joint, safe to switch at any time.
 
     The correction is to be added to the joint-equivalent feed-forward command. A measurement is
     compared with what was desired at its own stamp, so that a late tracker is no error. While the
     tracker is stale the laws stand still and the correction fades out; it fades in again, with what
-    was learnt, once measurements return.
+    was learnt, once measurements return, of which the first only begins a new count of time.
+
+    Nothing moves of its own accord. While a desired angle rests its law rests and its correction
+    stays what it is, whether measurements come, are lost or return. When it moves, whatever fades
+    or was learnt moves the correction by no more than half as far (`SHARE_OF_TRAVEL`), and no
+    faster than `RATE` and `fade_time` allow.
 
     Parameters
     ----------
@@ -104,7 +128,7 @@ class TrackerFeedback[Law: JointLaw]:
     stale_after : float
         s without a measurement after which the tracker counts as lost.
     fade_time : float
-        s from no to full weight of the correction and back.
+        Least time in s from no to full weight of the correction and back.
     """
 
     def __init__(
@@ -127,7 +151,8 @@ class TrackerFeedback[Law: JointLaw]:
         self._stale_after = stale_after
         self._fade_time = fade_time
         self._activated = False
-        self._weight = 0.0
+        self._outputs = [_Output() for _ in range(joints)]
+        self._plays: list[Play] = []
         self._laws = [new_law() for _ in range(joints)]
         self._last_stamp = -math.inf
         self._history: deque[_Desired] = deque()
@@ -139,8 +164,13 @@ class TrackerFeedback[Law: JointLaw]:
 
     @property
     def weight(self) -> float:
-        """Share of the correction that is applied, 0 to 1."""
-        return self._weight
+        """Share of the correction that is applied, 0 to 1; the largest of the joints."""
+        return max(output.weight for output in self._outputs)
+
+    @property
+    def faded(self) -> bool:
+        """Whether nothing is left of the correction."""
+        return all(output.weight == output.offset == 0.0 for output in self._outputs)
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -158,7 +188,7 @@ class TrackerFeedback[Law: JointLaw]:
     def forget(self) -> None:
         """Drop what has been learnt, for a new tube shape or new feed-forward parameters.
 
-        Call while the weight is 0, or the correction jumps.
+        What the correction held of it is worked off as the desired angle moves.
         """
         self._laws = [self._new_law() for _ in range(self._joints)]
 
@@ -208,18 +238,29 @@ class TrackerFeedback[Law: JointLaw]:
         if measurement is not None:
             self._learn(measurement, time)
         acting = self._activated and self.tracker_fresh(time)
-        change = dt / self._fade_time
-        self._weight = (
-            min(1.0, self._weight + change) if acting else max(0.0, self._weight - change)
-        )
         now = self._history[-1]
+        before = self._history[-2] if len(self._history) > 1 else now
+        now.correction = tuple(
+            self._correct(j, before, now, acting, dt) for j in range(self._joints)
+        )
+        return np.array(now.correction)
+
+    def _correct(self, j: int, before: _Desired, now: _Desired, acting: bool, dt: float) -> float:
+        law, output = self._laws[j], self._outputs[j]
         limit = self.timing.output_limit
-        correction = []
-        for j, law in enumerate(self._laws):
-            raw = law.correction(now.foreseen[j], now.direction[j], dt)
-            correction.append(self._weight * min(limit, max(-limit, raw)))
-        now.correction = tuple(correction)
-        return np.array(correction)
+        travel = abs(now.foreseen[j] - before.foreseen[j])
+        output.rested = output.rested and travel == 0.0
+        # What the law says now where it was before: the difference was learnt, not asked for.
+        running = dt if travel > 0.0 else 0.0
+        relearnt = _limit(law.correction(before.foreseen[j], before.direction[j], running), limit)
+        output.offset += output.weight * (output.raw - relearnt)
+        output.offset = worked_off(output.offset, travel, RATE * dt)
+        output.raw = _limit(law.correction(now.foreseen[j], now.direction[j], 0.0), limit)
+        change = dt / self._fade_time
+        if output.raw != 0.0:
+            change = min(change, SHARE_OF_TRAVEL * travel / abs(output.raw))
+        output.weight = min(1.0, max(0.0, output.weight + (change if acting else -change)))
+        return _limit(output.weight * output.raw + output.offset, limit)
 
     def _elapsed(self, time: float) -> float:
         if not math.isfinite(time):
@@ -234,7 +275,10 @@ class TrackerFeedback[Law: JointLaw]:
         return dt
 
     def _remember(self, time: float, angle: list[float], speed: list[float]) -> None:
-        foreseen = tuple(a + self.timing.lead * v for a, v in zip(angle, speed, strict=True))
+        ahead = [a + self.timing.lead * v for a, v in zip(angle, speed, strict=True)]
+        if not self._plays:
+            self._plays = [Play(0.5 * self.timing.dead_band, a) for a in ahead]
+        foreseen = tuple(play.follow(a) for play, a in zip(self._plays, ahead, strict=True))
         if self._history:
             last = self._history[-1]
             direction = tuple(
@@ -258,13 +302,20 @@ class TrackerFeedback[Law: JointLaw]:
         if not usable:
             self.refused += 1
             return
-        dt = min(stamp - self._last_stamp, self._stale_after)
+        dt = stamp - self._last_stamp
         self._last_stamp = stamp
+        rested = [output.rested for output in self._outputs]
+        for output in self._outputs:
+            output.rested = True
+        if dt > self._stale_after:
+            return
         then = self._at(stamp)
         answered = self._at(stamp - self.timing.response_delay)
         if not self._activated or then is None or answered is None:
             return
         for j, law in enumerate(self._laws):
+            if rested[j]:
+                continue
             law.learn(
                 measured[j] - then.angle[j],
                 answered.correction[j],
@@ -288,3 +339,7 @@ class TrackerFeedback[Law: JointLaw]:
 def direction_step(travel: float, direction: float, delta: float) -> float:
     """Direction memory in [-1, 1] after the desired angle has moved by `delta` rad."""
     return float(bouc_wen_normalised_step(direction, delta, travel, 0.0, 1.0))
+
+
+def _limit(value: float, bound: float) -> float:
+    return min(bound, max(-bound, value))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from endoscope_core.control import (
     ADAPTIVE_PHYSICAL,
     AdaptiveBacklashController,
+    DesiredMotion,
     Feedforward,
     FeedforwardLaw,
     RecursiveHysteresisController,
@@ -69,7 +70,7 @@ def run_tracking_trial(
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, seed)
     joints = len(rig.joints)
     gears = np.array([plant.joints[name].gear for name in rig.joints])
-    feedforward = Feedforward(joints)
+    motion, feedforward = DesiredMotion(joints), Feedforward(joints)
     feedforward.select(law)
     learns = law.mode == ADAPTIVE_PHYSICAL
     if controller is None:
@@ -84,7 +85,7 @@ def run_tracking_trial(
     for k, now in enumerate(time.tolist()):
         sample = rig.sample
         bending[k] = sample.bending_true
-        desired, velocity = [angles[k]] * joints, [velocities[k]] * joints
+        desired, velocity = motion.follow([angles[k]] * joints, [velocities[k]] * joints, TICK)
         measured = None
         if k % tracked_every == 0:
             measured = TrackerMeasurement(now, sensors.bending(sample.bending))
