@@ -9,6 +9,7 @@ from rclpy.time import Time
 from endoscope_core.control import (
     ADAPTIVE_PHYSICAL,
     MODES,
+    DesiredMotion,
     Feedforward,
     FeedforwardLaw,
     FeedforwardSettings,
@@ -86,6 +87,7 @@ class CompensatorNode(EndoscopeNode):
             len(JOINTS), FeedforwardSettings(lead=p.lead, speed_limit=motors.speed / facts.gear)
         )
         self._passing = Feedforward(len(JOINTS))
+        self._desired = DesiredMotion(len(JOINTS))
         self._choice = LawChoice(len(JOINTS), p.parameter_sets, p.table)
         self._trouble = self._load()
         self.findings: CalibrationFindings | None = None
@@ -249,20 +251,19 @@ class CompensatorNode(EndoscopeNode):
         if dt is None:
             return
         correction = self._correction(sample.stamp_ns)
-        if dt == 0.0 or (correction is None and self._corrected):
-            self._corrected = False
+        if dt == 0.0:
+            self._desired.restart()
+        added = _NOTHING if correction is None else correction
+        if dt == 0.0 or self._corrected != (correction is not None):
+            self._corrected = correction is not None
             self._feedforward.rebase(
-                self._drive_before - (_NOTHING if correction is None else correction),
-                sample.position if dt == 0.0 else None,
+                self._drive_before - added, sample.position if dt == 0.0 else None
             )
-        if self._news and not any(sample.velocity):
+        angle, velocity = self._desired.follow(sample.position, sample.velocity, dt or TICK_S)
+        if self._news and not any(velocity):
             self._take_news()
         self._learn(sample.stamp_ns)
-        velocity = sample.velocity or (0.0,) * len(JOINTS)
-        drive = self._feedforward.step(sample.position, velocity, dt or TICK_S)
-        if correction is not None:
-            self._corrected = True
-            drive = drive + correction
+        drive = self._feedforward.step(angle, velocity, dt or TICK_S) + added
         self._put_out(sample.stamp_ns, drive, dt or TICK_S)
 
     def _on_calibration(self, sample: JointSample) -> None:
