@@ -8,6 +8,7 @@
       word_order: big         # which register of a 32-bit value comes first
       rate: 200.0             # readings a second
       reply_timeout: 0.02     # s
+      latency: 0.0            # s from the wire to its register, by which stamps are put back
       serial: {baud: 115200, parity: none, stop_bits: 1}     # for modbus_rtu
     wires:                    # tension = sign * newton_per_count * (count - zero)
       wire_x_pos: {register: 0, type: int32, newton_per_count: 0.001, sign: 1, zero: 120}
@@ -62,6 +63,8 @@ class Transmitter:
         Readings a second in Hz.
     reply_timeout
         In s.
+    latency
+        Time in s by which a register is older than the question for it: filter and conversion.
     serial
         Line settings for RTU.
     """
@@ -71,6 +74,7 @@ class Transmitter:
     big_word_first: bool
     rate: float
     reply_timeout: float
+    latency: float
     serial: SerialSettings
 
 
@@ -188,7 +192,7 @@ def load_calibration(path: str | Path, wires: Sequence[str]) -> LoadCellCalibrat
     transmitter = _transmitter(
         file.section(
             'transmitter',
-            ('unit', 'registers', 'word_order', 'rate', 'reply_timeout', 'serial'),
+            ('unit', 'registers', 'word_order', 'rate', 'reply_timeout', 'latency', 'serial'),
             required=False,
         )
     )
@@ -221,6 +225,7 @@ def _transmitter(section: Section) -> Transmitter:
         section.choice('word_order', ('big', 'little'), 'big') == 'big',
         section.number('rate', 0.1, 1000.0, 200.0),
         section.number('reply_timeout', 0.001, 5.0, 0.02),
+        section.number('latency', 0.0, 0.5, 0.0),
         settings,
     )
 

@@ -33,7 +33,7 @@ class WireReading:
     Attributes
     ----------
     time_ns
-        When they were asked for, in ns of ``time.monotonic_ns``.
+        When they were measured, in ns of ``time.monotonic_ns``.
     tension
         In N, shape (W,).
     """
@@ -176,7 +176,8 @@ class ModbusLoadCells(ReadingThread[WireReading]):
             return
         self._unbelieved = 0
         self._window.add(time_ns, believed)
-        self._keep(WireReading(time_ns, believed), time_ns)
+        latency_ns = round(self.calibration.transmitter.latency * 1e9)
+        self._keep(WireReading(time_ns - latency_ns, believed), time_ns)
 
 
 def modbus_rtu(port: str, calibration: LoadCellCalibration) -> ModbusLoadCells:
