@@ -19,7 +19,7 @@
       saturated_below: -20000
       saturated_above: 150000
       frozen_after: 0.5       # s without a change of the last digit; 0 for cells without noise
-      spike_rate: 5000.0      # N/s, faster than any wire
+      spike_rate: 1650.0      # N/s, faster than any wire
       spike_noise: 1.0        # N
     tare: {noise: 0.1, drift: 0.05, largest: 2.0, shaft_speed: 0.02}     # N, N, N, rad/s
 
@@ -122,7 +122,11 @@ class FaultLimits:
     frozen_after
         In s; 0 to leave it out.
     spike_rate, spike_noise
-        Fastest change in N/s, and what noise may add in N.
+        Fastest change in N/s, and what noise may add in N.  A wire of stiffness k on a pulley of
+        radius r, whose shaft turns at w, changes its tension at the cell by k r w exp(phi) at most,
+        phi being the sheath's capstan exponent (Euler-Eytelwein): 1620 N/s for the nominal 2000 N/m
+        and 5 mm, the greatest exponent of 3 and the 8.06 rad/s of an XM430-W210 without load.
+        Noise: seven times that of a difference of two readings at the 0.1 N rms that a tare allows.
     """
 
     broken_below: float
@@ -130,7 +134,7 @@ class FaultLimits:
     saturated_below: float
     saturated_above: float
     frozen_after: float = 0.5
-    spike_rate: float = 5000.0
+    spike_rate: float = 1650.0
     spike_noise: float = 1.0
 
 

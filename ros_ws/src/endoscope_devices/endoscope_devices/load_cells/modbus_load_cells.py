@@ -130,6 +130,7 @@ class ModbusLoadCells(ReadingThread[WireReading]):
         for name, check in zip(self.calibration.wires, self._checks, strict=True):
             figures[f'{name}: zero [counts]'] = check.cell.zero
             figures[f'{name}: spikes'] = check.spikes
+            figures[f'{name}: new levels'] = check.new_levels
         return self.trouble, figures
 
     def _run(self) -> None:
