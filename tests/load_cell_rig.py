@@ -15,7 +15,7 @@ ZERO = 120
 BROKEN = 8_388_607
 SATURATED = 95_000
 
-LATENCY = 0.01
+LATENCY = 0.05
 TRANSMITTER = 'rate: 200, reply_timeout: 0.05'
 CALIBRATION = f"""
 wires:
