@@ -35,18 +35,18 @@ def tcp():
 
 
 @pytest.mark.parametrize(
-    ('line', 'cell_rate', 'tick_rate', 'motion', 'size_deg'),
-    [('rtu', 200, 200, 'sinusoid', 50), ('tcp', 1000, 500, 'brief', 80)],
+    ('line', 'cell_rate', 'tick_rate', 'size_deg'),
+    [('rtu', 200, 200, 50), ('tcp', 1000, 500, 80)],
 )
 def test_a_calibration_ends_with_the_class_of_the_tube(
-    tmp_path, request, line, cell_rate, tick_rate, motion, size_deg
+    tmp_path, request, line, cell_rate, tick_rate, size_deg
 ):
     device, port, cells = request.getfixturevalue(line)
     file = write_calibration(tmp_path, f'rate: {cell_rate}, latency: {LATENCY}')
     overrides = tube_of_size(tmp_path, size_deg, 900 + size_deg)
     overrides['load_cells'] = {'device': device, 'port': port, 'calibration_file': str(file)}
     overrides['supervisor'] = {'stream_timeout': 5.0}
-    overrides['calibration'] = {'stream_timeout': 5.0, 'motion': motion}
+    overrides['calibration'] = {'stream_timeout': 5.0, 'motion': 'brief'}
     graph = SensorGraph(
         tmp_path / 'bag',
         cells=cells,
