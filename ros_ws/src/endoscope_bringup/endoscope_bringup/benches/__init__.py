@@ -8,6 +8,7 @@ BENCHES: tuple[str, ...] = (
     'real_rig',
     'simulate',
     'compensation',
+    'calibration_rate',
     'papers',
     'motor_bus',
     'motor_faults',

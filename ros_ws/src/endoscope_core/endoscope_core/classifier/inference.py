@@ -8,6 +8,7 @@ import torch
 from numpy.typing import ArrayLike
 
 from endoscope_core.classifier.classification import (
+    CellReadings,
     ClassificationResult,
     ClassifierError,
     checked_tension,
@@ -67,7 +68,9 @@ class TensionClassifier:
         """The classifier that comes with this package."""
         return cls.load(Path(str(files('endoscope_core.classifier') / 'weights' / DEFAULT_WEIGHTS)))
 
-    def classify(self, tension: ArrayLike) -> ClassificationResult:
+    def classify(
+        self, tension: ArrayLike, cells: CellReadings | None = None
+    ) -> ClassificationResult:
         """Class of one calibration.
 
         Parameters
@@ -75,6 +78,8 @@ class TensionClassifier:
         tension : array_like, shape (9000, 4)
             N at 1 kHz from the start of the calibration sinusoid, wires in the order x_pos,
             x_neg, y_pos, y_neg.
+        cells : CellReadings, optional
+            Of no account here: the network names a class for any tension.
 
         Raises
         ------
