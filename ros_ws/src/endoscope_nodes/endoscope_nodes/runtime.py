@@ -16,14 +16,16 @@ from rclpy.exceptions import (
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from endoscope_core.closed_on_exit import ClosedOnExit
-from endoscope_nodes.discovery import stay_on_this_machine
+from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.matching import all_matched
+from endoscope_nodes.parameter_sections import check_sections
 from endoscope_nodes.parameters import (
     ParameterError,
     check_overrides,
@@ -89,15 +91,24 @@ class Runtime(ClosedOnExit):
     ) -> None:
         self.context = rclpy.get_default_context() if context is None else context
         stay_on_this_machine()
+        self._args = list(sys.argv[1:] if args is None else args)
+        # What rcl says to the log besides raising it would be a second line.
+        set_logger_level('rcl', LoggingSeverity.FATAL)
         try:
             rclpy.init(
-                args=None if args is None else list(args),
+                args=self._args,
                 context=self.context,
                 domain_id=domain_id,
                 signal_handler_options=SignalHandlerOptions.NO,
             )
-        except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
+        except rclpy_implementation.UnknownROSArgsError as error:
+            raise ParameterError(
+                f'unknown ROS arguments {str(error).strip("[]")}; see --help'
+            ) from error
+        except rclpy_implementation.RCLError as error:
             raise ParameterError(str(error).partition(', at /')[0]) from error
+        finally:
+            set_logger_level('rcl', LoggingSeverity.UNSET)
         self.executor = EventsExecutor(context=self.context)
         self.nodes: list[EndoscopeNode] = []
         self._ticker: Ticker | None = None
@@ -135,10 +146,13 @@ class Runtime(ClosedOnExit):
         Raises
         ------
         ParameterError
-            Nodes of one process disagree about ``use_sim_time``.
+            Nodes of one process disagree about ``use_sim_time``, or the command line has
+            parameters for nodes that there are not.
         """
         simulated = node.get_parameter('use_sim_time').value is True
         if self._ticker is None:
+            for line in check_sections(self._args, node.get_namespace()):
+                node.get_logger().warning(line)
             self._ticker = Ticker(node, simulated, self._stride_of(node))
         if self._ticker.simulated != simulated:
             raise ParameterError(
@@ -249,7 +263,7 @@ class Runtime(ClosedOnExit):
 def run_nodes(
     factories: Sequence[Callable[[Runtime], EndoscopeNode]], args: Sequence[str] | None = None
 ) -> int:
-    """Run nodes composed in this process until SIGINT or SIGTERM stops them.
+    """Run nodes composed in this process until SIGINT, SIGTERM or SIGHUP stops them.
 
     Parameters
     ----------
@@ -274,12 +288,15 @@ def run_nodes(
 def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -> int:
     """Let ``compose`` add nodes to a runtime and run them; see :func:`run_nodes`."""
     try:
-        with Runtime(args) as runtime, StopSignals(runtime.stop):
+        runtime = Runtime(args)
+        # The signals outermost: they are heard until the last node is closed.
+        with StopSignals(runtime.stop), runtime:
             compose(runtime)
             runtime.prepare()
             runtime.spin()
     except (
         ParameterError,
+        DiscoveryRangeError,
         InvalidNodeNameException,
         InvalidNamespaceException,
         InvalidParameterTypeException,

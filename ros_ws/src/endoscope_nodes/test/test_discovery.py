@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
+
 DOMAIN = 227
 # DDSI-RTPS 9.6.1.1: ports of a domain begin at 7400 + 250 * domain.
 SHOW = f"""
@@ -47,10 +49,24 @@ def test_by_default_no_other_machine_can_reach_the_ports(given):
     assert shown(**given) == ('LOCALHOST', {LOOPBACK})
 
 
+def test_nobody_is_heard_at_no_address_but_the_loopback():
+    assert shown(ROS_AUTOMATIC_DISCOVERY_RANGE='OFF') == ('OFF', {LOOPBACK})
+
+
+@pytest.mark.parametrize('unknown', ['localhost', 'Localhost', 'off', 'LOCAL', 'SUBNET '])
+def test_a_range_that_ros_would_take_for_the_subnet_is_refused(monkeypatch, unknown):
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', unknown)
+    with pytest.raises(DiscoveryRangeError, match='give LOCALHOST') as caught:
+        stay_on_this_machine()
+    assert repr(unknown) in str(caught.value)
+    assert '\n' not in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ('given', 'used'),
     [
         ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}, 'SUBNET'),
+        ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}, 'SYSTEM_DEFAULT'),
         ({'ROS_STATIC_PEERS': '192.0.2.77'}, 'LOCALHOST'),
     ],
 )
