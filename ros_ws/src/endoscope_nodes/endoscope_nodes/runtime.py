@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.exceptions import (
     InvalidNamespaceException,
@@ -32,6 +33,12 @@ from endoscope_nodes.parameters import (
     declare_parameters,
     parameter,
 )
+from endoscope_nodes.real_time import (
+    RealTimeParameters,
+    enter_real_time,
+    start_in_the_background,
+    threads_of_this_process,
+)
 from endoscope_nodes.stop_signals import StopSignals
 from endoscope_nodes.ticker import Ticker
 
@@ -40,6 +47,7 @@ from endoscope_nodes.ticker import Ticker
 FOREVER_S = 1e6
 SHUTDOWN_S = 2.0
 SWITCH_INTERVAL_S = 5e-5
+_CARRY_ON_S = 0.1
 # A collection of the second generation takes most of a tick: ten times rarer than by default.
 GC_THRESHOLDS = (7000, 10, 10)
 
@@ -91,6 +99,7 @@ class Runtime(ClosedOnExit):
     ) -> None:
         self.context = rclpy.get_default_context() if context is None else context
         stay_on_this_machine()
+        self._background_threads = threads_of_this_process()
         self._args = list(sys.argv[1:] if args is None else args)
         # What rcl says to the log besides raising it would be a second line.
         set_logger_level('rcl', LoggingSeverity.FATAL)
@@ -112,6 +121,7 @@ class Runtime(ClosedOnExit):
         self.executor = EventsExecutor(context=self.context)
         self.nodes: list[EndoscopeNode] = []
         self._ticker: Ticker | None = None
+        self._real_time = RealTimeParameters()
         self._overrides = overrides or {}
         self._exit_codes: list[int] = []
         self._stop = Future()
@@ -164,8 +174,8 @@ class Runtime(ClosedOnExit):
             node._time_source.detach_node()
         return self._ticker
 
-    @staticmethod
-    def _stride_of(node: EndoscopeNode) -> int:
+    def _stride_of(self, node: EndoscopeNode) -> int:
+        self._real_time = declare_parameters(node, RealTimeParameters)
         rate = declare_parameters(node, BeatParameters).tick_rate
         if 1000 % rate:
             raise ParameterError(
@@ -186,15 +196,32 @@ class Runtime(ClosedOnExit):
         Raises
         ------
         ParameterError
-            See :meth:`check_parameters`.
+            See :meth:`check_parameters` and :func:`enter_real_time`.
         """
         self.check_parameters()
+        self._enter_real_time()
         # A collection that walks over all that was imported would cost many ticks.
         gc.collect()
         gc.freeze()
         gc.set_threshold(*GC_THRESHOLDS)
         # By default a thread that writes a recording may keep the executor waiting for 5 ms.
         sys.setswitchinterval(SWITCH_INTERVAL_S)
+
+    def _enter_real_time(self) -> None:
+        if self._real_time == RealTimeParameters():
+            return
+        node = self.nodes[0]
+        urgent = threads_of_this_process() - self._background_threads
+        enter_real_time(node.get_name(), self._real_time, urgent, self.ticker.simulated)
+
+        def carry_on() -> None:
+            timer.cancel()
+            start_in_the_background()
+
+        # The executor starts the threads of its timers, which are urgent, when it begins to spin.
+        timer = node.create_timer(
+            _CARRY_ON_S, carry_on, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
 
     def check_parameters(self) -> None:
         """Refuse overrides that no node knows.
