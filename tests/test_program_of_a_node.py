@@ -23,7 +23,7 @@ WORDS = {
 }
 
 
-def start(name, *args, on_hangup=signal.SIG_DFL, **options):
+def start(name, *args, on_hangup=signal.SIG_DFL, environment=None, **options):
     # The tests themselves may have been started by `nohup`.
     hangup = f'import signal; signal.signal(signal.SIGHUP, signal.{on_hangup.name})'
     code = f'import sys; from endoscope_nodes.program import {name}; sys.exit({name}())'
@@ -32,7 +32,7 @@ def start(name, *args, on_hangup=signal.SIG_DFL, **options):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | {'ROS_DOMAIN_ID': str(private_domain())},
+        env=os.environ | (environment or {'ROS_DOMAIN_ID': str(private_domain())}),
         **options,
     )
 
@@ -143,3 +143,42 @@ def test_every_program_leads_to_a_module_that_runs(name):
         'assert callable(module.main)\n'
     )
     subprocess.run([sys.executable, '-c', code], check=True)
+
+
+def test_a_node_is_healthy_while_it_speaks(tmp_path):
+    domain = {'ROS_DOMAIN_ID': str(private_domain())}
+    silent = healthcheck('recorder', domain)
+    assert silent.returncode == 1
+    assert silent.stderr == 'healthcheck: recorder has been silent for 5 s\n'
+    bag = ['-p', f'bag:={tmp_path / "bag"}']
+    process = start('recorder', '--ros-args', *bag, environment=domain)
+    try:
+        wait_for_line(process, 'recording to')
+        heard = healthcheck('recorder', domain)
+        other = healthcheck('console', domain)
+    finally:
+        process.kill()
+        process.communicate()
+    assert (heard.returncode, heard.stderr) == (0, '')
+    assert other.returncode == 1
+
+
+def healthcheck(node, environment):
+    code = 'import sys; from endoscope_nodes.healthcheck import main; sys.exit(main())'
+    return subprocess.run(
+        [sys.executable, '-c', code, node],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_a_health_check_loads_nothing_that_a_node_does():
+    code = (
+        'import sys\n'
+        'import endoscope_nodes.healthcheck\n'
+        'print(*sorted({"torch", "numba", "scipy"} & set(sys.modules)))\n'
+    )
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []

@@ -33,6 +33,7 @@ setup(
             'replay = endoscope_nodes.program:replay',
             'conductor = endoscope_nodes.program:conductor',
             'graph = endoscope_nodes.program:graph',
+            'healthcheck = endoscope_nodes.healthcheck:main',
         ]
     },
 )
