@@ -96,6 +96,7 @@ class CommandGate:
         self._offset_ns = None
         self._received_ns = None
         self._alone = True
+        self.last_reason = ''
 
     def refuse(self, refusal: Refusal, words: str = '') -> Refusal:
         """Count a refusal that was found elsewhere."""
@@ -135,14 +136,12 @@ class CommandGate:
         for value in (*position, *velocity):
             if not math.isfinite(value):
                 return self.refuse(Refusal.NOT_FINITE, str(value))
-        limits = self.limits
-        for value in position:
-            if abs(value) > limits.reach:
-                return self.refuse(Refusal.RANGE, f'{value:.4g} rad beyond {limits.reach:.4g}')
-        refusal = self._check_stamp(stamp_ns, received_ns)
+        streaming = self.is_fresh(received_ns)
+        refusal = self._check_range(position, self._position if streaming else measured, streaming)
+        refusal = refusal or self._check_stamp(stamp_ns, received_ns)
         if refusal is not None:
             return refusal
-        if self.is_fresh(received_ns):
+        if streaming:
             refusal = self._check_speed(position, received_ns)
         else:
             refusal = self._check_entry(position, measured)
@@ -160,6 +159,18 @@ class CommandGate:
         return self._received_ns is not None and (
             now_ns - self._received_ns <= self.limits.max_age_ns
         )
+
+    def _check_range(
+        self, position: Sequence[float], here: Sequence[float], streaming: bool
+    ) -> Refusal | None:
+        """From beyond the reach, which a measured pose may be, there is a way back only."""
+        reach = self.limits.reach
+        for value, now in zip(position, here, strict=True):
+            if abs(value) > reach and abs(value) > abs(now) + (
+                0.0 if streaming else self.limits.max_step
+            ):
+                return self.refuse(Refusal.RANGE, f'{value:.4g} rad beyond {reach:.4g}')
+        return None
 
     def _check_stamp(self, stamp_ns: int, received_ns: int) -> Refusal | None:
         tolerance = self.limits.max_age_ns
