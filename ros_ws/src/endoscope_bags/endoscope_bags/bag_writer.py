@@ -8,7 +8,6 @@ from typing import Self
 
 import numpy as np
 
-from endoscope_bags.bag_files import METADATA
 from endoscope_bags.chunk_sink import ChunkSink, TopicRecord
 from endoscope_bags.errors import (
     BagExistsError,
@@ -20,7 +19,8 @@ from endoscope_bags.message_stream import MessageStream
 from endoscope_bags.message_types import MessageType, message_type
 from endoscope_bags.qos_profile import QosProfile
 from endoscope_bags.room_on_disk import write_error
-from endoscope_bags.rosbag2_metadata import (
+from endoscope_bags.metadata import (
+    METADATA,
     TopicSummary,
     metadata_document,
     metadata_text,

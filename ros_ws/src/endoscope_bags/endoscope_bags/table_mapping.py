@@ -20,9 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from endoscope_bags.errors import BagError
+from endoscope_core.strict_yaml import YamlError, load_yaml
 
 QUANTITIES = ('position', 'velocity', 'effort')
 UNITS = {
@@ -108,13 +107,10 @@ def load_table_mapping(path: str | Path) -> TableMapping:
     TableMappingError
         If the file cannot be read, or a key is unknown, missing or has a wrong value.
     """
-    path = Path(path)
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise TableMappingError(f'cannot read mapping {path}: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise TableMappingError(f'{path} is not YAML: {" ".join(str(error).split())}') from error
+        content = load_yaml(path)
+    except YamlError as error:
+        raise TableMappingError(f'mapping: {error}') from error
     try:
         return _mapping(content)
     except ValueError as error:

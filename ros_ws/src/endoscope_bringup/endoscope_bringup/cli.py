@@ -3,17 +3,19 @@
 import os
 import signal
 import sys
+import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
 from endoscope_bringup.commands import COMMANDS
 from endoscope_bringup.subcommands import OneLineParser, add_subcommands, run_chosen
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import EndoscopeError, printable
 
 EXIT_UNUSABLE_INPUT = 2
 EXIT_INTERRUPTED = 130
 EXIT_TERMINATED = 143
+LONGEST_MESSAGE = 2000
 
 
 def build_parser() -> OneLineParser:
@@ -52,7 +54,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _refuse(message: str) -> int:
-    print(f'endoscope: {" ".join(message.split())}', file=sys.stderr)
+    line = textwrap.shorten(message, LONGEST_MESSAGE, placeholder=' ...')
+    print(f'endoscope: {printable(line)}', file=sys.stderr)
     return EXIT_UNUSABLE_INPUT
 
 
