@@ -17,8 +17,6 @@ from endoscope_bags.errors import (
 from endoscope_bags.mcap_chunk import MESSAGE_OVERHEAD, ChunkMessage, chunk_message
 from endoscope_bags.message_stream import MessageStream
 from endoscope_bags.message_types import MessageType, message_type
-from endoscope_bags.qos_profile import QosProfile
-from endoscope_bags.room_on_disk import write_error
 from endoscope_bags.metadata import (
     METADATA,
     TopicSummary,
@@ -26,6 +24,8 @@ from endoscope_bags.metadata import (
     metadata_text,
     write_metadata,
 )
+from endoscope_bags.qos_profile import QosProfile
+from endoscope_bags.room_on_disk import write_error
 
 CHUNK_SECONDS = 0.25
 CHUNK_BYTES = 1 << 20

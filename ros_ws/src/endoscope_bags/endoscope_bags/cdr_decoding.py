@@ -136,7 +136,9 @@ def grouped_by_layout(
         while len(rows):
             n_layouts += 1
             if n_layouts > _MOST_LAYOUTS:
-                raise MalformedMessageError(f'message {int(rows[0]) + 1} has yet another layout: too many')
+                raise MalformedMessageError(
+                    f'message {int(rows[0]) + 1} has yet another layout: too many'
+                )
             try:
                 layout = find_layout(payloads[int(rows[0])])
             except MalformedMessageError as error:

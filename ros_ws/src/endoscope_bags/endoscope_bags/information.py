@@ -164,8 +164,9 @@ def _topic_information(
             gaps.add(sequence)
         lost = gaps.lost
     # Times of the source: header stamps where all messages have them, otherwise publication.
-    stamped = stamps is not None and len(stamps) == topic.message_count
-    times = np.sort(stamps if stamped else recording.times(name).publish_ns)
+    if stamps is None or len(stamps) != topic.message_count:
+        stamps = recording.times(name).publish_ns
+    times = np.sort(stamps)
     intervals = np.diff(times) * 1e-9
     period = float(np.median(intervals)) if len(intervals) else None
     periodic = (

@@ -407,7 +407,9 @@ class _Pass:
             records = unpacked(self._data[start:stop])
             positions = self._message_positions(records)
         except ChunkError as error:
-            self._damaged(CorruptBagError, f'chunk {self._n_chunks} at byte {start} is damaged: {error}')
+            self._damaged(
+                CorruptBagError, f'chunk {self._n_chunks} at byte {start} is damaged: {error}'
+            )
             return
         self._add_block(records, positions, (start, stop, True))
 

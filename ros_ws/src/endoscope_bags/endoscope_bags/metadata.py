@@ -3,7 +3,6 @@
 It is written in version 9 (ROS 2 Jazzy), with every key that it has.
 """
 
-import reprlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,7 +75,7 @@ def _listed_files(path: Path) -> list[str]:
         )
     if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
         raise NotABagError(
-            f'{path}: relative_file_paths is {reprlib.repr(listed)}: it has to list names of files'
+            f'{path}: relative_file_paths is {listed!r}: it has to list names of files'
         )
     names = [Path(name).name for name in listed]
     if len(set(names)) < len(names):

@@ -1,6 +1,5 @@
 """Quality of service as rosbag2 writes it into recordings (metadata version 9)."""
 
-import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -72,7 +71,7 @@ def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
     """
     entries = parse_yaml(text, 'the quality of service') if text.strip() else []
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise YamlError(f'the quality of service is {reprlib.repr(text)}: not a list of profiles')
+        raise YamlError(f'the quality of service is {text!r}: not a list of profiles')
     return tuple(_from_entry(entry) for entry in entries)
 
 
@@ -82,12 +81,12 @@ def _from_entry(entry: dict[str, Any]) -> QosProfile:
         if isinstance(value, int):
             return names[value] if 0 <= value < len(names) else 'unknown'
         if value is not None and not isinstance(value, str):
-            raise YamlError(f'the quality of service has {reprlib.repr(value)} as its {key}')
+            raise YamlError(f'the quality of service has {value!r} as its {key}')
         return value or 'unknown'
 
     depth = entry.get('depth') or 0
     if not isinstance(depth, int):
-        raise YamlError(f'the quality of service has {reprlib.repr(depth)} as its depth')
+        raise YamlError(f'the quality of service has {depth!r} as its depth')
     return QosProfile(
         reliability=named('reliability', ('system_default', 'reliable', 'best_effort')),
         durability=named('durability', ('system_default', 'transient_local', 'volatile')),

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 from rosbags.serde import SerdeError
 
-from endoscope_bags.metadata import bag_files
 from endoscope_bags.cdr_decoding import HEAD_WITH_STAMP, Payloads, stamps_of_heads
 from endoscope_bags.cdr_layout import QUANTITIES
 from endoscope_bags.errors import (
@@ -30,6 +29,7 @@ from endoscope_bags.joint_state_series import (
 )
 from endoscope_bags.mcap_scan import McapScan, scan_mcap
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, typestore
+from endoscope_bags.metadata import bag_files
 from endoscope_bags.qos_profile import QosProfile, qos_from_yaml
 from endoscope_bags.topic import MessageTimes, RawMessage, Topic
 from endoscope_core.strict_yaml import LARGEST, YamlError

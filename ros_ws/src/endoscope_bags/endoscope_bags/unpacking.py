@@ -10,9 +10,9 @@ import lz4.frame
 import zstandard
 
 LARGEST_CHUNK = 64 << 20
-"""Bytes that one chunk may hold. Writers close a chunk at 0.75 MiB (C++, with it rosbag2, and Rust),
-1 MiB (Go, Python, TypeScript), 8 MiB at most (`mcap convert`) or 10 MiB (Swift); one message may
-exceed that, 25 MB for an image of 3840 x 2160 in colour. This is six times the largest of them."""
+"""Bytes that one chunk may hold. Writers close a chunk at 0.75 MiB (C++ and so rosbag2, Rust),
+1 MiB (Go, Python, TypeScript), 8 MiB (`mcap convert`) or 10 MiB (Swift); one message may exceed
+that, 25 MB for an image of 3840 x 2160 in colour. This is six times the largest of them."""
 FREE_BYTES, BYTES_PER_BYTE = 128 << 20, 64
 """What all chunks of a file may hold together: the first, and the second for each byte of the file.
 Four topics of joint states of a rig at rest, without noise and with zstd at level 19, shrink to a

@@ -3,7 +3,6 @@
 import os
 import signal
 import sys
-import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
@@ -15,7 +14,6 @@ from endoscope_core.errors import EndoscopeError, printable
 EXIT_UNUSABLE_INPUT = 2
 EXIT_INTERRUPTED = 130
 EXIT_TERMINATED = 143
-LONGEST_MESSAGE = 2000
 
 
 def build_parser() -> OneLineParser:
@@ -54,8 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _refuse(message: str) -> int:
-    line = textwrap.shorten(message, LONGEST_MESSAGE, placeholder=' ...')
-    print(f'endoscope: {printable(line)}', file=sys.stderr)
+    print(f'endoscope: {printable(" ".join(message.split()))}', file=sys.stderr)
     return EXIT_UNUSABLE_INPUT
 
 

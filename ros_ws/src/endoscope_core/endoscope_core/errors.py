@@ -1,19 +1,22 @@
 """The one base of every error that a user, not a programmer, has to act on."""
 
+_LONGEST = 2000
+
 
 class EndoscopeError(Exception):
     """An input, a file or a request that cannot be used as it is.
 
     The message is one line that names the thing and says what to do. The command line prints it
     on stderr and exits 2; anything that is not an `EndoscopeError` is a defect and keeps its
-    traceback. Names that come out of files or off the network go into it as they are: it is
-    `printable` wherever it is shown. Derive from a built-in as well where callers expect one:
-    ``class X(EndoscopeError, ValueError)``.
+    traceback. Names that come out of files or off the network go into it as they are: wherever it
+    is shown, it is `printable` and of 2000 characters at most. Derive from a built-in as well where
+    callers expect one: ``class X(EndoscopeError, ValueError)``.
     """
 
     def __str__(self) -> str:
         # An OSError, which some derive from as well, would take its arguments for errno and text.
-        return printable(Exception.__str__(self))
+        text = Exception.__str__(self)
+        return printable(text if len(text) <= _LONGEST else f'{text[:_LONGEST]} ...')
 
 
 def printable(text: str) -> str:

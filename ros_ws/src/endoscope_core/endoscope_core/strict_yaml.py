@@ -67,7 +67,7 @@ def parse_yaml(text: str, name: str) -> Any:
         raise YamlError(f'{name} is larger than {LARGEST >> 20} MiB: no file of this kind is')
     try:
         _check_events(text)
-        return yaml.load(text, Loader=_StrictLoader)  # noqa: S506 (a SafeLoader)
+        return yaml.load(text, Loader=_StrictLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f'line {mark.line + 1}: ' if mark else ''
@@ -82,8 +82,9 @@ def _check_events(text: str) -> None:
     for event in yaml.parse(text, Loader=yaml.CSafeLoader):
         if isinstance(event, yaml.AliasEvent):
             raise _at(event, f'*{event.anchor} refers to another place: write it out')
-        if getattr(event, 'tag', None) not in (None, '!'):
-            raise _at(event, f'a type is given ({event.tag}): leave it out')
+        tag = getattr(event, 'tag', None)
+        if tag not in (None, '!'):
+            raise _at(event, f'a type is given ({tag}): leave it out')
         if isinstance(event, yaml.CollectionStartEvent):
             depth += 1
         elif isinstance(event, yaml.CollectionEndEvent):
@@ -118,4 +119,4 @@ class _StrictLoader(yaml.CSafeLoader):
 
 
 def _at(place: yaml.Node | yaml.Event, problem: str) -> yaml.MarkedYAMLError:
-    return yaml.MarkedYAMLError(problem=problem, problem_mark=place.start_mark)
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=place.start_mark)  # type: ignore[arg-type]

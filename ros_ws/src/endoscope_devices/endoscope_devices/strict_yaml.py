@@ -2,7 +2,6 @@
 
 import difflib
 import math
-import reprlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -70,7 +69,7 @@ class Section:
             or not low <= value <= high
         ):
             raise DeviceFileError(
-                f'{self._where}: {key} is {reprlib.repr(value)}: give a number from {low:g} to {high:g}'
+                f'{self._where}: {key} is {value!r}: give a number from {low:g} to {high:g}'
             )
         return float(value)
 
@@ -87,7 +86,7 @@ class Section:
         value = self._given(key, default)
         if type(value) is not int or not low <= value <= high:
             raise DeviceFileError(
-                f'{self._where}: {key} is {reprlib.repr(value)}: give a whole number from {low} to {high}'
+                f'{self._where}: {key} is {value!r}: give a whole number from {low} to {high}'
             )
         return value
 
@@ -101,7 +100,7 @@ class Section:
         """
         value = self._given(key, default)
         if type(value) is not int or value not in (1, -1):
-            raise DeviceFileError(f'{self._where}: {key} is {reprlib.repr(value)}: give 1 or -1')
+            raise DeviceFileError(f'{self._where}: {key} is {value!r}: give 1 or -1')
         return value
 
     def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
@@ -109,7 +108,7 @@ class Section:
         value = self._given(key, default)
         if value not in choices:
             raise DeviceFileError(
-                f'{self._where}: {key} is {reprlib.repr(value)}: give one of {", ".join(choices)}'
+                f'{self._where}: {key} is {value!r}: give one of {", ".join(choices)}'
             )
         return str(value)
 
@@ -128,14 +127,14 @@ class Section:
             or any(isinstance(v, bool) or not isinstance(v, int | float) for v in value)
             or not all(math.isfinite(v) for v in value)
         ):
-            raise DeviceFileError(f'{self._where}: {key} is {reprlib.repr(value)}: give {length} numbers')
+            raise DeviceFileError(f'{self._where}: {key} is {value!r}: give {length} numbers')
         return tuple(float(v) for v in value)
 
     def text(self, key: str) -> str:
         """The text under ``key``."""
         value = self._given(key, None)
         if not isinstance(value, str):
-            raise DeviceFileError(f'{self._where}: {key} is {reprlib.repr(value)}: give a text')
+            raise DeviceFileError(f'{self._where}: {key} is {value!r}: give a text')
         return value
 
     def _given(self, key: str, default: Any) -> Any:

@@ -1,7 +1,6 @@
 """plant.yaml: reading and writing a plant description."""
 
 import math
-import reprlib
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -164,7 +163,7 @@ def _section(value: Any, where: str) -> Mapping[str, Any]:
     if value is None:
         return {}
     if not isinstance(value, Mapping):
-        raise ValueError(f'{where} must be a mapping of names to values, not {reprlib.repr(value)}')
+        raise ValueError(f'{where} must be a mapping of names to values, not {value!r}')
     return value
 
 
@@ -197,7 +196,7 @@ def _number(value: Any, where: str) -> float:
         except ValueError:
             pass
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f'{where} is {reprlib.repr(value)}: give a number')
+        raise ValueError(f'{where} is {value!r}: give a number')
     return float(value)
 
 
