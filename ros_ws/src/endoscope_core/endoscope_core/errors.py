@@ -15,7 +15,7 @@ class EndoscopeError(Exception):
 
     def __str__(self) -> str:
         # An OSError, which some derive from as well, would take its arguments for errno and text.
-        text = Exception.__str__(self)
+        text = ' '.join(Exception.__str__(self).splitlines())
         return printable(text if len(text) <= _LONGEST else f'{text[:_LONGEST]} ...')
 
 

@@ -11,4 +11,5 @@ BENCHES: tuple[str, ...] = (
     'papers',
     'motor_bus',
     'motor_faults',
+    'files',
 )
