@@ -30,6 +30,7 @@ from endoscope_bags.errors import (
 from endoscope_bags.unpacking import Allowance, ChunkError, chunk_head, unpacked
 
 MAGIC = b'\x89MCAP0\r\n'
+UNSURE_NAMES = 'names of topics are from a summary that is damaged itself'
 _CRC_STEP = 1 << 24
 _MOST_DAMAGE = 100
 # How many records must follow each other, end to head, to be taken for records in a damaged file.
@@ -216,7 +217,7 @@ class _Pass:
         self._summary = _Described()
         self._statistics: Statistics | None = None
         self._data_end: int | None = None
-        self._summary_holds = False
+        self._summary_holds = self._summary_fails = False
         self._n_chunks = 0
         # Nothing before this byte is looked through for records again: chunks contain some.
         self._trusted = 0
@@ -368,7 +369,8 @@ class _Pass:
             self._damaged(CorruptBagError, 'the footer does not point to the summary')
         elif footer.summary_crc:
             self._summary_holds = self._checksum(begin, start + 16) == footer.summary_crc
-            if not self._summary_holds:
+            self._summary_fails = not self._summary_holds
+            if self._summary_fails:
                 self._damaged(CorruptBagError, 'the summary does not agree with its checksum')
 
     def _settle(self) -> None:
@@ -384,6 +386,8 @@ class _Pass:
         first, second = (written, summary) if self._summary_holds else (summary, written)
         self.scan.schemas = first.schemas | second.schemas
         self.scan.channels = first.channels | second.channels
+        if self._summary_fails and summary.channels.keys() - written.channels.keys():
+            self._damaged(CorruptBagError, UNSURE_NAMES)
         messages = self._table()
         counted = self._statistics.message_count if self._statistics else len(messages)
         if counted != len(messages):

@@ -18,6 +18,7 @@ from endoscope_core.classifier.classification import ClassifierError, UnseenTens
 from endoscope_core.classifier.inference import DEFAULT_WEIGHTS
 from endoscope_core.classifier.shipped import load_classifier, shipped_weights
 from endoscope_core.classifier.standardised_tension import WIRES
+from endoscope_core.classifier.weights_file import sealed
 from endoscope_core.signals import SINUSOID, calibration_motion
 
 
@@ -56,7 +57,7 @@ class WeightsCase:
         sound = self._sound[self._which]
         data, described = sound.read_bytes(), sound.with_suffix('.json').read_bytes()
         way = rng.integers(6)
-        self._told = way < 2
+        self._told = way < 3
         if way < 2:
             data = spoiled_bytes(data, rng)
         elif way == 2:
@@ -67,6 +68,8 @@ class WeightsCase:
             data = self._with_program(data, rng)
         else:
             described = json.dumps(_other_number(json.loads(described), rng)).encode()
+        if way > 2:
+            described = _sealed(described, data)
         self._path.write_bytes(data)
         self._path.with_suffix('.json').write_bytes(described)
 
@@ -106,6 +109,10 @@ class WeightsCase:
             return str(classifier.classify(self._tension))
         except UnseenTensionError as error:
             return str(error)
+
+
+def _sealed(described: bytes, data: bytes) -> bytes:
+    return json.dumps(sealed(json.loads(described), data)).encode()
 
 
 def _saved(state: dict[str, Any]) -> bytes:

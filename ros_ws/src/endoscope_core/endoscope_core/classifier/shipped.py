@@ -89,9 +89,8 @@ def _size_classifier(
         with torch.device('meta'):
             model = BacklashSizeModel(known, len(state['centre']), components)
         classes = classes_of(description)
-        return SizeClassifier(
-            filled(model, state), calibration, classes, str(description['motion'])
-        )
+        filled(model, state).require_fitted()
+        return SizeClassifier(model, calibration, classes, str(description['motion']))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise unusable(path, error) from error
 

@@ -2,6 +2,8 @@
 
 import json
 import struct
+from hashlib import sha256
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from zipfile import ZIP_STORED, BadZipFile, ZipFile
@@ -9,7 +11,7 @@ from zipfile import ZIP_STORED, BadZipFile, ZipFile
 import torch
 from torch import Tensor, nn
 
-from endoscope_core.atomic_output import atomic_file, write_text
+from endoscope_core.atomic_output import write_bytes, write_text
 from endoscope_core.classifier.classification import LEVEL, ClassifierError
 from endoscope_core.classifier.grouped_folds import CrossValidation
 from endoscope_core.classifier.size_classifier import SizeClassifier
@@ -19,9 +21,10 @@ from endoscope_core.classifier.training import Network, TrainingSettings
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 from endoscope_core.errors import EndoscopeError
 
-SCHEMA = 2
+SCHEMA = 3
 CNN = 'cnn'
 SIZE = 'size'
+SEAL = 'sha256'
 LARGEST_WEIGHTS, LARGEST_DESCRIPTION = 16 << 20, 1 << 20
 """In bytes. The largest that come with this package have 224 kB and 1.5 kB."""
 
@@ -107,8 +110,7 @@ def save_size_classifier(
 def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Description and state dict of a weights file.
 
-    Nothing in the file is run: PyTorch's unpickler for weights makes tensors and nothing else. The
-    checksums of the archive, which PyTorch itself leaves out, are compared.
+    Nothing in the file is run: PyTorch's unpickler for weights makes tensors and nothing else.
 
     Raises
     ------
@@ -126,6 +128,7 @@ def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
             raise ClassifierError(f'{each} holds no classifier weights: larger than {largest} B')
     try:
         description = json.loads(sidecar.read_text(encoding='utf-8'))
+        data = path.read_bytes()
     except (OSError, ValueError, RecursionError) as error:
         raise unusable(sidecar, error) from error
     if not isinstance(description, dict) or description.get('schema') != SCHEMA:
@@ -133,9 +136,14 @@ def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
             f'{sidecar} holds no classifier weights of schema {SCHEMA}: make them anew with '
             '`endoscope train`'
         )
-    _check_archive(path)
+    if description.get(SEAL) != sealed(description, data)[SEAL]:
+        raise ClassifierError(
+            f'{path} holds no classifier weights: it and {sidecar.name} are not what was written '
+            'together, one of them was damaged or exchanged'
+        )
+    _check_archive(path, data)
     try:
-        state = torch.load(path, map_location='cpu', weights_only=True)
+        state = torch.load(BytesIO(data), map_location='cpu', weights_only=True)
     except Exception as error:
         raise ClassifierError(
             f'{path} holds no classifier weights: it is no PyTorch file of tensors only'
@@ -147,19 +155,23 @@ def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
     return description, state
 
 
-def _check_archive(path: Path) -> None:
+def sealed(description: dict[str, Any], data: bytes) -> dict[str, Any]:
+    """The description with the SHA-256 of itself and of the weights, which ties them together."""
+    rest = {key: value for key, value in description.items() if key != SEAL}
+    digest = sha256(json.dumps(rest, sort_keys=True).encode() + data).hexdigest()
+    return {**rest, SEAL: digest}
+
+
+def _check_archive(path: Path, data: bytes) -> None:
     try:
-        with ZipFile(path) as archive:
+        with ZipFile(BytesIO(data)) as archive:
             packed = any(entry.compress_type != ZIP_STORED for entry in archive.infolist())
-            damaged = None if packed else archive.testzip()
     except (BadZipFile, OSError, ValueError, RuntimeError, EOFError, struct.error) as error:
         raise ClassifierError(
             f'{path} holds no classifier weights: it is no PyTorch file ({error})'
         ) from error
     if packed:
         raise ClassifierError(f'{path} holds no classifier weights: PyTorch does not compress them')
-    if damaged is not None:
-        raise ClassifierError(f'{path} is damaged: {damaged} does not agree with its checksum')
 
 
 def _check_state(state: Any) -> None:
@@ -241,8 +253,9 @@ def _save(
     seed: int,
 ) -> None:
     path = weights_path(path)
-    with atomic_file(path) as partial:
-        torch.save(state, partial)
+    buffer = BytesIO()
+    torch.save(state, buffer)
+    write_bytes(path, buffer.getvalue())
     description = {
         'schema': SCHEMA,
         'kind': kind,
@@ -258,4 +271,7 @@ def _save(
         },
         'held_out': held_out,
     }
-    write_text(path.with_suffix('.json'), json.dumps(description, indent=1) + '\n')
+    write_text(
+        path.with_suffix('.json'),
+        json.dumps(sealed(description, buffer.getvalue()), indent=1) + '\n',
+    )
