@@ -30,7 +30,7 @@ from endoscope_bags.errors import (
 from endoscope_bags.unpacking import Allowance, ChunkError, chunk_head, unpacked
 
 MAGIC = b'\x89MCAP0\r\n'
-UNSURE_NAMES = 'names of topics are from a summary that is damaged itself'
+UNSURE_NAMES = 'the names of topics agree with no checksum'
 _CRC_STEP = 1 << 24
 _MOST_DAMAGE = 100
 # How many records must follow each other, end to head, to be taken for records in a damaged file.
@@ -219,6 +219,7 @@ class _Pass:
         self._data_end: int | None = None
         self._summary_holds = self._summary_fails = False
         self._n_chunks = 0
+        self._chunked = False
         # Nothing before this byte is looked through for records again: chunks contain some.
         self._trusted = 0
         self._heads: list[npt.NDArray[np.void]] = []
@@ -271,6 +272,7 @@ class _Pass:
         if opcode == 0 or start + length > len(self._data):
             return None
         if opcode == Opcode.CHUNK and self._salvage:
+            self._chunked = True
             try:
                 chunk_head(self._data, start, start + length)
             except ChunkError:
@@ -302,6 +304,9 @@ class _Pass:
         return True
 
     def _is_of_known_channel(self, start: int, stop: int) -> bool:
+        # Where there are chunks, a message by itself is a piece of one that no checksum covers.
+        if self._chunked:
+            return False
         channel = int.from_bytes(self._data[start : start + 2], 'little')
         return stop - start >= MESSAGE_HEAD_LENGTH and channel in self._written.channels
 
@@ -337,6 +342,8 @@ class _Pass:
             elif opcode == Opcode.STATISTICS:
                 self._statistics = Statistics.read(_ExactStream(self._data[start:stop]))
             elif opcode == Opcode.DATA_END:
+                if self._data_end is not None:
+                    raise ValueError('the data ended before')
                 self._data_end = stop
                 self._check_data(start, stop)
             elif opcode == Opcode.FOOTER:
@@ -380,8 +387,9 @@ class _Pass:
             told, again = getattr(written, kind), getattr(summary, kind)
             for number in told.keys() & again.keys():
                 if told[number] != again[number]:
+                    unsure = '' if self._summary_holds else f'; {UNSURE_NAMES}'
                     self._damaged(
-                        CorruptBagError, f'{kind[:-1]} {number} is another in the summary'
+                        CorruptBagError, f'{kind[:-1]} {number} is another in the summary{unsure}'
                     )
         first, second = (written, summary) if self._summary_holds else (summary, written)
         self.scan.schemas = first.schemas | second.schemas
@@ -405,10 +413,9 @@ class _Pass:
     def _chunk(self, start: int, stop: int) -> None:
         self._n_chunks += 1
         try:
-            head = chunk_head(self._data, start, stop)
+            chunk_head(self._data, start, stop)
             self._trusted = stop
-            self._allowance.take(head.size, 0)
-            records = unpacked(self._data[start:stop])
+            records = unpacked(self._data[start:stop], self._allowance)
             positions = self._message_positions(records)
         except ChunkError as error:
             self._damaged(

@@ -97,8 +97,15 @@ class Allowance:
             raise ChunkTooLargeError('the chunks hold more than any recorder puts in such a file')
 
 
-def unpacked(body: bytes) -> bytes:
+def unpacked(body: bytes, allowance: Allowance | None = None) -> bytes:
     """Return the records in a chunk, of the size and checksum that it declares.
+
+    Parameters
+    ----------
+    body
+        Of the chunk record.
+    allowance
+        What is decompressed is taken from it, be it of use or not.
 
     Raises
     ------
@@ -110,9 +117,11 @@ def unpacked(body: bytes) -> bytes:
     head = chunk_head(body, 0, len(body))
     if head.size > LARGEST_CHUNK:
         raise ChunkTooLargeError(
-            f'it holds {head.size} bytes, at most {LARGEST_CHUNK} are read; write it anew with '
+            f'it claims {head.size} bytes, at most {LARGEST_CHUNK} are read; write it anew with '
             'smaller chunks'
         )
+    if allowance is not None:
+        allowance.take(0, 0)
     packed = memoryview(body)[head.data_start :]
     try:
         if head.compression == b'zstd':
@@ -126,6 +135,8 @@ def unpacked(body: bytes) -> bytes:
             raise ChunkError(f'compression {head.compression.decode(errors="replace")} is unknown')
     except (zstandard.ZstdError, RuntimeError, MemoryError) as error:
         raise ChunkError(f'it does not decompress: {error}') from error
+    if allowance is not None:
+        allowance.take(len(records), 0)
     if len(records) != head.size:
         raise ChunkError(f'it does not hold the {head.size} bytes that it declares')
     if head.crc not in (0, zlib.crc32(records)):
