@@ -13,4 +13,5 @@ BENCHES: tuple[str, ...] = (
     'motor_bus',
     'motor_faults',
     'faults',
+    'files',
 )

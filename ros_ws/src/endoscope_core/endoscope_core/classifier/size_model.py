@@ -18,6 +18,7 @@ STEPS = 120
 _RATE = 0.08
 _JITTER = 1e-9
 _LEAST = 1e-6
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,26 @@ class BacklashSizeModel(nn.Module):
             search.step()
         with torch.no_grad():
             self._take(logarithms)
+
+    def require_fitted(self) -> None:
+        """Refuse numbers that no fit gives.
+
+        Directions of a singular value decomposition are orthonormal, and whitened scores have a
+        mean square of one: to rounding, whatever the model was fitted to.
+
+        Raises
+        ------
+        ValueError
+            They are not, or a known size is no angle of a tube.
+        """
+        unit = torch.eye(len(self.basis), dtype=self.basis.dtype)
+        squares = self.scores.square().mean(dim=0)
+        if not torch.allclose(self.basis @ self.basis.T, unit, atol=_ROUNDING):
+            raise ValueError('the components are not orthonormal')
+        if not torch.allclose(squares, torch.ones_like(squares), atol=_ROUNDING):
+            raise ValueError('the scores are not whitened')
+        if not bool(((self.target >= 0.0) & (self.target <= 2.0 * torch.pi)).all()):
+            raise ValueError('the known sizes are no angles')
 
     def _take(self, logarithms: Tensor) -> None:
         values = logarithms.exp()
