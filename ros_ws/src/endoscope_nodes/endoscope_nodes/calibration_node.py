@@ -297,9 +297,7 @@ class CalibrationNode(EndoscopeNode):
         self.get_logger().error(self._last)
         if not self._homing:
             now = self.ticker.now_ns()
-            self._publish(
-                aborted_result(now, reason, str(run.step), (now - self._began_ns) * 1e-9)
-            )
+            self._publish(aborted_result(now, reason, str(run.step), (now - self._began_ns) * 1e-9))
 
     def _report(self) -> Report:
         values: dict[str, object] = {

@@ -48,6 +48,7 @@ CONSOLE = 'console'
 CALIBRATION = 'calibration'
 NOBODY = 'nobody'
 
+_AT_ZERO = (0.0,) * len(JOINTS)
 _NOTHING = np.zeros(len(JOINTS))
 _ANY_CLASS = CalibrationFindings(class_deg=70)
 
@@ -114,7 +115,7 @@ class CompensatorNode(EndoscopeNode):
         self._results = self.create_subscription(
             DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
         )
-        self.diagnostics.add('commands', CommandReport(self.gate))
+        self.diagnostics.add('commands', CommandReport(self.gate, self._session.leave))
         self.diagnostics.add('calibration commands', CommandReport(self.calibration_gate))
         self.diagnostics.add('corrections', CommandReport(self.correction_gate))
         self.diagnostics.add('output', self._report)
@@ -204,9 +205,7 @@ class CompensatorNode(EndoscopeNode):
         if self._source == NOBODY:
             self._take_news()
 
-    def _may_pass(
-        self, sample: JointSample, stream: JointSubscription, gate: CommandGate
-    ) -> bool:
+    def _may_pass(self, sample: JointSample, stream: JointSubscription, gate: CommandGate) -> bool:
         """Whether a message is of the open session and of the one sender of its topic."""
         if not self._session.belongs(sample):
             gate.refuse(Refusal.SESSION, sample.session or 'none named')
@@ -229,7 +228,7 @@ class CompensatorNode(EndoscopeNode):
         if not self._may_pass(sample, self._correction_in, self.correction_gate):
             return
         now = self.ticker.monotonic_ns()
-        if self.correction_gate.check(sample.stamp_ns, sample.position, now, _NOTHING) is None:
+        if self.correction_gate.check(sample.stamp_ns, sample.position, now, _AT_ZERO) is None:
             self._corrections = (self._corrections[1], sample)
 
     def _on_console(self, sample: JointSample) -> None:

@@ -72,6 +72,9 @@ class CommandGate:
         Number of refused commands by reason.
     accepted
         Number of obeyed ones.
+    due
+        Number of commands that the sender's stamps tell of, obeyed or lost on the way, in streams
+        that were obeyed: the time between their stamps by the shortest such time.
     last_reason
         The last refusal in words.
     """
@@ -80,7 +83,9 @@ class CommandGate:
         self.limits = limits
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
         self.accepted = 0
+        self.due = 0
         self.last_reason = ''
+        self._interval_ns = 0
         self._position: tuple[float, ...] = ()
         self._stamp_ns = 0
         self._offset_ns: int | None = None
@@ -95,6 +100,7 @@ class CommandGate:
         self._stamp_ns = 0
         self._offset_ns = None
         self._received_ns = None
+        self._interval_ns = 0
         self._alone = True
         self.last_reason = ''
 
@@ -147,6 +153,12 @@ class CommandGate:
             refusal = self._check_entry(position, measured)
         if refusal is not None:
             return refusal
+        gap_ns = stamp_ns - self._stamp_ns
+        if streaming and gap_ns > 0:
+            self._interval_ns = min(self._interval_ns or gap_ns, gap_ns)
+            self.due += round(gap_ns / self._interval_ns)
+        else:
+            self.due += 1
         self._alone = self._received_ns is None
         self._position = tuple(position)
         self._stamp_ns = stamp_ns
@@ -205,9 +217,7 @@ class CommandGate:
         self._allowance = min(allowance - travel, limits.max_speed * _JITTER_S)
         return None
 
-    def _check_entry(
-        self, position: Sequence[float], measured: Sequence[float]
-    ) -> Refusal | None:
+    def _check_entry(self, position: Sequence[float], measured: Sequence[float]) -> Refusal | None:
         step = max(abs(a - b) for a, b in zip(position, measured, strict=True))
         if step > self.limits.max_step:
             return self.refuse(Refusal.STEP, f'{step:.4g} rad from where it is')
