@@ -196,7 +196,7 @@ def test_measurements_at_rest_and_the_first_after_a_silence_move_nothing():
     assert feedforward.learnt[0] != bent
     rest = [np.sin(2.999)], [0.0], TICK
     commands = []
-    for k in range(2000):
+    for _ in range(2000):
         commands.append(feedforward.step(*rest)[0])
         feedforward.measure(0.0, [rig.tip + 0.1])
     assert np.ptp(commands[1000:]) < 1e-9
