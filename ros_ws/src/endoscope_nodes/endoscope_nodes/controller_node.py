@@ -165,14 +165,14 @@ class ControllerNode(EndoscopeNode):
     def _choose_whether_to_act(self) -> None:
         calibrating = not self._calibration.trouble(self._timeout_ns)
         changing = self._settings.law != self._law
-        if changing and self.controller.weight == 0.0:
+        if changing and self.controller.faded:
             self._law, changing = self._settings.law, False
             self.controller = self._new_controller()
         if self._settings.active and not calibrating and not changing:
             self.controller.activate()
         else:
             self.controller.deactivate()
-        if self._forget and self.controller.weight == 0.0:
+        if self._forget:
             self.controller.forget()
             self._forget = False
 
