@@ -15,7 +15,6 @@ DECLARED = {
     ),
     'load_cells': (('load_cells_node', 'LoadCellsParameters'),),
     'em_tracker': (('em_tracker_node', 'EmTrackerParameters'),),
-    'supervisor': (('supervisor_node', 'SupervisorParameters'),),
     'compensator': (('compensator_parameters', 'CompensatorParameters'),),
     'controller': (('controller_node', 'ControllerParameters'),),
     'calibration': (('calibration_node', 'CalibrationParameters'),),

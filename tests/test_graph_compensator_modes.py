@@ -35,7 +35,6 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
             assert len(drives) >= 20
             # 20 rad/s at the joint is what the feed-forward allows itself; a jump would be 0.1 rad.
             assert steps.max() <= 0.5 * 20.0 * 1e-3 + 1e-9
-        assert graph.reported('compensator: output')['saturated'] == '0'
 
 
 def test_what_the_calibration_did_not_find_is_not_guessed():

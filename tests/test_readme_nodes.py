@@ -41,6 +41,7 @@ def nodes():
         args=['--ros-args', '--log-level', 'fatal'],
         context=Context(),
         domain_id=private_domain(),
+        overrides={'console': {'source': 'motion'}},
     )
     for factory in (*SLAVE_NODES, *CONTROL_NODES):
         runtime.add(factory)
@@ -112,7 +113,7 @@ def test_every_parameter_is_listed():
 def test_the_parameters_are_those_that_the_nodes_declare(nodes):
     rows = [line.split('`') for line in parameter_table.rows()]
     of_process = {
-        *('use_sim_time', 'tick_rate', 'realtime_priority', 'cores'),
+        *('use_sim_time', 'tick_rate', 'rig_file', 'realtime_priority', 'cores'),
         'start_type_description_service',
     }
     for name, node in nodes.items():
@@ -129,8 +130,8 @@ def test_the_picture_shows_who_speaks_to_whom(nodes):
         for topic in re.findall(r'\w+/\w+', label.replace('\\n', ' '))
         if speaker in nodes
     }
-    # The state goes to every node that moves: the picture has one arrow and says so.
-    state = 'slave/operating_state'
+    # The session goes to every node that moves: the picture has one arrow and says so.
+    session = 'slave/motion_session'
     spoken = {
         (speaker, listener, _short(publisher.topic_name))
         for speaker, node in nodes.items()
@@ -138,11 +139,11 @@ def test_the_picture_shows_who_speaks_to_whom(nodes):
         for listener, other in nodes.items()
         if listener != speaker
         and publisher.topic_name in {s.topic_name for s in other.subscriptions}
-        and publisher.topic_name not in OF_EVERY_NODE | {'/diagnostics', NAMESPACE + state}
+        and publisher.topic_name not in OF_EVERY_NODE | {'/diagnostics', NAMESPACE + session}
         # The clutch is the handle's, for which a console that plays a motion stands in.
         and not publisher.topic_name.startswith(NAMESPACE + 'master/')
     }
-    assert drawn == spoken | {('supervisor', 'motor_driver', state)}
+    assert drawn == spoken | {('supervisor', 'motor_driver', session)}
 
 
 def test_the_picture_is_that_of_its_source():

@@ -71,7 +71,7 @@ class RecorderProcess:
             assert time.monotonic() < deadline, 'the recorder does not say so'
             executor.spin_once(timeout_sec=0.1)
             for status in (status for report in reports for status in report.status):
-                if status.name == 'recorder: recording' and status.level == level:
+                if status.name == '/endoscope/recorder: recording' and status.level == level:
                     executor.remove_node(self.node)
                     return {value.key: value.value for value in status.values}
 

@@ -14,6 +14,7 @@ SOLE_PUBLISHERS = {
     'slave/servo_jp': {'console'},
     'motor/servo_jp': {'compensator'},
     'slave/operating_state': {'supervisor'},
+    'slave/motion_session': {'supervisor'},
     'slave/state_command': {'operator'},
     'master/clutch': {'console', 'master'},
 }

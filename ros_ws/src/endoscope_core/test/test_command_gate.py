@@ -132,6 +132,19 @@ def test_reset_forgets_the_stream_but_not_the_counts():
     assert gate.refused[Refusal.NOT_ENABLED] == 1
 
 
+def test_commands_lost_on_the_way_are_told_from_a_sender_that_jitters():
+    gate = CommandGate(LIMITS)
+    stamps = [4 * k + 3 * (k % 7 == 0) for k in range(1000)]
+    for stamp in stamps:
+        assert gate.check((stamp + 1) * MS, HERE, stamp * MS, HERE) is None
+    assert 0.97 < gate.accepted / gate.due <= 1.01
+    gate = CommandGate(LIMITS)
+    for stamp in range(1, 1000):
+        if hash((stamp, 7)) % 10 >= 7:
+            assert gate.check(stamp * MS, HERE, stamp * MS, HERE) is None
+    assert 0.25 < gate.accepted / gate.due < 0.45
+
+
 numbers = st.floats(allow_nan=True, allow_infinity=True, width=64)
 
 

@@ -14,6 +14,7 @@ from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointSample, JointSubscription
 from endoscope_nodes.names import (
     MOTION_SESSION,
+    MOTOR_COMMAND,
     MOTOR_MEASURED,
     OPERATING_STATE,
     SOLE_SENDER,
@@ -100,6 +101,8 @@ class SupervisorNode(EndoscopeNode):
     def _check(self) -> None:
         for watch in (self._motor, self._wires):
             self._note(watch.topic, watch.trouble(self._timeout_ns))
+        deserted = self.machine.session and not self.count_publishers(MOTOR_COMMAND)
+        self._note('compensator', f'nobody sends {MOTOR_COMMAND}' if deserted else '')
         for topic in self._watched:
             crowded = self.count_publishers(topic) > 1
             self._note(f'senders of {topic}', senders_in_words(self, topic) if crowded else '')

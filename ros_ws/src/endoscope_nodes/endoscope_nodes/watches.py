@@ -278,7 +278,7 @@ class CommandReport:
         self._on_starved = on_starved
         self._reported = 0
         self._accepted = 0
-        self._due = 0
+        self._due = 0.0
         self._starved = 0
 
     def __call__(self) -> Report:
@@ -294,7 +294,7 @@ class CommandReport:
         values['carried [%]'] = 100.0 * share
         self._starved = self._starved + 1 if share < _HALF else 0
         starved = (
-            f'{100.0 * share:.0f} % of {due} commands arrive: give a lower tick_rate, or '
+            f'{100.0 * share:.0f} % of {due:.0f} commands arrive: give a lower tick_rate, or '
             'realtime_priority'
         )
         if self._starved >= _STARVED_REPORTS and self._on_starved is not None:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -76,7 +77,7 @@ class MotorRig(ClosedOnExit):
         self.shafts: list[tuple[float, JointSample]] = []
         self.messages: list[tuple[float, str, str]] = []
         domain = 100 + os.getpid() % 130
-        overrides = self._parameters(apart, patience)
+        overrides = self._parameters(apart, patience, folder / 'rig.yaml')
         self.runtime = Runtime(
             args=['--ros-args', '--log-level', 'fatal'],
             context=Context(),
@@ -100,7 +101,7 @@ class MotorRig(ClosedOnExit):
         self.probe.create_timer(0.01, self._weigh, clock=self._steady)
 
     def _parameters(
-        self, apart: Sequence[str], patience: float | None
+        self, apart: Sequence[str], patience: float | None, rig_file: Path
     ) -> dict[str, dict[str, Any]]:
         driver = {'device': 'dynamixel', 'port': self.emulator.port, 'bus_rate': float(RATE_HZ)}
         parameters: dict[str, dict[str, Any]] = {
@@ -110,12 +111,13 @@ class MotorRig(ClosedOnExit):
             'console': {'source': 'motion'},
             'recorder': {'bag': str(self.bag)},
         }
+        stream = {} if patience is None else {'timeouts': {'stream': patience}}
+        rig_file.write_text(yaml.safe_dump(stream), encoding='utf-8')
         if patience is not None:
             driver['fault_after'] = patience
-            parameters['supervisor']['stream_timeout'] = patience
         first = next(name for name in _NODES if name not in apart)
         for name in (first, *apart):
-            parameters[name]['tick_rate'] = RATE_HZ
+            parameters[name] |= {'tick_rate': RATE_HZ, 'rig_file': str(rig_file)}
         return parameters
 
     def node(self, name: str) -> Node:
