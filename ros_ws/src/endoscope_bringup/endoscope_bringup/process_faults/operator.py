@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -81,7 +82,7 @@ class Operator(ClosedOnExit):
         self.clutch = True
         self.shafts: list[JointSample] = []
         self.goals: list[JointSample] = []
-        self.sent: list[tuple[str, int, tuple[float, ...]]] = []
+        self.sent: deque[tuple[str, int, tuple[float, ...]]] = deque(maxlen=5000)
         self.replays = False
         self.late_ns = 0
         self.states: list[tuple[int, str]] = []
@@ -207,7 +208,7 @@ class Operator(ClosedOnExit):
             self._handle.publish(stamp, *self._hand)
         elif self.session:
             self.sent.append((self.session, stamp, (*self._hand, *speed)))
-            for session, stamped, values in self.sent[-1:] + self._old():
+            for session, stamped, values in (self.sent[-1], *self._old()):
                 self._handle.session = session
                 self._handle.publish(stamped, *values)
 
