@@ -1,6 +1,8 @@
 """A load-cell transmitter on a real line, whose cells a test pulls and breaks."""
 
 import struct
+import time
+from collections import deque
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +15,9 @@ ZERO = 120
 BROKEN = 8_388_607
 SATURATED = 95_000
 
+LATENCY = 0.05
+TRANSMITTER = 'rate: 200, reply_timeout: 0.05'
 CALIBRATION = f"""
-transmitter: {{rate: 200, reply_timeout: 0.05}}
 wires:
   wire_x_pos: {{register: 0, type: int32, newton_per_count: {NEWTON_PER_COUNT}, zero: {ZERO}}}
   wire_x_neg: {{register: 2, type: int32, newton_per_count: {NEWTON_PER_COUNT}, zero: {ZERO}}}
@@ -58,9 +61,35 @@ class Cells:
         return words
 
 
-def write_calibration(folder: Path) -> Path:
+class CellsOnWires(Cells):
+    """Cells with the nominal rig's noise, on the wires of a slave that moves between two beats.
+
+    They show what the wires did `LATENCY` ago, when the slave had simulated what came next.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._followed = deque(maxlen=100)
+        self._clock_offset = time.time() - time.monotonic()
+        self._own = np.random.default_rng(4)
+
+    def follow(self, sample) -> None:
+        self._followed.append((sample.stamp_ns * 1e-9 - self._clock_offset, *sample.effort))
+
+    def __call__(self, seconds):
+        if self._followed:
+            then, *wires = zip(*tuple(self._followed), strict=True)
+            at = time.monotonic() - LATENCY
+            self.tension = {
+                wire: float(np.interp(at, then, tension)) + self._own.normal(0.0, 0.02)
+                for wire, tension in zip(WIRES, wires, strict=True)
+            }
+        return super().__call__(seconds)
+
+
+def write_calibration(folder: Path, transmitter: str = TRANSMITTER) -> Path:
     path = folder / 'cells.yaml'
-    path.write_text(CALIBRATION)
+    path.write_text(f'transmitter: {{{transmitter}}}{CALIBRATION}')
     return path
 
 

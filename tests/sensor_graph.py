@@ -57,13 +57,26 @@ class SensorGraph(ProbedGraph):
         Takes the tension of the simulated wires, if given.
     follow_bending
         Takes the bending of the simulated slave, if given.
+    nodes
+        Factories of the nodes.
+    tick_rate
+        Beats a second.
     overrides
         Parameter values by node name.
     """
 
-    def __init__(self, bag: Path, *, cells=None, follow_bending=None, **overrides) -> None:
+    def __init__(
+        self,
+        bag: Path,
+        *,
+        cells=None,
+        follow_bending=None,
+        nodes=NODES,
+        tick_rate: int = 500,
+        **overrides,
+    ) -> None:
         runtime = Runtime(
-            ['--ros-args', '--log-level', 'fatal', '-p', 'tick_rate:=500'],
+            ['--ros-args', '--log-level', 'fatal', '-p', f'tick_rate:={tick_rate}'],
             Context(),
             private_domain(),
             {
@@ -72,7 +85,7 @@ class SensorGraph(ProbedGraph):
                 **overrides,
             },
         )
-        for factory in NODES:
+        for factory in nodes:
             runtime.add(factory)
         super().__init__(runtime, PATIENCE_S)
         self.tensions = self.listen(WIRES_MEASURED, WIRES)

@@ -10,7 +10,7 @@ import pytest
 from aurora_rig import Instrument
 from device_readings import collect, figure, until
 
-from endoscope_core.kinematics import bending_from_orientation
+from endoscope_core.kinematics import angle_between, bending_from_orientation
 from endoscope_devices.em_tracker import (
     AuroraTracker,
     RegistrationWindow,
@@ -20,7 +20,7 @@ from endoscope_devices.em_tracker import (
 )
 from endoscope_devices.em_tracker.aurora_emulator import AuroraEmulator
 from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
-from endoscope_devices.em_tracker.aurora_unit import SensorView
+from endoscope_devices.em_tracker.aurora_unit import SensorView, sealed
 from endoscope_devices.em_tracker.tx_reply import MalformedReplyError, parse_tx
 
 # In real time, on a machine that may stall for longer than a device may be silent.
@@ -145,6 +145,72 @@ def test_a_tracker_whose_frames_come_late_for_good_is_timed_anew(tracker, emulat
     until(lambda: figure(tracker, 'late') > 20)
     collect(tracker, 5)
     assert tracker.health()[0] == ''
+
+
+def test_old_replies_are_told_by_their_frame_and_left_out(tracker, emulator, instrument):
+    """The instrument turns all the while; every fourth reply is an earlier one again."""
+    instrument._bent.bending = lambda seconds: (0.5 * math.sin(seconds), 0.0)
+    kept, number = [], [0]
+
+    def replay(data):
+        if not data.startswith(b'010A'):
+            return [(0.0, data)]
+        if len(kept) < 100:
+            kept.append(data)
+            return [(0.0, data)]
+        number[0] += 1
+        return [(0.0, kept[number[0] % 100] if number[0] % 4 == 0 else data)]
+
+    emulator.tap = replay
+    until(lambda: figure(tracker, 'old frames') > 100)
+    readings = tracker.take()
+    frames = [reading.frame for reading in readings]
+    assert frames == sorted(set(frames))
+    zero = emulator.unit.frame_zero
+    for reading in readings[10:]:
+        assert abs(reading.time_ns * 1e-9 - zero - reading.frame / 40.0) < 0.03
+    assert figure(tracker, 'connections') == 1
+
+
+def test_a_tracker_that_counts_its_frames_anew_is_opened_again(tracker, emulator):
+    time.sleep(1.0)
+    collect(tracker, 5)
+    emulator.unit.frame_zero = time.monotonic() - 0.1
+    until(lambda: figure(tracker, 'connections') == 2)
+    assert figure(tracker, 'old frames') >= 3
+    tracker.take()
+    collect(tracker, 5)
+    assert tracker.health()[0] == ''
+
+
+def test_frames_ahead_of_their_time_and_poses_that_no_tip_reaches_are_left_out(
+    tracker, emulator, instrument
+):
+    collect(tracker, 20)
+    number = [0]
+
+    def seen(seconds):
+        number[0] += 1
+        return (1.5, 0.0) if number[0] % 10 == 0 else (0.0, 0.0)
+
+    instrument._bent.bending = seen
+    until(lambda: figure(tracker, 'jumps') >= 5)
+    straight = collect(tracker, 1)[0].orientation
+    for reading in collect(tracker, 20):
+        assert angle_between(reading.orientation, straight) < 0.01
+
+    def early(data):
+        head, frame, tail = data[:-18], data[-18:-10], data[-10:-5]
+        number[0] += 1
+        if not data.startswith(b'010A') or number[0] % 10:
+            return [(0.0, data)]
+        return [(0.0, sealed((head + b'%08X' % (int(frame, 16) + 40) + tail).decode()))]
+
+    emulator.tap = early
+    until(lambda: figure(tracker, 'frames ahead of time') >= 5)
+    zero = emulator.unit.frame_zero
+    for reading in collect(tracker, 20):
+        assert abs(reading.time_ns * 1e-9 - zero - reading.frame / 40.0) < 0.03
 
 
 def test_a_missing_sensor_is_named(tmp_path, instrument):

@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[1]
 COMPOSE_FILE = ROOT / 'docker' / 'compose.yaml'
 HARDWARE_FILE = ROOT / 'docker' / 'hardware.yaml'
 
-# All nodes in one process, the clock of simulated time, and the player of bags.
-STARTED_BY_HAND = {'graph', 'conductor', 'replay'}
+# All nodes in one process, the clock of simulated time, the player of bags; what services run too.
+STARTED_BY_HAND = {'graph', 'conductor', 'replay', 'healthcheck'}
 
 
 def _entry_points_of_nodes() -> set[str]:
@@ -45,6 +45,34 @@ def test_nodes_share_one_network_domain_and_user() -> None:
     services = yaml.safe_load(COMPOSE_FILE.read_text())['services'].values()
     for key in ('network_mode', 'ipc', 'user', 'environment', 'image'):
         assert len({str(service[key]) for service in services}) == 1, key
+
+
+def test_no_service_may_do_more_than_it_has_to() -> None:
+    for name, service in yaml.safe_load(COMPOSE_FILE.read_text())['services'].items():
+        assert service['restart'] == 'no', name
+        assert service['read_only'] is True
+        assert service['cap_drop'] == ['ALL']
+        assert 'cap_add' not in service
+        assert 'privileged' not in service
+        assert service['security_opt'] == ['no-new-privileges:true']
+        assert service['ulimits'] == {'rtprio': 99, 'memlock': -1}
+        assert service['healthcheck']['test'][-2:] == ['healthcheck', name]
+
+
+def test_hardware_takes_nothing_of_that_back() -> None:
+    hardened = set(yaml.safe_load(COMPOSE_FILE.read_text())['x-node']) - {'command'}
+    for service in yaml.safe_load(HARDWARE_FILE.read_text())['services'].values():
+        assert not hardened & set(service)
+        assert not {'cap_add', 'privileged', 'healthcheck'} & set(service)
+
+
+def test_the_image_is_built_on_what_is_pinned_and_runs_as_nobody_special() -> None:
+    lines = (ROOT / 'docker' / 'Dockerfile').read_text().splitlines()
+    assert [line for line in lines if line.startswith('FROM')] == ['FROM ${ROS_IMAGE}']
+    [image] = [line for line in lines if line.startswith('ARG ROS_IMAGE')]
+    assert re.fullmatch(r'ARG ROS_IMAGE=ros:jazzy@sha256:[0-9a-f]{64}', image)
+    [user] = [line.split()[1] for line in lines if line.startswith('USER')]
+    assert user.split(':')[0] not in ('0', 'root')
 
 
 def test_compose_accepts_the_file() -> None:

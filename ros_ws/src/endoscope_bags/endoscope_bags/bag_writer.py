@@ -8,7 +8,6 @@ from typing import Self
 
 import numpy as np
 
-from endoscope_bags.bag_files import METADATA
 from endoscope_bags.chunk_sink import ChunkSink, TopicRecord
 from endoscope_bags.errors import (
     BagExistsError,
@@ -18,14 +17,15 @@ from endoscope_bags.errors import (
 from endoscope_bags.mcap_chunk import MESSAGE_OVERHEAD, ChunkMessage, chunk_message
 from endoscope_bags.message_stream import MessageStream
 from endoscope_bags.message_types import MessageType, message_type
-from endoscope_bags.qos_profile import QosProfile
-from endoscope_bags.room_on_disk import write_error
-from endoscope_bags.rosbag2_metadata import (
+from endoscope_bags.metadata import (
+    METADATA,
     TopicSummary,
     metadata_document,
     metadata_text,
     write_metadata,
 )
+from endoscope_bags.qos_profile import QosProfile
+from endoscope_bags.room_on_disk import write_error
 
 CHUNK_SECONDS = 0.25
 CHUNK_BYTES = 1 << 20

@@ -14,8 +14,12 @@ from endoscope_bags.cdr_layout import Layout
 from endoscope_bags.errors import MalformedMessageError
 
 _NANOSECONDS = 1_000_000_000
+HEAD_WITH_STAMP = 12
+"""Bytes of encapsulation and stamp."""
 # A topic with more layouts than this (a counter in a string, say) is decoded one by one.
 _LAYOUTS_WORTH_COMPARING = 64
+# One by one a message takes about 20 us and 1 kB: these take 10 s and half a gigabyte.
+_MOST_LAYOUTS = 1 << 19
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,7 @@ class Payloads:
         Bytes of each message, shape (N,).
     """
 
-    data: bytes
+    data: bytes | bytearray
     start: npt.NDArray[np.int64]
     size: npt.NDArray[np.int64]
 
@@ -41,15 +45,7 @@ class Payloads:
 
     def __getitem__(self, index: int) -> bytes:
         first = int(self.start[index])
-        return self.data[first : first + int(self.size[index])]
-
-    def stamp_ns(self) -> npt.NDArray[np.int64]:
-        """Return the stamps of messages that begin with a header, in ns, shape (N,)."""
-        bytes_ = np.frombuffer(self.data, dtype=np.uint8)
-        field = bytes_[self.start[:, None] + np.arange(4, 12)]
-        big = bytes_[self.start + 1] == 0
-        little_endian = _stamps(field, '<')
-        return np.where(big, _stamps(field, '>'), little_endian) if big.any() else little_endian
+        return bytes(self.data[first : first + int(self.size[index])])
 
     def matrix(self, rows: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:
         """Return messages of equal size as a matrix, shape (len(rows), size)."""
@@ -58,6 +54,22 @@ class Payloads:
             np.frombuffer(self.data, dtype=np.uint8), size
         )
         return windows[self.start[rows]]
+
+
+def stamps_of_heads(data: bytes, start: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Stamps in ns of messages that begin with a header, shape (N,).
+
+    Parameters
+    ----------
+    data
+        Holds the messages.
+    start
+        Where each begins, shape (N,); at least `HEAD_WITH_STAMP` bytes before the end.
+    """
+    bytes_ = np.frombuffer(data, dtype=np.uint8)
+    field = bytes_[start[:, None] + np.arange(4, HEAD_WITH_STAMP)]
+    big = bytes_[start + 1] == 0
+    return np.where(big, _stamps(field, '>'), _stamps(field, '<'))
 
 
 @dataclass(frozen=True)
@@ -123,6 +135,10 @@ def grouped_by_layout(
         n_layouts = 0
         while len(rows):
             n_layouts += 1
+            if n_layouts > _MOST_LAYOUTS:
+                raise MalformedMessageError(
+                    f'message {int(rows[0]) + 1} has yet another layout: too many'
+                )
             try:
                 layout = find_layout(payloads[int(rows[0])])
             except MalformedMessageError as error:

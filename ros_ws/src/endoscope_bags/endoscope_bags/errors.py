@@ -10,9 +10,6 @@ class BagError(EndoscopeError):
 class BagNotFoundError(BagError, FileNotFoundError):
     """There is no file or folder of that name, or a file that the metadata lists is missing."""
 
-    # FileNotFoundError would print the arguments as errno and strerror.
-    __str__ = Exception.__str__
-
 
 class NotABagError(BagError):
     """The file or folder is something else."""
@@ -36,8 +33,6 @@ class UnsupportedBagError(BagError):
 
 class BagExistsError(BagError, FileExistsError):
     """The place that a recording should go to is taken; nothing is ever overwritten."""
-
-    __str__ = Exception.__str__
 
 
 class BagWriteError(BagError):

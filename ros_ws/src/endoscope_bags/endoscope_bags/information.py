@@ -1,5 +1,6 @@
 """What is in a recording, and what is missing from it: `endoscope bag info`."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,10 @@ from endoscope_bags.chunk_sink import LIBRARY
 from endoscope_bags.message_types import begins_with_header
 from endoscope_bags.recording import Recording
 from endoscope_bags.sequence_gaps import SequenceGaps
+from endoscope_core.errors import printable
 
 LOST_PREFIX = 'lost '
+_NUMBER = re.compile('[0-9]{1,18}')
 # A silence of this many periods is a dropout; a topic slower than this is not periodic.
 _DROPOUT_PERIODS = 2.5
 _SLOWEST_PERIOD_S = 0.2
@@ -108,7 +111,7 @@ class BagInformation:
             ).rstrip()
             for row in rows
         ]
-        return '\n'.join(lines)
+        return '\n'.join(map(printable, lines))
 
 
 def _row(topic: TopicInformation) -> tuple[str, ...]:
@@ -131,10 +134,14 @@ def bag_information(recording: Recording) -> BagInformation:
     lost = {
         key.removeprefix(LOST_PREFIX): int(notes.pop(key))
         for key in list(notes)
-        if key.startswith(LOST_PREFIX)
+        if key.startswith(LOST_PREFIX) and _NUMBER.fullmatch(notes[key])
     }
     names = sorted(recording.topics)
-    topics = tuple(_topic_information(recording, name, lost.get(name)) for name in names)
+    stamped = [n for n in names if begins_with_header(recording.topics[n].definition)]
+    stamps = dict(zip(stamped, recording.header_stamps(stamped), strict=bool(stamped)))
+    topics = tuple(
+        _topic_information(recording, name, lost.get(name), stamps.get(name)) for name in names
+    )
     start_ns = recording.start_ns
     return BagInformation(
         path=str(recording.path),
@@ -147,14 +154,19 @@ def bag_information(recording: Recording) -> BagInformation:
     )
 
 
-def _topic_information(recording: Recording, name: str, lost: int | None) -> TopicInformation:
+def _topic_information(
+    recording: Recording, name: str, lost: int | None, stamps: npt.NDArray[np.int64] | None
+) -> TopicInformation:
     topic = recording.topics[name]
     if lost is None and recording.library == LIBRARY:
         gaps = SequenceGaps()
         for sequence in recording.times(name).sequence.tolist():
             gaps.add(sequence)
         lost = gaps.lost
-    times = np.sort(_source_times(recording, name))
+    # Times of the source: header stamps where all messages have them, otherwise publication.
+    if stamps is None or len(stamps) != topic.message_count:
+        stamps = recording.times(name).publish_ns
+    times = np.sort(stamps)
     intervals = np.diff(times) * 1e-9
     period = float(np.median(intervals)) if len(intervals) else None
     periodic = (
@@ -172,12 +184,3 @@ def _topic_information(recording: Recording, name: str, lost: int | None) -> Top
         missing_s=float(np.sum(silent)) - len(silent) * (period or 0.0),
         lost=lost,
     )
-
-
-def _source_times(recording: Recording, name: str) -> npt.NDArray[np.int64]:
-    """Times of the source: header stamps where the type has them, otherwise publication."""
-    if begins_with_header(recording.topics[name].definition):
-        payloads = recording.payloads(name)
-        if len(payloads) and int(payloads.size.min()) >= 12:
-            return payloads.stamp_ns()
-    return recording.times(name).publish_ns

@@ -10,6 +10,12 @@ from endoscope_bags.cdr_decoding import LayoutGroup, Payloads, grouped_by_layout
 from endoscope_bags.cdr_layout import QUANTITIES, Layout, joint_state_layout, pose_layout
 from endoscope_bags.errors import MalformedMessageError, MissingJointError, NonFiniteError
 
+MOST_JOINTS = 1024
+"""Names on a topic; an instrument has ten, a robot a hundred."""
+# Cells of the decoded arrays that any recording may have. Beyond that there must not be more than
+# bytes: a joint takes 13 of a message that has it, its name and one number at least.
+_FREE_CELLS = 1 << 20
+
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
@@ -168,11 +174,16 @@ def decode_joint_states(
     groups = _groups(topic, payloads, joint_state_layout)
     names = tuple(dict.fromkeys(name for group in groups for name in group.layout.names))
     n = len(payloads)
+    if len(names) > MOST_JOINTS or n * len(names) > max(_FREE_CELLS, int(payloads.size.sum())):
+        raise MalformedMessageError(
+            f'topic {topic}: {len(names)} joints in {n} messages, most of which lack most of them'
+        )
     stamp_ns = np.zeros(n, dtype=np.int64)
     decoded: dict[str, FloatArray | None] = dict.fromkeys(QUANTITIES)
+    place = {name: k for k, name in enumerate(names)}
     for group in groups:
         stamp_ns[group.rows] = group.stamp_ns()
-        columns = [names.index(name) for name in group.layout.names]
+        columns = [place[name] for name in group.layout.names]
         for quantity in QUANTITIES:
             values = group.column(quantity)
             if values is None:

@@ -6,6 +6,7 @@ files that were cut off, too. Format: https://mcap.dev/spec.
 """
 
 import mmap
+import re
 import struct
 import zlib
 from collections.abc import Iterator
@@ -16,11 +17,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import EndOfFile, McapError
+from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Header, Metadata, Schema
-from mcap.stream_reader import get_chunk_data_stream
-from zstandard import ZstdError
+from mcap.records import Channel, DataEnd, Footer, Header, Metadata, Schema, Statistics
 
 from endoscope_bags.errors import (
     BagNotFoundError,
@@ -28,9 +27,16 @@ from endoscope_bags.errors import (
     NotABagError,
     TruncatedBagError,
 )
+from endoscope_bags.unpacking import Allowance, ChunkError, chunk_head, unpacked
 
 MAGIC = b'\x89MCAP0\r\n'
+UNSURE_NAMES = 'the names of topics agree with no checksum'
 _CRC_STEP = 1 << 24
+_MOST_DAMAGE = 100
+# How many records must follow each other, end to head, to be taken for records in a damaged file.
+_CHAIN = 3
+# Where a record may begin: an opcode, and a length below 4 GiB.
+_PERHAPS_RECORD = re.compile(rb'(?=[\x01-\x0f].{4}\x00{4})', re.DOTALL)
 _RECORD_HEAD = struct.Struct('<BQ')
 MESSAGE_HEAD = np.dtype(
     [
@@ -62,6 +68,12 @@ class Messages:
 
     def __len__(self) -> int:
         return len(self.channel)
+
+    def only(self, chosen: npt.NDArray[np.bool_]) -> 'Messages':
+        """The messages chosen, by a mask (N,)."""
+        if chosen.all():
+            return self
+        return Messages(**{key: values[chosen] for key, values in vars(self).items()})
 
 
 @dataclass
@@ -106,7 +118,12 @@ class McapScan:
                 start, stop, chunked = self.blocks[int(index)]
                 file.seek(start)
                 data = file.read(stop - start)
-                yield int(index), _decompressed(data) if chunked else data
+                try:
+                    yield int(index), unpacked(data) if chunked else data
+                except ChunkError as error:
+                    raise CorruptBagError(
+                        f'{self.path}: chunk at byte {start} changed while it was read: {error}'
+                    ) from error
 
 
 def scan_mcap(path: str | Path, *, salvage: bool = False) -> McapScan:
@@ -128,7 +145,8 @@ def scan_mcap(path: str | Path, *, salvage: bool = False) -> McapScan:
     TruncatedBagError
         The end is missing.
     CorruptBagError
-        A chunk does not agree with its checksum or does not decompress.
+        Something does not agree with its checksum, its length, or what the file says elsewhere, or
+        a chunk holds more than is read (see `endoscope_bags.unpacking`).
     """
     path = Path(path)
     if not path.is_file():
@@ -137,10 +155,54 @@ def scan_mcap(path: str | Path, *, salvage: bool = False) -> McapScan:
         size = path.stat().st_size
         if size == 0:
             raise NotABagError(f'{path}: empty file, not an MCAP recording')
-        if file.read(len(MAGIC)) != MAGIC:
+        # Damage may hit the first bytes, too; what is no recording shows by having no records.
+        if file.read(len(MAGIC)) != MAGIC and not salvage:
             raise NotABagError(f'{path}: not an MCAP recording (wrong first bytes)')
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             return _Pass(path, data, salvage).run()
+
+
+class _ExactStream(ReadDataStream):
+    """A stream of one record that ends nowhere but where the record does."""
+
+    def __init__(self, body: bytes) -> None:
+        super().__init__(BytesIO(body))
+
+    def read(self, length: int) -> bytes:
+        data: bytes = super().read(length)
+        if len(data) != length:
+            raise EndOfFile
+        return data
+
+
+@dataclass
+class _Described:
+    """Schemas and channels by id, each as first described; the bytes spare reading it again."""
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    _bodies: dict[tuple[int, bytes], bytes] = field(default_factory=dict)
+
+    def add(self, opcode: int, body: bytes) -> None:
+        """Take a description, unless it was given before.
+
+        Raises
+        ------
+        ValueError
+            Another one was given for the same id.
+        """
+        key = (opcode, body[:2])
+        if self._bodies.get(key) == body:
+            return
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(_ExactStream(body))
+            same = self.schemas.setdefault(schema.id, schema) == schema
+        else:
+            channel = Channel.read(_ExactStream(body))
+            same = self.channels.setdefault(channel.id, channel) == channel
+        if not same:
+            raise ValueError('another description of the same id came before')
+        self._bodies[key] = body
 
 
 class _Pass:
@@ -150,6 +212,16 @@ class _Pass:
         self.scan = McapScan(path)
         self._data = data
         self._salvage = salvage
+        self._allowance = Allowance.of(len(data))
+        self._written = _Described()
+        self._summary = _Described()
+        self._statistics: Statistics | None = None
+        self._data_end: int | None = None
+        self._summary_holds = self._summary_fails = False
+        self._n_chunks = 0
+        self._chunked = False
+        # Nothing before this byte is looked through for records again: chunks contain some.
+        self._trusted = 0
         self._heads: list[npt.NDArray[np.void]] = []
         self._starts: list[IntArray] = []
         self._blocks: list[int] = []
@@ -157,39 +229,86 @@ class _Pass:
 
     def run(self) -> McapScan:
         position = len(MAGIC)
-        ended = False
+        whole_head = self._data[:position] == MAGIC
+        if not whole_head:
+            self._damaged(CorruptBagError, 'the first bytes are not those of an MCAP recording')
+        before, ended = position, False
         while not ended:
             record = self._record(position)
             if record is None:
-                break
+                found = self._next_record(max(before + 1, self._trusted)) if self._salvage else None
+                if found is None:
+                    self._truncated(position)
+                    break
+                if found < position and self._loose and self._loose[-1] == before:
+                    self._loose.pop()
+                self._end_loose_messages(min(found, position))
+                self._damaged(CorruptBagError, f'no records at byte {position}, up to {found}')
+                before = position = found
+                continue
             opcode, start, stop = record
             if opcode == Opcode.MESSAGE and stop - start >= MESSAGE_HEAD_LENGTH:
                 self._loose.append(position)
             else:
                 self._end_loose_messages(position)
                 self._other(opcode, start, stop)
-                if opcode == Opcode.DATA_END:
-                    self._check_data(position, self._data[start:stop])
                 ended = opcode == Opcode.FOOTER
-            position = stop
+            before, position = position, stop
         if ended and self._data[position : position + len(MAGIC)] != MAGIC:
             self._truncated(position)
         self._end_loose_messages(position)
-        self.scan.messages = self._table()
+        self._settle()
+        if not (whole_head or len(self.scan.messages)):
+            raise NotABagError(f'{self.scan.path}: not an MCAP recording (wrong first bytes)')
         return self.scan
 
     def _record(self, position: int) -> tuple[int, int, int] | None:
+        """Opcode, start and stop of the record here; None where none can be."""
         start = position + _RECORD_HEAD.size
-        if start <= len(self._data):
-            opcode, length = _RECORD_HEAD.unpack_from(self._data, position)
-            if opcode == 0:
-                # A crash of the machine leaves zeros where the file had grown but was not written.
-                self._truncated(position)
+        if start > len(self._data):
+            return None
+        opcode, length = _RECORD_HEAD.unpack_from(self._data, position)
+        # A crash of the machine leaves zeros where the file had grown but was not written.
+        if opcode == 0 or start + length > len(self._data):
+            return None
+        if opcode == Opcode.CHUNK and self._salvage:
+            self._chunked = True
+            try:
+                chunk_head(self._data, start, start + length)
+            except ChunkError:
                 return None
-            if start + length <= len(self._data):
-                return opcode, start, start + length
-        self._truncated(position)
+        return opcode, start, start + length
+
+    def _next_record(self, begin: int) -> int | None:
+        """Where the next records of a damaged file begin that make a chain."""
+        for match in _PERHAPS_RECORD.finditer(self._data, begin):
+            if self._chained(match.start()):
+                return match.start()
         return None
+
+    def _chained(self, position: int) -> bool:
+        for _ in range(_CHAIN):
+            if self._data[position : position + len(MAGIC) + 1] == MAGIC:
+                return True
+            record = self._record(position)
+            if record is None or record[0] > Opcode.DATA_END:
+                return False
+            opcode, start, stop = record
+            if opcode == Opcode.MESSAGE and not self._is_of_known_channel(start, stop):
+                return False
+            if opcode == Opcode.CHUNK:
+                return True
+            if opcode == Opcode.FOOTER:
+                return stop - start == 20
+            position = stop
+        return True
+
+    def _is_of_known_channel(self, start: int, stop: int) -> bool:
+        # Where there are chunks, a message by itself is a piece of one that no checksum covers.
+        if self._chunked:
+            return False
+        channel = int.from_bytes(self._data[start : start + 2], 'little')
+        return stop - start >= MESSAGE_HEAD_LENGTH and channel in self._written.channels
 
     def _truncated(self, position: int) -> None:
         self.scan.truncated = True
@@ -201,7 +320,10 @@ class _Pass:
     def _damaged(self, kind: type[TruncatedBagError | CorruptBagError], what: str) -> None:
         if not self._salvage:
             raise kind(f'{self.scan.path}: {what}; try `endoscope bag recover`')
-        self.scan.damage.append(what)
+        if len(self.scan.damage) < _MOST_DAMAGE:
+            self.scan.damage.append(what)
+        elif len(self.scan.damage) == _MOST_DAMAGE:
+            self.scan.damage.append('and more')
 
     def _other(self, opcode: int, start: int, stop: int) -> None:
         try:
@@ -209,43 +331,96 @@ class _Pass:
                 self._chunk(start, stop)
             elif opcode == Opcode.MESSAGE:
                 self._damaged(CorruptBagError, f'message record at byte {start} is too short')
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.HEADER, Opcode.METADATA):
-                self._describe(opcode, self._data[start:stop])
-        except (EndOfFile, struct.error, UnicodeDecodeError) as error:
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                described = self._written if self._data_end is None else self._summary
+                described.add(opcode, self._data[start:stop])
+            elif opcode == Opcode.HEADER:
+                self.scan.header = Header.read(_ExactStream(self._data[start:stop]))
+            elif opcode == Opcode.METADATA:
+                record = Metadata.read(_ExactStream(self._data[start:stop]))
+                self.scan.metadata[record.name] = record.metadata
+            elif opcode == Opcode.STATISTICS:
+                self._statistics = Statistics.read(_ExactStream(self._data[start:stop]))
+            elif opcode == Opcode.DATA_END:
+                if self._data_end is not None:
+                    raise ValueError('the data ended before')
+                self._data_end = stop
+                self._check_data(start, stop)
+            elif opcode == Opcode.FOOTER:
+                self._check_summary(start, stop)
+        except (EndOfFile, struct.error, ValueError) as error:
             name = Opcode(opcode).name.lower()
             self._damaged(
-                CorruptBagError, f'{name} record at byte {start} does not decode: {error}'
+                CorruptBagError,
+                f'{name} record at byte {start} does not decode: {str(error) or "it is too short"}',
             )
 
-    def _check_data(self, end: int, body: bytes) -> None:
-        expected = DataEnd.read(ReadDataStream(BytesIO(body))).data_section_crc
+    def _checksum(self, begin: int, end: int) -> int:
         actual = 0
-        for start in range(0, end, _CRC_STEP):
+        for start in range(begin, end, _CRC_STEP):
             actual = zlib.crc32(self._data[start : min(start + _CRC_STEP, end)], actual)
-        if expected not in (0, actual):
+        return actual
+
+    def _check_data(self, start: int, stop: int) -> None:
+        expected = DataEnd.read(_ExactStream(self._data[start:stop])).data_section_crc
+        if expected not in (0, self._checksum(0, start - _RECORD_HEAD.size)):
             self._damaged(CorruptBagError, 'the data do not agree with their checksum')
 
-    def _describe(self, opcode: int, body: bytes) -> None:
-        stream = ReadDataStream(BytesIO(body))
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(stream)
-            self.scan.schemas[schema.id] = schema
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(stream)
-            self.scan.channels[channel.id] = channel
-        elif opcode == Opcode.HEADER:
-            self.scan.header = Header.read(stream)
-        else:
-            record = Metadata.read(stream)
-            self.scan.metadata[record.name] = record.metadata
+    def _check_summary(self, start: int, stop: int) -> None:
+        footer = Footer.read(_ExactStream(self._data[start:stop]))
+        if self._data_end is None:
+            self._damaged(CorruptBagError, 'the record that ends the data is missing')
+            return
+        begin = self._data_end
+        if footer.summary_start not in (0, begin):
+            self._damaged(CorruptBagError, 'the footer does not point to the summary')
+        elif footer.summary_crc:
+            self._summary_holds = self._checksum(begin, start + 16) == footer.summary_crc
+            self._summary_fails = not self._summary_holds
+            if self._summary_fails:
+                self._damaged(CorruptBagError, 'the summary does not agree with its checksum')
+
+    def _settle(self) -> None:
+        """Put together what data and summary say; where they differ, by which checksum holds."""
+        written, summary = self._written, self._summary
+        for kind in ('schemas', 'channels'):
+            told, again = getattr(written, kind), getattr(summary, kind)
+            for number in told.keys() & again.keys():
+                if told[number] != again[number]:
+                    unsure = '' if self._summary_holds else f'; {UNSURE_NAMES}'
+                    self._damaged(
+                        CorruptBagError, f'{kind[:-1]} {number} is another in the summary{unsure}'
+                    )
+        first, second = (written, summary) if self._summary_holds else (summary, written)
+        self.scan.schemas = first.schemas | second.schemas
+        self.scan.channels = first.channels | second.channels
+        if self._summary_fails and summary.channels.keys() - written.channels.keys():
+            self._damaged(CorruptBagError, UNSURE_NAMES)
+        messages = self._table()
+        counted = self._statistics.message_count if self._statistics else len(messages)
+        if counted != len(messages):
+            self._damaged(
+                CorruptBagError, f'{len(messages)} messages where its summary counts {counted}'
+            )
+        known = np.isin(messages.channel, list(self.scan.channels))
+        # A time beyond 2**63 ns (the year 2262) became negative.
+        timely = (messages.log_ns >= 0) & (messages.publish_ns >= 0)
+        for sound, what in ((known, 'of no channel'), (timely, 'of impossible times')):
+            if not sound.all():
+                self._damaged(CorruptBagError, f'{int((~sound).sum())} messages {what}')
+        self.scan.messages = messages.only(known & timely)
 
     def _chunk(self, start: int, stop: int) -> None:
+        self._n_chunks += 1
         try:
-            records = _decompressed(self._data[start:stop])
+            chunk_head(self._data, start, stop)
+            self._trusted = stop
+            records = unpacked(self._data[start:stop], self._allowance)
             positions = self._message_positions(records)
-        except (McapError, ValueError, RuntimeError, struct.error, ZstdError) as error:
-            number = sum(chunked for _, _, chunked in self.scan.blocks) + 1
-            self._damaged(CorruptBagError, f'chunk {number} at byte {start} is damaged: {error}')
+        except ChunkError as error:
+            self._damaged(
+                CorruptBagError, f'chunk {self._n_chunks} at byte {start} is damaged: {error}'
+            )
             return
         self._add_block(records, positions, (start, stop, True))
 
@@ -253,19 +428,26 @@ class _Pass:
         positions = []
         position = 0
         end = len(records)
-        while position + _RECORD_HEAD.size <= end:
-            opcode, length = _RECORD_HEAD.unpack_from(records, position)
-            following = position + _RECORD_HEAD.size + length
-            if following > end:
-                break
-            if opcode == Opcode.MESSAGE:
-                _require_message_head(length)
-                positions.append(position)
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._describe(opcode, records[position + _RECORD_HEAD.size : following])
-            position = following
-        if position != end:
-            raise ValueError(f'its records end after {position} of {end} bytes')
+        try:
+            while position < end:
+                if position + _RECORD_HEAD.size > end:
+                    raise ChunkError(f'its records end after {position} of {end} bytes')
+                opcode, length = _RECORD_HEAD.unpack_from(records, position)
+                following = position + _RECORD_HEAD.size + length
+                if following > end:
+                    raise ChunkError(f'its records end after {position} of {end} bytes')
+                self._allowance.take(0, 1)
+                if opcode == Opcode.MESSAGE:
+                    if length < MESSAGE_HEAD_LENGTH:
+                        raise ChunkError(f'a message record of {length} bytes')
+                    positions.append(position)
+                elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                    self._written.add(opcode, records[position + _RECORD_HEAD.size : following])
+                position = following
+        except (ChunkError, EndOfFile, struct.error, ValueError) as error:
+            if not self._salvage:
+                raise ChunkError(str(error) or 'a record in it is too short') from error
+            self._damaged(CorruptBagError, f'a chunk is sound for {position} bytes only: {error}')
         return positions
 
     def _end_loose_messages(self, stop: int) -> None:
@@ -303,14 +485,3 @@ class _Pass:
             start=np.concatenate(self._starts),
             size=size,
         )
-
-
-def _require_message_head(length: int) -> None:
-    if length < MESSAGE_HEAD_LENGTH:
-        raise ValueError(f'a message record of {length} bytes')
-
-
-def _decompressed(chunk_body: bytes) -> bytes:
-    chunk = Chunk.read(ReadDataStream(BytesIO(chunk_body)))
-    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-    return stream.read(size)

@@ -6,6 +6,8 @@ from typing import Any
 
 import yaml
 
+from endoscope_core.strict_yaml import YamlError, parse_yaml
+
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
 
@@ -58,17 +60,19 @@ def qos_as_yaml(profiles: Sequence[QosProfile]) -> str:
 
 
 def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
-    """Return the profiles in the channel metadata of any rosbag2 version; none if unreadable.
+    """Return the profiles in the channel metadata of any rosbag2 version; none for no text.
 
     Before version 9 rosbag2 wrote the policies as the numbers of rmw; both are understood.
+
+    Raises
+    ------
+    YamlError
+        The text is no list of profiles.
     """
-    try:
-        entries = yaml.safe_load(text) if text else None
-    except yaml.YAMLError:
-        return ()
-    if not isinstance(entries, list):
-        return ()
-    return tuple(_from_entry(entry) for entry in entries if isinstance(entry, dict))
+    entries = parse_yaml(text, 'the quality of service') if text.strip() else []
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise YamlError(f'the quality of service is {text!r}: not a list of profiles')
+    return tuple(_from_entry(entry) for entry in entries)
 
 
 def _from_entry(entry: dict[str, Any]) -> QosProfile:
@@ -76,11 +80,16 @@ def _from_entry(entry: dict[str, Any]) -> QosProfile:
         value = entry.get(key)
         if isinstance(value, int):
             return names[value] if 0 <= value < len(names) else 'unknown'
-        return str(value) if value is not None else 'unknown'
+        if value is not None and not isinstance(value, str):
+            raise YamlError(f'the quality of service has {value!r} as its {key}')
+        return value or 'unknown'
 
+    depth = entry.get('depth') or 0
+    if not isinstance(depth, int):
+        raise YamlError(f'the quality of service has {depth!r} as its depth')
     return QosProfile(
         reliability=named('reliability', ('system_default', 'reliable', 'best_effort')),
         durability=named('durability', ('system_default', 'transient_local', 'volatile')),
-        depth=int(entry.get('depth') or 0),
+        depth=max(depth, 0),
         history=named('history', ('system_default', 'keep_last', 'keep_all')),
     )

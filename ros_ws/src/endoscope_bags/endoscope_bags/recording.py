@@ -2,20 +2,19 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from rosbags.serde import SerdeError
 
-from endoscope_bags.bag_files import bag_files
-from endoscope_bags.cdr_decoding import Payloads
+from endoscope_bags.cdr_decoding import HEAD_WITH_STAMP, Payloads, stamps_of_heads
 from endoscope_bags.cdr_layout import QUANTITIES
 from endoscope_bags.errors import (
     AmbiguousTopicError,
     BagError,
+    CorruptBagError,
     EmptyBagError,
     MalformedMessageError,
     MissingTopicError,
@@ -30,18 +29,12 @@ from endoscope_bags.joint_state_series import (
 )
 from endoscope_bags.mcap_scan import McapScan, scan_mcap
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, typestore
-from endoscope_bags.qos_profile import qos_from_yaml
+from endoscope_bags.metadata import bag_files
+from endoscope_bags.qos_profile import QosProfile, qos_from_yaml
 from endoscope_bags.topic import MessageTimes, RawMessage, Topic
+from endoscope_core.strict_yaml import LARGEST, YamlError
 
 IntArray = npt.NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """The messages of one topic in one file."""
-
-    scan: McapScan
-    index: IntArray
 
 
 @contextmanager
@@ -53,6 +46,31 @@ def _naming(path: Path) -> Iterator[None]:
         if str(path) in str(error):
             raise
         raise type(error)(f'{path}: {error}') from error
+
+
+class _Block(NamedTuple):
+    """A chunk, decompressed, and where in it the messages of some topics are (by their number)."""
+
+    data: bytes
+    topic: IntArray
+    start: IntArray
+    size: IntArray
+    log_ns: IntArray
+    publish_ns: IntArray
+    sequence: IntArray
+
+
+def _rows_of_topics(scan: McapScan) -> dict[str, IntArray]:
+    """For each topic of a file the rows of its messages in the file's table."""
+    names = list(dict.fromkeys(channel.topic for channel in scan.channels.values()))
+    numbers = {name: k for k, name in enumerate(names)}
+    of_channel = np.zeros(1 << 16, dtype=np.int64)
+    for channel in scan.channels.values():
+        of_channel[channel.id] = numbers[channel.topic]
+    topic = of_channel[scan.messages.channel]
+    order = np.argsort(topic, kind='stable')
+    bounds = np.searchsorted(topic[order], np.arange(1, len(names)))
+    return dict(zip(names, np.split(order, bounds), strict=bool(names)))
 
 
 class Recording:
@@ -72,19 +90,26 @@ class Recording:
         What is wrong, one line each; empty unless it was opened with `salvage`.
     """
 
-    def __init__(self, path: Path, scans: Sequence[McapScan]) -> None:
+    def __init__(self, path: Path, scans: Sequence[McapScan], salvage: bool = False) -> None:
         self.path = path
+        self._salvage = salvage
         self.library = scans[0].header.library
         self.metadata = {k: v for scan in scans for k, v in scan.metadata.items()}
         self.damage = tuple(f'{s.path.name}: {what}' for s in scans for what in s.damage)
-        self._rows: dict[str, list[_Rows]] = {}
+        self._scans = tuple(scans)
+        # For each file, the rows of each topic in its table of messages.
+        self._rows: list[dict[str, IntArray]] = []
         self.topics: dict[str, Topic] = {}
+        self._qos: dict[str, tuple[QosProfile, ...]] = {}
         for scan in scans:
             self._add(scan)
 
     def _add(self, scan: McapScan) -> None:
+        rows = _rows_of_topics(scan)
+        uncounted = dict(rows)
+        self._rows.append(rows)
+        definitions = {n: s.data.decode(errors='replace') for n, s in scan.schemas.items()}
         for channel in scan.channels.values():
-            rows = np.flatnonzero(scan.messages.channel == channel.id)
             schema = scan.schemas.get(channel.schema_id)
             before = self.topics.get(channel.topic)
             kind = schema.name if schema else ''
@@ -92,15 +117,30 @@ class Recording:
                 raise TopicTypeError(
                     f'{scan.path}: topic {channel.topic} is both {before.type} and {kind}'
                 )
-            self._rows.setdefault(channel.topic, []).append(_Rows(scan, rows))
+            try:
+                qos = self._read_qos(channel.metadata.get('offered_qos_profiles', ''))
+            except YamlError as error:
+                what = f'{scan.path}: topic {channel.topic}: {error}'
+                if not self._salvage:
+                    raise CorruptBagError(f'{what}; try `endoscope bag recover`') from error
+                self.damage = (*self.damage, what)
+                qos = ()
+            counted = before.message_count if before else 0
             self.topics[channel.topic] = Topic(
                 name=channel.topic,
                 type=kind,
-                message_count=len(rows) + (before.message_count if before else 0),
-                definition=schema.data.decode(errors='replace') if schema else '',
+                message_count=counted + len(uncounted.pop(channel.topic, ())),
+                definition=definitions.get(channel.schema_id, ''),
                 type_hash=channel.metadata.get('topic_type_hash', ''),
-                qos=qos_from_yaml(channel.metadata.get('offered_qos_profiles', '')),
+                qos=qos,
             )
+
+    def _read_qos(self, text: str) -> tuple[QosProfile, ...]:
+        if text not in self._qos:
+            if sum(map(len, self._qos)) + len(text) > LARGEST:
+                raise YamlError(f'quality of service of more than {LARGEST >> 20} MiB')
+            self._qos[text] = qos_from_yaml(text)
+        return self._qos[text]
 
     @property
     def message_count(self) -> int:
@@ -118,10 +158,7 @@ class Recording:
         return max(int(t.max()) for t in self._all_log_ns())
 
     def _all_log_ns(self) -> Iterator[IntArray]:
-        for parts in self._rows.values():
-            for part in parts:
-                if len(part.index):
-                    yield part.scan.messages.log_ns[part.index]
+        return (scan.messages.log_ns for scan in self._scans if len(scan.messages))
 
     def find(self, suffix: str, namespace: str | None = None) -> str:
         """Return the full name of the topic `suffix` under whatever namespace.
@@ -220,29 +257,55 @@ class Recording:
 
     def times(self, topic: str) -> MessageTimes:
         """Return receipt, publication and counter of the messages of a full topic name."""
-        parts = self._rows[topic]
+        parts = [
+            (scan.messages, rows[topic])
+            for scan, rows in zip(self._scans, self._rows, strict=True)
+            if topic in rows
+        ]
         return MessageTimes(
             *(
-                np.concatenate([getattr(part.scan.messages, key)[part.index] for part in parts])
+                np.concatenate([getattr(messages, key)[index] for messages, index in parts])
                 for key in ('log_ns', 'publish_ns', 'sequence')
             )
         )
 
     def payloads(self, topic: str) -> Payloads:
         """Return the bytes of the messages of a full topic name, as recorded."""
-        pieces: list[bytes] = []
-        sizes: list[IntArray] = []
-        for part in self._rows[topic]:
-            messages = part.scan.messages
-            blocks = messages.block[part.index]
-            for block, data in part.scan.block_data(np.unique(blocks)):
-                rows = part.index[blocks == block]
-                starts, lengths = messages.start[rows], messages.size[rows]
-                ends = starts + lengths
-                pieces += [data[a:b] for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
-                sizes.append(lengths)
-        size = np.concatenate(sizes) if sizes else np.empty(0, np.int64)
-        return Payloads(b''.join(pieces), np.cumsum(size) - size, size)
+        return self._payloads([topic])[0]
+
+    def _payloads(self, topics: Sequence[str]) -> list[Payloads]:
+        content = [bytearray() for _ in topics]
+        sizes: list[list[int]] = [[] for _ in topics]
+        for block in self._blocks(topics):
+            ends = block.start + block.size
+            rows = zip(block.topic.tolist(), block.start.tolist(), ends.tolist(), strict=True)
+            for topic, start, end in rows:
+                content[topic] += block.data[start:end]
+                sizes[topic].append(end - start)
+        arrays = [np.array(each, dtype=np.int64) for each in sizes]
+        return [
+            Payloads(bytes_, np.cumsum(size) - size, size)
+            for bytes_, size in zip(content, arrays, strict=True)
+        ]
+
+    def header_stamps(self, topics: Sequence[str]) -> list[IntArray]:
+        """Return the header stamps in ns, each (N,), of topics whose messages begin with a header.
+
+        Parameters
+        ----------
+        topics
+            Full names. Messages too short for a stamp are left out.
+        """
+        heads = [
+            (block.topic[long], stamps_of_heads(block.data, block.start[long]))
+            for block in self._blocks(topics)
+            for long in [block.size >= HEAD_WITH_STAMP]
+        ]
+        topic = np.concatenate([t for t, _ in heads] or [np.empty(0, np.int64)])
+        stamp = np.concatenate([s for _, s in heads] or [np.empty(0, np.int64)])
+        order = np.argsort(topic, kind='stable')
+        bounds = np.searchsorted(topic[order], np.arange(1, len(topics)))
+        return np.split(stamp[order], bounds)
 
     def messages(self, topics: Sequence[str] | None = None) -> Iterator[RawMessage]:
         """Yield messages by receipt time.
@@ -253,10 +316,10 @@ class Recording:
             Full names; None for all.
         """
         chosen = list(self.topics) if topics is None else list(topics)
-        times = [self.times(topic) for topic in chosen]
-        payloads = [self.payloads(topic) for topic in chosen]
         if not chosen:
             return
+        times = [self.times(topic) for topic in chosen]
+        payloads = self._payloads(chosen)
         which = np.repeat(np.arange(len(chosen)), [len(t.log_ns) for t in times])
         row = np.concatenate([np.arange(len(t.log_ns)) for t in times])
         log_ns = np.concatenate([t.log_ns for t in times])
@@ -269,6 +332,34 @@ class Recording:
                 int(times[topic].sequence[index]),
                 payloads[topic][index],
             )
+
+    def stored_messages(self) -> Iterator[RawMessage]:
+        """Yield all messages as they are stored, chunk by chunk, which needs little memory."""
+        topics = list(self.topics)
+        for block in self._blocks(topics):
+            columns = (block.topic, block.log_ns, block.publish_ns, block.sequence)
+            ends = block.start + block.size
+            rows = zip(*(c.tolist() for c in (*columns, block.start, ends)), strict=True)
+            for topic, log_ns, publish_ns, sequence, start, end in rows:
+                data = block.data[start:end]
+                yield RawMessage(topics[topic], log_ns, publish_ns, sequence, data)
+
+    def _blocks(self, topics: Sequence[str]) -> Iterator['_Block']:
+        """Read each chunk that holds messages of these topics once."""
+        for scan, rows in zip(self._scans, self._rows, strict=True):
+            parts = [rows.get(topic, np.empty(0, np.int64)) for topic in topics]
+            index = np.concatenate([*parts, np.empty(0, np.int64)])
+            in_file_order = np.argsort(index, kind='stable')
+            index = index[in_file_order]
+            topic = np.repeat(np.arange(len(parts)), [len(p) for p in parts])[in_file_order]
+            m = scan.messages
+            numbers, first = np.unique(m.block[index], return_index=True)
+            ends = np.append(first, len(index))[1:]
+            spans = zip(first, ends, scan.block_data(numbers), strict=True)
+            for begin, end, (_, data) in spans:
+                i = index[begin:end]
+                columns = (m.start[i], m.size[i], m.log_ns[i], m.publish_ns[i], m.sequence[i])
+                yield _Block(data, topic[begin:end], *columns)
 
     def decoded(self, topic: str) -> Iterator[tuple[RawMessage, Any]]:
         """Yield the messages of a full topic name, each with its object, of whatever type.
@@ -316,7 +407,7 @@ def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
         foreign = {c.message_encoding for c in scan.channels.values()} - {'cdr'}
         if foreign:
             raise BagError(f'{scan.path}: message encoding {foreign.pop()!r} instead of cdr')
-    recording = Recording(path, scans)
+    recording = Recording(path, scans, salvage)
     if not recording.message_count:
         raise EmptyBagError(f'{path}: holds no message')
     return recording

@@ -6,6 +6,7 @@ from pathlib import Path
 from endoscope_bags.bag_writer import BagWriter
 from endoscope_bags.message_types import MessageType
 from endoscope_bags.recording import Recording, open_bag
+from endoscope_core.errors import printable
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class RecoveryReport:
         seconds = (self.end_ns - self.start_ns) * 1e-9
         lines.append(f'saved {self.message_count} messages over {seconds:.3f} s')
         lines += [f'  {topic}: {count}' for topic, count in sorted(self.counts.items())]
-        return '\n'.join(lines)
+        return '\n'.join(map(printable, lines))
 
 
 def recover(source: str | Path, target: str | Path) -> RecoveryReport:
@@ -68,7 +69,7 @@ def _copy(recording: Recording, writer: BagWriter) -> None:
     for topic in recording.topics.values():
         kind = MessageType(topic.type, topic.definition, topic.type_hash)
         writer.add_topic(topic.name, kind, topic.qos)
-    for message in recording.messages():
+    for message in recording.stored_messages():
         kind_name = recording.topics[message.topic].type
         writer.write_raw(
             message.topic,

@@ -20,10 +20,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from endoscope_bags.errors import BagError
+from endoscope_core.strict_yaml import YamlError, load_yaml
 
+_TYPES = {str: 'a text', int: 'a whole number', bool: 'true or false'}
 QUANTITIES = ('position', 'velocity', 'effort')
 UNITS = {
     's': 1.0,
@@ -108,13 +108,10 @@ def load_table_mapping(path: str | Path) -> TableMapping:
     TableMappingError
         If the file cannot be read, or a key is unknown, missing or has a wrong value.
     """
-    path = Path(path)
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise TableMappingError(f'cannot read mapping {path}: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise TableMappingError(f'{path} is not YAML: {" ".join(str(error).split())}') from error
+        content = load_yaml(path)
+    except YamlError as error:
+        raise TableMappingError(f'mapping: {error}') from error
     try:
         return _mapping(content)
     except ValueError as error:
@@ -147,17 +144,29 @@ def _mapping(content: Any) -> TableMapping:
         raise ValueError('topics is empty')
     if 'drop_repeats' in given and given.get('sample_and_hold'):
         raise ValueError('drop_repeats has no meaning beside sample_and_hold: leave it out')
-    delimiter = str(given.get('delimiter', ','))
+    delimiter = _of_type(str, given, 'delimiter', ',')
+    if delimiter != 'whitespace' and len(delimiter) != 1:
+        raise ValueError(f'delimiter is {delimiter!r}: give one character, or whitespace')
+    header_lines = _of_type(int, given, 'header_lines', 0)
+    if header_lines < 0:
+        raise ValueError(f'header_lines is {header_lines}: give how many lines to skip')
     return TableMapping(
         _column(given['time'], 'time'),
         topics,
         None if delimiter == 'whitespace' else delimiter,
-        int(_number(given.get('header_lines', 0), 'header_lines')),
-        str(given.get('namespace', '/endoscope')).rstrip('/'),
+        header_lines,
+        _of_type(str, given, 'namespace', '/endoscope').rstrip('/'),
         _number(given.get('start_s', 0.0), 'start_s'),
-        bool(given.get('drop_repeats', True)),
-        bool(given.get('sample_and_hold', False)),
+        _of_type(bool, given, 'drop_repeats', True),
+        _of_type(bool, given, 'sample_and_hold', False),
     )
+
+
+def _of_type[Kind](kind: type[Kind], given: Mapping[str, Any], key: str, default: Kind) -> Kind:
+    value = given.get(key, default)
+    if type(value) is not kind:
+        raise ValueError(f'{key} is {value!r}: give {_TYPES[kind]}')
+    return value
 
 
 def _topic(topic: str, content: Any) -> dict[str, dict[str, Column]]:
@@ -193,6 +202,8 @@ def _section(value: Any, where: str, valid: tuple[str, ...] | None = None) -> Ma
     if not isinstance(value, Mapping):
         raise ValueError(f'{where} must be a mapping of names to values, not {value!r}')
     for key in value:
+        if not isinstance(key, str):
+            raise ValueError(f'{key!r} in {where} is no name: put it in quotes')
         if valid is not None and key not in valid:
             raise ValueError(f'unknown key {key} in {where}: valid are {", ".join(valid)}')
     return value

@@ -16,6 +16,10 @@ from endoscope_bags.table_mapping import Column, TableMapping
 Array = NDArray[np.float64]
 
 
+# A bag counts nanoseconds in 63 bits; rows between times may lie as far behind the last one.
+_LATEST = 2.0**62 * 1e-9
+
+
 class TableError(BagError, ValueError):
     """A text table that cannot be converted; the message names the file and the line."""
 
@@ -67,10 +71,10 @@ def convert_table(table: str | Path, mapping: TableMapping, out: str | Path) -> 
     numbers = _read(table, mapping)
     rows = len(numbers)
     time = _si(numbers, mapping.time) + mapping.start_s
+    _check(table, time)
     if mapping.drop_repeats and not mapping.sample_and_hold:
         fresh = np.r_[True, np.diff(time) != 0.0]
         numbers, time = numbers[fresh], time[fresh]
-    _check(table, time)
     if mapping.sample_and_hold:
         time = _between_times(table, time)
     used = np.zeros(len(time), bool)
@@ -145,7 +149,9 @@ def _columns(mapping: TableMapping) -> list[Column]:
 
 
 def _si(numbers: Array, column: Column) -> Array:
-    return np.asarray(numbers[:, column.number - 1] * column.scale + column.offset)
+    # What goes beyond all numbers is found by its not being finite.
+    with np.errstate(over='ignore', invalid='ignore'):
+        return np.asarray(numbers[:, column.number - 1] * column.scale + column.offset)
 
 
 def _between_times(table: Path, time: Array) -> Array:
@@ -163,6 +169,8 @@ def _between_times(table: Path, time: Array) -> Array:
 
 def _check(table: Path, time: Array) -> None:
     _check_finite(table, 'the time', 'column', time[:, None])
+    if np.abs(time).max() >= _LATEST:
+        raise TableError(f'{table}: time reaches {np.abs(time).max():g} s: no stamp can')
     if time[0] < 0.0:
         raise TableError(f'{table}: time begins at {time[0]:g} s: set start_s in the mapping')
     backward = np.flatnonzero(np.diff(time) < 0.0)

@@ -219,7 +219,7 @@ def test_a_recording_without_messages_is_said(tmp_path):
 @pytest.mark.parametrize(
     ('text', 'error', 'what'),
     [
-        ('a: [', NotABagError, 'not readable as YAML'),
+        ('a: [', NotABagError, 'is not YAML'),
         ('a: 1', NotABagError, 'not the metadata of a rosbag2'),
         ('', NotABagError, 'not the metadata of a rosbag2'),
     ],

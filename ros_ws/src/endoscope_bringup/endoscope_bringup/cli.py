@@ -9,7 +9,7 @@ from types import FrameType
 
 from endoscope_bringup.commands import COMMANDS
 from endoscope_bringup.subcommands import OneLineParser, add_subcommands, run_chosen
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import EndoscopeError, printable
 
 EXIT_UNUSABLE_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _refuse(message: str) -> int:
-    print(f'endoscope: {" ".join(message.split())}', file=sys.stderr)
+    print(f'endoscope: {printable(" ".join(message.split()))}', file=sys.stderr)
     return EXIT_UNUSABLE_INPUT
 
 

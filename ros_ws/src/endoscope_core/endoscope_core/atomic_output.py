@@ -14,8 +14,6 @@ from endoscope_core.errors import EndoscopeError
 class OutputPlaceError(EndoscopeError, OSError):
     """Nothing can be written where an output should go to."""
 
-    __str__ = Exception.__str__
-
 
 class OutputExistsError(EndoscopeError, FileExistsError):
     """The place that an output should go to is taken."""

@@ -1,11 +1,30 @@
 """The one base of every error that a user, not a programmer, has to act on."""
 
+_LONGEST = 2000
+
 
 class EndoscopeError(Exception):
     """An input, a file or a request that cannot be used as it is.
 
     The message is one line that names the thing and says what to do. The command line prints it
     on stderr and exits 2; anything that is not an `EndoscopeError` is a defect and keeps its
-    traceback. Derive from a built-in as well where callers expect one:
-    ``class X(EndoscopeError, ValueError)``.
+    traceback. Names that come out of files or off the network go into it as they are: wherever it
+    is shown, it is `printable` and of 2000 characters at most. Derive from a built-in as well where
+    callers expect one: ``class X(EndoscopeError, ValueError)``.
     """
+
+    def __str__(self) -> str:
+        # An OSError, which some derive from as well, would take its arguments for errno and text.
+        text = ' '.join(Exception.__str__(self).splitlines())
+        return printable(text if len(text) <= _LONGEST else f'{text[:_LONGEST]} ...')
+
+
+def printable(text: str) -> str:
+    r"""Text with everything that steers a terminal shown as python writes it, such as ``\x1b``.
+
+    Control characters could clear a screen or set its title, line breaks forge lines of a log,
+    and marks of direction turn names around (Boucher, Anderson, USENIX Security 2023).
+    """
+    if text.isprintable():
+        return text
+    return ''.join(c if c.isprintable() else c.encode('unicode_escape').decode() for c in text)

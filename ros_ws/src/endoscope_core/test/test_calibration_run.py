@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from endoscope_core.calibration import BendingRecord, CalibrationRun, CalibrationStep
 from endoscope_core.signals import (
@@ -56,6 +57,16 @@ def test_missed_ticks_do_not_stretch_the_motion():
     run = CalibrationRun((0.0, 0.0), 4, MS, 1.0, 0.0)
     table, _ = commands_of(run, periods=3)
     assert abs(table[-1, 0] - table[0, 0] - 10.2) < 0.01
+
+
+@pytest.mark.parametrize('periods', [4, 5, 10, 20])
+def test_a_slower_beat_commands_the_same_motion_to_its_very_end(periods):
+    run = CalibrationRun((0.4, -1.0), 4, MS, 1.0, 0.5)
+    table, steps = commands_of(run, periods)
+    moving = steps.index(CalibrationStep.MOVING)
+    into = table[moving:-1, 0] - run.record.start_ns * 1e-9
+    np.testing.assert_allclose(table[moving:-1, 1], calibration_sinusoid()(into)[0], atol=1e-9)
+    np.testing.assert_array_equal(table[-1, 1:], run._rows[-1])
 
 
 def test_a_brief_calibration_from_rest_ends_within_five_seconds():

@@ -95,6 +95,14 @@ def test_first_command_must_be_near_the_measured_position():
     assert gate.check(2 * MS, (0.1, 0.0), 2 * MS, HERE) is None
 
 
+def test_from_beyond_the_reach_there_is_a_way_back_only():
+    gate = CommandGate(LIMITS)
+    beyond = (1.3, 0.0)
+    assert gate.check(MS, beyond, MS, beyond) is None
+    assert gate.check(2 * MS, (1.301, 0.0), 2 * MS, beyond) is Refusal.RANGE
+    assert gate.check(3 * MS, (1.299, 0.0), 3 * MS, beyond) is None
+
+
 def test_after_a_pause_a_stream_begins_anew_at_the_measured_position():
     gate = gate_after()
     assert gate.is_fresh(501 * MS + 100 * MS)

@@ -1,4 +1,4 @@
-"""Sessions and what the driver makes of them: no motion without an enable, no step beyond the bound."""
+"""Sessions and what the driver makes of them: no motion without an enable, no step too far."""
 
 import math
 
@@ -213,7 +213,7 @@ class AnyInterleaving(RuleBasedStateMachine):
         before, measured, now = self.driver.goal, tuple(self.shaft), self.now * MS
         if self.driver.command(session, stamp, tuple(position), (), now, doubt) is None:
             assert session, 'a command of no session was obeyed'
-            assert session == self.valid, 'a command was obeyed on nobody\'s word'
+            assert session == self.valid, "a command was obeyed on nobody's word"
             assert not doubt
             self.obeyed = self.now
             self.judge(before, measured, max(1, self.now - self.turned))
@@ -313,7 +313,7 @@ class AnyInterleaving(RuleBasedStateMachine):
         self.valid = ''
         self.send(self.driver.session.name, (position, position), doubt='2 senders')
 
-    @rule(position=st.floats(-2.0, 2.0), ahead=st.sampled_from([0, -500, 20, 10_000, 31_536_000_000]))
+    @rule(position=st.floats(-2.0, 2.0), ahead=st.sampled_from([0, -500, 20, 10_000, 10**11]))
     def leap(self, position, ahead):
         self.send(self.compensator.name, (position, position), ahead)
 

@@ -177,6 +177,31 @@ def test_estimates_stay_in_their_bounds_whatever_the_tracker_says(readings):
     assert np.all(np.linalg.eigvalsh(learning.covariance) > 0.0)
 
 
+def test_measurements_at_rest_and_the_first_after_a_silence_move_nothing():
+    feedforward = Feedforward(1)
+    bent = replace(JOINT, joint=replace(JOINT.joint, capstan_exponent=0.3))
+    feedforward.select(FeedforwardLaw('adaptive_physical', (bent,)))
+    rig = InternalModel(JOINT, 0.0, 0.0, 0.0)
+    before = 0.0
+    for k in range(3000):
+        time = k * TICK
+        command = feedforward.step([np.sin(time)], [np.cos(time)], TICK)[0]
+        if k == 2500:
+            feedforward.measure(0.0, [rig.tip])
+        if k > 2500:
+            # As fast as the motion asks for, and half as fast again.
+            assert abs(command - before) < 2.0 * TICK
+        rig.advance(command, TICK)
+        before = command
+    assert feedforward.learnt[0] != bent
+    rest = [np.sin(2.999)], [0.0], TICK
+    commands = []
+    for _ in range(2000):
+        commands.append(feedforward.step(*rest)[0])
+        feedforward.measure(0.0, [rig.tip + 0.1])
+    assert np.ptp(commands[1000:]) < 1e-9
+
+
 def test_settings_out_of_range_are_refused():
     with pytest.raises(ValueError, match='turn_lead'):
         PhysicalInverseSettings(turn_lead=1.0)

@@ -1,6 +1,6 @@
 """plant.yaml: what is written is read back, and what is wrong is named."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -14,6 +14,7 @@ from endoscope_core.plant import (
     load_plant,
     save_plant,
 )
+from endoscope_core.plant.plant_file import REACH
 
 
 def written(tmp_path, text):
@@ -69,11 +70,11 @@ def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
             "joints.bend_x.pretension is 'five': give a number",
         ),
         ('joints: {bend_x: {pretension: true}}', 'give a number'),
-        ('joints: {bend_x: {wire_stiffness: -1}}', 'wire_stiffness is -1.0: it must be positive'),
+        ('joints: {bend_x: {wire_stiffness: -1}}', 'wire_stiffness is -1: give 1 to 1e.07 N/m'),
         ('joints: {bend_x: {wire_stiffness: .nan}}', 'give a finite number'),
         ('joints: [bend_x]', 'joints must be a mapping'),
         ('sensors: {tracker_nois: 1}', 'did you mean tracker_noise'),
-        ('sensors: {tracker_rate: 0}', 'tracker_rate is 0.0: it must be positive'),
+        ('sensors: {tracker_rate: 0}', 'tracker_rate is 0: give 0.1 to 100000 Hz'),
         ('effects: {}\njoint: 1', 'unknown key joint in the plant: did you mean joints'),
         ('effects: gravity', 'effects must be a list'),
         ('effects: [{joint: bend_x}]', r'effects\[0\] has no id'),
@@ -90,6 +91,13 @@ def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
         ),
         ('joints: {bend_x: }\neffects: [{id: gravity, joint: bend_y}]', 'joint bend_y'),
         ('a: [', 'is not YAML'),
+        ('joints: {bend_x: {pretension: 1e308}}', 'pretension is 1e.308: give 0 to 1000 N'),
+        ('joints: {bend_x: {pretension: 1.0e+308}}', 'pretension is 1e.308: give 0 to 1000 N'),
+        ('sensors: {encoder_counts: 1e12}', 'give 1 to 4.29497e.09 counts a turn'),
+        ('joints: {bend_x: {pretension: 5,\n pretension: 6}}', 'line 2: key .* is given twice'),
+        ('joints: {bend_x: {pretension: ' + '9' * 5000 + '}}', 'line 1: a number of 5000 char'),
+        ('joints: ' + '[' * 5000, 'line 1: nested deeper than'),
+        ('joints: &all {bend_x: }\nsensors: *all', 'line 2: .all refers to another place'),
     ],
 )
 def test_what_is_wrong_is_named_in_one_line(tmp_path, text, message):
@@ -101,7 +109,7 @@ def test_what_is_wrong_is_named_in_one_line(tmp_path, text, message):
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(PlantFileError, match=r'cannot read plant file .*none\.yaml'):
+    with pytest.raises(PlantFileError, match=r'plant file: cannot read .*none\.yaml'):
         load_plant(tmp_path / 'none.yaml')
 
 
@@ -110,3 +118,11 @@ def test_a_file_that_is_not_text_is_refused(tmp_path):
     path.write_bytes(b'\xff\xfe\x00\x80')
     with pytest.raises(PlantFileError, match='is not YAML'):
         load_plant(path)
+
+
+def test_every_parameter_has_a_reach_that_holds_its_nominal_value():
+    for nominal in (JointParameters(), SensorParameters()):
+        for key, value in asdict(nominal).items():
+            low, high, _ = REACH[key]
+            assert low <= value <= high
+    assert len(REACH) == len(asdict(JointParameters())) + len(asdict(SensorParameters()))

@@ -134,3 +134,13 @@ def test_a_slow_motion_is_followed_with_noise_about_as_well_as_without(mode, fee
         asked = np.array([position for position, _ in wanted])
         errors.append(np.sqrt(np.mean((tips - asked)[1000:] ** 2)))
     assert errors[1] < errors[0] + 0.02
+
+
+def test_one_message_in_fifty_with_a_wrong_velocity_steps_no_shaft_and_moves_no_tip():
+    time = np.arange(0.0, 3.0, TICK).tolist()
+    clean = [((math.sin(t), math.sin(t)), (math.cos(t), math.cos(t))) for t in time]
+    wrong = [(p, (0.5, 0.5)) if k % 50 == 49 else (p, v) for k, (p, v) in enumerate(clean)]
+    tips_before, shafts_before = tip_and_shafts(clean, 'bouc_wen', 'alone')
+    tips, shafts = tip_and_shafts(wrong, 'bouc_wen', 'alone')
+    assert np.max(np.abs(shafts - shafts_before)) < 0.02
+    assert np.max(np.abs(tips - tips_before)) < 0.02

@@ -17,7 +17,7 @@ from endoscope_core.classifier.size_training import (
 )
 from endoscope_core.classifier.tension_features import log_courses, roughness
 from endoscope_core.classifier.training import use_one_thread
-from endoscope_core.classifier.weights_file import save_size_classifier
+from endoscope_core.classifier.weights_file import save_size_classifier, sealed
 from endoscope_core.dataset import (
     CLASSES_DEG,
     CalibrationDataset,
@@ -194,7 +194,7 @@ def test_weights_that_do_not_fit_are_one_clear_error(easy, tmp_path):
     save_size_classifier(path, classifier, easy, validation, 'endoscope train', 0)
     described = json.loads(path.with_suffix('.json').read_text())
     del described['inflation']
-    path.with_suffix('.json').write_text(json.dumps(described))
+    path.with_suffix('.json').write_text(json.dumps(sealed(described, path.read_bytes())))
     with pytest.raises(ClassifierError, match='no classifier weights'):
         load_classifier(path, 'brief')
     path.with_suffix('.json').write_text('{"schema": 1}')

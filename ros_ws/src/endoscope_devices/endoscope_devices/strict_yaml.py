@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.strict_yaml import YamlError, load_yaml
 
 
 class DeviceFileError(EndoscopeError, ValueError):
@@ -163,9 +162,7 @@ def load_section(path: str | Path, what: str, keys: Sequence[str]) -> Section:
         It cannot be read, is not YAML, or has an unknown key.
     """
     try:
-        content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
-    except OSError as error:
-        raise DeviceFileError(f'cannot read {what} {path}: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise DeviceFileError(f'{path} is not YAML: {" ".join(str(error).split())}') from error
+        content = load_yaml(path)
+    except YamlError as error:
+        raise DeviceFileError(f'{what}: {error}') from error
     return Section(f'{what} {path}', content, keys)

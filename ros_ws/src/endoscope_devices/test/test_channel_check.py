@@ -92,10 +92,19 @@ def test_a_spike_is_left_out_and_a_step_is_taken_at_the_third_reading():
     assert channel.check.spikes == 1
     channel.read(60_000)
     assert channel.live(5000, 1) == [None]
-    assert None not in channel.live(5000, 10)[2:]
+    assert None not in channel.live(5000, 220)[2:]
     values = [channel.read(60_000 + k) for k in range(6)]
     assert values[:2] == [None, None]
     assert values[-1] == pytest.approx(60.005)
+    assert channel.check.new_levels == 1
+
+
+def test_what_no_wire_does_in_one_interval_is_left_out():
+    channel = Channel()
+    channel.live(5000, 100)
+    assert channel.read(5000 + 9_000) == pytest.approx(14.0)
+    assert channel.read(5000 - 1_000) is None
+    assert 'spiking (from 14.00 N to 4.00 N)' in channel.check.fault
 
 
 def test_a_channel_that_keeps_spiking_is_not_believed_at_all():

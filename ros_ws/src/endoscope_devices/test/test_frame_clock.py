@@ -48,8 +48,10 @@ def test_a_late_reply_keeps_the_time_of_its_frame():
     assert clock.stamp(100, 100 * 25 * MS + 300 * MS) == pytest.approx(100 * 25 * MS, abs=MS)
 
 
-def test_a_tracker_that_counts_anew_is_followed_at_once():
+def test_a_frame_before_its_time_is_told():
     clock = FrameClock(40.0)
-    clock.stamp(90_000, 1_000 * MS)
-    assert clock.stamp(3, 9_000 * MS) == 9_000 * MS
-    assert clock.stamp(4, 9_030 * MS) == pytest.approx(9_025 * MS, abs=MS)
+    assert clock.ahead_ns(100, 0) == 0
+    clock.stamp(100, 5_000 * MS)
+    assert clock.ahead_ns(101, 5_025 * MS) <= 0.01 * MS
+    assert clock.ahead_ns(101, 5_090 * MS) == 0
+    assert clock.ahead_ns(141, 5_025 * MS) == pytest.approx(1_000 * MS, abs=MS)

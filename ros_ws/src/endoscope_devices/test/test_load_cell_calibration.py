@@ -43,6 +43,7 @@ def test_a_file_becomes_a_calibration(tmp_path):
     assert calibration.wires['left'].tension(8.0) == pytest.approx(6.0)
     assert calibration.wires['right'].tension(-400.0) == pytest.approx(4.0)
     assert calibration.faults.frozen_after == 0.5
+    assert calibration.transmitter.latency == 0.0
 
 
 def without(key, *path):

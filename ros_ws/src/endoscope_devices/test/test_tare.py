@@ -16,7 +16,7 @@ from endoscope_devices.strict_yaml import DeviceFileError
 MS = 1_000_000
 WIRES = ('pos', 'neg')
 CALIBRATION = LoadCellCalibration(
-    Transmitter(1, 4, True, 200.0, 0.02, SerialSettings()),
+    Transmitter(1, 4, True, 200.0, 0.02, 0.0, SerialSettings()),
     {'pos': WireCell(0, 'int32', 0.001, 1, 100.0), 'neg': WireCell(2, 'int32', 0.002, -1, 0.0)},
     FaultLimits(-9e4, 9e4, -8e4, 8e4),
     TareLimits(),

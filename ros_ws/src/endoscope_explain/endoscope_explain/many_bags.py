@@ -26,8 +26,6 @@ Say = Callable[[str], None]
 class ClusterError(EndoscopeError, ConnectionError):
     """The Dask cluster cannot be reached."""
 
-    __str__ = Exception.__str__
-
 
 class TogetherError(EndoscopeError, ValueError):
     """What was asked for several bags does not go together."""

@@ -17,6 +17,7 @@ from endoscope_core.calibration import (
     TensionGapError,
 )
 from endoscope_core.classifier.classification import (
+    CellReadings,
     ClassificationResult,
     Classifier,
     ClassifierError,
@@ -219,22 +220,24 @@ class CalibrationNode(EndoscopeNode):
         if run.record is None or self._classifier is None:
             return
         try:
-            tension = run.record.resampled()
+            tension, cells = run.record.resampled(), run.record.cells()
         except TensionGapError as error:
             self._abort(str(error))
             return
         if self._thread is not None:
-            self._judging = self._thread.submit(self._judgement, self._classifier, tension)
+            self._judging = self._thread.submit(self._judgement, self._classifier, tension, cells)
             return
         self._judging = Future()
         try:
-            self._judging.set_result(self._judgement(self._classifier, tension))
+            self._judging.set_result(self._judgement(self._classifier, tension, cells))
         except (ClassifierError, PlantFitError) as error:
             self._judging.set_exception(error)
 
-    def _judgement(self, classifier: Classifier, tension: np.ndarray) -> _Judgement:
+    def _judgement(
+        self, classifier: Classifier, tension: np.ndarray, cells: CellReadings
+    ) -> _Judgement:
         """What the tensions (N, 4) say; the plant is not looked for in a tube that is refused."""
-        verdict = classifier.classify(tension)
+        verdict = classifier.classify(tension, cells)
         if not self._settings.identify_plant:
             return verdict, ()
         time = np.arange(len(tension)) * TICK_NS * 1e-9
@@ -294,9 +297,7 @@ class CalibrationNode(EndoscopeNode):
         self.get_logger().error(self._last)
         if not self._homing:
             now = self.ticker.now_ns()
-            self._publish(
-                aborted_result(now, reason, str(run.step), (now - self._began_ns) * 1e-9)
-            )
+            self._publish(aborted_result(now, reason, str(run.step), (now - self._began_ns) * 1e-9))
 
     def _report(self) -> Report:
         values: dict[str, object] = {

@@ -9,6 +9,7 @@ from rclpy.time import Time
 from endoscope_core.control import (
     ADAPTIVE_PHYSICAL,
     MODES,
+    DesiredMotion,
     Feedforward,
     FeedforwardLaw,
     FeedforwardSettings,
@@ -47,6 +48,7 @@ CONSOLE = 'console'
 CALIBRATION = 'calibration'
 NOBODY = 'nobody'
 
+_AT_ZERO = (0.0,) * len(JOINTS)
 _NOTHING = np.zeros(len(JOINTS))
 _ANY_CLASS = CalibrationFindings(class_deg=70)
 
@@ -86,6 +88,7 @@ class CompensatorNode(EndoscopeNode):
             len(JOINTS), FeedforwardSettings(lead=p.lead, speed_limit=motors.speed / facts.gear)
         )
         self._passing = Feedforward(len(JOINTS))
+        self._desired = DesiredMotion(len(JOINTS))
         self._choice = LawChoice(len(JOINTS), p.parameter_sets, p.table)
         self._trouble = self._load()
         self.findings: CalibrationFindings | None = None
@@ -112,7 +115,7 @@ class CompensatorNode(EndoscopeNode):
         self._results = self.create_subscription(
             DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
         )
-        self.diagnostics.add('commands', CommandReport(self.gate))
+        self.diagnostics.add('commands', CommandReport(self.gate, self._session.leave))
         self.diagnostics.add('calibration commands', CommandReport(self.calibration_gate))
         self.diagnostics.add('corrections', CommandReport(self.correction_gate))
         self.diagnostics.add('output', self._report)
@@ -208,9 +211,7 @@ class CompensatorNode(EndoscopeNode):
         if self._source == NOBODY:
             self._take_news()
 
-    def _may_pass(
-        self, sample: JointSample, stream: JointSubscription, gate: CommandGate
-    ) -> bool:
+    def _may_pass(self, sample: JointSample, stream: JointSubscription, gate: CommandGate) -> bool:
         """Whether a message is of the open session and of the one sender of its topic."""
         if not self._session.belongs(sample):
             gate.refuse(Refusal.SESSION, sample.session or 'none named')
@@ -233,7 +234,7 @@ class CompensatorNode(EndoscopeNode):
         if not self._may_pass(sample, self._correction_in, self.correction_gate):
             return
         now = self.ticker.monotonic_ns()
-        if self.correction_gate.check(sample.stamp_ns, sample.position, now, _NOTHING) is None:
+        if self.correction_gate.check(sample.stamp_ns, sample.position, now, _AT_ZERO) is None:
             self._corrections = (self._corrections[1], sample)
 
     def _on_console(self, sample: JointSample) -> None:
@@ -255,20 +256,19 @@ class CompensatorNode(EndoscopeNode):
         if dt is None:
             return
         correction = self._correction(sample.stamp_ns)
-        if dt == 0.0 or (correction is None and self._corrected):
-            self._corrected = False
+        if dt == 0.0:
+            self._desired.restart()
+        added = _NOTHING if correction is None else correction
+        if dt == 0.0 or self._corrected != (correction is not None):
+            self._corrected = correction is not None
             self._feedforward.rebase(
-                self._drive_before - (_NOTHING if correction is None else correction),
-                sample.position if dt == 0.0 else None,
+                self._drive_before - added, sample.position if dt == 0.0 else None
             )
-        if self._news and not any(sample.velocity):
+        angle, velocity = self._desired.follow(sample.position, sample.velocity, dt or TICK_S)
+        if self._news and not any(velocity):
             self._take_news()
         self._learn(sample.stamp_ns)
-        velocity = sample.velocity or (0.0,) * len(JOINTS)
-        drive = self._feedforward.step(sample.position, velocity, dt or TICK_S)
-        if correction is not None:
-            self._corrected = True
-            drive = drive + correction
+        drive = self._feedforward.step(angle, velocity, dt or TICK_S) + added
         self._put_out(sample.stamp_ns, drive, dt or TICK_S)
 
     def _on_calibration(self, sample: JointSample) -> None:

@@ -218,7 +218,7 @@ class ConsoleNode(EndoscopeNode):
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         self._session.turn()
-        followed = self._handle.follow(self.ticker.monotonic_ns())
+        followed = self._handle.follow(self.ticker.monotonic_of(stamp_ns))
         if self._commands is None:
             return
         if not self._may_move:

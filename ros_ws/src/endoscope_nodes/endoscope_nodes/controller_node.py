@@ -8,6 +8,7 @@ from sensor_msgs.msg import JointState
 
 from endoscope_core.control import (
     AdaptiveBacklashController,
+    DesiredMotion,
     RecursiveHysteresisController,
     TrackerMeasurement,
 )
@@ -27,6 +28,7 @@ from endoscope_nodes.names import (
 from endoscope_nodes.parameters import parameter
 from endoscope_nodes.qos import COMMAND, RESULT
 from endoscope_nodes.runtime import Runtime, run_nodes
+from endoscope_nodes.ticker import TICK_S
 from endoscope_nodes.watches import CommandReport, MeasuredPose, SessionWatch, StreamWatch, rivals
 
 Controller = AdaptiveBacklashController | RecursiveHysteresisController
@@ -85,6 +87,7 @@ class ControllerNode(EndoscopeNode):
         self._gate = CommandGate(
             CommandLimits(facts.reach, facts.speed, facts.entry_step, self._timeout_ns)
         )
+        self._desired = DesiredMotion(len(JOINTS))
         self._used_ns = 0
         self._last_stamp_ns = 0
         self._forget = False
@@ -146,27 +149,30 @@ class ControllerNode(EndoscopeNode):
             is not None
         ):
             return
+        dt = (sample.stamp_ns - self._last_stamp_ns) * 1e-9
         if entering:
             self.controller.restart()
+            self._desired.restart()
+            dt = TICK_S
         self._last_stamp_ns = sample.stamp_ns
         self._choose_whether_to_act()
-        velocity = sample.velocity or (0.0,) * len(JOINTS)
+        angle, velocity = self._desired.follow(sample.position, sample.velocity, dt)
         correction = self.controller.step(
-            sample.stamp_ns * 1e-9, sample.position, velocity, self._fresh(sample.stamp_ns)
+            sample.stamp_ns * 1e-9, angle, velocity, self._fresh(sample.stamp_ns)
         )
         self._corrections.publish(sample.stamp_ns, *correction.tolist())
 
     def _choose_whether_to_act(self) -> None:
         calibrating = not self._calibration.trouble(self._timeout_ns)
         changing = self._settings.law != self._law
-        if changing and self.controller.weight == 0.0:
+        if changing and self.controller.faded:
             self._law, changing = self._settings.law, False
             self.controller = self._new_controller()
         if self._settings.active and not calibrating and not changing:
             self.controller.activate()
         else:
             self.controller.deactivate()
-        if self._forget and self.controller.weight == 0.0:
+        if self._forget:
             self.controller.forget()
             self._forget = False
 

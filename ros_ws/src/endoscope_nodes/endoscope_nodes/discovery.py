@@ -3,10 +3,19 @@
 import os
 from pathlib import Path
 
+from endoscope_core.errors import EndoscopeError
+
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 PEERS = 'ROS_STATIC_PEERS'
 PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 LOOPBACK = Path(__file__).with_name('this_machine.xml')
+# OFF is nobody but this process, for which Fast DDS listens at every address all the same.
+_ON_THIS_MACHINE = ('LOCALHOST', 'OFF')
+_WIDER = ('SUBNET', 'SYSTEM_DEFAULT')
+
+
+class DiscoveryRangeError(EndoscopeError, ValueError):
+    """A discovery range that ROS 2 does not know, and would take for `SUBNET`."""
 
 
 def stay_on_this_machine() -> None:
@@ -15,9 +24,20 @@ def stay_on_this_machine() -> None:
     Whoever can reach the topics can move the slave, and without DDS-Security nothing else stops
     them.  `ROS_AUTOMATIC_DISCOVERY_RANGE` in the environment (`SUBNET` for other machines) wins,
     and so do `ROS_STATIC_PEERS` and a profile of one's own for Fast DDS.
+
+    Raises
+    ------
+    DiscoveryRangeError
+        The range is none that ROS 2 knows, for example ``localhost`` in lower case.
     """
     # ROS 2 takes an empty range for SUBNET.
-    if not os.environ.get(RANGE):
-        os.environ[RANGE] = 'LOCALHOST'
-    if os.environ[RANGE] == 'LOCALHOST' and not os.environ.get(PEERS):
+    chosen = os.environ.get(RANGE) or 'LOCALHOST'
+    if chosen not in _ON_THIS_MACHINE + _WIDER:
+        raise DiscoveryRangeError(
+            f'{RANGE} is {chosen!r}; give LOCALHOST for this machine alone, OFF for this process '
+            'alone, SUBNET for other machines too, or SYSTEM_DEFAULT for what Fast DDS does by '
+            'itself'
+        )
+    os.environ[RANGE] = chosen
+    if chosen in _ON_THIS_MACHINE and not os.environ.get(PEERS):
         os.environ.setdefault(PROFILES, str(LOOPBACK))

@@ -133,9 +133,7 @@ class JointReader:
             Not a JointState, of an absurd size, or not of the joints asked for.
         """
         if len(data) > LARGEST_BYTES:
-            raise MalformedMessageError(
-                f'has {len(data)} bytes; at most {LARGEST_BYTES} are read'
-            )
+            raise MalformedMessageError(f'has {len(data)} bytes; at most {LARGEST_BYTES} are read')
         for start, stop, expected in self._spans:
             if data[start:stop] != expected:
                 self._learn(data)
@@ -144,7 +142,9 @@ class JointReader:
         fields = [values[part] for part in self._slices]
         if self._pick is not None:
             fields = [tuple(f[i] for i in self._pick) if f else f for f in fields]
-        return JointSample(values[0] * _SECOND + values[1], *fields, self._session)
+        position, velocity, effort = fields
+        stamp_ns = values[0] * _SECOND + values[1]
+        return JointSample(stamp_ns, position, velocity, effort, self._session)
 
     def _learn(self, data: bytes) -> None:
         self._spans = [_NOT_LEARNT]
@@ -204,7 +204,7 @@ class JointSubscription:
         qos: QoSProfile,
         *,
         exact: bool = False,
-        on_malformed: Callable[[str], None] | None = None,
+        on_malformed: Callable[[str], object] | None = None,
     ) -> None:
         self.malformed = 0
         self._reader = JointReader(names, exact)

@@ -104,7 +104,7 @@ class MotorDriverNode(EndoscopeNode):
             exact=True,
             on_malformed=lambda reason: self.motion.gate.refuse(Refusal.MALFORMED, reason),
         )
-        self.diagnostics.add('commands', CommandReport(self.motion.gate))
+        self.diagnostics.add('commands', CommandReport(self.motion.gate, self._session.leave))
         self.diagnostics.add('device', self._report_device, p.device)
         self.ticker.add(self._on_tick)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.exceptions import (
     InvalidNamespaceException,
@@ -16,20 +17,28 @@ from rclpy.exceptions import (
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.rig import Rig, RigFileError, load_rig
-from endoscope_nodes.discovery import stay_on_this_machine
+from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.matching import all_matched
+from endoscope_nodes.parameter_sections import check_sections
 from endoscope_nodes.parameters import (
     ParameterError,
     check_overrides,
     declare_parameters,
     parameter,
+)
+from endoscope_nodes.real_time import (
+    RealTimeParameters,
+    enter_real_time,
+    start_in_the_background,
+    threads_of_this_process,
 )
 from endoscope_nodes.stop_signals import StopSignals
 from endoscope_nodes.ticker import Ticker
@@ -39,6 +48,7 @@ from endoscope_nodes.ticker import Ticker
 FOREVER_S = 1e6
 SHUTDOWN_S = 2.0
 SWITCH_INTERVAL_S = 5e-5
+_CARRY_ON_S = 0.1
 # A collection of the second generation takes most of a tick: ten times rarer than by default.
 GC_THRESHOLDS = (7000, 10, 10)
 
@@ -96,19 +106,30 @@ class Runtime(ClosedOnExit):
     ) -> None:
         self.context = rclpy.get_default_context() if context is None else context
         stay_on_this_machine()
+        self._background_threads = threads_of_this_process()
+        self._args = list(sys.argv[1:] if args is None else args)
+        # What rcl says to the log besides raising it would be a second line.
+        set_logger_level('rcl', LoggingSeverity.FATAL)
         try:
             rclpy.init(
-                args=None if args is None else list(args),
+                args=self._args,
                 context=self.context,
                 domain_id=domain_id,
                 signal_handler_options=SignalHandlerOptions.NO,
             )
-        except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
+        except rclpy_implementation.UnknownROSArgsError as error:
+            raise ParameterError(
+                f'unknown ROS arguments {str(error).strip("[]")}; see --help'
+            ) from error
+        except rclpy_implementation.RCLError as error:
             raise ParameterError(str(error).partition(', at /')[0]) from error
+        finally:
+            set_logger_level('rcl', LoggingSeverity.UNSET)
         self.executor = EventsExecutor(context=self.context)
         self.nodes: list[EndoscopeNode] = []
         self._ticker: Ticker | None = None
         self._rig = rig
+        self._real_time = RealTimeParameters()
         self._overrides = overrides or {}
         self._exit_codes: list[int] = []
         self._stop = Future()
@@ -143,10 +164,13 @@ class Runtime(ClosedOnExit):
         Raises
         ------
         ParameterError
-            Nodes of one process disagree about ``use_sim_time``.
+            Nodes of one process disagree about ``use_sim_time``, or the command line has
+            parameters for nodes that there are not.
         """
         simulated = node.get_parameter('use_sim_time').value is True
         if self._ticker is None:
+            for line in check_sections(self._args, node.get_namespace()):
+                node.get_logger().warning(line)
             self._ticker = Ticker(node, simulated, self._stride_and_rig(node))
         if self._ticker.simulated != simulated:
             raise ParameterError(
@@ -159,6 +183,7 @@ class Runtime(ClosedOnExit):
         return self._ticker
 
     def _stride_and_rig(self, node: EndoscopeNode) -> int:
+        self._real_time = declare_parameters(node, RealTimeParameters)
         given = declare_parameters(node, BeatParameters)
         rate = given.tick_rate
         if 1000 % rate:
@@ -192,15 +217,32 @@ class Runtime(ClosedOnExit):
         Raises
         ------
         ParameterError
-            See :meth:`check_parameters`.
+            See :meth:`check_parameters` and :func:`enter_real_time`.
         """
         self.check_parameters()
+        self._enter_real_time()
         # A collection that walks over all that was imported would cost many ticks.
         gc.collect()
         gc.freeze()
         gc.set_threshold(*GC_THRESHOLDS)
         # By default a thread that writes a recording may keep the executor waiting for 5 ms.
         sys.setswitchinterval(SWITCH_INTERVAL_S)
+
+    def _enter_real_time(self) -> None:
+        if self._real_time == RealTimeParameters():
+            return
+        node = self.nodes[0]
+        urgent = threads_of_this_process() - self._background_threads
+        enter_real_time(node.get_name(), self._real_time, urgent, self.ticker.simulated)
+
+        def carry_on() -> None:
+            timer.cancel()
+            start_in_the_background()
+
+        # The executor starts the threads of its timers, which are urgent, when it begins to spin.
+        timer = node.create_timer(
+            _CARRY_ON_S, carry_on, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
 
     def check_parameters(self) -> None:
         """Refuse overrides that no node knows.
@@ -269,7 +311,7 @@ class Runtime(ClosedOnExit):
 def run_nodes(
     factories: Sequence[Callable[[Runtime], EndoscopeNode]], args: Sequence[str] | None = None
 ) -> int:
-    """Run nodes composed in this process until SIGINT or SIGTERM stops them.
+    """Run nodes composed in this process until SIGINT, SIGTERM or SIGHUP stops them.
 
     Parameters
     ----------
@@ -294,12 +336,15 @@ def run_nodes(
 def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -> int:
     """Let ``compose`` add nodes to a runtime and run them; see :func:`run_nodes`."""
     try:
-        with Runtime(args) as runtime, StopSignals(runtime.stop):
+        runtime = Runtime(args)
+        # The signals outermost: they are heard until the last node is closed.
+        with StopSignals(runtime.stop), runtime:
             compose(runtime)
             runtime.prepare()
             runtime.spin()
     except (
         ParameterError,
+        DiscoveryRangeError,
         InvalidNodeNameException,
         InvalidNamespaceException,
         InvalidParameterTypeException,

@@ -1,5 +1,6 @@
-"""SIGINT and SIGTERM as a request to stop, seen at once and never in the middle of a callback."""
+"""SIGINT, SIGTERM and SIGHUP as a request to stop, seen at once and never within a callback."""
 
+import os
 import signal
 import socket
 import threading
@@ -7,7 +8,37 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Self
 
-_STOPPING = (signal.SIGINT, signal.SIGTERM)
+_WORDS = {
+    signal.SIGINT: 'interrupted',
+    signal.SIGTERM: 'terminated',
+    signal.SIGHUP: 'hung up',
+}
+
+
+def _stopping() -> tuple[signal.Signals, ...]:
+    # Whoever starts a program by `nohup` wants it to outlive the terminal.
+    ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    return tuple(s for s in _WORDS if not (s == signal.SIGHUP and ignored))
+
+
+def end_when_asked(program: str) -> None:
+    """End the process at a signal, with one line and status 128 + number, from now on.
+
+    For a program that is still starting and has opened nothing: an exception out of a handler would
+    be raised wherever the imports are, some of which turn it into another one or lose it.
+
+    Parameters
+    ----------
+    program
+        Name to begin the line with.
+    """
+
+    def end(number: int, frame: FrameType | None) -> None:
+        os.write(2, f'{program}: {_WORDS[signal.Signals(number)]} while starting\n'.encode())
+        os._exit(128 + number)
+
+    for number in _stopping():
+        signal.signal(number, end)
 
 
 class StopSignals:
@@ -15,39 +46,38 @@ class StopSignals:
 
     An exception raised by a signal handler would tear a callback apart, and rclpy's own handler
     shuts the context down under callbacks that are publishing, so that a node could neither finish
-    its work nor say that it ends.  A second signal raises KeyboardInterrupt, for a process
-    that does not stop.
+    its work nor say that it ends.  Further signals change nothing: whatever is being finished is
+    finished, and only SIGKILL ends a process that hangs.
 
-    Parameters
+    Attributes
     ----------
     on_stop
-        Must be safe to call from another thread.
+        Called at the first signal; must be safe to call from another thread.
     """
 
     def __init__(self, on_stop: Callable[[], None]) -> None:
-        self._on_stop = on_stop
+        self.on_stop = on_stop
         self._asked = False
 
     def __enter__(self) -> Self:
         self._reader, self._writer = socket.socketpair()
         self._writer.setblocking(False)
-        self._former_handlers = {s: signal.signal(s, self._handle) for s in _STOPPING}
+        self._former_handlers = {s: signal.signal(s, self._handle) for s in _stopping()}
         self._former_fd = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
         self._thread = threading.Thread(target=self._watch, name='stop_signals', daemon=True)
         self._thread.start()
         return self
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        if self._asked:
-            raise KeyboardInterrupt
-        self._asked = True
+        """Leave it to the thread."""
 
     def _watch(self) -> None:
         # Python runs handlers between byte codes only, which a quiet executor never reaches; the
         # interpreter writes the signal's number to this socket at once.
         while data := self._reader.recv(16):
-            if any(number in data for number in _STOPPING):
-                self._on_stop()
+            if not self._asked and any(number in data for number in self._former_handlers):
+                self._asked = True
+                self.on_stop()
 
     def __exit__(
         self,
@@ -57,7 +87,8 @@ class StopSignals:
     ) -> None:
         signal.set_wakeup_fd(self._former_fd)
         for number, handler in self._former_handlers.items():
-            signal.signal(number, handler)
+            # A process that was asked to stop is about to end; asked again it need not hurry.
+            signal.signal(number, signal.SIG_IGN if self._asked else handler)
         self._writer.close()
         self._thread.join()
         self._reader.close()

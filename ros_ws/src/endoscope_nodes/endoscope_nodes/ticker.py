@@ -75,6 +75,10 @@ class Ticker:
         """Time for ages and watchdogs: the steady clock, or simulated time."""
         return self._sim_ns if self.simulated else time.monotonic_ns()
 
+    def monotonic_of(self, stamp_ns: int) -> int:
+        """Time for ages at which a beat was due: beats come late, what they sample must not."""
+        return stamp_ns if self.simulated else stamp_ns - self._offset_ns
+
     def add(self, listener: TickCallback) -> None:
         """Call ``listener(stamp_ns, periods)`` at each beat.
 

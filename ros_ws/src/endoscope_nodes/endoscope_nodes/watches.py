@@ -25,6 +25,9 @@ from endoscope_nodes.ticker import Ticker
 
 SESSION_REPORT = 'motion session'
 TURN_S = 0.04
+_CARRIED = 0.99
+_HALF = 0.5
+_STARVED_REPORTS = 2
 
 # The clutch is repeated at 10 Hz; three missed repetitions mean that the console is gone.
 CLUTCH_TIMEOUT_NS = 350_000_000
@@ -127,11 +130,7 @@ class SessionWatch:
 
     def _report(self) -> Report:
         session = self._session
-        return (
-            (ERROR, session.trouble, {})
-            if session.trouble
-            else (OK, session.name or 'none', {})
-        )
+        return (ERROR, session.trouble, {}) if session.trouble else (OK, session.name or 'none', {})
 
 
 class ClutchWatch:
@@ -272,20 +271,46 @@ class CommandReport:
     """What a command gate did, as a diagnostic report.
 
     Refusals since the last report are told from old ones, so that a warning ends when its cause
-    does.
+    does.  Commands that were lost on the way, because this process or the sender's came too late,
+    are told as such: the hop that starves is the first whose share is low.
+
+    Parameters
+    ----------
+    gate
+        The gate.
+    on_starved
+        Called with the reason when more than half of the commands were lost in two reports in a
+        row: a rate of which a half would be carried better.
     """
 
-    def __init__(self, gate: CommandGate) -> None:
+    def __init__(self, gate: CommandGate, on_starved: Callable[[str], None] | None = None) -> None:
         self._gate = gate
+        self._on_starved = on_starved
         self._reported = 0
+        self._accepted = 0
+        self._due = 0
+        self._starved = 0
 
     def __call__(self) -> Report:
-        """Report counts; a warning if anything was refused since the last report."""
+        """Report counts; a warning if anything was refused or lost since the last report."""
         gate = self._gate
         values: dict[str, object] = {'accepted': gate.accepted}
         values |= {f'refused: {reason}': count for reason, count in gate.refused.items()}
         total = sum(gate.refused.values())
         fresh, self._reported = total - self._reported, total
+        accepted, self._accepted = gate.accepted - self._accepted, gate.accepted
+        due, self._due = gate.due - self._due, gate.due
+        share = accepted / due if due else 1.0
+        values['carried [%]'] = 100.0 * share
+        self._starved = self._starved + 1 if share < _HALF else 0
+        starved = (
+            f'{100.0 * share:.0f} % of {due} commands arrive: give a lower tick_rate, or '
+            'realtime_priority'
+        )
+        if self._starved >= _STARVED_REPORTS and self._on_starved is not None:
+            self._on_starved(starved)
         if fresh:
             return WARN, f'{fresh} commands refused, last: {gate.last_reason}', values
+        if share < _CARRIED:
+            return WARN, starved, values
         return OK, 'commands in order', values

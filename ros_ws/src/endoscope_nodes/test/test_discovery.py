@@ -3,8 +3,13 @@
 import os
 import subprocess
 import sys
+import time
 
 import pytest
+import rclpy
+from rclpy.context import Context
+
+from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
 
 DOMAIN = 227
 # DDSI-RTPS 9.6.1.1: ports of a domain begin at 7400 + 250 * domain.
@@ -47,10 +52,24 @@ def test_by_default_no_other_machine_can_reach_the_ports(given):
     assert shown(**given) == ('LOCALHOST', {LOOPBACK})
 
 
+def test_nobody_is_heard_at_no_address_but_the_loopback():
+    assert shown(ROS_AUTOMATIC_DISCOVERY_RANGE='OFF') == ('OFF', {LOOPBACK})
+
+
+@pytest.mark.parametrize('unknown', ['localhost', 'Localhost', 'off', 'LOCAL', 'SUBNET '])
+def test_a_range_that_ros_would_take_for_the_subnet_is_refused(monkeypatch, unknown):
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', unknown)
+    with pytest.raises(DiscoveryRangeError, match='give LOCALHOST') as caught:
+        stay_on_this_machine()
+    assert repr(unknown) in str(caught.value)
+    assert '\n' not in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ('given', 'used'),
     [
         ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}, 'SUBNET'),
+        ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}, 'SYSTEM_DEFAULT'),
         ({'ROS_STATIC_PEERS': '192.0.2.77'}, 'LOCALHOST'),
     ],
 )
@@ -58,3 +77,68 @@ def test_the_operator_may_let_others_in(given, used):
     found, addresses = shown(**given)
     assert found == used
     assert ANY_ADDRESS in addresses
+
+
+BE_THERE = """
+import sys, time
+from rclpy.context import Context
+import rclpy
+from std_msgs.msg import String
+from endoscope_nodes.discovery import stay_on_this_machine
+stay_on_this_machine()
+context = Context()
+rclpy.init(args=[], context=context, domain_id=DOMAIN)
+node = rclpy.create_node('there', context=context)
+node.create_publisher(String, sys.argv[1], 1)
+print('there', flush=True)
+time.sleep(600)
+""".replace('DOMAIN', str(DOMAIN))
+DEFAULT_LEASE = """\
+<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles>
+  <participant profile_name="plain" is_default_profile="true"><rtps/></participant>
+</profiles></dds>
+"""
+
+
+def process_that_is_there(topic, **given):
+    process = subprocess.Popen(
+        [sys.executable, '-c', BE_THERE, topic],
+        env=os.environ | given,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout.readline() == 'there\n'
+    return process
+
+
+def test_a_killed_process_is_forgotten_long_before_the_lease_of_fast_dds_ends(tmp_path):
+    profile = tmp_path / 'plain.xml'
+    profile.write_text(DEFAULT_LEASE)
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=DOMAIN)
+    node = rclpy.create_node('watcher', context=context)
+    processes = [
+        process_that_is_there('slow', FASTRTPS_DEFAULT_PROFILES_FILE=str(profile)),
+        process_that_is_there('quick'),
+        process_that_is_there('alive'),
+    ]
+    try:
+        wait_until(lambda: all(node.count_publishers(t) for t in ('slow', 'quick', 'alive')))
+        for process in processes[:2]:
+            process.kill()
+        wait_until(lambda: not node.count_publishers('quick'))
+        assert node.count_publishers('slow') == 1
+        assert node.count_publishers('alive') == 1
+    finally:
+        for process in processes:
+            process.kill()
+            process.communicate()
+        node.destroy_node()
+        context.shutdown()
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)

@@ -8,8 +8,10 @@ BENCHES: tuple[str, ...] = (
     'real_rig',
     'simulate',
     'compensation',
+    'calibration_rate',
     'papers',
     'motor_bus',
     'motor_faults',
     'faults',
+    'files',
 )

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -32,6 +33,7 @@ NODES = (
     'recorder',
 )
 CARRIED = 0.99
+_OBEYING = ('compensator', 'motor_driver')
 _SETTLING_S = 2.0
 
 
@@ -51,6 +53,12 @@ class ProcessesFigure:
         CPU time of all processes per second.
     load
         Load average of the machine at the end.
+    state
+        Operating state at the end.
+    hops
+        What became of the commands from node to node: how many the console sent, how many of them
+        the compensator and the motor driver obeyed, and why the others were refused. What is
+        missing beyond the refusals was replaced by newer ones before it was read.
     """
 
     rate: int
@@ -58,6 +66,8 @@ class ProcessesFigure:
     commands: float
     cores: float
     load: float
+    state: str
+    hops: str
 
     @property
     def carried(self) -> bool:
@@ -68,7 +78,8 @@ class ProcessesFigure:
         return (
             f'{len(NODES)} processes at {self.rate} Hz: {100 * self.ticks:.1f} % of ticks, '
             f'{100 * self.commands:.1f} % of commands obeyed, {self.cores:.2f} cores, '
-            f'load average {self.load:.1f}' + ('' if self.carried else ': not carried')
+            f'load average {self.load:.1f}'
+            + ('' if self.carried else f': not carried, {self.state}, {self.hops}')
         )
 
 
@@ -102,19 +113,37 @@ def run_processes_bench(rate: int, seconds: float) -> ProcessesFigure:
         try:
             watcher.enable()
             watcher.serve(_SETTLING_S)
-            before, cpu = watcher.counts(), sum(cpu_seconds(p.pid) for p in processes)
+            before = watcher.counts()
+            cpu = sum(cpu_seconds(p.pid) for p in processes)
             began = time.monotonic()
             watcher.serve(seconds)
             after, elapsed = watcher.counts(), time.monotonic() - began
+            state = watcher.state
             cpu = sum(cpu_seconds(p.pid) for p in processes) - cpu
         finally:
             for process in processes:
                 process.terminate()
             for process in processes:
                 process.wait(timeout=30)
-    ticks, missed, obeyed = (b - a for a, b in zip(before, after, strict=True))
-    due = ticks + missed
-    return ProcessesFigure(rate, ticks / due, obeyed / due, cpu / elapsed, os.getloadavg()[0])
+    done = after - before
+    due = done['ticks'] + done['missed ticks']
+    return ProcessesFigure(
+        rate=rate,
+        ticks=done['ticks'] / due,
+        commands=done['motor_driver accepted'] / due,
+        cores=cpu / elapsed,
+        load=os.getloadavg()[0],
+        state=state,
+        hops=_hops(done),
+    )
+
+
+def _hops(done: Counter[str]) -> str:
+    text = f'the console sent {done["sent"]}'
+    for node in _OBEYING:
+        refused = [f'{n} {key}' for key, n in done.items() if key.startswith(f'{node} refused')]
+        text += ', '.join([f', {node} obeyed {done[f"{node} accepted"]}', *refused])
+    return text
 
 
 def _command(node: str, rate: int, folder: str) -> list[str]:
@@ -142,13 +171,13 @@ class _Watcher:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._commands = self._node.create_publisher(String, STATE_COMMAND, EVENT)
-        self._state = ''
+        self.state = ''
         self._values: dict[str, dict[str, str]] = {}
         self._node.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._on_health, EVENT)
 
     def _on_state(self, message: Any) -> None:
-        self._state = message.data
+        self.state = message.data
 
     def _on_health(self, message: Any) -> None:
         for status in message.status:
@@ -162,22 +191,26 @@ class _Watcher:
     def enable(self) -> None:
         """Wait until every node is heard and the slave follows commands."""
         deadline = time.monotonic() + self._PATIENCE_S
-        while self._state != OperatingState.ENABLED or len(self._heard()) < len(NODES):
+        while self.state != OperatingState.ENABLED or len(self._heard()) < len(NODES):
             if time.monotonic() > deadline:
                 silent = sorted(set(NODES) - self._heard())
-                raise RuntimeError(f'{self._state or "no state"}; silent: {", ".join(silent)}')
+                raise RuntimeError(f'{self.state or "no state"}; silent: {", ".join(silent)}')
             self._commands.publish(String(data='enable'))
             self.serve(1.0)
 
     def _heard(self) -> set[str]:
         return {name.partition(':')[0] for name in self._values}
 
-    def counts(self) -> tuple[int, int, int]:
-        """Ticks, missed ticks and obeyed commands of the motor driver."""
+    def counts(self) -> Counter[str]:
+        """Ticks of the motor driver, and of each node what it sent, obeyed and refused."""
         self.serve(1.1)
         device = self._values['motor_driver: device']
-        commands = self._values['motor_driver: commands']
-        return int(device['ticks']), int(device['missed ticks']), int(commands['accepted'])
+        found = Counter({key: int(device[key]) for key in ('ticks', 'missed ticks')})
+        found['sent'] = int(self._values['console: commands']['published'])
+        for node in _OBEYING:
+            for key, value in self._values[f'{node}: commands'].items():
+                found[f'{node} {key}'] = int(value)
+        return found
 
     def __enter__(self) -> Self:
         return self

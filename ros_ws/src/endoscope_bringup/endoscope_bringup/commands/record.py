@@ -9,8 +9,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'record',
         help='record topics into a bag',
-        description='Records until Ctrl-C or SIGTERM. Exits 1 if a message was lost or the disk '
-        'was full; what was recorded is kept.',
+        description='Records until Ctrl-C, SIGTERM or SIGHUP. Exits 1 if a message was lost or the '
+        'disk was full; what was recorded is kept.',
     )
     parser.add_argument(
         '--out',
@@ -33,6 +33,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record; return 1 if something is missing from the bag."""
+    from endoscope_nodes.stop_signals import end_when_asked
+
+    end_when_asked('endoscope')
     from endoscope_nodes.recorder_node import RecorderNode
     from endoscope_nodes.runtime import run_nodes
 

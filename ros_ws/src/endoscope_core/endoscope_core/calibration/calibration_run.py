@@ -106,14 +106,18 @@ class CalibrationRun:
         return self._next / len(self._rows)
 
     def command(self, stamp_ns: int, periods: int) -> CalibrationCommand | None:
-        """Command for the tick at ``stamp_ns``, ``periods`` ms after the last; None when done."""
-        if self._next >= len(self._rows):
+        """Command for the tick at ``stamp_ns``, ``periods`` ms after the last; None when done.
+
+        However far apart the ticks are, the last command is the motion's end.
+        """
+        last = len(self._rows) - 1
+        if self._next > last:
             return None
         if self._next >= self._moving_from and self.record is None:
             into = (self._next - self._moving_from) * self._tick_ns
             self.record = TensionRecord(self._wires, stamp_ns - into, self._tick_ns, self._samples)
         row = self._rows[self._next].tolist()
-        self._next += periods
+        self._next = min(self._next + periods, last) if self._next < last else last + 1
         return CalibrationCommand(tuple(row[: self._joints]), tuple(row[self._joints :]))
 
     def add_tension(self, stamp_ns: int, tension: Sequence[float]) -> None:

@@ -5,17 +5,40 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.classifier.classification import CellReadings
 from endoscope_core.errors import EndoscopeError
 
 Array = NDArray[np.float64]
 
+LONGEST_GAP_NS = 40_000_000
+"""Longest time between readings that a straight line may bridge.
+
+A reply that is lost leaves up to this between the readings on either side, at a time-out of 20 ms
+and with the fence that follows.  Where the tension bends most such a gap costs the sinusoid nothing
+that can be measured and the brief motion 0.14 deg of backlash size; one of 60 ms costs it 0.6 deg
+(`endoscope bench calibration_rate`).
+"""
+
+LONGEST_INTERVAL_NS = 12_500_000
+"""Longest interval in which an instant may lie on average: 100 Hz, a quarter for lost readings."""
+
+_SPAN = 5
+
 
 class TensionGapError(EndoscopeError, ValueError):
-    """Too many samples are missing for the record to be judged."""
+    """Too few tensions came for the record to be judged."""
 
 
 class TensionRecord:
     """Tensions of W wires from a start time on, resampled to N equally spaced instants.
+
+    The readings come when the line carries them: their rate is known from their stamps alone, and
+    any from 100 Hz on will do.  Between two readings the tension is taken for a straight line.  The
+    classifier reads means over 50 ms, which hold what a calibration has to tell: over 10 ms a
+    straight line misses the tension by less than one reading's noise all but where a wire turns
+    from pulling to paying out.  A smoother curve would gain nothing that these means show, and a
+    filter that takes noise away takes the turning of the loop with it.  Interpolated tensions are
+    less noisy than readings, so `cells` says what the readings were.
 
     Parameters
     ----------
@@ -23,10 +46,8 @@ class TensionRecord:
         Number of wires W.
     start_ns, period_ns, samples
         The grid: stamp of the first instant and distance of the instants in ns, and their number N.
-    longest_gap
-        Largest distance in periods of two readings between which values may be interpolated.
-    most_missing
-        Largest share of instants without a reading of their own.
+    longest_gap_ns
+        Longest time between readings that is bridged.
     """
 
     def __init__(
@@ -35,14 +56,12 @@ class TensionRecord:
         start_ns: int,
         period_ns: int,
         samples: int,
-        longest_gap: int = 20,
-        most_missing: float = 0.02,
+        longest_gap_ns: int = LONGEST_GAP_NS,
     ) -> None:
         self.start_ns = start_ns
         self._period_ns = period_ns
         self._samples = samples
-        self._longest_gap = longest_gap
-        self._most_missing = most_missing
+        self._longest_gap_ns = longest_gap_ns
         # Room for a source that is somewhat faster than the grid, and for one reading either side.
         self._stamps = np.zeros(samples + samples // 2 + 2, dtype=np.int64)
         self._values = np.zeros((len(self._stamps), wires))
@@ -52,7 +71,7 @@ class TensionRecord:
         """Take a reading in N, shape (W,); one that is not newer than the last is left out."""
         if self._count and stamp_ns <= self._stamps[self._count - 1]:
             return
-        if stamp_ns < self.start_ns - self._period_ns or self._count == len(self._stamps):
+        if stamp_ns < self.start_ns - self._longest_gap_ns or self._count == len(self._stamps):
             return
         self._stamps[self._count] = stamp_ns
         self._values[self._count] = tension
@@ -61,8 +80,11 @@ class TensionRecord:
     @property
     def complete(self) -> bool:
         """Whether a reading at or after the last instant has been taken."""
-        last = self.start_ns + (self._samples - 1) * self._period_ns
-        return self._count > 0 and bool(self._stamps[self._count - 1] >= last)
+        return self._count > 0 and bool(self._stamps[self._count - 1] >= self._end_ns)
+
+    @property
+    def _end_ns(self) -> int:
+        return self.start_ns + (self._samples - 1) * self._period_ns
 
     def resampled(self) -> Array:
         """Tensions at the instants of the grid by linear interpolation.
@@ -75,26 +97,58 @@ class TensionRecord:
         Raises
         ------
         TensionGapError
-            A gap is too long, or too many instants have no reading of their own.
+            A gap is too long, or the readings are too far apart.
         """
-        periods = (self._stamps[: self._count] - self.start_ns) / self._period_ns
-        grid = np.arange(self._samples)
-        edges = np.concatenate(([-1.0], periods, [float(self._samples)]))
-        longest = float(np.max(np.diff(edges)))
-        if longest > self._longest_gap:
-            where = max(0.0, float(edges[np.argmax(np.diff(edges))])) * self._period_ns * 1e-9
+        since = self._stamps[: self._count] - self.start_ns
+        intervals = self._intervals()
+        longest = int(np.argmax(intervals))
+        if intervals[longest] > self._longest_gap_ns:
             raise TensionGapError(
-                f'no tension for {longest * self._period_ns * 1e-6:.0f} ms from '
-                f'{where:.3f} s on; at most {self._longest_gap * self._period_ns * 1e-6:.0f} ms '
-                'can be bridged'
+                f'no tension for {intervals[longest] * 1e-6:.0f} ms from '
+                f'{np.sum(intervals[:longest]) * 1e-9:.3f} s on; at most '
+                f'{self._longest_gap_ns * 1e-6:.0f} ms can be bridged'
             )
-        nearest = np.unique(np.floor(periods + 0.5).astype(int))
-        present = np.count_nonzero((nearest >= 0) & (nearest < self._samples))
-        missing = 1.0 - present / self._samples
-        if missing > self._most_missing:
+        interval = self._mean_interval(intervals)
+        if interval > LONGEST_INTERVAL_NS:
             raise TensionGapError(
-                f'{100 * missing:.1f} % of the tensions are missing; at most '
-                f'{100 * self._most_missing:g} % can be bridged'
+                f'tensions came {interval * 1e-6:.1f} ms apart; at most '
+                f'{LONGEST_INTERVAL_NS * 1e-6:.1f} ms can be judged: read the load cells at '
+                '100 Hz or more'
             )
+        grid = np.arange(self._samples) * self._period_ns
         values = self._values[: self._count]
-        return np.stack([np.interp(grid, periods, column) for column in values.T], axis=1)
+        return np.stack([np.interp(grid, since, column) for column in values.T], axis=1)
+
+    def cells(self) -> CellReadings:
+        """How the load cells were read.
+
+        The noise of a cell is the rms of its fourth divided differences, each in units of what
+        white noise of 1 N would have there.  They are nothing for a cubic: at 100 Hz the motion
+        still adds less than a quarter to them, where second differences gain a half (both as
+        Gasser, Sroka, Jennen-Steinmetz, Biometrika 73(3), 1986, estimate noise from readings at
+        uneven distances, there with second ones).
+        """
+        values = self._values[: self._count]
+        interval = float(self._mean_interval(self._intervals())) * 1e-9
+        if self._count < _SPAN:
+            return CellReadings((0.0,) * values.shape[1], interval)
+        seconds = (self._stamps[: self._count] - self.start_ns) * 1e-9
+        spans = np.lib.stride_tricks.sliding_window_view(seconds, _SPAN)
+        apart = spans[:, :, None] - spans[:, None, :] + np.eye(_SPAN)
+        weights = 1.0 / np.prod(apart, axis=2)
+        weights /= np.linalg.norm(weights, axis=1, keepdims=True)
+        readings = np.lib.stride_tricks.sliding_window_view(values, _SPAN, axis=0)
+        differences = np.einsum('ns,nws->nw', weights, readings)
+        return CellReadings(tuple(np.sqrt(np.mean(differences**2, axis=0)).tolist()), interval)
+
+    def _intervals(self) -> NDArray[np.int64]:
+        """Times in ns between readings, cut off where the record begins and ends."""
+        stamps = self._stamps[: self._count]
+        inside = stamps[(stamps > self.start_ns) & (stamps < self._end_ns)]
+        return np.diff(np.concatenate(([self.start_ns], inside, [self._end_ns])))
+
+    @staticmethod
+    def _mean_interval(intervals: NDArray[np.int64]) -> float:
+        """Length in ns of the interval in which an instant lies on average."""
+        lengths = intervals.astype(float)
+        return float(np.sum(lengths**2) / np.sum(lengths))

@@ -56,14 +56,34 @@ class ClassificationResult:
         return self.interval is not None and self.interval[0] <= size <= self.interval[1]
 
 
+@dataclass(frozen=True)
+class CellReadings:
+    """How load cells were read, which tensions interpolated to 1 kHz no longer show.
+
+    Parameters
+    ----------
+    noise : tuple of float
+        Rms noise of one reading of each cell in N, shape (4,).
+    interval : float
+        Length in s of the interval between readings in which an instant lies on average.
+    """
+
+    noise: tuple[float, ...]
+    interval: float
+
+
 class Classifier(Protocol):
     """Names the class of a tube from the tensions of one calibration."""
 
     motion: str
     """Name of the calibration motion whose tensions it reads."""
 
-    def classify(self, tension: ArrayLike) -> ClassificationResult:
-        """Class of the tensions (N, 4) in N, recorded at 1 kHz from the start of the motion.
+    def classify(
+        self, tension: ArrayLike, cells: CellReadings | None = None
+    ) -> ClassificationResult:
+        """Class of the tensions (N, 4) in N at 1 kHz from the start of the motion.
+
+        Without `cells` each of them is a reading.
 
         Raises
         ------

@@ -2,20 +2,23 @@
 
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
+from torch import Tensor
 
 from endoscope_core.classifier.classification import (
+    CellReadings,
     ClassificationResult,
     ClassifierError,
     checked_tension,
     result_of,
 )
 from endoscope_core.classifier.standardised_tension import WIRES
-from endoscope_core.classifier.tension_cnn import TensionCnn
-from endoscope_core.classifier.weights_file import read_weights, unusable
+from endoscope_core.classifier.tension_cnn import CHANNELS, TensionCnn
+from endoscope_core.classifier.weights_file import classes_of, filled, read_weights, unusable
 from endoscope_core.signals import CALIBRATION_SAMPLES, SINUSOID
 
 DEFAULT_WEIGHTS = 'tension_cnn.pt'
@@ -53,21 +56,32 @@ class TensionClassifier:
         ClassifierError
             If a file is missing or is not what `endoscope train` writes.
         """
-        description, state = read_weights(weights)
+        return cls.of(weights, *read_weights(weights))
+
+    @classmethod
+    def of(
+        cls, weights: str | Path, description: dict[str, Any], state: dict[str, Tensor]
+    ) -> 'TensionClassifier':
+        """Classifier from what `read_weights` returned; errors as in `load`."""
         try:
-            classes = tuple(int(c) for c in description['classes_deg'])
-            network = TensionCnn(len(classes), description['channels'])
-            network.load_state_dict(state)
-        except (KeyError, TypeError, ValueError, RuntimeError) as error:
+            classes = classes_of(description)
+            channels = description.get('channels')
+            if channels != list(CHANNELS):
+                raise ValueError(f'channels are {channels}, not {list(CHANNELS)}')
+            with torch.device('meta'):
+                network = TensionCnn(len(classes))
+            return cls(filled(network, state), classes)
+        except ValueError as error:
             raise unusable(weights, error) from error
-        return cls(network, classes)
 
     @classmethod
     def load_default(cls) -> 'TensionClassifier':
         """The classifier that comes with this package."""
         return cls.load(Path(str(files('endoscope_core.classifier') / 'weights' / DEFAULT_WEIGHTS)))
 
-    def classify(self, tension: ArrayLike) -> ClassificationResult:
+    def classify(
+        self, tension: ArrayLike, cells: CellReadings | None = None
+    ) -> ClassificationResult:
         """Class of one calibration.
 
         Parameters
@@ -75,6 +89,8 @@ class TensionClassifier:
         tension : array_like, shape (9000, 4)
             N at 1 kHz from the start of the calibration sinusoid, wires in the order x_pos,
             x_neg, y_pos, y_neg.
+        cells : CellReadings, optional
+            Of no account here: the network names a class for any tension.
 
         Raises
         ------

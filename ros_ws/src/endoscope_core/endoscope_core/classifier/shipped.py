@@ -1,17 +1,36 @@
 """Opens classifier weights of either kind, by default those that come with this package."""
 
+import math
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import torch
 from torch import Tensor
 
-from endoscope_core.classifier.classification import Classifier, ClassifierError
+from endoscope_core.classifier.classification import (
+    Classifier,
+    ClassifierError,
+    UnseenTensionError,
+)
 from endoscope_core.classifier.inference import TensionClassifier
 from endoscope_core.classifier.size_classifier import HeldOutCalibration, SizeClassifier
-from endoscope_core.classifier.size_model import BacklashSizeModel
-from endoscope_core.classifier.weights_file import CNN, SIZE, read_weights, unusable
-from endoscope_core.signals import SINUSOID
+from endoscope_core.classifier.size_model import STRANGENESS, BacklashSizeModel
+from endoscope_core.classifier.standardised_tension import WIRES
+from endoscope_core.classifier.weights_file import (
+    CNN,
+    SIZE,
+    classes_of,
+    filled,
+    read_weights,
+    unusable,
+)
+from endoscope_core.signals import SINUSOID, calibration_motion
+
+MOST_KNOWN = 4096
+"""Courses that a size model may know: their covariance, their square, is 134 MB then. Those that
+come with this package know 420."""
 
 
 def shipped_weights(motion: str) -> Path:
@@ -32,13 +51,14 @@ def load_classifier(weights: str | Path | None = None, motion: str = SINUSOID) -
     Raises
     ------
     ClassifierError
-        If a file is missing, is not what `endoscope train` writes, or is for another motion.
+        If a file is missing, is not what `endoscope train` writes, was damaged, is for another
+        motion, or holds numbers that give no answer.
     """
     path = Path(weights) if weights else shipped_weights(motion)
     description, state = read_weights(path)
     kind = description.get('kind')
     if kind == CNN:
-        classifier: Classifier = TensionClassifier.load(path)
+        classifier: Classifier = TensionClassifier.of(path, description, state)
     elif kind == SIZE:
         classifier = _size_classifier(path, description, state)
     else:
@@ -47,6 +67,7 @@ def load_classifier(weights: str | Path | None = None, motion: str = SINUSOID) -
         raise ClassifierError(
             f'{path} was trained on the {classifier.motion} calibration, not the {motion} one'
         )
+    _try(path, classifier)
     return classifier
 
 
@@ -54,13 +75,34 @@ def _size_classifier(
     path: Path, description: dict[str, Any], state: dict[str, Tensor]
 ) -> SizeClassifier:
     try:
-        components, course = state['basis'].shape
-        model = BacklashSizeModel(len(state['target']), course, components)
-        model.load_state_dict(state)
-        calibration = HeldOutCalibration(
-            float(description['inflation']), tuple(float(x) for x in description['ceilings'])
-        )
-        classes = tuple(int(c) for c in description['classes_deg'])
+        ceilings = tuple(float(x) for x in description['ceilings'])
+        calibration = HeldOutCalibration(float(description['inflation']), ceilings)
+        numbers = (calibration.inflation, *ceilings)
+        if len(ceilings) != len(STRANGENESS) or not all(map(math.isfinite, numbers)):
+            raise ValueError(f'inflation and ceilings are {numbers}')
+        known, components = state['scores'].shape
+        if known > MOST_KNOWN:
+            raise ValueError(f'it knows {known} courses, more than {MOST_KNOWN}')
+        for name in ('spread', 'lengths', 'height', 'noise', 'rest', 'quiet'):
+            if not (state[name] > 0.0).all():
+                raise ValueError(f'{name} is not positive')
+        with torch.device('meta'):
+            model = BacklashSizeModel(known, len(state['centre']), components)
+        classes = classes_of(description)
+        filled(model, state).require_fitted()
         return SizeClassifier(model, calibration, classes, str(description['motion']))
-    except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise unusable(path, error) from error
+
+
+def _try(path: Path, classifier: Classifier) -> None:
+    """Judge slack wires' constant tension, which shows whether the numbers go together at all."""
+    samples = calibration_motion(classifier.motion).samples
+    try:
+        result = classifier.classify(np.full((samples, WIRES), 1.0))
+    except UnseenTensionError:
+        return
+    except RuntimeError as error:
+        raise unusable(path, error) from error
+    if not all(map(math.isfinite, (*result.probabilities.values(), result.expected_size))):
+        raise ClassifierError(f'{path} holds no classifier weights: its answers are not finite')

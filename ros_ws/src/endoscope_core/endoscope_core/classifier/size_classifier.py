@@ -10,6 +10,7 @@ from torch import Tensor
 
 from endoscope_core.classifier.classification import (
     LEVEL,
+    CellReadings,
     ClassificationResult,
     UnseenTensionError,
     checked_tension,
@@ -68,13 +69,17 @@ class SizeClassifier:
         recorded = calibration_motion(motion)
         self._samples, self._settled = recorded.samples, recorded.settled
 
-    def classify(self, tension: ArrayLike) -> ClassificationResult:
+    def classify(
+        self, tension: ArrayLike, cells: CellReadings | None = None
+    ) -> ClassificationResult:
         """Class, backlash size and interval of one calibration.
 
         Parameters
         ----------
         tension : array_like, shape (N, 4)
             N at 1 kHz from the start of the motion, wires in the order x_pos, x_neg, y_pos, y_neg.
+        cells : CellReadings, optional
+            How they were read, where they were not at 1 kHz.
 
         Raises
         ------
@@ -85,7 +90,7 @@ class SizeClassifier:
         """
         array = checked_tension(tension, (self._samples, WIRES))
         with torch.no_grad():
-            estimate = self.model(torch.from_numpy(array[self._settled :]).unsqueeze(0))
+            estimate = self.model(torch.from_numpy(array[self._settled :]).unsqueeze(0), cells)
         reasons = self.reasons_to_refuse(estimate)[0]
         if reasons:
             raise UnseenTensionError(f'none of the classes: {reasons[0]}')

@@ -5,12 +5,20 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from endoscope_core.classifier.tension_features import log_courses, roughness
+from endoscope_core.classifier.classification import CellReadings
+from endoscope_core.classifier.tension_features import (
+    PERIOD,
+    log_courses,
+    roughness,
+    variance_of_fewer_readings,
+)
 
 COMPONENTS = 16
 STEPS = 120
 _RATE = 0.08
 _JITTER = 1e-9
+_LEAST = 1e-6
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -136,6 +144,26 @@ class BacklashSizeModel(nn.Module):
         with torch.no_grad():
             self._take(logarithms)
 
+    def require_fitted(self) -> None:
+        """Refuse numbers that no fit gives.
+
+        Directions of a singular value decomposition are orthonormal, and whitened scores have a
+        mean square of one: to rounding, whatever the model was fitted to.
+
+        Raises
+        ------
+        ValueError
+            They are not, or a known size is no angle of a tube.
+        """
+        unit = torch.eye(len(self.basis), dtype=self.basis.dtype)
+        squares = self.scores.square().mean(dim=0)
+        if not torch.allclose(self.basis @ self.basis.T, unit, atol=_ROUNDING):
+            raise ValueError('the components are not orthonormal')
+        if not torch.allclose(squares, torch.ones_like(squares), atol=_ROUNDING):
+            raise ValueError('the scores are not whitened')
+        if not bool(((self.target >= 0.0) & (self.target <= 2.0 * torch.pi)).all()):
+            raise ValueError('the known sizes are no angles')
+
     def _take(self, logarithms: Tensor) -> None:
         values = logarithms.exp()
         self.lengths = values[:-3]
@@ -162,32 +190,55 @@ class BacklashSizeModel(nn.Module):
         rest = (deviation - raw @ self.basis).square().mean(dim=-1).sqrt()
         return raw / self.spread, rest
 
-    def forward(self, tension: Tensor) -> SizeEstimate:
-        """Sizes of recordings (R, N, 2 J) in N at 1 kHz."""
+    def forward(self, tension: Tensor, cells: CellReadings | None = None) -> SizeEstimate:
+        """Sizes of recordings (R, N, 2 J) in N at 1 kHz.
+
+        Where the cells were read less often, their noise is that of the readings, and what fewer
+        readings add to the noise of the courses is no strangeness of the tube.
+        """
         if self._conditioned is None:
             middle = self.target.mean()
             self._conditioned = (middle, *self._solve(self.target - middle))
         middle, factor, weights = self._conditioned
         tension = tension.double()
-        scores, rest = self._components(log_courses(tension))
+        course = log_courses(tension)
+        scores, rest = self._components(course)
         flat = scores.flatten(0, 1)
         known = self._covariance(flat, self.scores)
         told = torch.linalg.solve_triangular(factor, known.T, upper=False).square().sum(dim=0)
         alone = self.height**2 + self.linear**2 * flat.square().sum(dim=1)
         size = (known @ weights + middle).unflatten(0, scores.shape[:2])
         deviation = (alone - told).clamp(min=0.0).add(self.noise**2).sqrt()
-        noise = (roughness(tension) / self.quiet).clamp(min=1e-6).log().abs()
-        strangeness = torch.stack(
+        # The joints of a rig are alike, and so are the model's errors on them: they do not average.
+        deviation = deviation.unflatten(0, scores.shape[:2]).mean(dim=1)
+        return SizeEstimate(
+            size.mean(dim=1), deviation, self._strangeness(tension, course, scores, rest, cells)
+        )
+
+    def _strangeness(
+        self,
+        tension: Tensor,
+        course: Tensor,
+        scores: Tensor,
+        rest: Tensor,
+        cells: CellReadings | None,
+    ) -> Tensor:
+        rms, interval = roughness(tension), PERIOD
+        if cells is not None:
+            rms = torch.tensor(cells.noise, dtype=rms.dtype).reshape(1, *rms.shape[1:])
+            interval = cells.interval
+        added = variance_of_fewer_readings(course, rms, interval)
+        of_basis = self.basis.square()
+        unknown = rest.square() - (added * (1.0 - of_basis.sum(dim=0))).mean(dim=-1)
+        far = scores.square().mean(dim=-1) - (added @ of_basis.T / self.spread**2).mean(dim=-1)
+        noise = (rms / self.quiet).clamp(min=_LEAST).log().abs().amax(dim=(1, 2))
+        return torch.stack(
             [
-                (rest / self.rest).log().amax(dim=1),
-                scores.square().mean(dim=-1).sqrt().log().amax(dim=1),
-                noise.amax(dim=(1, 2)),
+                (unknown / self.rest**2).clamp(min=_LEAST).sqrt().log().amax(dim=1),
+                far.clamp(min=_LEAST).sqrt().log().amax(dim=1),
+                noise.expand(len(tension)),
             ],
             dim=1,
-        )
-        # The joints of a rig are alike, and so are the model's errors on them: they do not average.
-        return SizeEstimate(
-            size.mean(dim=1), deviation.unflatten(0, scores.shape[:2]).mean(dim=1), strangeness
         )
 
 

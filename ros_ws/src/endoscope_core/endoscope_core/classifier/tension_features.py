@@ -2,6 +2,7 @@
 
 from torch import Tensor
 
+PERIOD = 1e-3
 BIN = 50
 WIRES_OF_A_JOINT = 2
 SLACK = 0.5
@@ -35,3 +36,26 @@ def roughness(tension: Tensor) -> Tensor:
     bend = tension[:, 2:] - 2.0 * tension[:, 1:-1] + tension[:, :-2]
     rms = bend.square().mean(dim=1).div(6.0).sqrt()
     return rms.unflatten(1, (-1, WIRES_OF_A_JOINT))
+
+
+def variance_of_fewer_readings(course: Tensor, noise: Tensor, interval: float) -> Tensor:
+    """Variance of log courses (R, J, 2 B) by which readings at intervals exceed those at 1 kHz.
+
+    A straight line between readings of white noise at intervals T covaries over a time u as the
+    cubic B-spline of u / T, whose mean absolute deviation is 7/15: over a bin of length t the
+    variance of the mean is ``T/t (1 - 7/15 T/t)`` of that of one reading, for ``T <= t / 2``.  The
+    logarithm divides its root by the mean tension.
+
+    Parameters
+    ----------
+    course : Tensor, shape (R, J, 2 B)
+        As `log_courses` gives them.
+    noise : Tensor, shape (J, 2)
+        Rms of one reading of each cell in N.
+    interval : float
+        Between readings in s.
+    """
+    share = interval / (BIN * PERIOD)
+    more = max(0.0, share * (1.0 - 7.0 / 15.0 * share) - 1.0 / BIN)
+    by_wire = (-2.0 * course).exp().unflatten(-1, (WIRES_OF_A_JOINT, -1))
+    return more * (noise.square()[..., None] * by_wire).flatten(-2)

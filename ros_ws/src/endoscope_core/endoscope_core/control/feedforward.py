@@ -252,7 +252,8 @@ class Feedforward:
     def measure(self, age: float, angle: Vector) -> None:
         """Let the modes that learn have bending angles (J,) in rad that held `age` s ago.
 
-        A joint that has rested since the last ones learns nothing: its command would move.
+        A joint that has rested since the last ones learns nothing, and what another learns enters
+        its command as it moves: the difference becomes an offset, as after a switch.
 
         Raises
         ------
@@ -262,7 +263,9 @@ class Feedforward:
         angles = self._checked('angle', angle)
         for joint, measured in zip(self._joints, angles, strict=False):
             if isinstance(joint.inverse, AdaptivePhysicalInverse) and not joint.rested:
+                before = joint.inverse.would_want(joint.desired, joint.velocity)
                 joint.inverse.measured(age, measured)
+                joint.offset += before - joint.inverse.would_want(joint.desired, joint.velocity)
             joint.rested = True
 
     def _step(self, joint: _Joint, desired: float, velocity: float, dt: float) -> float:

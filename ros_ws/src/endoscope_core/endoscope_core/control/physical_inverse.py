@@ -196,6 +196,10 @@ class PhysicalInverse:
         self._memory[JOINT_MEMORY] = direction
         self._memory[TARGET] = command
         self._memory[TURN] = desired + self.settings.turn_lead * velocity
+        return self.would_want(desired, velocity)
+
+    def would_want(self, desired: float, velocity: float) -> float:
+        """Command (rad) for a desired angle and velocity, without going on."""
         return self._law(desired, velocity, 1e-3, self._memory.copy())
 
     def wanted(self, desired: float, velocity: float, dt: float) -> float:

@@ -195,6 +195,7 @@ class TrackerFeedback[Law: JointLaw]:
     def restart(self) -> None:
         """Begin a new stream of desired angles; what has been learnt stays."""
         self._history.clear()
+        self._plays = []
         self._last_stamp = -math.inf
 
     def tracker_fresh(self, time: float) -> bool:

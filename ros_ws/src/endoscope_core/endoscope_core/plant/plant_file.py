@@ -1,5 +1,6 @@
 """plant.yaml: reading and writing a plant description."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -18,8 +19,41 @@ from endoscope_core.plant.parameters import (
     SensorParameters,
 )
 from endoscope_core.plant.recording import recording_faults
+from endoscope_core.strict_yaml import YamlError, load_yaml
 
 JOINT_NAMES = ('bend_x', 'bend_y')
+
+REACH: Mapping[str, tuple[float, float, str]] = {
+    'pretension': (0.0, 1e3, 'N'),
+    'wire_stiffness': (1.0, 1e7, 'N/m'),
+    'joint_radius': (1e-4, 0.1, 'm'),
+    'pulley_radius': (1e-4, 0.1, 'm'),
+    'capstan_exponent': (0.0, 10.0, ''),
+    'presliding_distance': (1e-7, 0.1, 'm'),
+    'joint_stiffness': (0.0, 10.0, 'N m/rad'),
+    'joint_damping': (1e-7, 10.0, 'N m s/rad'),
+    'joint_friction': (0.0, 10.0, 'N m'),
+    'joint_presliding': (1e-5, math.pi, 'rad'),
+    'motor_bandwidth': (0.1, 1e4, 'rad/s'),
+    'motor_damping_ratio': (0.01, 100.0, ''),
+    'load_cell_noise': (0.0, 1e3, 'N'),
+    'load_cell_resolution': (0.0, 1e3, 'N'),
+    'load_cell_rate': (0.1, 1e5, 'Hz'),
+    'tracker_noise': (0.0, math.pi, 'rad'),
+    'tracker_rate': (0.1, 1e5, 'Hz'),
+    'encoder_counts': (1.0, 2.0**32, 'counts a turn'),
+    'velocity_resolution': (0.0, 1e3, 'rad/s'),
+    'effort_noise': (0.0, 1e3, 'N m'),
+    'effort_resolution': (0.0, 1e3, 'N m'),
+}
+"""Smallest and largest value of each key that a steerable instrument drawn by wires can have.
+
+A wire of 1 mm breaks at about 1 kN, and one of 20 mm length and 1 mm2 stiffens to E A / L = 1e7 N/m
+(steel, E = 2e11 Pa). A pulley finer than the wire, or one of 0.2 m, is none. An exponent of 10 is
+friction of 1 over one and a half turns and passes 1/22000 of the tension. Joint and motor are
+bounded by a finger's moment (10 N m) and by servos between 0.02 Hz and 1.6 kHz; a sensor's
+resolution by what it measures at most.
+"""
 
 
 class PlantFileError(EndoscopeError, ValueError):
@@ -44,12 +78,9 @@ def load_plant(path: str | Path) -> PlantDescription:
     """
     path = Path(path)
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise PlantFileError(f'cannot read plant file {path}: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        detail = ' '.join(str(error).split())
-        raise PlantFileError(f'{path} is not YAML: {detail}') from error
+        content = load_yaml(path)
+    except YamlError as error:
+        raise PlantFileError(f'plant file: {error}') from error
     try:
         return plant_from_mapping({} if content is None else content)
     except ValueError as error:
@@ -145,7 +176,16 @@ def _check_keys(given: Mapping[str, Any], valid: tuple[str, ...], where: str) ->
 def _numbers(given: Any, kind: type, where: str) -> dict[str, float]:
     section = _section(given, where)
     _check_keys(section, tuple(f.name for f in fields(kind)), where)
-    return {key: _number(value, f'{where}.{key}') for key, value in section.items()}
+    return {key: _within_reach(key, value, f'{where}.{key}') for key, value in section.items()}
+
+
+def _within_reach(key: str, value: Any, where: str) -> float:
+    number = _number(value, where)
+    low, high, unit = REACH[key]
+    # NaN passes: the parameters themselves refuse it, with a better word.
+    if number < low or number > high:
+        raise ValueError(f'{where} is {number:g}: give {low:g} to {high:g} {unit}'.rstrip())
+    return number
 
 
 def _number(value: Any, where: str) -> float:

@@ -72,6 +72,9 @@ class CommandGate:
         Number of refused commands by reason.
     accepted
         Number of obeyed ones.
+    due
+        Number of commands that the sender's stamps tell of, obeyed or lost on the way, in streams
+        that were obeyed: the time between their stamps by the shortest such time.
     last_reason
         The last refusal in words.
     """
@@ -80,7 +83,9 @@ class CommandGate:
         self.limits = limits
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
         self.accepted = 0
+        self.due = 0
         self.last_reason = ''
+        self._interval_ns = 0
         self._position: tuple[float, ...] = ()
         self._stamp_ns = 0
         self._offset_ns: int | None = None
@@ -95,7 +100,9 @@ class CommandGate:
         self._stamp_ns = 0
         self._offset_ns = None
         self._received_ns = None
+        self._interval_ns = 0
         self._alone = True
+        self.last_reason = ''
 
     def refuse(self, refusal: Refusal, words: str = '') -> Refusal:
         """Count a refusal that was found elsewhere."""
@@ -135,19 +142,23 @@ class CommandGate:
         for value in (*position, *velocity):
             if not math.isfinite(value):
                 return self.refuse(Refusal.NOT_FINITE, str(value))
-        limits = self.limits
-        for value in position:
-            if abs(value) > limits.reach:
-                return self.refuse(Refusal.RANGE, f'{value:.4g} rad beyond {limits.reach:.4g}')
-        refusal = self._check_stamp(stamp_ns, received_ns)
+        streaming = self.is_fresh(received_ns)
+        refusal = self._check_range(position, self._position if streaming else measured, streaming)
+        refusal = refusal or self._check_stamp(stamp_ns, received_ns)
         if refusal is not None:
             return refusal
-        if self.is_fresh(received_ns):
+        if streaming:
             refusal = self._check_speed(position, received_ns)
         else:
             refusal = self._check_entry(position, measured)
         if refusal is not None:
             return refusal
+        gap_ns = stamp_ns - self._stamp_ns
+        if streaming and gap_ns > 0:
+            self._interval_ns = min(self._interval_ns or gap_ns, gap_ns)
+            self.due += round(gap_ns / self._interval_ns)
+        else:
+            self.due += 1
         self._alone = self._received_ns is None
         self._position = tuple(position)
         self._stamp_ns = stamp_ns
@@ -160,6 +171,18 @@ class CommandGate:
         return self._received_ns is not None and (
             now_ns - self._received_ns <= self.limits.max_age_ns
         )
+
+    def _check_range(
+        self, position: Sequence[float], here: Sequence[float], streaming: bool
+    ) -> Refusal | None:
+        """From beyond the reach, which a measured pose may be, there is a way back only."""
+        reach = self.limits.reach
+        for value, now in zip(position, here, strict=True):
+            if abs(value) > reach and abs(value) > abs(now) + (
+                0.0 if streaming else self.limits.max_step
+            ):
+                return self.refuse(Refusal.RANGE, f'{value:.4g} rad beyond {reach:.4g}')
+        return None
 
     def _check_stamp(self, stamp_ns: int, received_ns: int) -> Refusal | None:
         tolerance = self.limits.max_age_ns
@@ -194,9 +217,7 @@ class CommandGate:
         self._allowance = min(allowance - travel, limits.max_speed * _JITTER_S)
         return None
 
-    def _check_entry(
-        self, position: Sequence[float], measured: Sequence[float]
-    ) -> Refusal | None:
+    def _check_entry(self, position: Sequence[float], measured: Sequence[float]) -> Refusal | None:
         step = max(abs(a - b) for a, b in zip(position, measured, strict=True))
         if step > self.limits.max_step:
             return self.refuse(Refusal.STEP, f'{step:.4g} rad from where it is')

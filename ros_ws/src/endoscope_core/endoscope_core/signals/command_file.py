@@ -100,7 +100,11 @@ def read_command_file(path: str | Path, joints: Sequence[str] = JOINTS) -> Comma
     try:
         with path.open(newline='', encoding='utf-8') as file:
             reader = csv.DictReader(file)
-            missing = [c for c in wanted if c not in (reader.fieldnames or ())]
+            columns = list(reader.fieldnames or ())
+            doubled = [c for c in wanted if columns.count(c) > 1]
+            if doubled:
+                raise CommandFileError(f'{path}: two columns {", ".join(doubled)}')
+            missing = [c for c in wanted if c not in columns]
             if missing:
                 raise CommandFileError(f'{path}: no column {", ".join(missing)}')
             rows = [_numbers(path, reader.line_num, row, wanted) for row in reader]
@@ -131,6 +135,7 @@ def _check(table: CommandTable, name: str) -> None:
         )
     if not (np.isfinite(table.time).all() and np.isfinite(table.angle).all()):
         raise CommandFileError(f'{name}: a value is not finite')
-    backward = np.flatnonzero(np.diff(table.time) <= 0)
+    # Differences of neighbours can overflow; the order cannot.
+    backward = np.flatnonzero(table.time[1:] <= table.time[:-1])
     if len(backward):
         raise CommandFileError(f'{name}: time does not increase at line {backward[0] + 3}')

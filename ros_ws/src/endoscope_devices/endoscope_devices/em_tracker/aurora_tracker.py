@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
 from endoscope_devices.em_tracker.frame_clock import FrameClock
+from endoscope_devices.em_tracker.pose_check import PoseCheck
 from endoscope_devices.em_tracker.tx_reply import (
     MalformedReplyError,
     PortStatus,
@@ -18,8 +19,11 @@ _REOPEN_S = 0.3
 _KEPT = 200
 _PAUSE_S = 0.002
 _GIVE_UP = 5
-# So many late frames in a row mean that the frames lie otherwise than thought: a second of them.
-_LATE_FOR_GOOD = 40
+# So many frames in a row that are late, a second of them, or replies whose frame number cannot be,
+# mean that the frames lie otherwise than thought.
+_FOR_GOOD = 40
+# So far before its time a frame may seem to come: the replies before it may have waited as long.
+_AHEAD_NS = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,10 @@ class TrackerReading:
 class AuroraTracker(ReadingThread[TrackerReading]):
     """Asks for the newest frame again and again, and keeps each that is new and shows the sensor.
 
-    A tracker that goes away is opened again for as long as the device is open.
+    A reply that is whole but old, because something on the way kept it, has a right CRC; its frame
+    number betrays it.  Numbers increase, and no faster than the frame clock.  A pose that the tip
+    cannot have come to is left out as well (`PoseCheck`).  A tracker that goes away, or counts its
+    frames anew, is opened again for as long as the device is open.
 
     Parameters
     ----------
@@ -86,6 +93,8 @@ class AuroraTracker(ReadingThread[TrackerReading]):
         self._start_clock()
         self._handle = -1
         self._frame: int | None = None
+        self._misnumbered = 0
+        self._poses = PoseCheck(settings.frame_rate)
         self._trouble = 'not connected yet'
 
     def health(self) -> tuple[str, dict[str, object]]:
@@ -100,6 +109,9 @@ class AuroraTracker(ReadingThread[TrackerReading]):
             'missing',
             'sensor broken',
             'late',
+            'old frames',
+            'frames ahead of time',
+            'jumps',
             'refused replies',
             'silences',
             'connections',
@@ -135,6 +147,8 @@ class AuroraTracker(ReadingThread[TrackerReading]):
             )
         self._handle = enabled[self._settings.tool - 1]
         self._frame = None
+        self._misnumbered = 0
+        self._poses = PoseCheck(self._settings.frame_rate)
         self._start_clock()
         self._port.ask('TSTART:')
 
@@ -171,8 +185,11 @@ class AuroraTracker(ReadingThread[TrackerReading]):
             self._trouble = f'sensor {self._settings.tool} was unplugged'
             return
         if tool.frame == self._frame:
+            self._misnumbered = 0
             return
-        if self._frame is not None and tool.frame > self._frame:
+        if not self._follows(tool.frame, asked_ns):
+            return
+        if self._frame is not None:
             self._counts['lost frames'] += tool.frame - self._frame - 1
         measured = self._clock.stamp(tool.frame, asked_ns)
         self._frame = tool.frame
@@ -185,9 +202,12 @@ class AuroraTracker(ReadingThread[TrackerReading]):
         elif asked_ns - measured > self._settings.oldest * 1e9:
             self._counts['late'] += 1
             self._late_in_a_row += 1
-            if self._late_in_a_row >= _LATE_FOR_GOOD:
+            if self._late_in_a_row >= _FOR_GOOD:
                 self._start_clock()
             self._trouble = f'frames come {(asked_ns - measured) * 1e-6:.0f} ms late'
+        elif not self._poses.believable(tool):
+            self._counts['jumps'] += 1
+            self._trouble = 'the sensor jumps as no tip can'
         else:
             self._trouble = ''
             self._late_in_a_row = 0
@@ -196,6 +216,23 @@ class AuroraTracker(ReadingThread[TrackerReading]):
                 TrackerReading(measured - latency_ns, tool.frame, tool.position, tool.orientation),
                 asked_ns,
             )
+
+    def _follows(self, frame: int, asked_ns: int) -> bool:
+        """Whether a frame can come after the last one at the time at which it was asked for."""
+        ahead = self._clock.ahead_ns(frame, asked_ns)
+        if self._frame is not None and frame < self._frame:
+            self._counts['old frames'] += 1
+            self._trouble = f'frame {frame} came after frame {self._frame}: an old reply'
+        elif ahead > _AHEAD_NS:
+            self._counts['frames ahead of time'] += 1
+            self._trouble = f'frame {frame} came {ahead * 1e-6:.0f} ms before its time'
+        else:
+            self._misnumbered = 0
+            return True
+        self._misnumbered += 1
+        if self._misnumbered >= _FOR_GOOD:
+            raise DeviceError(f'tracker at {self._path} counts its frames anew: it is opened again')
+        return False
 
 
 def _handles(reply: str) -> list[int]:

@@ -28,7 +28,7 @@ class FrameClock:
         Parameters
         ----------
         frame
-            Its number, larger than the last; a smaller one begins anew.
+            Its number, larger than the last.
         asked_ns
             When the reply that brought it was asked for, in ns.
 
@@ -38,10 +38,23 @@ class FrameClock:
             In ns of the same clock, never later than ``asked_ns``.
         """
         seen = asked_ns - frame * self._period_ns
-        if self._offset_ns is None or frame <= self._frame:
-            self._offset_ns = seen
-        else:
-            passed = (frame - self._frame) * self._period_ns
-            self._offset_ns = min(seen, self._offset_ns + _DRIFT * passed)
+        self._offset_ns = seen if self._offset_ns is None else min(seen, self._latest_ns(frame))
         self._frame = frame
         return round(self._offset_ns + frame * self._period_ns)
+
+    def ahead_ns(self, frame: int, asked_ns: int) -> int:
+        """How much earlier than it can have been measured a frame was seen; 0 if it was not.
+
+        Parameters
+        ----------
+        frame, asked_ns
+            As in `stamp`.
+        """
+        if self._offset_ns is None:
+            return 0
+        return max(0, round(self._latest_ns(frame) + frame * self._period_ns - asked_ns))
+
+    def _latest_ns(self, frame: int) -> float:
+        """Latest time of frame 0, after what the clocks may have drifted until a frame."""
+        passed = (frame - self._frame) * self._period_ns
+        return (self._offset_ns or 0.0) + _DRIFT * passed

@@ -18,7 +18,9 @@ class ChannelCheck:
     an open bridge drives the amplifier.  Saturated: beyond ``saturated_*``.  Frozen: not one count
     of change for ``frozen_after`` seconds; the noise of a living cell changes its last digit.
     Spiking: a change faster than ``spike_rate``; three readings in a row that agree with each other
-    are a new level.  With five spikes in a second the whole channel is not believed.
+    are a new level.  With five spikes in a second the whole channel is not believed.  This is all
+    that tells an old reply of Modbus RTU, which has no number: kept on the way and sent again, it
+    is left out where the tension has gone on by more than a wire can in one interval.
 
     Parameters
     ----------
@@ -33,8 +35,8 @@ class ChannelCheck:
     ----------
     fault
         What is wrong, naming the wire; empty while readings are good.
-    spikes
-        Readings that changed too fast.
+    spikes, new_levels
+        Readings that changed too fast, and how often three of them were taken for a new level.
     """
 
     def __init__(self, wire: str, cell: WireCell, limits: FaultLimits) -> None:
@@ -43,6 +45,7 @@ class ChannelCheck:
         self.cell = cell
         self.fault = ''
         self.spikes = 0
+        self.new_levels = 0
         self._good = 0
         self._spiked_ns: deque[int] = deque(maxlen=_SPIKES)
         self._count = math.nan
@@ -108,6 +111,7 @@ class ChannelCheck:
         self._agreeing = self._agreeing + 1 if agrees else 1
         self._candidate, self._candidate_ns = tension, time_ns
         if self._agreeing >= CONFIRMATIONS:
+            self.new_levels += 1
             self._take(time_ns, tension)
             return ''
         return f'spiking (from {self._level:.2f} N to {tension:.2f} N)'

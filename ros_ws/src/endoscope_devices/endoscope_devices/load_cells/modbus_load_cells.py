@@ -33,7 +33,7 @@ class WireReading:
     Attributes
     ----------
     time_ns
-        When they were asked for, in ns of ``time.monotonic_ns``.
+        When they were measured, in ns of ``time.monotonic_ns``.
     tension
         In N, shape (W,).
     """
@@ -130,6 +130,7 @@ class ModbusLoadCells(ReadingThread[WireReading]):
         for name, check in zip(self.calibration.wires, self._checks, strict=True):
             figures[f'{name}: zero [counts]'] = check.cell.zero
             figures[f'{name}: spikes'] = check.spikes
+            figures[f'{name}: new levels'] = check.new_levels
         return self.trouble, figures
 
     def _run(self) -> None:
@@ -176,7 +177,8 @@ class ModbusLoadCells(ReadingThread[WireReading]):
             return
         self._unbelieved = 0
         self._window.add(time_ns, believed)
-        self._keep(WireReading(time_ns, believed), time_ns)
+        latency_ns = round(self.calibration.transmitter.latency * 1e9)
+        self._keep(WireReading(time_ns - latency_ns, believed), time_ns)
 
 
 def modbus_rtu(port: str, calibration: LoadCellCalibration) -> ModbusLoadCells:

@@ -1,0 +1,171 @@
+"""The `metadata.yaml` of a rosbag2 folder: which files make a recording, and what is said of them.
+
+It is written in version 9 (ROS 2 Jazzy), with every key that it has.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from endoscope_bags.errors import BagNotFoundError, NotABagError, UnsupportedBagError
+from endoscope_bags.message_types import MessageType
+from endoscope_bags.qos_profile import QosProfile
+from endoscope_core.atomic_output import write_text
+from endoscope_core.strict_yaml import YamlError, load_yaml
+
+METADATA = 'metadata.yaml'
+ROS_DISTRO = 'jazzy'
+VERSION = 9
+_ROOT = 'rosbag2_bagfile_information'
+
+
+def bag_files(path: Path) -> list[Path]:
+    """Return the ``.mcap`` files of a recording in their order.
+
+    Parameters
+    ----------
+    path
+        A ``.mcap`` file, or a rosbag2 folder. A folder without ``metadata.yaml`` (its recorder was
+        killed) is taken with all the ``.mcap`` in it.
+
+    Raises
+    ------
+    BagNotFoundError
+        The path, or a file that the metadata lists, does not exist.
+    NotABagError
+        The folder holds no recording, or its metadata are not rosbag2's.
+    UnsupportedBagError
+        The recording is in sqlite3 or compressed as a whole.
+    """
+    if not path.exists():
+        raise BagNotFoundError(f'{path}: no such file or folder')
+    if path.is_file():
+        return [path]
+    if not (path / METADATA).is_file():
+        found = sorted(path.glob('*.mcap'))
+        if not found:
+            raise NotABagError(f'{path}: a folder with neither metadata.yaml nor any .mcap in it')
+        return found
+    files = [path / name for name in _listed_files(path / METADATA)]
+    for file in files:
+        # What no file can be named, pathlib would complain of in its own words.
+        if not os.path.isfile(file):  # noqa: PTH113
+            raise BagNotFoundError(f'{file}: missing, though {path / METADATA} lists it')
+    return files
+
+
+def _listed_files(path: Path) -> list[str]:
+    """Names of the files that a `metadata.yaml` lists, without their folders."""
+    try:
+        document = load_yaml(path)
+    except YamlError as error:
+        raise NotABagError(str(error)) from error
+    information = document.get(_ROOT) if isinstance(document, dict) else None
+    listed = information.get('relative_file_paths') if isinstance(information, dict) else None
+    if not isinstance(information, dict) or not listed:
+        raise NotABagError(f'{path}: not the metadata of a rosbag2 recording')
+    storage = information.get('storage_identifier')
+    compression = information.get('compression_mode') or 'none'
+    if storage != 'mcap' or str(compression).lower() in ('file', 'message'):
+        raise UnsupportedBagError(
+            f'{path}: storage {storage}, compression mode {compression}; '
+            'convert it to plain mcap first (ros2 bag convert)'
+        )
+    if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
+        raise NotABagError(
+            f'{path}: relative_file_paths is {listed!r}: it has to list names of files'
+        )
+    names = [Path(name).name for name in listed]
+    if len(set(names)) < len(names):
+        raise NotABagError(f'{path}: relative_file_paths lists a file twice')
+    return names
+
+
+@dataclass(frozen=True)
+class TopicSummary:
+    """What the metadata say of one topic."""
+
+    name: str
+    type: MessageType
+    qos: tuple[QosProfile, ...]
+    message_count: int
+
+
+def metadata_document(
+    files: Sequence[str],
+    topics: Sequence[TopicSummary],
+    *,
+    start_ns: int,
+    end_ns: int,
+    custom_data: Mapping[str, str],
+) -> dict[str, Any]:
+    """Return the document that `ros2 bag` expects.
+
+    Parameters
+    ----------
+    files
+        Names of the ``.mcap`` files; this project writes one.
+    topics
+        All topics, also those without messages.
+    start_ns, end_ns
+        First and last receipt, ns since the epoch; both 0 for a recording without messages.
+    custom_data
+        Free text by free keys.
+    """
+    count = sum(topic.message_count for topic in topics)
+    start = {'nanoseconds_since_epoch': start_ns}
+    duration = {'nanoseconds': end_ns - start_ns}
+    information = {
+        'version': VERSION,
+        'storage_identifier': 'mcap',
+        'duration': duration,
+        'starting_time': start,
+        'message_count': count,
+        'topics_with_message_count': [
+            {
+                'topic_metadata': {
+                    'name': topic.name,
+                    'type': topic.type.name,
+                    'serialization_format': 'cdr',
+                    'offered_qos_profiles': [profile.as_rosbag2() for profile in topic.qos],
+                    'type_description_hash': topic.type.type_hash,
+                },
+                'message_count': topic.message_count,
+            }
+            for topic in topics
+        ],
+        'compression_format': '',
+        'compression_mode': '',
+        'relative_file_paths': list(files),
+        'files': [
+            {
+                'path': file,
+                'starting_time': dict(start),
+                'duration': dict(duration),
+                'message_count': count,
+            }
+            for file in files
+        ],
+        'custom_data': dict(custom_data) or None,
+        'ros_distro': ROS_DISTRO,
+    }
+    return {_ROOT: information}
+
+
+def metadata_text(document: Mapping[str, Any]) -> str:
+    """Return the document as YAML without anchors, which yaml-cpp would print otherwise."""
+    return yaml.dump(dict(document), Dumper=_PlainDumper, sort_keys=False)
+
+
+def write_metadata(path: Path, document: Mapping[str, Any]) -> None:
+    """Write `metadata.yaml` whole or not at all."""
+    write_text(path, metadata_text(document))
+
+
+class _PlainDumper(yaml.SafeDumper):
+    def ignore_aliases(self, data: Any) -> bool:
+        return True

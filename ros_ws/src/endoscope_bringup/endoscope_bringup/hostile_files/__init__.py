@@ -1,0 +1,1 @@
+"""Files that were damaged or crafted, and what the readers of this project do with them."""

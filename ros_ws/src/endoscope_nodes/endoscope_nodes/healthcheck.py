@@ -1,0 +1,82 @@
+"""The program `healthcheck`: whether a node has spoken on ``/diagnostics`` just now.
+
+For container engines, which run it now and then beside the node: it loads nothing that a node does.
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from endoscope_core.errors import EndoscopeError
+from endoscope_nodes.discovery import stay_on_this_machine
+from endoscope_nodes.program import NODES
+from endoscope_nodes.qos import EVENT
+
+_LONGEST_S = 5.0
+
+
+def is_heard(node: str, namespace: str, longest_s: float) -> bool:
+    """Listen to ``/diagnostics`` until a node speaks.
+
+    Parameters
+    ----------
+    node, namespace
+        Its name, which a status bears before the colon, alone or behind the namespace.
+    longest_s
+        For how long to listen, in s; a node speaks once a second.
+    """
+    stay_on_this_machine()
+    names = {node, f'/{namespace.strip("/")}/{node}'}
+    context = Context()
+    rclpy.init(args=[], context=context)
+    listener = Node(
+        f'healthcheck_of_{node}',
+        context=context,
+        enable_rosout=False,
+        start_parameter_services=False,
+    )
+    heard: list[str] = []
+
+    def listen(message: DiagnosticArray) -> None:
+        heard.extend(status.name.partition(':')[0] for status in message.status)
+
+    listener.create_subscription(DiagnosticArray, '/diagnostics', listen, EVENT)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(listener)
+    deadline = time.monotonic() + longest_s
+    try:
+        while not names & set(heard) and (left := deadline - time.monotonic()) > 0:
+            executor.spin_once(timeout_sec=left)
+    finally:
+        executor.shutdown()
+        listener.destroy_node()
+        context.try_shutdown()
+    return bool(names & set(heard))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Return 0 if the node speaks, 1 if it is silent, 2 for wrong usage."""
+    parser = argparse.ArgumentParser(
+        prog='healthcheck',
+        description='Exits 0 if a node speaks on /diagnostics, 1 if it is silent.',
+    )
+    parser.add_argument('node', choices=NODES, metavar='NODE', help=', '.join(NODES))
+    parser.add_argument(
+        '--namespace', default='endoscope', help='of the node (default: %(default)s)'
+    )
+    args = parser.parse_args(argv)
+    try:
+        if is_heard(args.node, args.namespace, _LONGEST_S):
+            return 0
+    except EndoscopeError as error:
+        print(f'healthcheck: {error}', file=sys.stderr)
+        return 2
+    print(f'healthcheck: {args.node} has been silent for {_LONGEST_S:g} s', file=sys.stderr)
+    return 1

@@ -1,0 +1,88 @@
+import pytest
+
+from endoscope_nodes.parameter_sections import check_sections
+from endoscope_nodes.parameters import ParameterError
+
+HERE = '/endoscope'
+
+
+@pytest.fixture
+def check(tmp_path):
+    def check(text, *more, namespace=HERE):
+        file = tmp_path / 'given.yaml'
+        file.write_text(text)
+        return check_sections(['--ros-args', '--params-file', str(file), *more], namespace)
+
+    return check
+
+
+@pytest.mark.parametrize(
+    'section',
+    [
+        '/endoscope/recorder',
+        'endoscope/recorder',
+        '/**/recorder',
+        '/*/recorder',
+        '/**',
+        '/endoscope/*',
+        '/endoscope/**',
+    ],
+)
+def test_what_rcl_gives_to_a_node_here_is_not_worth_a_word(check, section):
+    assert check(f'{section}:\n  ros__parameters: {{autostart: false}}\n') == []
+
+
+def test_sections_may_be_nested(check):
+    assert check('endoscope:\n  recorder:\n    ros__parameters: {autostart: false}\n') == []
+    with pytest.raises(ParameterError, match=r"'/endoscope/recoder'.* did you mean 'recorder'"):
+        check('endoscope:\n  recoder:\n    ros__parameters: {autostart: false}\n')
+
+
+@pytest.mark.parametrize('section', ['/**/recoder', '/endoscope/recoder', '/arm1/recoder'])
+def test_a_misspelt_node_is_refused_wherever_it_might_be(check, section):
+    with pytest.raises(ParameterError, match=r"given\.yaml: section .* did you mean 'recorder'"):
+        check(f'{section}:\n  ros__parameters: {{autostart: false}}\n')
+
+
+@pytest.mark.parametrize('section', ['recorder', '/console'])
+def test_a_node_without_its_namespace_is_refused(check, section):
+    name = section.strip('/')
+    with pytest.raises(ParameterError, match=f"write '/endoscope/{name}' or '/\\*\\*/{name}'"):
+        check(f'{section}:\n  ros__parameters: {{bag: a}}\n')
+    assert check(f'{section}:\n  ros__parameters: {{bag: a}}\n', namespace='/') == []
+
+
+def test_what_is_for_another_rig_is_said(check):
+    [line] = check('/arm1/recorder:\n  ros__parameters: {bag: a}\n')
+    assert "section '/arm1/recorder' is for no node in /endoscope" in line
+    assert check('/arm1/recorder:\n  ros__parameters: {bag: a}\n', namespace='/arm1') == []
+
+
+def test_a_renamed_node_is_known(check):
+    assert check('/**/left:\n  ros__parameters: {bag: a}\n', '-r', 'recorder:__node:=left') == []
+
+
+def test_a_parameter_twice_is_refused(check):
+    with pytest.raises(ParameterError, match="'/\\*\\*/recorder' has the parameter 'bag' twice"):
+        check('/**/recorder:\n  ros__parameters:\n    bag: a\n    bag: b\n')
+
+
+def test_an_empty_file_is_for_nobody(check):
+    assert check('') == []
+
+
+@pytest.mark.parametrize(
+    ('rule', 'words'),
+    [
+        ('recorder:bag:=a', "write '/endoscope/recorder'"),
+        ('recoder:bag:=a', "there is no node 'recoder'; did you mean 'recorder'"),
+    ],
+)
+def test_a_rule_for_one_node_is_for_one_without_a_namespace(rule, words):
+    with pytest.raises(ParameterError, match=words):
+        check_sections(['--ros-args', '-p', rule], HERE)
+
+
+def test_a_rule_for_all_nodes_may_have_colons_in_its_value():
+    assert check_sections(['--ros-args', '-p', 'bag:=a:b:=c'], HERE) == []
+    assert check_sections(['--ros-args', '-p', 'recorder:bag:=a'], '/') == []

@@ -1,0 +1,184 @@
+"""What a node's program does with its command line and with signals, from its first moment on."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from private_domain import private_domain
+
+from endoscope_nodes.program import NODES
+
+PATIENCE_S = 120.0
+# The last bytes of a complete file: https://mcap.dev/spec.
+MCAP_MAGIC = b'\x89MCAP0\r\n'
+STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+WORDS = {
+    signal.SIGINT: 'interrupted',
+    signal.SIGTERM: 'terminated',
+    signal.SIGHUP: 'hung up',
+}
+
+
+def start(name, *args, on_hangup=signal.SIG_DFL, environment=None, **options):
+    # The tests themselves may have been started by `nohup`.
+    hangup = f'import signal; signal.signal(signal.SIGHUP, signal.{on_hangup.name})'
+    code = f'import sys; from endoscope_nodes.program import {name}; sys.exit({name}())'
+    return subprocess.Popen(
+        [sys.executable, '-c', f'{hangup}; {code}', *args],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | (environment or {'ROS_DOMAIN_ID': str(private_domain())}),
+        **options,
+    )
+
+
+def ended(name, *args, **options):
+    process = start(name, *args, **options)
+    out, errors = process.communicate(timeout=PATIENCE_S)
+    return process.returncode, out, errors
+
+
+def mask_of_signals(process, kind):
+    """Read a mask of proc(5): SigCgt of the signals caught, SigIgn of those ignored."""
+    lines = Path(f'/proc/{process.pid}/status').read_text().splitlines()
+    [mask] = [line.split()[1] for line in lines if line.startswith(kind)]
+    return int(mask, 16) << 1
+
+
+def wait_until_it_catches_signals(process):
+    """Wait for the last of the handlers."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not mask_of_signals(process, 'SigCgt') >> STOPPING[-1] & 1:
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < deadline, 'it catches no signals'
+
+
+def wait_for_line(process, words):
+    for line in process.stderr:
+        if words in line:
+            return
+    pytest.fail(f'it never said {words!r}')
+
+
+@pytest.mark.parametrize('number', STOPPING)
+@pytest.mark.parametrize('name', ['graph', 'recorder'])
+def test_a_signal_while_it_starts_is_one_line(tmp_path, name, number):
+    process = start(name, '--ros-args', '-p', f'bag:={tmp_path / "bag"}')
+    wait_until_it_catches_signals(process)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=PATIENCE_S)
+    assert errors == f'{name}: {WORDS[number]} while starting\n'
+    assert process.returncode == 128 + number
+    assert not (tmp_path / 'bag').exists()
+
+
+@pytest.mark.parametrize('first', STOPPING)
+def test_a_recording_is_finished_once_however_often_it_is_asked_for(tmp_path, first):
+    process = start('recorder', '--ros-args', '-p', f'bag:={tmp_path / "bag"}')
+    wait_for_line(process, 'recording to')
+    process.send_signal(first)
+    while process.poll() is None:
+        for number in STOPPING:
+            process.send_signal(number)
+        time.sleep(0.002)
+    errors = process.stderr.read()
+    assert process.returncode == 0, errors
+    [line] = errors.splitlines()
+    assert '0 lost' in line
+    assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
+    assert (tmp_path / 'bag' / 'bag_0.mcap').read_bytes().endswith(MCAP_MAGIC)
+
+
+def test_a_program_started_by_nohup_outlives_the_terminal(tmp_path):
+    bag = ['-p', f'bag:={tmp_path / "bag"}']
+    process = start('recorder', '--ros-args', *bag, on_hangup=signal.SIG_IGN)
+    wait_for_line(process, 'recording to')
+    assert mask_of_signals(process, 'SigIgn') >> signal.SIGHUP & 1
+    process.terminate()
+    _, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0, errors
+
+
+@pytest.mark.parametrize('name', ['motor_driver', 'graph'])
+@pytest.mark.parametrize('word', ['-h', '--help'])
+def test_who_asks_for_help_gets_it_and_starts_nothing(name, word):
+    code, out, errors = ended(name, word)
+    assert (code, errors) == (0, '')
+    assert out.startswith(f'usage: {name} ')
+
+
+@pytest.mark.parametrize(
+    ('args', 'words'),
+    [
+        (['start'], "recorder: unknown argument 'start'; parameters go behind --ros-args"),
+        (['-p', 'autostart:=false'], "unknown argument '-p'"),
+        (['--ros-args', '-p', 'autostart:=false', '--', 'now'], "unknown argument 'now'"),
+        (['--ros-args', '--log-levl', 'info'], "unknown ROS arguments '--log-levl', 'info'"),
+        (['--ros-args', '-p', 'autostart'], "'-p autostart'"),
+        (['--ros-args', '-p', 'recorder:autostart:=false'], 'in a parameters file'),
+        (['--ros-args', '-p', 'recoder:autostart:=false'], "did you mean 'recorder'?"),
+        (['--ros-args', '--params-file', 'nowhere.yaml'], 'nowhere.yaml'),
+    ],
+)
+def test_words_that_nobody_would_hear_are_one_line_and_exit_code_2(tmp_path, args, words):
+    code, _, errors = ended('recorder', *args, cwd=tmp_path)
+    assert code == 2
+    [line] = errors.splitlines()
+    assert words in line
+    assert not (tmp_path / 'bags').exists()
+
+
+@pytest.mark.parametrize('name', ['graph', *NODES])
+def test_every_program_leads_to_a_module_that_runs(name):
+    code = (
+        'import importlib\n'
+        f'from endoscope_nodes.program import {name} as program\n'
+        f'assert program.name == {name!r}\n'
+        'module = importlib.import_module("endoscope_nodes." + program.module)\n'
+        'assert callable(module.main)\n'
+    )
+    subprocess.run([sys.executable, '-c', code], check=True)
+
+
+def test_a_node_is_healthy_while_it_speaks(tmp_path):
+    domain = {'ROS_DOMAIN_ID': str(private_domain())}
+    silent = healthcheck('recorder', domain)
+    assert silent.returncode == 1
+    assert silent.stderr == 'healthcheck: recorder has been silent for 5 s\n'
+    bag = ['-p', f'bag:={tmp_path / "bag"}']
+    process = start('recorder', '--ros-args', *bag, environment=domain)
+    try:
+        wait_for_line(process, 'recording to')
+        heard = healthcheck('recorder', domain)
+        other = healthcheck('console', domain)
+    finally:
+        process.kill()
+        process.communicate()
+    assert (heard.returncode, heard.stderr) == (0, '')
+    assert other.returncode == 1
+
+
+def healthcheck(node, environment):
+    code = 'import sys; from endoscope_nodes.healthcheck import main; sys.exit(main())'
+    return subprocess.run(
+        [sys.executable, '-c', code, node],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_a_health_check_loads_nothing_that_a_node_does():
+    code = (
+        'import sys\n'
+        'import endoscope_nodes.healthcheck\n'
+        'print(*sorted({"torch", "numba", "scipy"} & set(sys.modules)))\n'
+    )
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
