@@ -91,6 +91,7 @@ class Operator(ClosedOnExit):
         self.heard_ns: dict[str, int] = {}
         self._bending: JointSample | None = None
         self._turn = 0
+        self._due_ns = 0
         self._phase = 0.0
         self._hand: tuple[float, ...] = (0.0,) * len(JOINTS)
         self._entered = ''
@@ -177,17 +178,17 @@ class Operator(ClosedOnExit):
     def serve(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Move and listen for some time, or until something has come true; whether it has."""
         end = time.monotonic_ns() + round(seconds * 1e9)
-        due = time.monotonic_ns()
         while True:
-            self._send()
+            now = time.monotonic_ns()
+            if now >= self._due_ns:
+                self._due_ns = max(self._due_ns + _TURN_NS, now)
+                self._send()
             self._hear()
             if until():
                 return True
-            now = time.monotonic_ns()
             if now >= end:
                 return False
-            due = max(due + _TURN_NS, now)
-            time.sleep(min(due, end) * 1e-9 - now * 1e-9 if min(due, end) > now else 0.0)
+            time.sleep(max(0, min(self._due_ns, end) - time.monotonic_ns()) * 1e-9)
 
     def _send(self) -> None:
         self._turn += 1
