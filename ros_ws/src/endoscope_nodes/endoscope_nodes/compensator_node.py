@@ -105,7 +105,7 @@ class CompensatorNode(EndoscopeNode):
         self._motors = JointPublisher(self, MOTOR_COMMAND, MOTORS, ('position',), COMMAND)
         self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
         self._session = SessionWatch(self, self._start_anew, self._start_anew)
-        self._clutch = ClutchWatch(self)
+        self._clutch = ClutchWatch(self, self._end_stream)
         self._pose = MeasuredPose(self)
         self._calibration_in = self._listen(
             CALIBRATION_COMMAND, self._on_calibration, self.calibration_gate
@@ -192,6 +192,12 @@ class CompensatorNode(EndoscopeNode):
         self._corrections = (None, None)
         self._source = NOBODY
         self._motors.session = self._session.name
+
+    def _end_stream(self) -> None:
+        """The clutch was let go of: whatever is commanded after it begins at the measured pose."""
+        self.gate.reset()
+        if self._source == CONSOLE:
+            self._source = NOBODY
 
     def _watch_console(self) -> None:
         now = self.ticker.monotonic_ns()

@@ -9,6 +9,7 @@ from sensor_msgs.msg import JointState, Joy
 
 from endoscope_core.control import Handle, HandleRefusal, HandleSettings
 from endoscope_core.safety import MotionLimits, MotionShaper
+from endoscope_core.safety.motion_session import STALL_NS
 from endoscope_core.signals import MOTIONS
 from endoscope_core.signals.command_file import CommandFileError
 from endoscope_nodes.console_motion import (
@@ -89,6 +90,7 @@ class ConsoleNode(EndoscopeNode):
         self._approached = 0
         self._stay: tuple[float, ...] = ()
         self._moving = False
+        self._sent_ns: int | None = None
         self._clutch_said = False
         self._refused_before = 0
         facts = self.rig.joints
@@ -201,6 +203,19 @@ class ConsoleNode(EndoscopeNode):
             self._calibration.trouble(self.rig.timeouts.command_ns)
         )
 
+    def _begin(self) -> bool:
+        """Begin a stream, but not before the compensator knows that the last one has ended.
+
+        The compensator would take it for the last one going on, and for a jump: the measured pose
+        is not what was commanded.  It hears a command at most `STALL_NS` late, or leaves the
+        session.
+        """
+        apart_ns = self.rig.timeouts.command_ns + STALL_NS
+        now = self.ticker.monotonic_ns()
+        soon = self._sent_ns is not None and now - self._sent_ns <= apart_ns
+        self._moving = not soon
+        return self._moving
+
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         self._session.turn()
         followed = self._handle.follow(self.ticker.monotonic_of(stamp_ns))
@@ -219,7 +234,7 @@ class ConsoleNode(EndoscopeNode):
     ) -> None:
         if not self._moving:
             pose = self._pose.bending()
-            if pose is None:
+            if pose is None or not self._begin():
                 return
             self._stay = pose
             self._approach = approach(
@@ -227,7 +242,6 @@ class ConsoleNode(EndoscopeNode):
             )
             self._approached = 0
             self._playing_shaper.restart(pose)
-            self._moving = True
             self._publish_clutch(stamp_ns)
         if self._approach is not None and self._approached < len(self._approach):
             angle, velocity = self._approach.at(self._approached, self._stay)
@@ -251,12 +265,11 @@ class ConsoleNode(EndoscopeNode):
         if followed is None and self._handle.alive(self.ticker.monotonic_ns()):
             # A handle that was silent while the slave was told to stay is taken up from there.
             pose = self._hand_shaper.position if self._moving else self._pose.bending()
-            if pose is None:
+            if pose is None or not (self._moving or self._begin()):
                 return
             self._handle.scale = self._settings.scale
             self._handle.engage(pose)
             self._hand_shaper.restart(pose)
-            self._moving = True
             followed = pose, (0.0,) * len(JOINTS)
         if not self._moving:
             return
@@ -264,8 +277,8 @@ class ConsoleNode(EndoscopeNode):
         target, velocity = followed or (self._hand_shaper.position, (0.0,) * len(JOINTS))
         self._publish(commands, self._hand_shaper, target, velocity, stamp_ns, periods)
 
-    @staticmethod
     def _publish(
+        self,
         commands: JointPublisher,
         shaper: MotionShaper,
         angle: Sequence[float],
@@ -275,6 +288,7 @@ class ConsoleNode(EndoscopeNode):
     ) -> None:
         shaped = shaper.shape(angle, periods * TICK_S)
         as_asked = all(abs(a - b) < 1e-9 for a, b in zip(angle, shaped, strict=True))
+        self._sent_ns = self.ticker.monotonic_ns()
         commands.publish(stamp_ns, *shaped, *(velocity if as_asked else shaper.velocity))
 
     def _report(self) -> Report:

@@ -136,20 +136,30 @@ class SessionWatch:
 class ClutchWatch:
     """The clutch as last heard; silence counts as released.
 
+    Parameters
+    ----------
+    on_release
+        Called when it is let go of, or heard again after having been silent.
+
     Attributes
     ----------
     subscription
         Of the clutch, by which its senders are told.
     """
 
-    def __init__(self, node: EndoscopeNode) -> None:
+    def __init__(self, node: EndoscopeNode, on_release: Callable[[], None] | None = None) -> None:
         self._ticker = node.ticker
+        self._on_release = on_release
         self._pressed = False
         self._heard_ns = 0
         self.subscription = node.create_subscription(Joy, MASTER_CLUTCH, self._receive, EVENT)
 
     def _receive(self, message: Joy) -> None:
-        self._pressed = bool(message.buttons) and message.buttons[0] == 1
+        before = self._pressed
+        pressed = bool(message.buttons) and message.buttons[0] == 1
+        if before and not (pressed and self.held) and self._on_release is not None:
+            self._on_release()
+        self._pressed = pressed
         self._heard_ns = self._ticker.monotonic_ns()
 
     @property

@@ -96,8 +96,8 @@ def _row(name: str, outcomes: Sequence['Outcome'], loads: Sequence[float]) -> st
     still = [o.still_s * 1e3 for o in outcomes if o.still_s is not None]
     enabled = [o.enabled_s for o in outcomes if o.enabled_s is not None]
     never = len(outcomes) - len(enabled)
-    missing = max(o.bag for o in outcomes)
-    lost = -sum(min(0.0, o.bag) for o in outcomes)
+    missing = max(0.0, *(o.bag for o in outcomes))
+    lost = sum(max(0.0, -o.bag) for o in outcomes)
     columns = (
         name,
         f'{len(outcomes)}',

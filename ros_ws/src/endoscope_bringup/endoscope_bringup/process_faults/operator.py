@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -40,8 +41,8 @@ _DEEP = QoSProfile(
 )
 _TURN_NS = 4_000_000
 _CLUTCH_TURNS = 25
-AMPLITUDE, RATE = 0.8, 1.5
-"""The hand swings by 0.8 rad at 1.5 rad/s: a shaft by 0.4 rad at up to 0.6 rad/s."""
+# The hand swings at up to 1 rad/s, a shaft at half of that, and steers back to the middle.
+AMPLITUDE, RATE, STEERING = 0.5, 2.0, 0.5
 
 
 class Operator(ClosedOnExit):
@@ -81,7 +82,7 @@ class Operator(ClosedOnExit):
         self.clutch = True
         self.shafts: list[JointSample] = []
         self.goals: list[JointSample] = []
-        self.sent: list[tuple[str, int, tuple[float, ...]]] = []
+        self.sent: deque[tuple[str, int, tuple[float, ...]]] = deque(maxlen=5000)
         self.replays = False
         self.late_ns = 0
         self.states: list[tuple[int, str]] = []
@@ -90,8 +91,9 @@ class Operator(ClosedOnExit):
         self.heard_ns: dict[str, int] = {}
         self._bending: JointSample | None = None
         self._turn = 0
+        self._due_ns = 0
         self._phase = 0.0
-        self._anchor: tuple[float, ...] = ()
+        self._hand: tuple[float, ...] = (0.0,) * len(JOINTS)
         self._entered = ''
         self._handle: JointPublisher | None = None
         self._clutch: Any = None
@@ -176,17 +178,17 @@ class Operator(ClosedOnExit):
     def serve(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Move and listen for some time, or until something has come true; whether it has."""
         end = time.monotonic_ns() + round(seconds * 1e9)
-        due = time.monotonic_ns()
         while True:
-            self._send()
+            now = time.monotonic_ns()
+            if now >= self._due_ns:
+                self._due_ns = max(self._due_ns + _TURN_NS, now)
+                self._send()
             self._hear()
             if until():
                 return True
-            now = time.monotonic_ns()
             if now >= end:
                 return False
-            due = max(due + _TURN_NS, now)
-            time.sleep(min(due, end) * 1e-9 - now * 1e-9 if min(due, end) > now else 0.0)
+            time.sleep(max(0, min(self._due_ns, end) - time.monotonic_ns()) * 1e-9)
 
     def _send(self) -> None:
         self._turn += 1
@@ -195,24 +197,21 @@ class Operator(ClosedOnExit):
         if self._handle is None:
             return
         self._phase += RATE * _TURN_NS * 1e-9
+        swing = AMPLITUDE * RATE * math.cos(self._phase)
+        bent = self._bending.position if self._bending else (0.0,) * len(JOINTS)
+        speed = tuple(swing - STEERING * x for x in bent)
         stamp = time.time_ns() - self.late_ns
-        if self.source == 'master':
-            angle = AMPLITUDE * math.sin(self._phase)
-            self._handle.publish(stamp, angle, angle)
-            return
-        if self.session != self._entered:
+        if self.source == 'outside' and self.session != self._entered:
             # Whoever enters a session starts from the measured pose.
-            self._entered, self._phase = self.session, 0.0
-            self._anchor = self._bending.position if self._bending else ()
-        if not (self.session and self._anchor):
-            return
-        way = 0.5 * AMPLITUDE * (1.0 - math.cos(self._phase))
-        speed = 0.5 * AMPLITUDE * RATE * math.sin(self._phase)
-        angles = tuple(a + way for a in self._anchor)
-        self.sent.append((self.session, stamp, (*angles, speed, speed)))
-        for session, stamped, values in self.sent[-1:] + self._old():
-            self._handle.session = session
-            self._handle.publish(stamped, *values)
+            self._entered, self._hand = self.session, bent
+        self._hand = tuple(a + v * _TURN_NS * 1e-9 for a, v in zip(self._hand, speed, strict=True))
+        if self.source == 'master':
+            self._handle.publish(stamp, *self._hand)
+        elif self.session:
+            self.sent.append((self.session, stamp, (*self._hand, *speed)))
+            for session, stamped, values in (self.sent[-1], *self._old()):
+                self._handle.session = session
+                self._handle.publish(stamped, *values)
 
     def _old(self) -> list[tuple[str, int, tuple[float, ...]]]:
         return [self.sent[self._turn * 7919 % len(self.sent)]] if self.replays else []

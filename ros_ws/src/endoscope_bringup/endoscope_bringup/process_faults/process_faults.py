@@ -51,11 +51,14 @@ class ProcessFault:
         ``outside`` for a program that writes `slave/servo_jp` itself.
     kills
         Process that is gone afterwards.
+    pauses
+        Whether the operator himself lets the slave stand and move again.
     """
 
     inject: Callable[[ProcessRig], object]
     source: str = 'master'
     kills: str = ''
+    pauses: bool = False
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,8 @@ class Outcome:
         From the fault to standstill; None where the motion went on, or the plant died.
     unasked
         How far shafts went after standstill and before the next enable.
+    gap_s
+        Longest time between two readings of the shafts, by their stamps.
     enabled_s
         From the next enable to motion; None where that did not come.
     before
@@ -91,6 +96,7 @@ class Outcome:
     shaft_speed: float
     still_s: float | None
     unasked: float
+    gap_s: float
     enabled_s: float | None
     before: str
     bag: float
@@ -138,7 +144,8 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
         shafts.step(round(1.5e9 / rig.rate)),
         shafts.speed(),
         None if plant_died else still_s,
-        unasked,
+        0.0 if fault.pauses else unasked,
+        shafts.longest_gap(),
         enabled_s,
         before,
         bag or lost - _lost(rig),
@@ -192,6 +199,9 @@ def _speak(kind: type, topic: str, make: Callable[[ProcessRig], Any], qos: Any) 
             publisher.publish(message)
             rig.operator.serve(_TURN_S)
         publisher.destroy()
+        if topic == MOTOR_COMMAND:
+            # Those were the rival's.
+            rig.operator.goals.clear()
 
     return ProcessFault(inject)
 
@@ -223,10 +233,17 @@ def _speak_while_disabled(rig: ProcessRig) -> None:
     state.inject(rig)
 
 
+def _clutch_again(rig: ProcessRig) -> None:
+    rig.operator.press(False)
+    rig.operator.serve(rig.random.uniform(0.0, 0.6))
+    rig.operator.press(True)
+
+
+def _fall_silent(rig: ProcessRig) -> None:
+    time.sleep(rig.random.uniform(0.0, 0.6))
+
+
 def _replay(rig: ProcessRig) -> None:
-    rig.operator.order('disable')
-    rig.operator.serve(0.3)
-    rig.enable_and_move()
     rig.operator.replays = True
     rig.operator.serve(0.5)
     rig.operator.replays = False
@@ -270,6 +287,8 @@ _ANYWHERE: dict[str, ProcessFault] = {
     'nothing': ProcessFault(lambda rig: rig.operator.serve(3.0)),
     **_rivals(),
     'ENABLED said by a rival while DISABLED': ProcessFault(_speak_while_disabled),
+    'clutch let go and pressed within 0.6 s': ProcessFault(_clutch_again, pauses=True),
+    'handle and clutch silent for up to 0.6 s': ProcessFault(_fall_silent, pauses=True),
     'old commands sent anew, outside program': ProcessFault(_replay, 'outside'),
     'commands 0.12 to 0.5 s late, outside program': ProcessFault(_come_late, 'outside'),
 }

@@ -69,6 +69,9 @@ class ProcessRig(ClosedOnExit):
         parameters: dict[str, dict[str, object]] = {first: {'tick_rate': self.rate}}
         if name in ('console', GRAPH):
             parameters.setdefault('console', {})['source'] = self._console
+        if name in ('controller', GRAPH):
+            # What feedback adds to a motion would hide what a fault adds.
+            parameters.setdefault('controller', {})['active'] = False
         if name in ('recorder', GRAPH):
             self._bags += 1
             self.bag = self._folder / f'bag-{self._bags}'

@@ -67,6 +67,10 @@ class ShaftTrace:
         steps = np.abs(np.diff(self._angles, axis=0)).max(axis=1)
         return float(steps[near].max(initial=0.0))
 
+    def longest_gap(self) -> float:
+        """Longest time in s between two readings."""
+        return float(np.diff(self._stamps).max(initial=0)) * 1e-9
+
     def speed(self) -> float:
         """Largest mean speed in rad/s over 10 ms."""
         ends = np.searchsorted(self._stamps, self._stamps + _SPEED_NS)

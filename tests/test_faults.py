@@ -1,0 +1,48 @@
+"""Nodes as processes that die, stall or are spoken over: nothing moves but on an enable.
+
+`endoscope bench faults` tries the other rows, and each of them often; see doc/faults.md.
+"""
+
+from random import Random
+
+import pytest
+
+from endoscope_bringup.process_faults.process_faults import PROCESS_FAULTS, undergo
+from endoscope_bringup.process_faults.process_rig import ProcessRig
+from endoscope_bringup.process_faults.trace import STILL
+from endoscope_core.rig import load_rig
+
+RATE_HZ = 250
+# From silence to the order to hold; a servo of the nominal plant stands 0.1 s later.
+HELD_S = 0.2 + 0.1
+
+
+@pytest.fixture(scope='module')
+def rig(tmp_path_factory):
+    with ProcessRig(RATE_HZ, False, tmp_path_factory.mktemp('faults'), Random(1)) as rig:
+        yield rig
+
+
+@pytest.mark.parametrize(
+    ('name', 'state'),
+    [
+        ('supervisor killed', 'DISABLED'),
+        ('compensator killed', 'FAULT'),
+        ('console killed', 'FAULT'),
+        ('console stalled for 2 s', 'FAULT'),
+        ('motor_driver stalled for 0.2 s', 'FAULT'),
+        ('rival on slave/servo_jp', 'FAULT'),
+        ('clutch let go and pressed within 0.6 s', None),
+    ],
+)
+def test_nothing_moves_but_on_an_enable(rig, name, state):
+    outcome = undergo(PROCESS_FAULTS[name], rig)
+    assert state is None or outcome.state == state, outcome
+    assert outcome.unasked <= STILL, outcome
+    assert outcome.goal_share <= 1.001, outcome
+    # The measured pose of another stream is no reason to hurry.
+    assert outcome.shaft_speed < 0.5 * load_rig().motors.speed, outcome
+    assert outcome.enabled_s is not None, outcome
+    if name == 'supervisor killed':
+        assert outcome.still_s is not None
+        assert outcome.still_s < HELD_S + outcome.gap_s, outcome
