@@ -144,6 +144,7 @@ def test_the_whole_graph_in_motion_stops_cleanly(operator, tmp_path, number):
         ('console', 'source:=motin', 'did you mean motion?'),
         ('motor_driver', 'plant_file:=nowhere.yaml', 'nowhere.yaml'),
         ('motor_driver', 'device:=dynamixel', '/dev/ttyUSB0: there is no such port'),
+        ('calibration', f'weights:={__file__}', "calibration: parameter 'weights': "),
         ('graph', 'moed:=none', "unknown parameter 'moed'"),
     ],
 )

@@ -33,7 +33,7 @@ from endoscope_nodes.calibration_result import (
     refused_result,
     successful_result,
 )
-from endoscope_nodes.diagnostics import ERROR, OK, Report
+from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
@@ -47,7 +47,7 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.parameters import parameter
+from endoscope_nodes.parameters import ParameterError, parameter
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_NS
@@ -96,7 +96,7 @@ class CalibrationNode(EndoscopeNode):
         self._settings = p
         self._timeout_ns = self.rig.timeouts.stream_ns
         self._motion = calibration_motion(p.motion)
-        self._classifier, self._no_classifier = self._load_classifier(p.weights)
+        self._classifier = self._load_classifier(p.weights)
         self._thread = None if self.ticker.simulated else ThreadPoolExecutor(1)
         self._run: CalibrationRun | None = None
         self._homing = False
@@ -127,17 +127,17 @@ class CalibrationNode(EndoscopeNode):
         """Whether the slave is being moved for a calibration or home."""
         return self._run is not None
 
-    def _load_classifier(self, weights: str) -> tuple[Classifier | None, str]:
+    def _load_classifier(self, weights: str) -> Classifier:
         torch.set_num_threads(1)
         try:
             classifier = load_classifier(weights or None, self._motion.name)
         except ClassifierError as error:
-            return None, str(error)
+            raise ParameterError(f"calibration: parameter 'weights': {error}") from error
         # The first judgement sets up memory, which takes longer than a tick. What it says of no
         # tension at all does not matter.
         with contextlib.suppress(UnseenTensionError):
             classifier.classify(np.zeros((self._motion.samples, len(WIRES))))
-        return classifier, ''
+        return classifier
 
     def _on_run(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.message = self._start(homing=False)
@@ -155,8 +155,6 @@ class CalibrationNode(EndoscopeNode):
         """Begin, or say why not."""
         if self._run is not None:
             return f'busy: {self._run.step}'
-        if self._no_classifier and not homing:
-            return self._no_classifier
         if not self._session.name:
             return 'no motion session is open: the slave has to be ENABLED'
         trouble, shafts = self._trouble(), self._pose.shafts()
@@ -217,7 +215,7 @@ class CalibrationNode(EndoscopeNode):
             self._finish(run)
 
     def _judge(self, run: CalibrationRun) -> None:
-        if run.record is None or self._classifier is None:
+        if run.record is None:
             return
         try:
             tension, cells = run.record.resampled(), run.record.cells()
@@ -307,8 +305,6 @@ class CalibrationNode(EndoscopeNode):
             'last': self._last,
             'peak tension [N]': self._guard.peak,
         }
-        if self._no_classifier:
-            return ERROR, self._no_classifier, values
         if self._run is None:
             return OK, 'waiting', values
         values['progress'] = self._run.progress

@@ -181,7 +181,9 @@ class _Watcher:
 
     def _on_health(self, message: Any) -> None:
         for status in message.status:
-            self._values[status.name.removeprefix('/endoscope/')] = {v.key: v.value for v in status.values}
+            self._values[status.name.removeprefix('/endoscope/')] = {
+                v.key: v.value for v in status.values
+            }
 
     def serve(self, seconds: float) -> None:
         deadline = time.monotonic() + seconds
