@@ -110,7 +110,7 @@ class SimulatedGraph(ProbedGraph):
             if len(self.results) > known:
                 break
         status = self.results[-1].status[0]
-        assert status.level == b'\x00', status.message
+        assert status.level == b'\x00', f'{status.message}: {self.cause}'
         return {v.key: v.value for v in status.values}
 
     @property

@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from sensor_msgs.msg import JointState, Joy
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.runtime import Runtime
@@ -28,11 +28,12 @@ class ForeignConsole(Node):
         super().__init__('foreign_console', context=context)
         qos = QoSProfile(depth=10)
         self.measured = []
-        self.state = ''
+        self.state = self.session = ''
         self.commands = self.create_publisher(JointState, NAMESPACE + 'slave/servo_jp', qos)
         self.clutch = self.create_publisher(Joy, NAMESPACE + 'master/clutch', qos)
         self.orders = self.create_publisher(String, NAMESPACE + 'slave/state_command', qos)
         self.create_subscription(String, NAMESPACE + 'slave/operating_state', self._on_state, qos)
+        self.create_subscription(Header, NAMESPACE + 'slave/motion_session', self._on_session, qos)
         self.create_subscription(
             JointState, NAMESPACE + 'motor/measured_js', self.measured.append, qos
         )
@@ -43,8 +44,12 @@ class ForeignConsole(Node):
     def _on_state(self, message):
         self.state = message.data
 
+    def _on_session(self, message):
+        self.session = message.frame_id
+
     def _on_timer(self):
-        if self.state != 'ENABLED':
+        if not self.session:
+            self._begun = None
             self.orders.publish(String(data='enable'))
             return
         now = self.get_clock().now()
@@ -53,6 +58,7 @@ class ForeignConsole(Node):
         angle = 0.3 * (1.0 - math.cos(2.0 * t))
         message = JointState(name=['bend_y', 'bend_x'], position=[-angle, angle])
         message.header.stamp = now.to_msg()
+        message.header.frame_id = self.session
         self.clutch.publish(Joy(buttons=[1]))
         self.commands.publish(message)
         if t > 3.0 and not self.done.done():

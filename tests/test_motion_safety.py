@@ -314,6 +314,20 @@ def test_stamps_that_run_ahead_stretch_no_allowance(foreign, console):
     assert foreign.nodes['compensator'].gate.refused['too fast']
 
 
+def test_enabling_anew_clears_what_a_stamp_from_the_future_left(foreign, console):
+    console.tick(ahead_ns=10_000_000_000)
+    console.move(50)
+    assert foreign.state == 'ENABLED'
+    foreign.command('disable')
+    foreign.advance(0.2)
+    foreign.enable()
+    corrections = foreign.listen(CORRECTION)
+    console._start, console._way = foreign.nodes['compensator']._pose.bending(), 0.0
+    console.move(1200)
+    assert len(corrections) > 1100
+    assert foreign.diagnostics['controller: feedback'][-1].message == 'in the loop'
+
+
 def test_a_velocity_that_belies_the_positions_moves_nothing(foreign, console):
     console.move(100)
     for _ in range(300):
@@ -566,6 +580,23 @@ def test_a_handle_of_any_rate_is_followed_smoothly(rate):
         assert speeds.min() > 0.25
         assert moved.largest_step < BOUND
         assert not any(graph.nodes['console']._handle.refused.values())
+
+
+@pytest.mark.parametrize('rate', [50, 1000])
+def test_a_handle_at_rest_with_a_count_of_noise_leaves_the_tip_at_rest(rate):
+    noise = np.random.default_rng(4)
+    with run(overrides={'calibration': {'motion': 'brief'}}) as graph:
+        graph.calibrate()
+        graph.set('console', source='master')
+        handle = Handle(graph, rate)
+        handle.move(1.0, (0.3, 0.3))
+        handle.move(0.5)
+        moved, rest = Moved(graph), handle.angle
+        for _ in range(rate):
+            handle.angle = rest + RIG.handle.resolution * noise.integers(-1, 2, 2)
+            handle.move(1.0 / rate)
+        assert len(moved.goals) > 900
+        assert moved.of_tip < 0.02
 
 
 def test_unusable_handle_messages_are_counted_and_said():

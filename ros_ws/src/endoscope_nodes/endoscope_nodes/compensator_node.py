@@ -299,13 +299,13 @@ class CompensatorNode(EndoscopeNode):
         if measured is None or shafts is None:
             gate.refuse(Refusal.STEP, 'no measured position')
             return None
-        goes_on = source == self._source and gate.is_fresh(now)
         if gate.check(sample.stamp_ns, sample.position, now, measured, sample.velocity) is not None:
             return None
+        goes_on = source == self._source and not gate.began
         dt = (sample.stamp_ns - self._last_stamp_ns) * 1e-9
         self._last_stamp_ns = sample.stamp_ns
         self._source = source
-        if goes_on and dt > 0.0:
+        if goes_on:
             return dt
         self._drive_before = np.array(shafts) / self.rig.joints.gear
         self.shaper.restart(shafts)

@@ -35,10 +35,12 @@ class SampledMotion:
         return len(self._angle)
 
     def at(self, tick: int, stay: Sequence[float]) -> tuple[list[float], list[float]]:
-        """Angles and velocities at a tick; the last row beyond the end.
+        """Angles and velocities at a tick.
 
         Parameters
         ----------
+        tick
+            Which; the last row holds beyond the end.
         stay
             Where joints are that do not move, rad, shape (J,).
         """

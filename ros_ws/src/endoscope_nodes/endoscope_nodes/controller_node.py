@@ -143,14 +143,13 @@ class ControllerNode(EndoscopeNode):
         if bending is None:
             self._gate.refuse(Refusal.STEP, 'no measured position')
             return
-        entering = not self._gate.is_fresh(now)
         if (
             self._gate.check(sample.stamp_ns, sample.position, now, bending, sample.velocity)
             is not None
         ):
             return
         dt = (sample.stamp_ns - self._last_stamp_ns) * 1e-9
-        if entering:
+        if self._gate.began:
             self.controller.restart()
             self._desired.restart()
             dt = TICK_S

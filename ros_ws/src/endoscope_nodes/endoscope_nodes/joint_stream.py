@@ -76,6 +76,7 @@ class JointPublisher:
 
     @session.setter
     def session(self, name: str) -> None:
+        """Name the session of the messages from now on."""
         if name != self._session:
             self._session = name
             self._lay_out()

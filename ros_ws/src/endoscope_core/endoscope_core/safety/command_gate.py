@@ -78,6 +78,8 @@ class CommandGate:
         Number of commands that the sender's stamps tell of, obeyed or lost on the way, in streams
         that were obeyed: the time between their stamps by what is usual of it, a low quantile, for
         a command that is lost makes it longer.
+    began
+        Whether the last command obeyed was the first of a stream.
     last_reason
         The last refusal in words.
     """
@@ -87,6 +89,7 @@ class CommandGate:
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
         self.accepted = 0
         self.due = 0.0
+        self.began = True
         self.last_reason = ''
         self._interval_ns = 0
         self._gaps: list[int] = []
@@ -96,17 +99,21 @@ class CommandGate:
         self._offset_at_ns = 0
         self._received_ns: int | None = None
         self._allowance = 0.0
-        self._alone = True
+        # Whether only one command of the stream has been obeyed.
+        self._alone = False
 
     def reset(self) -> None:
         """Forget the stream so far, as when a motion session begins; counts stay."""
+        self._forget_stream()
+        self.last_reason = ''
+
+    def _forget_stream(self) -> None:
         self._position = ()
         self._stamp_ns = 0
         self._offset_ns = None
         self._received_ns = None
         self._interval_ns = 0
-        self._alone = True
-        self.last_reason = ''
+        self._alone = False
 
     def refuse(self, refusal: Refusal, words: str = '') -> Refusal:
         """Count a refusal that was found elsewhere."""
@@ -146,6 +153,8 @@ class CommandGate:
         for value in (*position, *velocity):
             if not math.isfinite(value):
                 return self.refuse(Refusal.NOT_FINITE, str(value))
+        if self._alone and self._disagrees(stamp_ns, received_ns):
+            self._forget_stream()
         streaming = self.is_fresh(received_ns)
         refusal = self._check_range(position, self._position if streaming else measured, streaming)
         refusal = refusal or self._check_stamp(stamp_ns, received_ns)
@@ -159,6 +168,7 @@ class CommandGate:
             return refusal
         gap_ns = stamp_ns - self._stamp_ns
         self.due += self._commands_in(gap_ns) if streaming else 1.0
+        self.began = not streaming
         self._alone = self._received_ns is None
         self._position = tuple(position)
         self._stamp_ns = stamp_ns
@@ -193,23 +203,28 @@ class CommandGate:
 
     def _check_stamp(self, stamp_ns: int, received_ns: int) -> Refusal | None:
         tolerance = self.limits.max_age_ns
-        difference = received_ns - stamp_ns
+        late_ns = self._lateness(stamp_ns, received_ns)
         if self._offset_ns is not None:
-            drift = max(0, received_ns - self._offset_at_ns) // 1000
-            late_ns = difference - self._offset_ns - drift
-            if self._alone and abs(late_ns) > tolerance:
-                self._offset_ns = None
-            elif stamp_ns <= self._stamp_ns:
+            if stamp_ns <= self._stamp_ns:
                 return self.refuse(Refusal.STAMP, f'{stamp_ns} after {self._stamp_ns}')
-            elif late_ns > tolerance:
+            if late_ns > tolerance:
                 return self.refuse(Refusal.LATE, f'by {late_ns * 1e-6:.1f} ms')
-            elif late_ns < -tolerance:
+            if late_ns < -tolerance:
                 return self.refuse(Refusal.FUTURE, f'by {-late_ns * 1e-6:.1f} ms')
-            else:
-                difference = min(self._offset_ns + drift, difference)
-        self._offset_ns = difference
+        self._offset_ns = received_ns - stamp_ns - max(0, late_ns)
         self._offset_at_ns = received_ns
         return None
+
+    def _lateness(self, stamp_ns: int, received_ns: int) -> int:
+        """By how much longer than the quickest so far the command took, in ns; 0 for the first."""
+        if self._offset_ns is None:
+            return 0
+        drift = max(0, received_ns - self._offset_at_ns) // 1000
+        return received_ns - stamp_ns - self._offset_ns - drift
+
+    def _disagrees(self, stamp_ns: int, received_ns: int) -> bool:
+        late_ns = self._lateness(stamp_ns, received_ns)
+        return abs(late_ns) > self.limits.max_age_ns
 
     def _check_speed(self, position: Sequence[float], received_ns: int) -> Refusal | None:
         limits = self.limits

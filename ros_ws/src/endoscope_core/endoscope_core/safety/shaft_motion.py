@@ -95,13 +95,12 @@ class ShaftMotion:
             return self.gate.refuse(Refusal.SENDER, doubt)
         if not self._measured:
             return self.gate.refuse(Refusal.STEP, 'no measured position yet')
-        streaming = self.gate.is_fresh(now_ns)
         refusal = self.gate.check(stamp_ns, position, now_ns, self._measured, velocity)
         if refusal is not None:
             return refusal
         period = (stamp_ns - self._stamp_ns) * _NS
         self._stamp_ns = stamp_ns
-        if self._held or not streaming:
+        if self._held or self.gate.began:
             self._begin()
             period = _FIRST_PERIOD_S
         self._held = ()
