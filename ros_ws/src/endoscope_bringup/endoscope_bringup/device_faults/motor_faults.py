@@ -140,7 +140,7 @@ MOTOR_FAULTS: dict[str, MotorFault] = {
     'console killed': MotorFault(
         'console killed (SIGKILL)',
         lambda rig: rig.kill('console'),
-        'ENABLED',
+        cause='slave/servo_jp ended while the clutch was held',
         apart=('console',),
     ),
     'motor driver killed': MotorFault(
