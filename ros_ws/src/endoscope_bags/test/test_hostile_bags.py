@@ -13,7 +13,7 @@ from endoscope_bags import BagError, BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
 from endoscope_bags.errors import MalformedMessageError, NotABagError
 from endoscope_bags.information import bag_information
-from endoscope_bags.mcap_scan import MAGIC
+from endoscope_bags.mcap_records import MAGIC
 from endoscope_bags.message_types import JOINT_STATE, STRING
 from endoscope_bags.recovery import recover
 from endoscope_bags.unpacking import LARGEST_CHUNK

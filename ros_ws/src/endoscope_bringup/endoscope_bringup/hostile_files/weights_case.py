@@ -129,7 +129,8 @@ def _other_state(state: dict[str, Any], rng: Generator) -> dict[str, Any]:
         if way == 0:
             state.pop(name)
         elif way == 1:
-            state[name] = torch.full_like(tensor, float(rng.choice((np.nan, np.inf, 0.0, -1.0))))
+            value = float(rng.choice((np.nan, np.inf, 0.0, -1.0)))
+            state[name] = torch.full_like(tensor, value, dtype=torch.float64)
         elif way == 2:
             state[name] = tensor.new_ones(()).expand(1 << int(rng.integers(1, 40)))
         elif way == 3:
