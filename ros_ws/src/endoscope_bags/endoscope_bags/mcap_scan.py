@@ -36,6 +36,7 @@ from endoscope_bags.mcap_records import (
 from endoscope_bags.unpacking import Allowance, ChunkError, chunk_head, unpacked
 
 UNSURE_NAMES = 'the names of topics agree with no checksum'
+_CUT = 'ends in the middle'
 _CRC_STEP = 1 << 24
 _MOST_DAMAGE = 100
 # How many records must follow each other, end to head, to be taken for records in a damaged file.
@@ -167,9 +168,11 @@ class _Pass:
         self._summary = Descriptions()
         self._statistics: Statistics | None = None
         self._data_end: int | None = None
-        self._summary_holds = self._summary_fails = False
+        self._summary_holds = False
         self._n_chunks = 0
         self._chunked = False
+        # Channels that the checksum of a chunk vouches for.
+        self._in_chunks: set[int] = set()
         # Nothing before this byte is looked through for records again: chunks contain some.
         self._trusted = 0
         self._heads: list[npt.NDArray[np.void]] = []
@@ -197,7 +200,9 @@ class _Pass:
                 before = position = found
                 continue
             opcode, start, stop = record
-            if opcode == Opcode.MESSAGE and stop - start >= MESSAGE_HEAD_LENGTH:
+            if opcode == Opcode.MESSAGE and self._chunked:
+                self._damaged(CorruptBagError, f'a message by itself at byte {start}')
+            elif opcode == Opcode.MESSAGE and stop - start >= MESSAGE_HEAD_LENGTH:
                 self._loose.append(position)
             else:
                 self._end_loose_messages(position)
@@ -264,7 +269,7 @@ class _Pass:
         self.scan.truncated = True
         self._damaged(
             TruncatedBagError,
-            f'ends in the middle, after {position} sound bytes of {len(self._data)}',
+            f'{_CUT}, after {position} sound bytes of {len(self._data)}',
         )
 
     def _damaged(self, kind: type[TruncatedBagError | CorruptBagError], what: str) -> None:
@@ -326,8 +331,7 @@ class _Pass:
             self._damaged(CorruptBagError, 'the footer does not point to the summary')
         elif footer.summary_crc:
             self._summary_holds = self._checksum(begin, start + 16) == footer.summary_crc
-            self._summary_fails = not self._summary_holds
-            if self._summary_fails:
+            if not self._summary_holds:
                 self._damaged(CorruptBagError, 'the summary does not agree with its checksum')
 
     def _settle(self) -> None:
@@ -337,15 +341,16 @@ class _Pass:
             told, again = getattr(written, kind), getattr(summary, kind)
             for number in told.keys() & again.keys():
                 if told[number] != again[number]:
-                    unsure = '' if self._summary_holds else f'; {UNSURE_NAMES}'
                     self._damaged(
-                        CorruptBagError, f'{kind[:-1]} {number} is another in the summary{unsure}'
+                        CorruptBagError, f'{kind[:-1]} {number} is another in the summary'
                     )
         first, second = (written, summary) if self._summary_holds else (summary, written)
         self.scan.schemas = first.schemas | second.schemas
         self.scan.channels = first.channels | second.channels
-        if self._summary_fails and summary.channels.keys() - written.channels.keys():
-            self._damaged(CorruptBagError, UNSURE_NAMES)
+        if not (self._summary_holds or self.scan.channels.keys() <= self._in_chunks):
+            unsure = [what for what in self.scan.damage if not what.startswith(_CUT)]
+            if unsure:
+                self._damaged(CorruptBagError, UNSURE_NAMES)
         messages = self._table()
         counted = self._statistics.message_count if self._statistics else len(messages)
         if counted != len(messages):
@@ -392,6 +397,10 @@ class _Pass:
                         raise ChunkError(f'a message record of {length} bytes')
                     positions.append(position)
                 elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                    if opcode == Opcode.CHANNEL:
+                        self._in_chunks.add(
+                            int.from_bytes(records[position + 9 : position + 11], 'little')
+                        )
                     self._written.add(opcode, records[position + RECORD_HEAD.size : following])
                 position = following
         except (ChunkError, EndOfFile, struct.error, ValueError) as error:
