@@ -133,6 +133,7 @@ def _other_state(state: dict[str, Any], rng: Generator) -> dict[str, Any]:
             state[name] = torch.full_like(tensor, value, dtype=torch.float64)
         elif way == 2:
             state[name] = tensor.new_ones(()).expand(1 << int(rng.integers(1, 40)))
+            break
         elif way == 3:
             state[name] = tensor.to((torch.float16, torch.int64, torch.bool)[rng.integers(3)])
         elif way == 4:
