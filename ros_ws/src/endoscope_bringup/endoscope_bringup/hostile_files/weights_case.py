@@ -18,6 +18,7 @@ from endoscope_core.classifier.classification import ClassifierError, UnseenTens
 from endoscope_core.classifier.inference import DEFAULT_WEIGHTS
 from endoscope_core.classifier.shipped import load_classifier, shipped_weights
 from endoscope_core.classifier.standardised_tension import WIRES
+from endoscope_core.classifier.training import use_one_thread
 from endoscope_core.classifier.weights_file import sealed
 from endoscope_core.signals import SINUSOID, calibration_motion
 
@@ -38,6 +39,7 @@ class WeightsCase:
     name = 'weights'
 
     def __init__(self, folder: Path) -> None:
+        use_one_thread()
         self._path, self._mark = folder / 'weights.pt', folder / 'ran'
         size = shipped_weights(SINUSOID)
         self._sound = [size, size.with_name(DEFAULT_WEIGHTS)]
