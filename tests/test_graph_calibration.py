@@ -12,6 +12,7 @@ from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.plant import EffectSpec, PlantDescription, save_plant
 from endoscope_core.rig import load_rig
 
+
 @pytest.mark.parametrize(('size_deg', 'seed'), [(50, 901), (80, 902)])
 def test_finds_the_class_of_a_known_tube(tmp_path, size_deg, seed):
     with SimulatedGraph(overrides=tube_of_size(tmp_path, size_deg, seed)) as graph:

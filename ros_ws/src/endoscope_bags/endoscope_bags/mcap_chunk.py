@@ -18,7 +18,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex
 
-from endoscope_bags.mcap_scan import MESSAGE_HEAD, MESSAGE_HEAD_LENGTH
+from endoscope_bags.mcap_records import MESSAGE_HEAD, MESSAGE_HEAD_LENGTH
 
 # Upper bound of what a message adds to a file besides its own bytes: head and index entry.
 MESSAGE_OVERHEAD = MESSAGE_HEAD.itemsize + 16

@@ -21,7 +21,7 @@ from mcap.records import (
 )
 
 from endoscope_bags.mcap_chunk import EncodedChunk
-from endoscope_bags.mcap_scan import MAGIC
+from endoscope_bags.mcap_records import MAGIC
 
 _FOOTER_HEAD_AND_OFFSETS = 1 + 8 + 8 + 8
 

@@ -11,12 +11,10 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Channel, DataEnd, Footer, Header, Metadata, Schema, Statistics
@@ -27,29 +25,25 @@ from endoscope_bags.errors import (
     NotABagError,
     TruncatedBagError,
 )
+from endoscope_bags.mcap_records import (
+    MAGIC,
+    MESSAGE_HEAD,
+    MESSAGE_HEAD_LENGTH,
+    RECORD_HEAD,
+    Descriptions,
+    ExactStream,
+)
 from endoscope_bags.unpacking import Allowance, ChunkError, chunk_head, unpacked
 
-MAGIC = b'\x89MCAP0\r\n'
 UNSURE_NAMES = 'the names of topics agree with no checksum'
+_CUT = 'ends in the middle'
 _CRC_STEP = 1 << 24
 _MOST_DAMAGE = 100
 # How many records must follow each other, end to head, to be taken for records in a damaged file.
 _CHAIN = 3
 # Where a record may begin: an opcode, and a length below 4 GiB.
 _PERHAPS_RECORD = re.compile(rb'(?=[\x01-\x0f].{4}\x00{4})', re.DOTALL)
-_RECORD_HEAD = struct.Struct('<BQ')
-MESSAGE_HEAD = np.dtype(
-    [
-        ('opcode', 'u1'),
-        ('length', '<u8'),
-        ('channel', '<u2'),
-        ('sequence', '<u4'),
-        ('log', '<u8'),
-        ('publish', '<u8'),
-    ]
-)
 
-MESSAGE_HEAD_LENGTH = MESSAGE_HEAD.itemsize - _RECORD_HEAD.size
 
 IntArray = npt.NDArray[np.int64]
 
@@ -162,49 +156,6 @@ def scan_mcap(path: str | Path, *, salvage: bool = False) -> McapScan:
             return _Pass(path, data, salvage).run()
 
 
-class _ExactStream(ReadDataStream):
-    """A stream of one record that ends nowhere but where the record does."""
-
-    def __init__(self, body: bytes) -> None:
-        super().__init__(BytesIO(body))
-
-    def read(self, length: int) -> bytes:
-        data: bytes = super().read(length)
-        if len(data) != length:
-            raise EndOfFile
-        return data
-
-
-@dataclass
-class _Described:
-    """Schemas and channels by id, each as first described; the bytes spare reading it again."""
-
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    _bodies: dict[tuple[int, bytes], bytes] = field(default_factory=dict)
-
-    def add(self, opcode: int, body: bytes) -> None:
-        """Take a description, unless it was given before.
-
-        Raises
-        ------
-        ValueError
-            Another one was given for the same id.
-        """
-        key = (opcode, body[:2])
-        if self._bodies.get(key) == body:
-            return
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(_ExactStream(body))
-            same = self.schemas.setdefault(schema.id, schema) == schema
-        else:
-            channel = Channel.read(_ExactStream(body))
-            same = self.channels.setdefault(channel.id, channel) == channel
-        if not same:
-            raise ValueError('another description of the same id came before')
-        self._bodies[key] = body
-
-
 class _Pass:
     """State of one pass over the records of a file."""
 
@@ -213,13 +164,15 @@ class _Pass:
         self._data = data
         self._salvage = salvage
         self._allowance = Allowance.of(len(data))
-        self._written = _Described()
-        self._summary = _Described()
+        self._written = Descriptions()
+        self._summary = Descriptions()
         self._statistics: Statistics | None = None
         self._data_end: int | None = None
-        self._summary_holds = self._summary_fails = False
+        self._summary_holds = False
         self._n_chunks = 0
         self._chunked = False
+        # Channels that the checksum of a chunk vouches for.
+        self._in_chunks: set[int] = set()
         # Nothing before this byte is looked through for records again: chunks contain some.
         self._trusted = 0
         self._heads: list[npt.NDArray[np.void]] = []
@@ -247,7 +200,9 @@ class _Pass:
                 before = position = found
                 continue
             opcode, start, stop = record
-            if opcode == Opcode.MESSAGE and stop - start >= MESSAGE_HEAD_LENGTH:
+            if opcode == Opcode.MESSAGE and self._chunked:
+                self._damaged(CorruptBagError, f'a message by itself at byte {start}')
+            elif opcode == Opcode.MESSAGE and stop - start >= MESSAGE_HEAD_LENGTH:
                 self._loose.append(position)
             else:
                 self._end_loose_messages(position)
@@ -264,10 +219,10 @@ class _Pass:
 
     def _record(self, position: int) -> tuple[int, int, int] | None:
         """Opcode, start and stop of the record here; None where none can be."""
-        start = position + _RECORD_HEAD.size
+        start = position + RECORD_HEAD.size
         if start > len(self._data):
             return None
-        opcode, length = _RECORD_HEAD.unpack_from(self._data, position)
+        opcode, length = RECORD_HEAD.unpack_from(self._data, position)
         # A crash of the machine leaves zeros where the file had grown but was not written.
         if opcode == 0 or start + length > len(self._data):
             return None
@@ -314,7 +269,7 @@ class _Pass:
         self.scan.truncated = True
         self._damaged(
             TruncatedBagError,
-            f'ends in the middle, after {position} sound bytes of {len(self._data)}',
+            f'{_CUT}, after {position} sound bytes of {len(self._data)}',
         )
 
     def _damaged(self, kind: type[TruncatedBagError | CorruptBagError], what: str) -> None:
@@ -335,12 +290,12 @@ class _Pass:
                 described = self._written if self._data_end is None else self._summary
                 described.add(opcode, self._data[start:stop])
             elif opcode == Opcode.HEADER:
-                self.scan.header = Header.read(_ExactStream(self._data[start:stop]))
+                self.scan.header = Header.read(ExactStream(self._data[start:stop]))
             elif opcode == Opcode.METADATA:
-                record = Metadata.read(_ExactStream(self._data[start:stop]))
+                record = Metadata.read(ExactStream(self._data[start:stop]))
                 self.scan.metadata[record.name] = record.metadata
             elif opcode == Opcode.STATISTICS:
-                self._statistics = Statistics.read(_ExactStream(self._data[start:stop]))
+                self._statistics = Statistics.read(ExactStream(self._data[start:stop]))
             elif opcode == Opcode.DATA_END:
                 if self._data_end is not None:
                     raise ValueError('the data ended before')
@@ -362,12 +317,12 @@ class _Pass:
         return actual
 
     def _check_data(self, start: int, stop: int) -> None:
-        expected = DataEnd.read(_ExactStream(self._data[start:stop])).data_section_crc
-        if expected not in (0, self._checksum(0, start - _RECORD_HEAD.size)):
+        expected = DataEnd.read(ExactStream(self._data[start:stop])).data_section_crc
+        if expected not in (0, self._checksum(0, start - RECORD_HEAD.size)):
             self._damaged(CorruptBagError, 'the data do not agree with their checksum')
 
     def _check_summary(self, start: int, stop: int) -> None:
-        footer = Footer.read(_ExactStream(self._data[start:stop]))
+        footer = Footer.read(ExactStream(self._data[start:stop]))
         if self._data_end is None:
             self._damaged(CorruptBagError, 'the record that ends the data is missing')
             return
@@ -376,8 +331,7 @@ class _Pass:
             self._damaged(CorruptBagError, 'the footer does not point to the summary')
         elif footer.summary_crc:
             self._summary_holds = self._checksum(begin, start + 16) == footer.summary_crc
-            self._summary_fails = not self._summary_holds
-            if self._summary_fails:
+            if not self._summary_holds:
                 self._damaged(CorruptBagError, 'the summary does not agree with its checksum')
 
     def _settle(self) -> None:
@@ -387,15 +341,16 @@ class _Pass:
             told, again = getattr(written, kind), getattr(summary, kind)
             for number in told.keys() & again.keys():
                 if told[number] != again[number]:
-                    unsure = '' if self._summary_holds else f'; {UNSURE_NAMES}'
                     self._damaged(
-                        CorruptBagError, f'{kind[:-1]} {number} is another in the summary{unsure}'
+                        CorruptBagError, f'{kind[:-1]} {number} is another in the summary'
                     )
         first, second = (written, summary) if self._summary_holds else (summary, written)
         self.scan.schemas = first.schemas | second.schemas
         self.scan.channels = first.channels | second.channels
-        if self._summary_fails and summary.channels.keys() - written.channels.keys():
-            self._damaged(CorruptBagError, UNSURE_NAMES)
+        if not (self._summary_holds or self.scan.channels.keys() <= self._in_chunks):
+            unsure = [what for what in self.scan.damage if not what.startswith(_CUT)]
+            if unsure:
+                self._damaged(CorruptBagError, UNSURE_NAMES)
         messages = self._table()
         counted = self._statistics.message_count if self._statistics else len(messages)
         if counted != len(messages):
@@ -430,10 +385,10 @@ class _Pass:
         end = len(records)
         try:
             while position < end:
-                if position + _RECORD_HEAD.size > end:
+                if position + RECORD_HEAD.size > end:
                     raise ChunkError(f'its records end after {position} of {end} bytes')
-                opcode, length = _RECORD_HEAD.unpack_from(records, position)
-                following = position + _RECORD_HEAD.size + length
+                opcode, length = RECORD_HEAD.unpack_from(records, position)
+                following = position + RECORD_HEAD.size + length
                 if following > end:
                     raise ChunkError(f'its records end after {position} of {end} bytes')
                 self._allowance.take(0, 1)
@@ -442,7 +397,11 @@ class _Pass:
                         raise ChunkError(f'a message record of {length} bytes')
                     positions.append(position)
                 elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                    self._written.add(opcode, records[position + _RECORD_HEAD.size : following])
+                    if opcode == Opcode.CHANNEL:
+                        self._in_chunks.add(
+                            int.from_bytes(records[position + 9 : position + 11], 'little')
+                        )
+                    self._written.add(opcode, records[position + RECORD_HEAD.size : following])
                 position = following
         except (ChunkError, EndOfFile, struct.error, ValueError) as error:
             if not self._salvage:

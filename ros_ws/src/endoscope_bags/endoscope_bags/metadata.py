@@ -70,7 +70,7 @@ def _listed_files(path: Path) -> list[str]:
         raise NotABagError(f'{path}: not the metadata of a rosbag2 recording')
     storage = information.get('storage_identifier')
     compression = information.get('compression_mode') or 'none'
-    if storage != 'mcap' or str(compression).lower() in ('file', 'message'):
+    if storage != 'mcap' or str(compression).lower() != 'none':
         raise UnsupportedBagError(
             f'{path}: storage {storage}, compression mode {compression}; '
             'convert it to plain mcap first (ros2 bag convert)'

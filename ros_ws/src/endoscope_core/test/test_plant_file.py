@@ -96,6 +96,7 @@ def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
         ('sensors: {encoder_counts: 1e12}', 'give 1 to 4.29497e.09 counts a turn'),
         ('joints: {bend_x: {pretension: 5,\n pretension: 6}}', 'line 2: key .* is given twice'),
         ('joints: {bend_x: {pretension: ' + '9' * 5000 + '}}', 'line 1: a number of 5000 char'),
+        ('effects: [{id: gravity, joint: bend_x, parameters: {5: 1}}]', 'unknown key 5 in'),
         ('joints: ' + '[' * 5000, 'line 1: nested deeper than'),
         ('joints: &all {bend_x: }\nsensors: *all', 'line 2: .all refers to another place'),
     ],

@@ -1,4 +1,4 @@
-"""YAML from elsewhere: what is ambiguous or boundless is refused, the rest is as written."""
+"""YAML from elsewhere: what is ambiguous or boundless is refused by its line."""
 
 import string
 

@@ -1,6 +1,7 @@
 """What a node watches to know whether it may move the slave: session, senders, clutch, streams."""
 
 import math
+import struct
 from collections.abc import Callable
 
 from rclpy.subscription import Subscription
@@ -25,6 +26,7 @@ from endoscope_nodes.ticker import Ticker
 
 SESSION_REPORT = 'motion session'
 TURN_S = 0.04
+_STAMP = struct.Struct('<iI')
 _CARRIED = 0.99
 _HALF = 0.5
 _STARVED_REPORTS = 2
@@ -222,7 +224,9 @@ class MeasuredPose:
         self._gear = node.rig.joints.gear
         self._timeout_ns = node.rig.timeouts.stream_ns
         self._shafts_reader = JointReader(MOTORS)
-        self._shafts: tuple[bytes, int] | None = None
+        self._shafts = b''
+        self._shafts_stamp = (0, 0)
+        self._shafts_ns = 0
         self._joints_reader = JointReader(JOINTS)
         self.tracked: JointSample | None = None
         self._tracked_ns = 0
@@ -234,18 +238,25 @@ class MeasuredPose:
         )
 
     def _keep_shafts(self, data: bytes) -> None:
-        self._shafts = (data, self._ticker.monotonic_ns())
+        # A writer that is killed while it writes may leave a torn message behind, stamped zero.
+        now, stamp = self._ticker.monotonic_ns(), _STAMP.unpack_from(data, 4)
+        if stamp > self._shafts_stamp or now - self._shafts_ns > self._timeout_ns:
+            self._shafts, self._shafts_stamp, self._shafts_ns = data, stamp, now
 
     def _keep_bending(self, data: bytes) -> None:
         sample = _read(self._joints_reader, data)
-        if sample is not None:
-            self.tracked, self._tracked_ns = sample, self._ticker.monotonic_ns()
+        now = self._ticker.monotonic_ns()
+        newer = self.tracked is None or (
+            sample is not None and sample.stamp_ns > self.tracked.stamp_ns
+        )
+        if sample is not None and (newer or now - self._tracked_ns > TRACKER_TIMEOUT_NS):
+            self.tracked, self._tracked_ns = sample, now
 
     def shafts(self) -> tuple[float, ...] | None:
         """Shaft angles in rad, shape (J,); None while none were read lately."""
-        if self._shafts is None or self._silent(self._shafts[1], self._timeout_ns):
+        if not self._shafts or self._silent(self._shafts_ns, self._timeout_ns):
             return None
-        sample = _read(self._shafts_reader, self._shafts[0])
+        sample = _read(self._shafts_reader, self._shafts)
         return None if sample is None else sample.position
 
     def bending(self) -> tuple[float, ...] | None:

@@ -18,6 +18,7 @@ from endoscope_core.classifier.classification import ClassifierError, UnseenTens
 from endoscope_core.classifier.inference import DEFAULT_WEIGHTS
 from endoscope_core.classifier.shipped import load_classifier, shipped_weights
 from endoscope_core.classifier.standardised_tension import WIRES
+from endoscope_core.classifier.training import use_one_thread
 from endoscope_core.classifier.weights_file import sealed
 from endoscope_core.signals import SINUSOID, calibration_motion
 
@@ -38,6 +39,7 @@ class WeightsCase:
     name = 'weights'
 
     def __init__(self, folder: Path) -> None:
+        use_one_thread()
         self._path, self._mark = folder / 'weights.pt', folder / 'ran'
         size = shipped_weights(SINUSOID)
         self._sound = [size, size.with_name(DEFAULT_WEIGHTS)]
@@ -129,9 +131,11 @@ def _other_state(state: dict[str, Any], rng: Generator) -> dict[str, Any]:
         if way == 0:
             state.pop(name)
         elif way == 1:
-            state[name] = torch.full_like(tensor, float(rng.choice((np.nan, np.inf, 0.0, -1.0))))
+            value = float(rng.choice((np.nan, np.inf, 0.0, -1.0)))
+            state[name] = torch.full_like(tensor, value, dtype=torch.float64)
         elif way == 2:
             state[name] = tensor.new_ones(()).expand(1 << int(rng.integers(1, 40)))
+            break
         elif way == 3:
             state[name] = tensor.to((torch.float16, torch.int64, torch.bool)[rng.integers(3)])
         elif way == 4:

@@ -164,6 +164,9 @@ def _section(value: Any, where: str) -> Mapping[str, Any]:
         return {}
     if not isinstance(value, Mapping):
         raise ValueError(f'{where} must be a mapping of names to values, not {value!r}')
+    for key in value:
+        if not isinstance(key, str):
+            raise ValueError(f'unknown key {key!r} in {where}: keys are names')
     return value
 
 
