@@ -27,6 +27,7 @@ from endoscope_nodes.ticker import Ticker
 SESSION_REPORT = 'motion session'
 TURN_S = 0.04
 _STAMP = struct.Struct('<iI')
+_STAMP_END = 12
 _CARRIED = 0.99
 _HALF = 0.5
 _STARVED_REPORTS = 2
@@ -239,6 +240,8 @@ class MeasuredPose:
 
     def _keep_shafts(self, data: bytes) -> None:
         # A writer that is killed while it writes may leave a torn message behind, stamped zero.
+        if len(data) < _STAMP_END:
+            return
         now, stamp = self._ticker.monotonic_ns(), _STAMP.unpack_from(data, 4)
         if stamp > self._shafts_stamp or now - self._shafts_ns > self._timeout_ns:
             self._shafts, self._shafts_stamp, self._shafts_ns = data, stamp, now

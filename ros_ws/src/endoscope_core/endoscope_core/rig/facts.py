@@ -6,10 +6,9 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from endoscope_core.effects import nearest
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.strict_yaml import YamlError, load_yaml
 
 SHIPPED = Path(__file__).with_name('rig.yaml')
 
@@ -193,11 +192,9 @@ def load_rig(path: str | Path | None = None) -> Rig:
 
 def _content(path: Path) -> Mapping[str, Any]:
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise RigFileError(f'cannot read rig file {path}: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise RigFileError(f'{path} is not YAML: {" ".join(str(error).split())}') from error
+        content = load_yaml(path)
+    except YamlError as error:
+        raise RigFileError(str(error)) from error
     if not isinstance(content, Mapping):
         raise RigFileError(f'rig file {path} has to be a mapping')
     return content
