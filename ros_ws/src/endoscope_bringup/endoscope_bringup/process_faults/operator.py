@@ -3,7 +3,7 @@
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import rclpy
@@ -73,8 +73,8 @@ class Operator(ClosedOnExit):
         Operating states with the time of receipt in ns.
     session
         Motion session as last heard.
-    lost
-        Messages that the recorder said it had lost.
+    values, heard_ns
+        What was said last on `/diagnostics`, by status, and when each node was heard there.
     """
 
     def __init__(self, domain: int) -> None:
@@ -151,11 +151,11 @@ class Operator(ClosedOnExit):
 
     def use(self, source: str) -> None:
         """Be the sender of what the source needs, and of nothing else."""
-        for publisher in (self._handle, self._clutch):
-            if publisher is not None and source != self.source:
-                publisher.close() if publisher is self._handle else publisher.destroy()
         if source == self.source:
             return
+        if self._handle is not None:
+            self._handle.close()
+            self.node.destroy_publisher(self._clutch)
         self.source = source
         self._handle = self._clutch = None
         if source == 'master':

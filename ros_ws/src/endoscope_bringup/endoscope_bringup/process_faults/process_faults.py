@@ -133,6 +133,8 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
     enable_ns = time.time_ns()
     enabled_s = rig.enable_and_move()
     operator.serve(0.3)
+    if enabled_s is None:
+        rig.kill_all()
     shafts = ShaftTrace(operator.shafts)
     still_s, unasked = shafts.standstill(since_ns, enable_ns)
     step, share = goal_step(operator.goals, rig.facts.motors)

@@ -84,6 +84,11 @@ class ProcessRig(ClosedOnExit):
         self.processes.kill(name)
         self._forget(name)
 
+    def kill_all(self) -> None:
+        """Have the next :meth:`begin` start everything anew."""
+        for name in self.processes.running:
+            self.kill(name)
+
     def end(self, name: str) -> None:
         """End a process in good order."""
         self.processes.end(name)
