@@ -94,7 +94,7 @@ def _is_wrong(outcome: 'Outcome') -> bool:
 
 def _row(name: str, outcomes: Sequence['Outcome'], loads: Sequence[float]) -> str:
     states = Counter(outcome.state for outcome in outcomes)
-    ended = sum(bool(outcome.before) for outcome in outcomes)
+    ended = sum(len(outcome.before) for outcome in outcomes)
     still = [o.still_s * 1e3 for o in outcomes if o.still_s is not None]
     enabled = [o.enabled_s for o in outcomes if o.enabled_s is not None]
     never = len(outcomes) - len(enabled)
@@ -105,7 +105,7 @@ def _row(name: str, outcomes: Sequence['Outcome'], loads: Sequence[float]) -> st
         name,
         f'{len(outcomes)}',
         ', '.join(f'{state} {n}' for state, n in states.most_common())
-        + (f'; {ended} had ended before' if ended else ''),
+        + (f'; ended before by itself {ended}' if ended else ''),
         _middle_and_most(still, '.0f'),
         f'{1e3 * step:.1f}, {max(o.goal_share for o in outcomes):.2f}',
         f'{1e3 * max(o.shaft_step for o in outcomes):.1f}',

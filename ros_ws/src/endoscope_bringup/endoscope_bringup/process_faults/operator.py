@@ -92,6 +92,7 @@ class Operator(ClosedOnExit):
         self._bending: JointSample | None = None
         self._turn = 0
         self._due_ns = 0
+        self._to_stamp_ns = time.time_ns() - time.monotonic_ns()
         self._phase = 0.0
         self._hand: tuple[float, ...] = (0.0,) * len(JOINTS)
         self._entered = ''
@@ -181,8 +182,11 @@ class Operator(ClosedOnExit):
         while True:
             now = time.monotonic_ns()
             if now >= self._due_ns:
-                self._due_ns = max(self._due_ns + _TURN_NS, now)
-                self._send()
+                if now > self._due_ns + 2 * _TURN_NS:
+                    self._due_ns = now
+                # Stamps are a turn apart, however late this process was run.
+                self._send(self._due_ns + self._to_stamp_ns)
+                self._due_ns += _TURN_NS
             self._hear()
             if until():
                 return True
@@ -190,7 +194,7 @@ class Operator(ClosedOnExit):
                 return False
             time.sleep(max(0, min(self._due_ns, end) - time.monotonic_ns()) * 1e-9)
 
-    def _send(self) -> None:
+    def _send(self, stamp_ns: int) -> None:
         self._turn += 1
         if self._clutch is not None and self._turn % _CLUTCH_TURNS == 0:
             self._clutch.publish(Joy(buttons=[int(self.clutch)]))
@@ -200,7 +204,7 @@ class Operator(ClosedOnExit):
         swing = AMPLITUDE * RATE * math.cos(self._phase)
         bent = self._bending.position if self._bending else (0.0,) * len(JOINTS)
         speed = tuple(swing - STEERING * x for x in bent)
-        stamp = time.time_ns() - self.late_ns
+        stamp = stamp_ns - self.late_ns
         if self.source == 'outside' and self.session != self._entered:
             # Whoever enters a session starts from the measured pose.
             self._entered, self._hand = self.session, bent

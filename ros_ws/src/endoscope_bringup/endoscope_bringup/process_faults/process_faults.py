@@ -34,6 +34,7 @@ from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
 
 STALLS_S = (0.2, 0.5, 2.0)
 _AFTERMATH_S = 1.0
+_MOST_TRIES = 10
 _RIVAL_TURNS = 75
 _TURN_S = 0.004
 
@@ -82,7 +83,7 @@ class Outcome:
     enabled_s
         From the next enable to motion; None where that did not come.
     before
-        What ended the motion before the fault; empty where nothing did.
+        What ended the motion before the fault, each time that it was tried again.
     bag
         Seconds between the last message of a killed recorder's bag and the fault; messages lost by
         one that lives, below zero.
@@ -98,7 +99,7 @@ class Outcome:
     unasked: float
     gap_s: float
     enabled_s: float | None
-    before: str
+    before: tuple[str, ...]
     bag: float
 
 
@@ -108,16 +109,17 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
     Raises
     ------
     RuntimeError
-        The graph could not be brought to move.
+        The graph does not move, or not long enough.
     """
     operator = rig.operator
-    rig.begin(fault.source)
-    if rig.enable_and_move() is None:
-        raise RuntimeError(f'the slave does not move: {operator.state}, {operator.cause}')
-    operator.shafts.clear()
-    operator.goals.clear()
-    operator.serve(rig.random.uniform(0.3, 1.5))
-    before = '' if operator.state == 'ENABLED' else f'{operator.state}: {operator.cause}'
+    if fault.kills == 'recorder' and 'recorder' in rig.processes.running:
+        # A bag of its own, for what is complete is found by reading it.
+        rig.end('recorder')
+    before: list[str] = []
+    while not _moves(rig, fault.source):
+        before.append(operator.cause)
+        if len(before) > _MOST_TRIES:
+            raise RuntimeError(f'the motion ends before anything breaks: {before[-1]}')
     lost = _lost(rig)
     fault_ns = since_ns = time.time_ns()
     fault.inject(rig)
@@ -127,7 +129,7 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
     if plant_died:
         operator.shafts.clear()
         since_ns = time.time_ns()
-    rig.begin(fault.source if fault.source != 'motion' else 'master')
+    rig.revive()
     operator.serve(_AFTERMATH_S)
     state, cause = operator.state, operator.cause
     enable_ns = time.time_ns()
@@ -149,9 +151,25 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
         0.0 if fault.pauses else unasked,
         shafts.longest_gap(),
         enabled_s,
-        before,
+        tuple(before),
         bag or lost - _lost(rig),
     )
+
+
+def _moves(rig: ProcessRig, source: str) -> bool:
+    """Bring it to move; whether it still does at a random instant."""
+    operator = rig.operator
+    rig.begin(source)
+    if rig.enable_and_move() is None:
+        return False
+    operator.shafts.clear()
+    operator.goals.clear()
+    operator.serve(rig.random.uniform(0.3, 1.5))
+    moves = operator.state == 'ENABLED'
+    if not moves:
+        # The cause is told within a second.
+        operator.serve(1.1)
+    return moves
 
 
 def _lost(rig: ProcessRig) -> int:
