@@ -103,12 +103,12 @@ class Operator(ClosedOnExit):
         rclpy.init(args=[], context=self._context, domain_id=domain)
         self.node = rclpy.create_node('operator', context=self._context, namespace='endoscope')
         self._orders = self.node.create_publisher(String, STATE_COMMAND, EVENT)
-        motors, joints = JointReader(MOTORS), JointReader(JOINTS)
+        shafts, goals, joints = JointReader(MOTORS), JointReader(MOTORS), JointReader(JOINTS)
         self._heard: list[tuple[RawSubscription, Callable[[bytes, int], object]]] = [
             (self._listen(kind, topic), take)
             for kind, topic, take in (
-                (JointState, MOTOR_MEASURED, lambda d, _: self.shafts.append(motors.read(d))),
-                (JointState, MOTOR_COMMAND, lambda d, _: self.goals.append(motors.read(d))),
+                (JointState, MOTOR_MEASURED, lambda d, _: self.shafts.append(shafts.read(d))),
+                (JointState, MOTOR_COMMAND, lambda d, _: self.goals.append(goals.read(d))),
                 (JointState, SLAVE_MEASURED, lambda d, _: self._note_bending(joints.read(d))),
                 (String, OPERATING_STATE, self._note_state),
                 (Header, MOTION_SESSION, self._note_session),

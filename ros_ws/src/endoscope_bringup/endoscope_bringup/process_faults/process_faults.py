@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -120,10 +121,9 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
         before.append(operator.cause)
         if len(before) > _MOST_TRIES:
             raise RuntimeError(f'the motion ends before anything breaks: {before[-1]}')
-    lost = _lost(rig)
+    lost, bag = _lost(rig), rig.bag
     fault_ns = since_ns = time.time_ns()
     fault.inject(rig)
-    bag = _complete_to(rig, fault_ns) if fault.kills in ('recorder', GRAPH) else 0.0
     operator.serve(rig.random.uniform(0.0, _AFTERMATH_S))
     plant_died = fault.kills in ('motor_driver', GRAPH)
     if plant_died:
@@ -152,7 +152,7 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
         shafts.longest_gap(),
         enabled_s,
         tuple(before),
-        bag or lost - _lost(rig),
+        _complete_to(bag, fault_ns) if fault.kills in ('recorder', GRAPH) else lost - _lost(rig),
     )
 
 
@@ -177,9 +177,9 @@ def _lost(rig: ProcessRig) -> int:
     return int(said.get('lost', 0))
 
 
-def _complete_to(rig: ProcessRig, fault_ns: int) -> float:
+def _complete_to(bag: Path, fault_ns: int) -> float:
     try:
-        return (fault_ns - open_bag(rig.bag, salvage=True).end_ns) * 1e-9
+        return (fault_ns - open_bag(bag, salvage=True).end_ns) * 1e-9
     except BagError:
         return math.inf
 
