@@ -33,7 +33,7 @@ def test_what_a_file_does_not_say_is_as_shipped(tmp_path):
     ],
 )
 def test_what_is_wrong_is_named(tmp_path, text, words):
-    with pytest.raises(RigFileError, match='rig.yaml') as refused:
+    with pytest.raises(RigFileError, match=r'rig\.yaml') as refused:
         load_rig(written(tmp_path, text))
     assert words in str(refused.value)
 

@@ -23,7 +23,7 @@ _HEADING = (
     '| enable to motion [s] median, largest | recording | load |\n'
     '|---|---|---|---|---|---|---|---|---|---|---|'
 )
-# A bag ends with a whole chunk of at most 1 s; a step is bounded but for rounding.
+# A step is bounded but for rounding.
 _SHARE = 1.001
 
 
@@ -69,18 +69,20 @@ def run(args: argparse.Namespace) -> int:
     )
     wrong = 0
     random = Random(args.seed)
-    with tempfile.TemporaryDirectory() as folder:
-        with ProcessRig(args.rate, args.composed, Path(folder), random) as rig:
-            for name in args.only or faults:
-                outcomes, loads = [], []
-                for k in range(args.repetitions):
-                    outcomes.append(undergo(faults[name], rig))
-                    loads.append(os.getloadavg()[0])
-                    if args.log:
-                        with args.log.open('a', encoding='utf-8') as log:
-                            log.write(f'{name} {k}: {outcomes[-1]} load {loads[-1]:.1f}\n')
-                print(_row(name, outcomes, loads), flush=True)
-                wrong += sum(map(_is_wrong, outcomes))
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        ProcessRig(args.rate, args.composed, Path(folder), random) as rig,
+    ):
+        for name in args.only or faults:
+            outcomes, loads = [], []
+            for k in range(args.repetitions):
+                outcomes.append(undergo(faults[name], rig))
+                loads.append(os.getloadavg()[0])
+                if args.log:
+                    with args.log.open('a', encoding='utf-8') as log:
+                        log.write(f'{name} {k}: {outcomes[-1]} load {loads[-1]:.1f}\n')
+            print(_row(name, outcomes, loads), flush=True)
+            wrong += sum(map(_is_wrong, outcomes))
     return 1 if wrong else 0
 
 
@@ -92,20 +94,20 @@ def _is_wrong(outcome: 'Outcome') -> bool:
 
 def _row(name: str, outcomes: Sequence['Outcome'], loads: Sequence[float]) -> str:
     states = Counter(outcome.state for outcome in outcomes)
-    ended = sum(bool(outcome.before) for outcome in outcomes)
+    ended = sum(len(outcome.before) for outcome in outcomes)
     still = [o.still_s * 1e3 for o in outcomes if o.still_s is not None]
     enabled = [o.enabled_s for o in outcomes if o.enabled_s is not None]
     never = len(outcomes) - len(enabled)
     missing = max(0.0, *(o.bag for o in outcomes))
     lost = sum(max(0.0, -o.bag) for o in outcomes)
+    step = max(o.goal_step for o in outcomes)
     columns = (
         name,
         f'{len(outcomes)}',
         ', '.join(f'{state} {n}' for state, n in states.most_common())
-        + (f'; {ended} had ended before' if ended else ''),
+        + (f'; ended before by itself {ended}' if ended else ''),
         _middle_and_most(still, '.0f'),
-        f'{1e3 * max(o.goal_step for o in outcomes):.1f}, '
-        f'{max(o.goal_share for o in outcomes):.2f}',
+        f'{1e3 * step:.1f}, {max(o.goal_share for o in outcomes):.2f}',
         f'{1e3 * max(o.shaft_step for o in outcomes):.1f}',
         f'{max(o.shaft_speed for o in outcomes):.2f}',
         f'{1e3 * max(o.unasked for o in outcomes):.1f}',

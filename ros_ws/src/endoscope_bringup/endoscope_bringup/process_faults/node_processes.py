@@ -38,11 +38,6 @@ class NodeProcesses(ClosedOnExit):
         ROS domain.
     folder
         For what each process says, ``NAME.log``.
-
-    Attributes
-    ----------
-    running
-        Names of the processes that were started and neither killed nor ended since.
     """
 
     def __init__(self, domain: int, folder: Path) -> None:
@@ -53,7 +48,13 @@ class NodeProcesses(ClosedOnExit):
 
     @property
     def running(self) -> tuple[str, ...]:
+        """Names of the processes that were started and neither killed nor ended since."""
         return tuple(self._processes)
+
+    @property
+    def pids(self) -> tuple[int, ...]:
+        """Their numbers."""
+        return tuple(map(self._pid, self._processes))
 
     def start(self, name: str, parameters: Mapping[str, Mapping[str, object]]) -> None:
         """Start a node, or all of them, with parameters by node.
@@ -117,7 +118,7 @@ def _module(name: str) -> str:
 
 
 def _run(name: str, words: list[str], domain: int, log: str) -> None:
-    with open(log, 'ab', buffering=0) as sink:
+    with Path(log).open('ab', buffering=0) as sink:
         os.dup2(sink.fileno(), 1)
         os.dup2(sink.fileno(), 2)
     os.environ['ROS_DOMAIN_ID'] = str(domain)

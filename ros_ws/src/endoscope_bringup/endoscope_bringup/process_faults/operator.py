@@ -3,7 +3,7 @@
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import rclpy
@@ -73,8 +73,8 @@ class Operator(ClosedOnExit):
         Operating states with the time of receipt in ns.
     session
         Motion session as last heard.
-    lost
-        Messages that the recorder said it had lost.
+    values, heard_ns
+        What was said last on `/diagnostics`, by status, and when each node was heard there.
     """
 
     def __init__(self, domain: int) -> None:
@@ -92,6 +92,7 @@ class Operator(ClosedOnExit):
         self._bending: JointSample | None = None
         self._turn = 0
         self._due_ns = 0
+        self._to_stamp_ns = time.time_ns() - time.monotonic_ns()
         self._phase = 0.0
         self._hand: tuple[float, ...] = (0.0,) * len(JOINTS)
         self._entered = ''
@@ -102,12 +103,12 @@ class Operator(ClosedOnExit):
         rclpy.init(args=[], context=self._context, domain_id=domain)
         self.node = rclpy.create_node('operator', context=self._context, namespace='endoscope')
         self._orders = self.node.create_publisher(String, STATE_COMMAND, EVENT)
-        motors, joints = JointReader(MOTORS), JointReader(JOINTS)
+        shafts, goals, joints = JointReader(MOTORS), JointReader(MOTORS), JointReader(JOINTS)
         self._heard: list[tuple[RawSubscription, Callable[[bytes, int], object]]] = [
             (self._listen(kind, topic), take)
             for kind, topic, take in (
-                (JointState, MOTOR_MEASURED, lambda d, _: self.shafts.append(motors.read(d))),
-                (JointState, MOTOR_COMMAND, lambda d, _: self.goals.append(motors.read(d))),
+                (JointState, MOTOR_MEASURED, lambda d, _: self.shafts.append(shafts.read(d))),
+                (JointState, MOTOR_COMMAND, lambda d, _: self.goals.append(goals.read(d))),
                 (JointState, SLAVE_MEASURED, lambda d, _: self._note_bending(joints.read(d))),
                 (String, OPERATING_STATE, self._note_state),
                 (Header, MOTION_SESSION, self._note_session),
@@ -151,11 +152,11 @@ class Operator(ClosedOnExit):
 
     def use(self, source: str) -> None:
         """Be the sender of what the source needs, and of nothing else."""
-        for publisher in (self._handle, self._clutch):
-            if publisher is not None and source != self.source:
-                publisher.close() if publisher is self._handle else publisher.destroy()
         if source == self.source:
             return
+        if self._handle is not None:
+            self._handle.close()
+            self.node.destroy_publisher(self._clutch)
         self.source = source
         self._handle = self._clutch = None
         if source == 'master':
@@ -181,8 +182,11 @@ class Operator(ClosedOnExit):
         while True:
             now = time.monotonic_ns()
             if now >= self._due_ns:
-                self._due_ns = max(self._due_ns + _TURN_NS, now)
-                self._send()
+                if now > self._due_ns + 2 * _TURN_NS:
+                    self._due_ns = now
+                # Stamps are a turn apart, however late this process was run.
+                self._send(self._due_ns + self._to_stamp_ns)
+                self._due_ns += _TURN_NS
             self._hear()
             if until():
                 return True
@@ -190,7 +194,7 @@ class Operator(ClosedOnExit):
                 return False
             time.sleep(max(0, min(self._due_ns, end) - time.monotonic_ns()) * 1e-9)
 
-    def _send(self) -> None:
+    def _send(self, stamp_ns: int) -> None:
         self._turn += 1
         if self._clutch is not None and self._turn % _CLUTCH_TURNS == 0:
             self._clutch.publish(Joy(buttons=[int(self.clutch)]))
@@ -200,7 +204,7 @@ class Operator(ClosedOnExit):
         swing = AMPLITUDE * RATE * math.cos(self._phase)
         bent = self._bending.position if self._bending else (0.0,) * len(JOINTS)
         speed = tuple(swing - STEERING * x for x in bent)
-        stamp = time.time_ns() - self.late_ns
+        stamp = stamp_ns - self.late_ns
         if self.source == 'outside' and self.session != self._entered:
             # Whoever enters a session starts from the measured pose.
             self._entered, self._hand = self.session, bent

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -34,6 +35,7 @@ from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
 
 STALLS_S = (0.2, 0.5, 2.0)
 _AFTERMATH_S = 1.0
+_MOST_TRIES = 10
 _RIVAL_TURNS = 75
 _TURN_S = 0.004
 
@@ -82,7 +84,7 @@ class Outcome:
     enabled_s
         From the next enable to motion; None where that did not come.
     before
-        What ended the motion before the fault; empty where nothing did.
+        What ended the motion before the fault, each time that it was tried again.
     bag
         Seconds between the last message of a killed recorder's bag and the fault; messages lost by
         one that lives, below zero.
@@ -98,7 +100,7 @@ class Outcome:
     unasked: float
     gap_s: float
     enabled_s: float | None
-    before: str
+    before: tuple[str, ...]
     bag: float
 
 
@@ -108,31 +110,33 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
     Raises
     ------
     RuntimeError
-        The graph could not be brought to move.
+        The graph does not move, or not long enough.
     """
     operator = rig.operator
-    rig.begin(fault.source)
-    if rig.enable_and_move() is None:
-        raise RuntimeError(f'the slave does not move: {operator.state}, {operator.cause}')
-    operator.shafts.clear()
-    operator.goals.clear()
-    operator.serve(rig.random.uniform(0.3, 1.5))
-    before = '' if operator.state == 'ENABLED' else f'{operator.state}: {operator.cause}'
-    lost = _lost(rig)
+    if fault.kills == 'recorder' and 'recorder' in rig.processes.running:
+        # A bag of its own, for what is complete is found by reading it.
+        rig.end('recorder')
+    before: list[str] = []
+    while not _moves(rig, fault.source):
+        before.append(operator.cause)
+        if len(before) > _MOST_TRIES:
+            raise RuntimeError(f'the motion ends before anything breaks: {before[-1]}')
+    lost, bag = _lost(rig), rig.bag
     fault_ns = since_ns = time.time_ns()
     fault.inject(rig)
-    bag = _complete_to(rig, fault_ns) if fault.kills in ('recorder', GRAPH) else 0.0
     operator.serve(rig.random.uniform(0.0, _AFTERMATH_S))
     plant_died = fault.kills in ('motor_driver', GRAPH)
     if plant_died:
         operator.shafts.clear()
         since_ns = time.time_ns()
-    rig.begin(fault.source if fault.source != 'motion' else 'master')
+    rig.revive()
     operator.serve(_AFTERMATH_S)
     state, cause = operator.state, operator.cause
     enable_ns = time.time_ns()
     enabled_s = rig.enable_and_move()
     operator.serve(0.3)
+    if enabled_s is None:
+        rig.kill_all()
     shafts = ShaftTrace(operator.shafts)
     still_s, unasked = shafts.standstill(since_ns, enable_ns)
     step, share = goal_step(operator.goals, rig.facts.motors)
@@ -147,9 +151,25 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
         0.0 if fault.pauses else unasked,
         shafts.longest_gap(),
         enabled_s,
-        before,
-        bag or lost - _lost(rig),
+        tuple(before),
+        _complete_to(bag, fault_ns) if fault.kills in ('recorder', GRAPH) else lost - _lost(rig),
     )
+
+
+def _moves(rig: ProcessRig, source: str) -> bool:
+    """Bring it to move; whether it still does at a random instant."""
+    operator = rig.operator
+    rig.begin(source)
+    if rig.enable_and_move() is None:
+        return False
+    operator.shafts.clear()
+    operator.goals.clear()
+    operator.serve(rig.random.uniform(0.3, 1.5))
+    moves = operator.state == 'ENABLED'
+    if not moves:
+        # The cause is told within a second.
+        operator.serve(1.1)
+    return moves
 
 
 def _lost(rig: ProcessRig) -> int:
@@ -157,9 +177,9 @@ def _lost(rig: ProcessRig) -> int:
     return int(said.get('lost', 0))
 
 
-def _complete_to(rig: ProcessRig, fault_ns: int) -> float:
+def _complete_to(bag: Path, fault_ns: int) -> float:
     try:
-        return (fault_ns - open_bag(rig.bag, salvage=True).end_ns) * 1e-9
+        return (fault_ns - open_bag(bag, salvage=True).end_ns) * 1e-9
     except BagError:
         return math.inf
 

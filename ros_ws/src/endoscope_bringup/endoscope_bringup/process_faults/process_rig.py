@@ -44,7 +44,7 @@ class ProcessRig(ClosedOnExit):
         self.begin('master')
 
     def begin(self, source: str) -> None:
-        """Have every process run and every node heard, the console with a source of its own."""
+        """Have the graph run with a source of its motion; see `ProcessFault`."""
         of_console = {'outside': 'none'}.get(source, source)
         holder = GRAPH if GRAPH in self.names else 'console'
         if of_console != self._console or source == 'motion':
@@ -53,6 +53,16 @@ class ProcessRig(ClosedOnExit):
             self._console = of_console
         self.operator.use('none' if source == 'motion' else source)
         self.operator.press(True)
+        self.revive()
+
+    def revive(self) -> None:
+        """Start what does not run, and wait until every node is heard.
+
+        Raises
+        ------
+        RuntimeError
+            One is not.
+        """
         for name in self.names:
             if name not in self.processes.running:
                 self.start(name)
@@ -83,6 +93,11 @@ class ProcessRig(ClosedOnExit):
         """End a process with SIGKILL."""
         self.processes.kill(name)
         self._forget(name)
+
+    def kill_all(self) -> None:
+        """Have the next :meth:`begin` start everything anew."""
+        for name in self.processes.running:
+            self.kill(name)
 
     def end(self, name: str) -> None:
         """End a process in good order."""

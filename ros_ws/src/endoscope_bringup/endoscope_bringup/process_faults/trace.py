@@ -50,10 +50,11 @@ class ShaftTrace:
     Parameters
     ----------
     samples
-        In the order of their stamps.
+        In any order.
     """
 
     def __init__(self, samples: Sequence[JointSample]) -> None:
+        samples = sorted(samples, key=lambda sample: sample.stamp_ns)
         self._stamps = np.array([s.stamp_ns for s in samples], dtype=np.int64)
         self._angles: NDArray[np.float64] = np.array([s.position for s in samples]).reshape(
             len(samples), -1
