@@ -62,7 +62,9 @@ class Operator:
         )
 
     def _on_health(self, message):
-        self.heard |= {status.name.partition(':')[0] for status in message.status}
+        self.heard |= {
+            status.name.removeprefix('/endoscope/').partition(':')[0] for status in message.status
+        }
 
     def _on_motors(self, message):
         self.reach = max(self.reach, abs(message.position[0]))
