@@ -46,7 +46,7 @@ def test_leaving_a_point_out_predicts_it_from_the_others():
 @pytest.mark.skipif(not REAL.is_dir(), reason=f'no {REAL}; set ENDOSCOPE_SHARED')
 def test_real_backlash_sizes_from_tension_alone():
     sizes, widths = [], []
-    for path in sorted(REAL.glob('*.txt')):
+    for path in sorted(REAL.glob('[0-9]*.txt')):
         table = np.loadtxt(path, delimiter=',')
         table = table[np.diff(table[:, 0], prepend=-1.0) != 0.0]
         time, desired, actual = table[:, 0], table[:, 1], table[:, 3]

@@ -90,7 +90,8 @@ def real_recordings() -> list[RealRecording]:
     if folder is None:
         return []
     found = []
-    for path in folder.glob('*.txt'):
+    # The tubes are named by their bend; other files of the folder are recordings of another form.
+    for path in folder.glob('[0-9]*.txt'):
         table = np.loadtxt(path, delimiter=',')
         # Rows repeat each reading of a slower clock.
         table = table[np.diff(table[:, _PHASE], prepend=-1.0) != 0.0]
