@@ -103,8 +103,15 @@ def register(rig):
 def moving(rig):
     """Enabled, and the shafts at speed."""
     graph = rig.graph
-    graph.enable()
-    graph.wait(lambda: max(abs(v) for v in graph.shafts[-1][1].velocity) > 0.1)
+
+    def under_way():
+        # A machine that does not run the nodes for 0.1 s ends the session by itself.
+        if graph.state != 'ENABLED':
+            graph.command('enable')
+            return False
+        return max(abs(v) for v in graph.shafts[-1][1].velocity) > 0.1
+
+    graph.wait(under_way)
 
 
 def held(rig):
@@ -345,7 +352,18 @@ def test_the_bag_shows_it_all(rig):
     assert (np.diff(poses.stamp_ns) > 0).all()
     states = [(raw.log_ns, m.data) for raw, m in bag.decoded('/endoscope/slave/operating_state')]
     changes = [b for a, b in pairwise(states) if a[1] != b[1]]
-    faults = [at for at, name in changes if name == 'FAULT']
+    # Sessions that a stall of this machine ended are none of the faults that were tried.
+    stalls = [
+        raw.log_ns
+        for raw, m in bag.decoded('/diagnostics')
+        for status in m.status
+        if 'stood still' in status.message and status.name.endswith(': motion session')
+    ]
+    faults = [
+        at
+        for at, name in changes
+        if name == 'FAULT' and not any(abs(at - stall) < 50_000_000 for stall in stalls)
+    ]
     assert len(faults) == len(FAULTS)
     assert {name for _, name in changes} == {'ENABLED', 'FAULT'}
     gaps = np.flatnonzero(np.diff(wires.stamp_ns) > 45_000_000)
