@@ -42,7 +42,7 @@ import math
 from dataclasses import dataclass
 
 from endoscope_core.control.law_settings import check_settings
-from endoscope_core.control.smoothing import COUNT
+from endoscope_core.control.smoothing import COUNT, limited
 
 
 @dataclass(frozen=True)
@@ -147,15 +147,15 @@ def adapt(
         s since the measurement before.
     """
     c = settings
-    bounded = _limit(error, c.error_limit)
-    integral = _limit(state.integral + c.integral_weight * bounded * dt, c.integral_limit)
+    bounded = limited(error, c.error_limit)
+    integral = limited(state.integral + c.integral_weight * bounded * dt, c.integral_limit)
     w = bounded + integral
     gain = state.gain - dt * (c.gain_rate * w * desired + c.leakage * state.gain)
     backlash = state.backlash - dt * (c.backlash_rate * w * direction + c.leakage * state.backlash)
     bound = state.bound + dt * c.bound_rate * (abs(w) - c.bound_leakage * state.bound)
     return AdaptationState(
-        gain=_limit(gain, c.gain_limit),
-        backlash=_limit(backlash, c.backlash_limit),
+        gain=limited(gain, c.gain_limit),
+        backlash=limited(backlash, c.backlash_limit),
         bound=min(max(bound, 0.0), c.loop_gain * c.boundary_layer),
         integral=integral,
         surface=w,
@@ -170,7 +170,3 @@ def robust_term(settings: AdaptiveBacklashSettings, state: AdaptationState) -> f
 def learnt_term(state: AdaptationState, desired: float, direction: float) -> float:
     """``g theta + D s`` in rad."""
     return state.gain * desired + state.backlash * direction
-
-
-def _limit(value: float, bound: float) -> float:
-    return min(bound, max(-bound, value))

@@ -13,7 +13,7 @@ from endoscope_core.control.adaptive_physical_inverse import AdaptivePhysicalInv
 from endoscope_core.control.joint_inverse import HysteresisInverse, JointInverse, Passing
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.physical_parameters import PhysicalParameters
-from endoscope_core.control.smoothing import COUNT, worked_off
+from endoscope_core.control.smoothing import COUNT, limited, worked_off
 from endoscope_core.hysteresis.inverse import MODELS, HysteresisParameters
 
 Vector = Sequence[float] | NDArray[np.float64]
@@ -276,7 +276,7 @@ class Feedforward:
         joint.desired, joint.velocity = desired, velocity
         most = min(c.offset_rate * dt, abs(joint.offset) * min(1.0, dt / c.offset_time))
         joint.offset = worked_off(joint.offset, travel, most)
-        joint.command += _limit(joint.wanted + joint.offset - joint.command, c.speed_limit * dt)
+        joint.command += limited(joint.wanted + joint.offset - joint.command, c.speed_limit * dt)
         joint.inverse.sent(joint.command, dt)
         return joint.command
 
@@ -304,7 +304,3 @@ class Feedforward:
         if len(numbers) != self._count or not all(map(math.isfinite, numbers)):
             raise ValueError(f'{name} must be {self._count} finite numbers, not {numbers}')
         return numbers
-
-
-def _limit(value: float, bound: float) -> float:
-    return min(bound, max(-bound, value))

@@ -72,6 +72,11 @@ class SmoothFollower:
         self.velocity = (self.velocity - w * slope * dt) * decay
 
 
+def limited(value: float, bound: float) -> float:
+    """The value, held within a bound either way."""
+    return min(bound, max(-bound, value))
+
+
 def worked_off(value: float, travel: float, bound: float) -> float:
     """What is left of a value of which each step takes off some, until nothing is left.
 
@@ -86,4 +91,4 @@ def worked_off(value: float, travel: float, bound: float) -> float:
         Most in rad that may be taken off.
     """
     most = min(bound, SHARE_OF_TRAVEL * travel)
-    return value - min(most, max(-most, value))
+    return value - limited(value, most)

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.control.smoothing import SHARE_OF_TRAVEL, Play, worked_off
+from endoscope_core.control.smoothing import SHARE_OF_TRAVEL, Play, limited, worked_off
 from endoscope_core.hysteresis.bouc_wen_kernel import bouc_wen_normalised_step
 
 Vector = Sequence[float] | NDArray[np.float64]
@@ -253,15 +253,15 @@ class TrackerFeedback[Law: JointLaw]:
         output.rested = output.rested and travel == 0.0
         # What the law says now where it was before: the difference was learnt, not asked for.
         running = dt if travel > 0.0 else 0.0
-        relearnt = _limit(law.correction(before.foreseen[j], before.direction[j], running), limit)
+        relearnt = limited(law.correction(before.foreseen[j], before.direction[j], running), limit)
         output.offset += output.weight * (output.raw - relearnt)
         output.offset = worked_off(output.offset, travel, RATE * dt)
-        output.raw = _limit(law.correction(now.foreseen[j], now.direction[j], 0.0), limit)
+        output.raw = limited(law.correction(now.foreseen[j], now.direction[j], 0.0), limit)
         change = dt / self._fade_time
         if output.raw != 0.0:
             change = min(change, SHARE_OF_TRAVEL * travel / abs(output.raw))
         output.weight = min(1.0, max(0.0, output.weight + (change if acting else -change)))
-        return _limit(output.weight * output.raw + output.offset, limit)
+        return limited(output.weight * output.raw + output.offset, limit)
 
     def _elapsed(self, time: float) -> float:
         if not math.isfinite(time):
@@ -340,7 +340,3 @@ class TrackerFeedback[Law: JointLaw]:
 def direction_step(travel: float, direction: float, delta: float) -> float:
     """Direction memory in [-1, 1] after the desired angle has moved by `delta` rad."""
     return float(bouc_wen_normalised_step(direction, delta, travel, 0.0, 1.0))
-
-
-def _limit(value: float, bound: float) -> float:
-    return min(bound, max(-bound, value))
