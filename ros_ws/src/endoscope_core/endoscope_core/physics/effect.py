@@ -1,0 +1,168 @@
+"""What an effect is: its parameters, equation, source, place, and what a search must know of it."""
+
+import difflib
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from endoscope_core.physics.layout import SLOTS
+
+
+class UnknownEffectError(ValueError):
+    """An effect, its joint or one of its parameters that the catalogue does not have."""
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """A hint that names the valid name nearest to a wrong one, and else all of them."""
+    valid = list(valid)
+    close = difflib.get_close_matches(name, valid, n=1, cutoff=0.5)
+    return f'did you mean {close[0]}?' if close else 'valid are ' + ', '.join(valid)
+
+
+class Stage(StrEnum):
+    """Part of the chain from command to recording in which an effect acts."""
+
+    ACTUATOR = 'actuator'
+    TRANSMISSION = 'transmission'
+    JOINT = 'joint'
+    SENSING = 'sensing'
+    RECORDING = 'recording'
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect.
+
+    Attributes
+    ----------
+    name, unit : str
+        Name in plant.yaml and SI unit.
+    low, high : float
+        Bounds within which the physics is defined and a fit may move.
+    typical : float
+        Value where plant.yaml gives none.
+    off : float
+        Value at which the effect vanishes, or NaN where no value of this parameter does that.
+    choices : tuple of float
+        All admissible values of a parameter that is not continuous (a wire's number); else empty.
+    starts : tuple of float
+        Where a fit begins; the typical value if empty.
+    comparable : bool
+        Whether a person could measure the parameter another way.
+    phase : bool
+        Whether half a turn more reverses the effect.
+    scale : float
+        Where the effect is far from linear in this parameter, the change over which it nearly is;
+        else 0.
+    counted : bool
+        Whether it is a whole number, which a fit steps through one by one.
+    is_duration : bool
+        Whether it is the length of the recording, which nobody has to look for.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    typical: float
+    off: float = math.nan
+    choices: tuple[float, ...] = ()
+    starts: tuple[float, ...] = ()
+    comparable: bool = False
+    phase: bool = False
+    scale: float = 0.0
+    counted: bool = False
+    is_duration: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.low <= self.typical <= self.high:
+            raise ValueError(f'{self.name}: typical {self.typical} is outside its bounds')
+        for value in (*self.starts, *self.choices):
+            if not self.low <= value <= self.high:
+                raise ValueError(f'{self.name}: {value} is outside its bounds')
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What a search for missing physics must know of an effect.
+
+    Attributes
+    ----------
+    depends_on_time
+        It is told from others only where a motion is made twice.
+    of_device
+        It belongs to a device that all joints share.
+    of_shape
+        It belongs to the shape of the tube, and is another in each recording.
+    rugged
+        Its misfit has many valleys: a fit needs many starts and wide difference steps.
+    audited
+        No simulation shows it: it is found in the recording itself.
+    """
+
+    depends_on_time: bool = False
+    of_device: bool = False
+    of_shape: bool = False
+    rugged: bool = False
+    audited: bool = False
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect of the catalogue, which it enters as it is made.
+
+    Attributes
+    ----------
+    id : str
+        Name in the catalogue.
+    stage : Stage
+        Where in the chain it acts.
+    order : int
+        Its place among those of its stage: the smaller, the earlier in the chain.
+    physics, equation, source : str
+        In words, as an equation, and the literature it comes from.
+    parameters : tuple of Parameter
+        In the order of their slots.
+    traits : Traits
+    flag, first_parameter : int
+        Indices in the compiled physics' flag and parameter arrays.
+
+    Raises
+    ------
+    ValueError
+        If the id is taken.
+    """
+
+    id: str
+    stage: Stage
+    order: int
+    physics: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    traits: Traits = Traits()
+    flag: int = field(default_factory=SLOTS.flag)
+    first_parameter: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        if self.id in _DEFINED:
+            raise ValueError(f'effect {self.id} is defined twice')
+        first = SLOTS.parameter_block(len(self.parameters))
+        object.__setattr__(self, 'first_parameter', first)
+        _DEFINED[self.id] = self
+
+    @property
+    def places(self) -> range:
+        """Indices of its parameters in the compiled physics' parameter array."""
+        return range(self.first_parameter, self.first_parameter + len(self.parameters))
+
+
+_DEFINED: dict[str, Effect] = {}
+
+
+def in_order_of_chain() -> dict[str, Effect]:
+    """All effects defined so far by their ids, in the order of the chain."""
+    stages = list(Stage)
+    ordered = sorted(_DEFINED.values(), key=lambda e: (stages.index(e.stage), e.order, e.id))
+    return {effect.id: effect for effect in ordered}

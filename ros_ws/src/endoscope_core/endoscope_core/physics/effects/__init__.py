@@ -1,0 +1,29 @@
+"""Catalogue of physics that can be added to the nominal plant, one file an effect.
+
+An effect's module enters it in the catalogue; a new file in this folder is all that a new effect
+needs. Modules without an effect hold laws that several share.
+"""
+
+import importlib
+import pkgutil
+
+from endoscope_core.physics.effect import Effect, UnknownEffectError, in_order_of_chain, nearest
+
+for _module in sorted(module.name for module in pkgutil.iter_modules(__path__)):
+    importlib.import_module(f'{__name__}.{_module}')
+
+CATALOGUE: dict[str, Effect] = in_order_of_chain()
+"""All effects by their ids, in the order of the chain."""
+
+
+def describe(effect_id: str) -> Effect:
+    """The catalogue's effect of that id.
+
+    Raises
+    ------
+    UnknownEffectError
+        If the catalogue has no such id; the message names the nearest.
+    """
+    if effect_id not in CATALOGUE:
+        raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, CATALOGUE)}')
+    return CATALOGUE[effect_id]

@@ -1,0 +1,395 @@
+"""One bending joint, tick by tick: servo, pair of wires in their sheaths, joint, readings.
+
+No effect is named here: what can be added to the nominal plant acts through the hooks.
+"""
+
+import math
+
+from endoscope_core.compiled import Array, Flags, compiled
+from endoscope_core.physics import hooks
+from endoscope_core.physics.folds import acting, folded
+from endoscope_core.physics.joint import bend
+from endoscope_core.physics.layout import (
+    ANGLE_HISTORY,
+    CAPSTAN_EXPONENT,
+    CELLS,
+    COMMAND_HISTORY,
+    EXPONENTS,
+    EXTRA_LENGTH,
+    FALLING_FACTOR,
+    FILM,
+    FLOOR,
+    FRICTION_PROFILE,
+    HISTORY,
+    IN_COMMAND,
+    IN_MOTOR,
+    IN_OTHER_JOINT,
+    IN_PUSH_COMMAND,
+    IN_PUSH_MOMENT,
+    IN_PUSH_STRETCH,
+    JOINT,
+    JOINT_REST_ANGLE,
+    JOINT_STEP,
+    MOTOR,
+    MOTOR_BANDWIDTH,
+    MOTOR_DAMPING_RATIO,
+    MOTOR_SPEED,
+    OUT_BENDING,
+    OUT_EFFORT,
+    OUT_JOINT,
+    OUT_MOTOR,
+    OUT_MOTOR_SPEED,
+    OUT_TENSION_A,
+    OUT_TENSION_B,
+    PLACES,
+    PRETENSION,
+    PRETENSION_PROFILE,
+    PROFILE_TERMS,
+    PULLEY,
+    PULLEY_RADIUS,
+    RISING_FACTOR,
+    SHAPES,
+    SLIDING_SPEED,
+    TICKS,
+    TIP,
+    TRANSITION,
+    TRAVEL,
+    WIRE_A,
+    WIRE_B,
+    WIRE_STIFFNESS,
+    WORK,
+)
+from endoscope_core.physics.sheath import (
+    MOTOR_END,
+    NODES,
+    lengthen,
+    mean_tension,
+    move,
+    moved,
+    node_tension,
+    relax,
+    spread,
+    tabulate,
+)
+from endoscope_core.physics.servo import transition
+
+command_at_servo = folded(hooks.COMMAND)
+servo_error = folded(hooks.SERVO_ERROR)
+torque_limit, torque_is_limited = folded(hooks.TORQUE), acting(hooks.TORQUE)
+pulley_angle = folded(hooks.PULLEY_ANGLE)
+travel_of = folded(hooks.TRAVEL_OF)
+exponent_factor, exponent_varies = folded(hooks.EXPONENT), acting(hooks.EXPONENT)
+direction_factors = folded(hooks.DIRECTION)
+friction_floor = folded(hooks.FRICTION_FLOOR)
+stiffness_factor, stiffness_varies = folded(hooks.STIFFNESS), acting(hooks.STIFFNESS)
+added_length, length_varies = folded(hooks.LENGTH), acting(hooks.LENGTH)
+tip_angle = folded(hooks.TIP_ANGLE)
+effort_reading = folded(hooks.EFFORT)
+tracker_reading = folded(hooks.TRACKER)
+load_cell_reading = folded(hooks.LOAD_CELL)
+advance, something_follows = folded(hooks.ADVANCE), acting(hooks.ADVANCE)
+
+_STEPS_TO_START = 64
+_SETTLING_TICK = 1.0
+_TRIES = 40
+_SAME_FACTOR = 1e-12
+
+
+@compiled
+def settle(
+    x: Array, history: Array, sheath: Array, p: Array, on: Flags, shaft: float, tick: float
+) -> None:
+    """Bring a joint to rest, its wires tightened at angle zero and the motor gone to `shaft` since.
+
+    Parameters
+    ----------
+    x, history, sheath : array (states,), array (2, HISTORY), array (SHEATH_ROWS, CELLS + 1)
+        Written.
+    p, on : array (parameters,), array (flags,) of bool
+    shaft : float
+        Rad.
+    tick : float
+        That of all ticks to come, s.
+    """
+    x[:] = 0.0
+    a11, a12, a21, a22 = transition(p[MOTOR_BANDWIDTH], p[MOTOR_DAMPING_RATIO], tick)
+    x[TRANSITION], x[TRANSITION + 1], x[TRANSITION + 2], x[TRANSITION + 3] = a11, a12, a21, a22
+    history[COMMAND_HISTORY, :] = shaft
+    _lay_out(sheath, p)
+    x[FLOOR] = friction_floor(on, p, x)
+    x[JOINT] = x[TIP] = p[JOINT_REST_ANGLE]
+    history[ANGLE_HISTORY, :] = x[TIP]
+    _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, 0.0, tick))
+    table = sheath[SHAPES : SHAPES + 5]
+    for wire in (WIRE_A, WIRE_B):
+        for i in range(CELLS + 1):
+            start = p[PRETENSION] * math.exp(-p[PRETENSION_PROFILE] * sheath[EXPONENTS, i])
+            x[wire + NODES + i] = start + x[FLOOR]
+        relax(x, wire, table, sheath[WORK : WORK + 3])
+    if length_varies(on):
+        _grow(x, table, p, on, 0.0, 0.0)
+    steps = _STEPS_TO_START if shaft != 0.0 else 1
+    for k in range(1, steps + 1):
+        x[MOTOR] = shaft * k / steps
+        _wind_up(x, table, p, on, x[MOTOR])
+        bend(x, table, p, on, 0.0, 0.0, 0.0, 0.0, _SETTLING_TICK)
+    for wire in range(2):
+        x[FILM + wire] = 0.0
+    x[SLIDING_SPEED] = x[JOINT_STEP] = 0.0
+    x[TIP] = x[JOINT]
+    history[ANGLE_HISTORY, :] = x[TIP]
+
+
+@compiled
+def _lay_out(sheath: Array, p: Array) -> None:
+    """Places of the nodes along the wire, and the capstan exponent from the motor to each.
+
+    The places are those of Clenshaw and Curtis (Numer. Math. 2, 1960): closest at the ends.
+    """
+    total = 0.0
+    for i in range(CELLS + 1):
+        sheath[PLACES, i] = 0.5 - 0.5 * math.cos(math.pi * i / CELLS)
+        if i > 0:
+            before, after = sheath[PLACES, i - 1], sheath[PLACES, i]
+            middle = _curvature(p, 0.5 * (before + after))
+            ends = _curvature(p, before) + _curvature(p, after)
+            total += (after - before) * (ends + 4.0 * middle) / 6.0
+        sheath[EXPONENTS, i] = total
+    for i in range(CELLS + 1):
+        sheath[EXPONENTS, i] *= p[CAPSTAN_EXPONENT] / total
+
+
+@compiled
+def _curvature(p: Array, place: float) -> float:
+    exponent = 0.0
+    for j in range(PROFILE_TERMS):
+        if p[FRICTION_PROFILE + j] != 0.0:
+            exponent += p[FRICTION_PROFILE + j] * math.cos((j + 1) * math.pi * place)
+    return math.exp(exponent)
+
+
+@compiled
+def _shape(x: Array, sheath: Array, p: Array, on: Flags, factor: float) -> None:
+    """Work out the table of shapes for a factor on the capstan exponent."""
+    falling, rising = direction_factors(on, p, x)
+    x[FALLING_FACTOR], x[RISING_FACTOR] = factor * falling, factor * rising
+    table = sheath[SHAPES : SHAPES + 5]
+    tabulate(table, sheath[PLACES], sheath[EXPONENTS], x[FALLING_FACTOR], x[RISING_FACTOR])
+
+
+@compiled
+def _change_friction(
+    x: Array, sheath: Array, p: Array, on: Flags, speed: float, time: float, tick: float
+) -> None:
+    """Go over to the friction of this tick; where it holds less than before, the wires slip."""
+    falling, _ = direction_factors(on, p, x)
+    factor = exponent_factor(on, p, x, speed, time, tick)
+    before = x[FALLING_FACTOR] / falling
+    if abs(factor - before) <= _SAME_FACTOR * before:
+        return
+    table = sheath[SHAPES : SHAPES + 5]
+    for wire in (WIRE_A, WIRE_B):
+        spread(x, wire, table)
+    _shape(x, sheath, p, on, factor)
+    if factor < before:
+        for wire in (WIRE_A, WIRE_B):
+            relax(x, wire, table, sheath[WORK : WORK + 3])
+
+
+@compiled
+def _stiffness(x: Array, wire: int, table: Array, p: Array, on: Flags) -> float:
+    if not stiffness_varies(on):
+        return p[WIRE_STIFFNESS]
+    mean = mean_tension(x, wire, table) - x[FLOOR]
+    return p[WIRE_STIFFNESS] * stiffness_factor(on, p, x, mean)
+
+
+@compiled
+def _grow(x: Array, table: Array, p: Array, on: Flags, push: float, time: float) -> None:
+    """Give both wires the length that effects have added to them by `time`, and a latent push."""
+    for k in range(2):
+        wire = WIRE_A if k == 0 else WIRE_B
+        length = added_length(on, p, x, k, time) + (push if k == 0 else -push)
+        grown = length - x[EXTRA_LENGTH + k]
+        if grown != 0.0:
+            lengthen(x, wire, table, _stiffness(x, wire, table, p, on) * grown, x[FLOOR])
+            x[EXTRA_LENGTH + k] = length
+
+
+@compiled
+def _travels(x: Array, p: Array, on: Flags, pulley: float) -> tuple[float, float]:
+    wound = p[PULLEY_RADIUS] * pulley
+    return travel_of(on, p, x, wound, 0), travel_of(on, p, x, -wound, 1)
+
+
+@compiled
+def _wind_up(x: Array, table: Array, p: Array, on: Flags, shaft: float) -> float:
+    """Turn the shaft to an angle; returns by how much the positive wire has moved, m."""
+    x[PULLEY] = pulley_angle(on, p, x, shaft)
+    travel_a, travel_b = _travels(x, p, on, x[PULLEY])
+    for k in range(2):
+        wire = WIRE_A if k == 0 else WIRE_B
+        travel = travel_a if k == 0 else travel_b
+        force = _stiffness(x, wire, table, p, on) * (travel - x[TRAVEL + k])
+        if force != 0.0:
+            move(x, wire, table, MOTOR_END, force, x[FLOOR])
+    way = 0.5 * (travel_a - x[TRAVEL] - travel_b + x[TRAVEL + 1])
+    x[TRAVEL], x[TRAVEL + 1] = travel_a, travel_b
+    return way
+
+
+@compiled
+def _torque(x: Array, table: Array, p: Array, on: Flags, step: float) -> float:
+    """Torque of the wires on the pulley in N m once it has turned by `step` rad."""
+    force = p[WIRE_STIFFNESS] * p[PULLEY_RADIUS] * step
+    ta, _, _, _, _, _ = moved(x, WIRE_A, table, MOTOR_END, force, x[FLOOR])
+    tb, _, _, _, _, _ = moved(x, WIRE_B, table, MOTOR_END, -force, x[FLOOR])
+    return p[PULLEY_RADIUS] * (ta - tb)
+
+
+@compiled
+def _yield(x: Array, table: Array, p: Array, on: Flags, step: float, tick: float) -> float:
+    """Step of the motor in rad, cut where the wires load it with more than it can bear.
+
+    The load grows with the step, the bearable falls with the speed: one step divides them.
+    """
+    limit = torque_limit(on, p, x, abs(step) / tick)
+    load = _torque(x, table, p, on, step)
+    if abs(load) <= limit:
+        return step
+    way = 1.0 if load > 0.0 else -1.0
+    too_far = step
+    back = max(1e-4, abs(step))
+    far_enough = step
+    for _ in range(_TRIES):
+        far_enough -= way * back
+        back *= 2.0
+        bearable = torque_limit(on, p, x, abs(far_enough) / tick)
+        if way * _torque(x, table, p, on, far_enough) <= bearable:
+            break
+    for _ in range(_TRIES):
+        middle = 0.5 * (too_far + far_enough)
+        bearable = torque_limit(on, p, x, abs(middle) / tick)
+        if way * _torque(x, table, p, on, middle) > bearable:
+            too_far = middle
+        else:
+            far_enough = middle
+    return far_enough
+
+
+@compiled
+def advance_tick(
+    x: Array, history: Array, sheath: Array, p: Array, on: Flags, inputs: Array, tick: float
+) -> None:
+    """Advance one joint by one tick with a row of inputs in force.
+
+    Parameters
+    ----------
+    x, history, sheath : array (states,), array (2, HISTORY), array (SHEATH_ROWS, CELLS + 1)
+        Changed in place; from `settle`.
+    p, on : array (parameters,), array (flags,) of bool
+    inputs : array (INPUTS,)
+        See `layout.INPUTS`.
+    tick : float
+        That of `settle`, s.
+    """
+    table = sheath[SHAPES : SHAPES + 5]
+    time = (x[TICKS] + 0.5) * tick
+    other = inputs[IN_OTHER_JOINT]
+    history[COMMAND_HISTORY, int(x[TICKS]) % HISTORY] = inputs[IN_COMMAND]
+
+    if math.isnan(inputs[IN_MOTOR]):
+        command = command_at_servo(on, p, x, inputs[IN_COMMAND], history, tick)
+        command += inputs[IN_PUSH_COMMAND]
+        from_error, kept = x[TRANSITION + 2], x[TRANSITION + 3]
+        error = servo_error(on, p, x, x[MOTOR] - command, from_error, kept)
+        target = x[MOTOR] - error
+        speed = from_error * error + kept * x[MOTOR_SPEED]
+        shaft = target + x[TRANSITION] * error + x[TRANSITION + 1] * x[MOTOR_SPEED]
+        if torque_is_limited(on):
+            step = _yield(x, table, p, on, shaft - x[MOTOR], tick)
+            if step != shaft - x[MOTOR]:
+                shaft, speed = x[MOTOR] + step, step / tick
+    else:
+        shaft = inputs[IN_MOTOR]
+        speed = (shaft - x[MOTOR]) / tick
+    x[MOTOR], x[MOTOR_SPEED] = shaft, speed
+
+    if exponent_varies(on):
+        _change_friction(x, sheath, p, on, abs(x[SLIDING_SPEED]), time, tick)
+    if length_varies(on) or inputs[IN_PUSH_STRETCH] != x[EXTRA_LENGTH]:
+        _grow(x, table, p, on, inputs[IN_PUSH_STRETCH], time)
+    way = _wind_up(x, table, p, on, shaft)
+    bend(x, table, p, on, way, other, inputs[IN_PUSH_MOMENT], time, tick)
+    x[TIP] = tip_angle(on, p, x, x[JOINT])
+    x[TICKS] += 1.0
+    if something_follows(on):
+        load_a = mean_tension(x, WIRE_A, table) - x[FLOOR]
+        load_b = mean_tension(x, WIRE_B, table) - x[FLOOR]
+        advance(on, p, x, load_a, load_b, time, tick)
+
+
+@compiled
+def tensions(x: Array, sheath: Array, end: int) -> tuple[float, float]:
+    """Tensions in N of both wires at `MOTOR_END` or `JOINT_END`."""
+    table = sheath[SHAPES : SHAPES + 5]
+    i = 0 if end == MOTOR_END else CELLS
+    way = 0.5 if end == MOTOR_END else -0.5
+    ta = node_tension(x, WIRE_A, table, i) - x[FLOOR] + way * x[FILM]
+    tb = node_tension(x, WIRE_B, table, i) - x[FLOOR] + way * x[FILM + 1]
+    return max(0.0, ta), max(0.0, tb)
+
+
+@compiled
+def read_sensors(
+    x: Array, history: Array, sheath: Array, p: Array, on: Flags, tick: float, out: Array
+) -> None:
+    """Write what the noise-free sensors read now into `out` (OUTPUTS,); once a tick."""
+    time = x[TICKS] * tick
+    history[ANGLE_HISTORY, int(x[TICKS]) % HISTORY] = x[TIP]
+    ta, tb = tensions(x, sheath, MOTOR_END)
+    out[OUT_MOTOR] = x[MOTOR]
+    out[OUT_MOTOR_SPEED] = x[MOTOR_SPEED]
+    out[OUT_EFFORT] = effort_reading(on, p, x, p[PULLEY_RADIUS] * (ta - tb), x[MOTOR_SPEED])
+    out[OUT_TENSION_A] = load_cell_reading(on, p, x, ta, 0, tb, time)
+    out[OUT_TENSION_B] = load_cell_reading(on, p, x, tb, 1, ta, time)
+    out[OUT_BENDING] = tracker_reading(on, p, x, x[TIP], history, time, tick)
+    out[OUT_JOINT] = x[TIP]
+
+
+@compiled
+def run_joints(
+    x: Array,
+    histories: Array,
+    sheaths: Array,
+    p: Array,
+    on: Flags,
+    inputs: Array,
+    coupled: bool,
+    tick: float,
+    out: Array,
+) -> None:
+    """Run all joints side by side over a whole input.
+
+    Parameters
+    ----------
+    x, histories, sheaths : array (J, ...)
+        As in `advance_tick`; changed in place.
+    p, on : array (J, parameters), array (J, flags) of bool
+    inputs : array (J, N, INPUTS)
+        Changed where `coupled`.
+    coupled : bool
+        Whether each joint sees the other's angle, which is then written into its input.
+    tick : float
+    out : array (J, N, OUTPUTS)
+        Row k is what the sensors read at tick k, before command k acts.
+    """
+    joints, ticks = inputs.shape[0], inputs.shape[1]
+    for n in range(ticks):
+        for j in range(joints):
+            read_sensors(x[j], histories[j], sheaths[j], p[j], on[j], tick, out[j, n])
+        for j in range(joints):
+            row = inputs[j, n]
+            if coupled and joints > 1:
+                row[IN_OTHER_JOINT] = out[1 - j, n, OUT_JOINT]
+            advance_tick(x[j], histories[j], sheaths[j], p[j], on[j], row, tick)

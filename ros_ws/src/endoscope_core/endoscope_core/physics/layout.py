@@ -1,0 +1,155 @@
+"""Places of numbers in the flat arrays that the compiled physics works on.
+
+Every nominal parameter, effect parameter and state has one fixed index, handed out here while the
+modules are imported; numba then compiles the indices in as constants. An effect that is off costs
+one test of a flag.
+"""
+
+from endoscope_core.physics.sheath import wire_states
+
+PROFILE_TERMS = 4
+"""Most coefficients that a friction profile can have."""
+
+NOMINAL_KEYS = (
+    'pretension',
+    'pretension_profile',
+    'wire_stiffness',
+    'pulley_radius',
+    'joint_radius',
+    'capstan_exponent',
+    'joint_stiffness',
+    'joint_rest_angle',
+    'joint_friction',
+    'joint_presliding',
+    'joint_presliding_spread',
+    'joint_damping',
+    'motor_bandwidth',
+    'motor_damping_ratio',
+)
+"""Nominal parameters of one number, in order; `friction_profile` follows them."""
+
+(
+    PRETENSION,
+    PRETENSION_PROFILE,
+    WIRE_STIFFNESS,
+    PULLEY_RADIUS,
+    JOINT_RADIUS,
+    CAPSTAN_EXPONENT,
+    JOINT_STIFFNESS,
+    JOINT_REST_ANGLE,
+    JOINT_FRICTION,
+    JOINT_PRESLIDING,
+    JOINT_PRESLIDING_SPREAD,
+    JOINT_DAMPING,
+    MOTOR_BANDWIDTH,
+    MOTOR_DAMPING_RATIO,
+) = range(len(NOMINAL_KEYS))
+FRICTION_PROFILE = len(NOMINAL_KEYS)
+
+CELLS = 32
+"""Cells of a wire."""
+ELEMENTS = 3
+"""Dahl elements that make up the joint's friction."""
+
+
+class Slots:
+    """Hands out consecutive indices of the flag, parameter and state arrays.
+
+    Attributes
+    ----------
+    flags, parameters, states : int
+        How many there are so far.
+    shaft_angles, joint_angles : list of int
+        States that begin at the shaft's and at the joint's angle.
+    """
+
+    def __init__(self) -> None:
+        self.flags = 0
+        self.parameters = FRICTION_PROFILE + PROFILE_TERMS
+        self.states = 0
+        self.shaft_angles: list[int] = []
+        self.joint_angles: list[int] = []
+
+    def flag(self) -> int:
+        """Index of the next effect's on/off flag."""
+        self.flags += 1
+        return self.flags - 1
+
+    def parameter_block(self, count: int) -> int:
+        """First of `count` consecutive parameter indices."""
+        self.parameters += count
+        return self.parameters - count
+
+    def state_block(self, count: int = 1) -> int:
+        """First of `count` consecutive state indices."""
+        self.states += count
+        return self.states - count
+
+    def shaft_angle(self) -> int:
+        """Index of a state that begins at the motor shaft's angle."""
+        self.shaft_angles.append(self.state_block())
+        return self.shaft_angles[-1]
+
+    def joint_angle(self) -> int:
+        """Index of a state that begins at the joint's angle."""
+        self.joint_angles.append(self.state_block())
+        return self.joint_angles[-1]
+
+
+SLOTS = Slots()
+
+TICKS = SLOTS.state_block()
+"""Ticks since the start."""
+MOTOR = SLOTS.shaft_angle()
+"""Motor shaft, rad."""
+MOTOR_SPEED = SLOTS.state_block()
+PULLEY = SLOTS.shaft_angle()
+"""Pulley, rad: the shaft behind what lies between them."""
+TRAVEL = SLOTS.state_block(2)
+"""By how much the pulley has wound up each wire, m."""
+EXTRA_LENGTH = SLOTS.state_block(2)
+"""What effects have added to each wire's length, m."""
+JOINT = SLOTS.joint_angle()
+"""Bending angle of the joint, rad."""
+JOINT_STEP = SLOTS.state_block()
+"""By how much it bent in the last tick, rad."""
+TIP = SLOTS.joint_angle()
+"""Bending angle of the tip, rad."""
+JOINT_SLIDE = SLOTS.state_block(ELEMENTS)
+"""Dahl states of the joint's friction."""
+SLIDING_SPEED = SLOTS.state_block()
+"""Speed at which the positive wire slid towards the motor in the last tick, m/s."""
+FALLING_FACTOR = SLOTS.state_block()
+RISING_FACTOR = SLOTS.state_block()
+"""Factors on the capstan exponent that the table of shapes holds."""
+FLOOR = SLOTS.state_block()
+"""What load-independent friction adds to every node's tension, N."""
+TRANSITION = SLOTS.state_block(4)
+"""Exact transition of the servo over a tick."""
+END_WAY = SLOTS.state_block()
+"""What the other joint has added to the way of the positive wire at the joint, m."""
+FILM = SLOTS.state_block(2)
+"""What viscous friction adds to each wire's tension at the motor and takes off it at the joint, N."""
+WIRE_A = SLOTS.state_block(wire_states(CELLS))
+WIRE_B = SLOTS.state_block(wire_states(CELLS))
+
+# Rows of the arrays of a joint's sheath, (SHEATH_ROWS, CELLS + 1).
+SHAPES = 0
+"""First of the rows of the table of shapes."""
+PLACES, EXPONENTS, WORK = 5, 6, 7
+SHEATH_ROWS = 10
+
+HISTORY = 1024
+"""Ticks of command and of angle that are kept for delays."""
+COMMAND_HISTORY, ANGLE_HISTORY = 0, 1
+
+IN_COMMAND, IN_OTHER_JOINT, IN_MOTOR, IN_PUSH_COMMAND, IN_PUSH_STRETCH, IN_PUSH_MOMENT = range(6)
+INPUTS = 6
+"""Columns of the input: command and measured motor angle (NaN: let the servo run) in rad of the
+shaft, the other joint's angle, and latent pushes added to command (rad), length of the positive wire
+(m) and joint moment (N m)."""
+
+OUT_MOTOR, OUT_MOTOR_SPEED, OUT_EFFORT, OUT_TENSION_A, OUT_TENSION_B, OUT_BENDING, OUT_JOINT = (
+    range(7)
+)
+OUTPUTS = 7
