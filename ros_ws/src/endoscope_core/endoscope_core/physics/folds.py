@@ -1,7 +1,7 @@
 """From the effects' functions to one compiled function for each hook.
 
-Numba inlines functions that are called by their names, and compiles them once for all; functions in a
-tuple, or closures over them, cost up to twice the time and a compilation in every process. So the
+Numba inlines functions that are called by their names, and compiles them once for all; functions in
+a tuple, or closures over them, cost up to twice the time and a compilation in every process. So the
 calls are written out as source, by the catalogue, into the folder that holds the compiled cache.
 """
 
@@ -72,7 +72,8 @@ def _module() -> ModuleType:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, text)
     spec = importlib.util.spec_from_file_location(_NAME, path)
-    assert spec is not None and spec.loader is not None
+    if spec is None or spec.loader is None:
+        raise ImportError(f'{path} cannot be imported')
     module = importlib.util.module_from_spec(spec)
     sys.modules[_NAME] = module
     spec.loader.exec_module(module)

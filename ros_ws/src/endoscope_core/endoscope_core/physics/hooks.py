@@ -59,7 +59,7 @@ TORQUE = Hook('torque', Fold.LEAST, 'p, x, speed')
 PULLEY_ANGLE = Hook('pulley_angle', Fold.THROUGH, 'p, x, shaft')
 """Pulley's angle behind the shaft, rad."""
 TRAVEL_OF = Hook('travel_of', Fold.THROUGH, 'p, x, travel, wire')
-"""By how much the pulley winds up wire 0 or 1, m; a pulley without a link gives radius times angle."""
+"""By how much the pulley winds up wire 0 or 1, m; without a link radius times angle."""
 EXPONENT = Hook('exponent', Fold.FACTORS, 'p, x, speed, time, tick')
 """Factor on the capstan exponent, mean over the tick; `speed` of sliding in m/s, not negative."""
 DIRECTION = Hook('direction', Fold.FACTORS, 'p, x', results=2)
@@ -76,7 +76,7 @@ END_LENGTH = Hook('end_length', Fold.TERMS, 'p, x, other')
 """What the other joint's angle in rad adds to the way of the positive wire at the joint, m; the
 negative one's is the opposite."""
 LOAD = Hook('load', Fold.TERMS, 'p, x, angle, step, other, time, tick', results=2)
-"""Moment on the joint in N m once it has bent by `step` to `angle`, and minus its slope by `step`."""
+"""Moment on the joint in N m, bent by `step` to `angle`, and minus its slope by `step`."""
 TIP_ANGLE = Hook('tip_angle', Fold.THROUGH, 'p, x, joint')
 """Tip's angle behind the joint's, rad."""
 EFFORT = Hook('effort', Fold.THROUGH, 'p, x, effort, speed')

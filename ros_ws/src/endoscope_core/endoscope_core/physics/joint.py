@@ -1,7 +1,7 @@
 """The bending joint: overdamped, with friction that builds up over an angle.
 
-``c q' = r (Ta - Tb) - K (q - q0) - tau_f z``, implicit in the angle at the end of a tick. Friction is
-Dahl's (Aerospace Corp. TOR-0158(3107-18)-1, 1968), exact for a step of one sign.
+``c q' = r (Ta - Tb) - K (q - q0) - tau_f z``, implicit in the angle at the end of a tick. Friction
+is Dahl's (Aerospace Corp. TOR-0158(3107-18)-1, 1968), exact for a step of one sign.
 """
 
 import math
@@ -86,7 +86,7 @@ def _imbalance(
     time: float,
     tick: float,
 ) -> tuple[float, float]:
-    """What is missing in N m to bend by `step`, and its slope: zero where the joint comes to rest."""
+    """What is missing in N m to bend by `step`, and its slope."""
     r = p[JOINT_RADIUS]
     angle = x[JOINT] + step
     ta, sa, _, _, _, _ = moved(x, WIRE_A, table, JOINT_END, -stiff_a * r * step, x[FLOOR])
@@ -117,8 +117,8 @@ def _step(
 ) -> float:
     """By how much the joint bends, rad: Newton's method within a bracket.
 
-    The nominal imbalance grows with the step and is concave on either side of zero, where fronts and
-    pre-sliding soften it: from the last step Newton's method comes to the root from one side.
+    The nominal imbalance grows with the step and is concave on either side of zero, where fronts
+    and pre-sliding soften it: from the last step Newton's method comes to the root from one side.
     """
     missing, slope = _imbalance(
         x, table, p, on, 0.0, stiff_a, stiff_b, film, way, other, push, time, tick

@@ -129,7 +129,7 @@ TRANSITION = SLOTS.state_block(4)
 END_WAY = SLOTS.state_block()
 """What the other joint has added to the way of the positive wire at the joint, m."""
 FILM = SLOTS.state_block(2)
-"""What viscous friction adds to each wire's tension at the motor and takes off it at the joint, N."""
+"""Viscous drag on each wire, half of it at either end, N."""
 WIRE_A = SLOTS.state_block(wire_states(CELLS))
 WIRE_B = SLOTS.state_block(wire_states(CELLS))
 
@@ -146,8 +146,8 @@ COMMAND_HISTORY, ANGLE_HISTORY = 0, 1
 IN_COMMAND, IN_OTHER_JOINT, IN_MOTOR, IN_PUSH_COMMAND, IN_PUSH_STRETCH, IN_PUSH_MOMENT = range(6)
 INPUTS = 6
 """Columns of the input: command and measured motor angle (NaN: let the servo run) in rad of the
-shaft, the other joint's angle, and latent pushes added to command (rad), length of the positive wire
-(m) and joint moment (N m)."""
+shaft, the other joint's angle, and latent pushes added to command (rad), length of the positive
+wire (m) and joint moment (N m)."""
 
 OUT_MOTOR, OUT_MOTOR_SPEED, OUT_EFFORT, OUT_TENSION_A, OUT_TENSION_B, OUT_BENDING, OUT_JOINT = (
     range(7)

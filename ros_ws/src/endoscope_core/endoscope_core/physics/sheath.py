@@ -1,17 +1,17 @@
 """A wire in its sheath: capstan friction along the whole length, solved quasi-statically.
 
-The wire's tension is kept at nodes, closest at both ends, where fronts begin. Where it slides towards
-the motor, ``dT/dphi = -T`` (Kaneko et al., IEEE ICRA 1991; Palli, Melchiorri, IEEE ICRA 2006); where
-it slides towards the joint, ``dT/dphi = T``; where it is stuck, its tension stays as it was. An end
-that moves sends a front into the wire, behind which the tension follows the end and before which
-everything is as it was: return-point memory, as in Preisach's model (Mayergoyz, Mathematical Models
-of Hysteresis, 1991, ch. I). The stretch is the integral of the tension by the trapezoidal rule, so
-that the tension at a moving end is a continuous function of its motion.
+The wire's tension is kept at nodes, closest at both ends, where fronts begin. Where it slides
+towards the motor, ``dT/dphi = -T`` (Kaneko et al., IEEE ICRA 1991; Palli, Melchiorri, IEEE ICRA
+2006); where it slides towards the joint, ``dT/dphi = T``; where it is stuck, its tension stays as
+it was. An end that moves sends a front into the wire, behind which the tension follows the end and
+before which everything is as it was: return-point memory, as in Preisach's model (Mayergoyz,
+Mathematical Models of Hysteresis, 1991, ch. I). The stretch is the integral of the tension by the
+trapezoidal rule, so that the tension at a moving end is a continuous function of its motion.
 
 Behind a front the tension is an amplitude times one of two shapes, ``exp(-phi)`` and ``exp(phi)``.
 So a wire is two regions, one from each end, and the nodes between them; a motion that goes on costs
-only the nodes that its front passes. Displacements are given as ``force``: the stiffness of the whole
-wire times the way, N.
+only the nodes that its front passes. Displacements are given as ``force``: the stiffness of the
+whole wire times the way, N.
 """
 
 import math
@@ -144,9 +144,7 @@ def moved(
     count = int(x[wire + COUNT + end])
     if count > 0 and int(x[wire + SHAPE + end]) == shape:
         load = x[wire + AMPLITUDE + end] * _weight_behind(table, shape, end, count)
-    elif (
-        int(x[wire + COUNT + 1 - end]) == nodes and int(x[wire + SHAPE + 1 - end]) == shape
-    ):
+    elif int(x[wire + COUNT + 1 - end]) == nodes and int(x[wire + SHAPE + 1 - end]) == shape:
         # The other end's front has passed the whole wire, which slides the way that this end moves.
         count = nodes
         load = x[wire + AMPLITUDE + 1 - end] * _weight_behind(table, shape, end, count)
@@ -223,8 +221,8 @@ def mean_tension(x: Array, wire: int, table: Array) -> float:
 def lengthen(x: Array, wire: int, table: Array, force: float, floor: float) -> None:
     """Let a wire that is held at both ends grow longer by `force` N of stretch.
 
-    It grows in proportion to its tension everywhere, as what creeps under load does, so that nothing
-    slips. What a slack wire grows is slack at the motor; what shrinks there is pulled in.
+    It grows in proportion to its tension everywhere, as what creeps under load does: nothing slips.
+    What a slack wire grows is slack at the motor; what shrinks there is pulled in.
     """
     had = mean_tension(x, wire, table) - floor
     left = had - force
@@ -252,9 +250,10 @@ def spread(x: Array, wire: int, table: Array) -> None:
 def relax(x: Array, wire: int, table: Array, work: Array) -> None:
     """Let a spread wire slip where its tension is steeper than friction can now hold.
 
-    A stretch that slips keeps its extension and ends on the limit; a stretch next to it that is then
-    too steep slips with it. That is the pooling of adjacent violators (Barlow et al., Statistical
-    Inference under Order Restrictions, 1972, sec. 1.2) of tension over shape, once for each way.
+    A stretch that slips keeps its extension and ends on the limit; a stretch next to it that is
+    then too steep slips with it. That is the pooling of adjacent violators (Barlow et al.,
+    Statistical Inference under Order Restrictions, 1972, sec. 1.2) of tension over shape, once for
+    each way.
 
     Parameters
     ----------
@@ -273,7 +272,7 @@ def relax(x: Array, wire: int, table: Array, work: Array) -> None:
             load = table[WEIGHT, i] * x[wire + NODES + i]
             weight = table[WEIGHT, i] * table[shape, i]
             size = 1.0
-            # Tension over the falling shape may only grow along the wire, over the rising only fall.
+            # Tension over the falling shape may only grow along the wire, over the rising fall.
             while blocks > 0 and way * (
                 work[0, blocks - 1] * weight - load * work[1, blocks - 1]
             ) > 1e-12 * abs(load * work[1, blocks - 1]):

@@ -1,0 +1,164 @@
+"""The plant's answer to recorded commands, at the stamps of a recording."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.recording import recording_faults
+from endoscope_core.physics.simulator import TICK, PlantTrajectory, simulate
+
+Stamps = NDArray[np.int64]
+Array = NDArray[np.float64]
+
+NANOSECONDS = 1e-9
+
+
+@dataclass(frozen=True)
+class AnswerStamps:
+    """Stamps in ns at which the motor, the load cells and the tracker are to answer."""
+
+    motor: Stamps
+    wires: Stamps
+    tracker: Stamps
+
+    def first(self) -> int:
+        """Earliest stamp of all."""
+        return int(np.concatenate([self.motor, self.wires, self.tracker]).min())
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Noise-free readings at the stamps asked for, for J joints.
+
+    Attributes
+    ----------
+    shaft_position, shaft_velocity, shaft_effort : array (N_motor, J)
+    tension : array (N_wires, J, 2)
+    bending : array (N_tracker, J)
+    """
+
+    shaft_position: Array
+    shaft_velocity: Array
+    shaft_effort: Array
+    tension: Array
+    bending: Array
+
+
+def hold_on_ticks(times: Array, values: Array, ticks: int, tick: float = TICK) -> Array:
+    """Commands that are each in force until the next one, as the mean over each tick.
+
+    Parameters
+    ----------
+    times : array (N,)
+        Seconds, not decreasing. Before the first one, the first command is in force.
+    values : array (N, J)
+    ticks : int
+        Number of ticks M, the first one beginning at zero.
+    tick : float
+        In s.
+
+    Returns
+    -------
+    array (M, J)
+
+    Raises
+    ------
+    ValueError
+        If the stamps decrease.
+    """
+    if np.any(np.diff(times) < 0):
+        raise ValueError('the stamps of the commands decrease')
+    edges = tick * np.arange(ticks + 1)
+    index = np.clip(np.searchsorted(times, edges, side='right') - 1, 0, None)
+    held = values[index]
+    # Only ticks with a change inside need the integral; elsewhere the held value is exact.
+    later = np.clip(np.searchsorted(times, edges[1:], side='left') - 1, 0, None)
+    result = held[:-1].copy()
+    for n in np.flatnonzero(later > index[:-1]):
+        inside = np.arange(index[n] + 1, later[n] + 1)
+        corners = np.concatenate([[edges[n]], times[inside], [edges[n + 1]]])
+        pieces = values[np.concatenate([[index[n]], inside])]
+        result[n] = np.diff(corners) @ pieces / tick
+    return result
+
+
+def answer_commands(
+    plant: PlantDescription,
+    command_stamps: Stamps,
+    shaft_commands: Array,
+    answer_stamps: AnswerStamps,
+    start_shaft: Array | None = None,
+    read_delay: float = 0.0,
+) -> Answer:
+    """What the noise-free sensors of a rig read at given stamps under recorded commands.
+
+    The stamps are what the devices' clocks say: a plant whose tracker's clock is skewed answers
+    with the angle of the time at which that clock said so.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+        J joints, in the order of the commands' columns.
+    command_stamps : array (N,) of int64
+        Stamps in ns, not decreasing.
+    shaft_commands : array (N, J)
+        Motor shaft angle in rad, in force from its stamp until the next one.
+    answer_stamps : AnswerStamps
+    start_shaft : array (J,), optional
+        Shaft angle in rad at which the rig rests at first; the first command if not given.
+    read_delay : float
+        Seconds from a stamp to the reading that carries it: zero, or the length of a cycle where
+        a rig stamps the cycle's beginning, sends the command and then reads.
+
+    Returns
+    -------
+    Answer
+
+    Raises
+    ------
+    ValueError
+        If the stamps decrease, or a command is not finite.
+    """
+    origin = min(answer_stamps.first(), int(command_stamps[0]))
+    faults = recording_faults(plant)
+    answer_times = {
+        'motor': _seconds(answer_stamps.motor, origin) + read_delay,
+        'wires': _seconds(answer_stamps.wires, origin) + read_delay,
+        'tracker': faults.tracker_time(_seconds(answer_stamps.tracker, origin)) + read_delay,
+    }
+    last = max(float(stretch.max(initial=0.0)) for stretch in answer_times.values())
+    # One tick more than the last stamp needs, so that interpolation has a right neighbour.
+    ticks = int(np.ceil(last / TICK)) + 2
+    times = _seconds(command_stamps, origin)
+    command = hold_on_ticks(times, shaft_commands, ticks)
+    start = shaft_commands[0] if start_shaft is None else start_shaft
+    trajectory = simulate(plant, command, start_shaft=start)
+    answer = _at_stamps(trajectory, answer_times)
+    return replace(answer, bending=faults.spoilt(answer.bending, answer_times['tracker']))
+
+
+def _seconds(stamps: Stamps, origin: int) -> Array:
+    return np.asarray((stamps - origin) * NANOSECONDS, dtype=np.float64)
+
+
+def _at_stamps(trajectory: PlantTrajectory, times: Mapping[str, Array]) -> Answer:
+    return Answer(
+        _interpolate(trajectory.shaft_position, times['motor']),
+        _interpolate(trajectory.shaft_velocity, times['motor']),
+        _interpolate(trajectory.shaft_effort, times['motor']),
+        _interpolate(trajectory.tension, times['wires']),
+        _interpolate(trajectory.bending, times['tracker']),
+    )
+
+
+def _interpolate(rows: Array, times: Array) -> Array:
+    place = times / TICK
+    # Stamps on a tick, to the nanosecond, take the tick's own row.
+    nearest_row = np.round(place)
+    place = np.where(np.abs(place - nearest_row) < 1e-5, nearest_row, place)
+    left = np.clip(place.astype(np.int64), 0, len(rows) - 2)
+    share = (place - left).reshape(-1, *[1] * (rows.ndim - 1))
+    return rows[left] + share * (rows[left + 1] - rows[left])

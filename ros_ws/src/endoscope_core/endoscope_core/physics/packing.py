@@ -1,0 +1,133 @@
+"""From a plant description to the flat arrays that the compiled physics works on."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
+from endoscope_core.physics.effect import UnknownEffectError, nearest
+from endoscope_core.physics.effects import CATALOGUE, describe
+from endoscope_core.physics.kernel import settle
+from endoscope_core.physics.layout import (
+    CELLS,
+    FRICTION_PROFILE,
+    HISTORY,
+    NOMINAL_KEYS,
+    SHEATH_ROWS,
+    SLOTS,
+)
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+def effect_values(spec: EffectSpec) -> Array:
+    """Values of an effect's parameters in slot order, typical where the spec gives none.
+
+    Raises
+    ------
+    UnknownEffectError
+        If the effect or one of its parameters is unknown.
+    ValueError
+        If a value is not finite, outside the parameter's bounds or, where it must be, not whole.
+    """
+    definition = describe(spec.id)
+    names = [parameter.name for parameter in definition.parameters]
+    for name in spec.parameters:
+        if name not in names:
+            raise UnknownEffectError(
+                f'effect {spec.id} has no parameter {name}: {nearest(name, names)}'
+            )
+    values = np.array(
+        [
+            float(spec.parameters.get(parameter.name, parameter.typical))
+            for parameter in definition.parameters
+        ]
+    )
+    for parameter, value in zip(definition.parameters, values, strict=True):
+        if not math.isfinite(value) or not parameter.low <= value <= parameter.high:
+            raise ValueError(
+                f'effect {spec.id}: {parameter.name} is {value:g}, it must be between '
+                f'{parameter.low:g} and {parameter.high:g} {parameter.unit}'
+            )
+        if parameter.counted and not value.is_integer():
+            raise ValueError(
+                f'effect {spec.id}: {parameter.name} is {value:g}, it must be a whole number'
+            )
+    return values
+
+
+def pack(plant: PlantDescription) -> tuple[Array, Flags]:
+    """Parameter and flag arrays of a plant.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+
+    Returns
+    -------
+    parameters : array (J, parameters)
+    flags : array (J, flags) of bool
+
+    Raises
+    ------
+    UnknownEffectError, ValueError
+        If an effect is unknown, on an unknown joint, given twice, or out of bounds.
+    """
+    names = plant.joint_names()
+    parameters = np.zeros((len(names), SLOTS.parameters))
+    flags = np.zeros((len(names), SLOTS.flags), dtype=np.bool_)
+    for row, joint in zip(parameters, plant.joints.values(), strict=True):
+        row[: FRICTION_PROFILE + len(joint.friction_profile)] = _nominal(joint)
+        for effect in CATALOGUE.values():
+            row[effect.places] = [parameter.typical for parameter in effect.parameters]
+    for spec in plant.effects:
+        if spec.joint not in names:
+            raise UnknownEffectError(
+                f'effect {spec.id} is on joint {spec.joint}: {nearest(spec.joint, names)}'
+            )
+        j = names.index(spec.joint)
+        values = effect_values(spec)
+        definition = CATALOGUE[spec.id]
+        if flags[j, definition.flag]:
+            raise ValueError(f'effect {spec.id} is given twice on joint {spec.joint}')
+        flags[j, definition.flag] = True
+        first = definition.first_parameter
+        parameters[j, first : first + len(values)] = values
+    return parameters, flags
+
+
+def _nominal(joint: JointParameters) -> list[float]:
+    return [*(getattr(joint, key) for key in NOMINAL_KEYS), *joint.friction_profile]
+
+
+def rest_state(
+    parameters: Array, on: Flags, tick: float, shaft: Array | None = None
+) -> tuple[Array, Array, Array]:
+    """States, histories and sheaths of joints at rest.
+
+    Parameters
+    ----------
+    parameters, on : array (J, parameters), array (J, flags) of bool
+        From `pack`.
+    tick : float
+        In s.
+    shaft : array (J,), optional
+        Shaft angle in rad to which each motor has gone since the wires were tightened at zero; zero
+        if not given.
+
+    Returns
+    -------
+    states : array (J, states)
+    histories : array (J, 2, HISTORY)
+    sheaths : array (J, SHEATH_ROWS, CELLS + 1)
+    """
+    joints = len(parameters)
+    states = np.zeros((joints, SLOTS.states))
+    histories = np.zeros((joints, 2, HISTORY))
+    sheaths = np.zeros((joints, SHEATH_ROWS, CELLS + 1))
+    for j in range(joints):
+        start = 0.0 if shaft is None else float(shaft[j])
+        settle(states[j], histories[j], sheaths[j], parameters[j], on[j], start, tick)
+    return states, histories, sheaths

@@ -1,0 +1,233 @@
+"""plant.yaml: reading and writing a plant description."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from endoscope_core.atomic_output import write_text
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.physics.description import (
+    EffectSpec,
+    JointParameters,
+    PlantDescription,
+    SensorParameters,
+)
+from endoscope_core.physics.effect import nearest
+from endoscope_core.physics.layout import PROFILE_TERMS
+from endoscope_core.physics.packing import pack
+from endoscope_core.physics.recording import recording_faults
+from endoscope_core.strict_yaml import YamlError, load_yaml
+
+JOINT_NAMES = ('bend_x', 'bend_y')
+
+REACH: Mapping[str, tuple[float, float, str]] = {
+    'pretension': (0.0, 1e3, 'N'),
+    'pretension_profile': (-1.0, 1.0, ''),
+    'friction_profile': (-5.0, 5.0, ''),
+    'joint_rest_angle': (-math.pi, math.pi, 'rad'),
+    'joint_presliding_spread': (0.0, 5.0, ''),
+    'wire_stiffness': (1.0, 1e7, 'N/m'),
+    'joint_radius': (1e-4, 0.1, 'm'),
+    'pulley_radius': (1e-4, 0.1, 'm'),
+    'capstan_exponent': (0.0, 10.0, ''),
+    'joint_stiffness': (0.0, 10.0, 'N m/rad'),
+    'joint_damping': (1e-7, 10.0, 'N m s/rad'),
+    'joint_friction': (0.0, 10.0, 'N m'),
+    'joint_presliding': (1e-5, math.pi, 'rad'),
+    'motor_bandwidth': (0.1, 1e4, 'rad/s'),
+    'motor_damping_ratio': (0.01, 100.0, ''),
+    'load_cell_noise': (0.0, 1e3, 'N'),
+    'load_cell_resolution': (0.0, 1e3, 'N'),
+    'load_cell_rate': (0.1, 1e5, 'Hz'),
+    'tracker_noise': (0.0, math.pi, 'rad'),
+    'tracker_rate': (0.1, 1e5, 'Hz'),
+    'encoder_counts': (1.0, 2.0**32, 'counts a turn'),
+    'velocity_resolution': (0.0, 1e3, 'rad/s'),
+    'effort_noise': (0.0, 1e3, 'N m'),
+    'effort_resolution': (0.0, 1e3, 'N m'),
+}
+"""Smallest and largest value of each key that a steerable instrument drawn by wires can have.
+
+A wire of 1 mm breaks at about 1 kN, and one of 20 mm length and 1 mm2 stiffens to E A / L = 1e7 N/m
+(steel, E = 2e11 Pa). A pulley finer than the wire, or one of 0.2 m, is none. An exponent of 10 is
+friction of 1 over one and a half turns and passes 1/22000 of the tension. Joint and motor are
+bounded by a finger's moment (10 N m) and by servos between 0.02 Hz and 1.6 kHz; a sensor's
+resolution by what it measures at most.
+"""
+
+
+class PlantFileError(EndoscopeError, ValueError):
+    """A plant file that cannot be read; the message names the file, the key and what to do."""
+
+
+def load_plant(path: str | Path) -> PlantDescription:
+    """Read a plant.yaml; missing keys take their nominal values.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    PlantDescription
+
+    Raises
+    ------
+    PlantFileError
+        If the file cannot be read, is not a plant, or has an unknown key or an invalid value.
+    """
+    path = Path(path)
+    try:
+        content = load_yaml(path)
+    except YamlError as error:
+        raise PlantFileError(f'plant file: {error}') from error
+    try:
+        return plant_from_mapping({} if content is None else content)
+    except ValueError as error:
+        raise PlantFileError(f'{path}: {error}') from error
+
+
+def plant_from_mapping(content: Any) -> PlantDescription:
+    """A plant description from the content of a plant.yaml.
+
+    Parameters
+    ----------
+    content : Mapping
+        With the keys `joints`, `sensors` and `effects`, each optional.
+
+    Returns
+    -------
+    PlantDescription
+
+    Raises
+    ------
+    ValueError
+        If a key is unknown or a value invalid; the message names it and the nearest valid one.
+    """
+    sections = _section(content, 'the plant')
+    _check_keys(sections, ('joints', 'sensors', 'effects'), 'the plant')
+    joints_given: Mapping[str, Any] = dict.fromkeys(JOINT_NAMES)
+    if sections.get('joints') is not None:
+        joints_given = _section(sections['joints'], 'joints')
+    _check_keys(joints_given, JOINT_NAMES, 'joints')
+    if not joints_given:
+        raise ValueError('joints is empty: name bend_x, bend_y or both')
+    joints = {
+        name: JointParameters(**_numbers(joints_given[name], JointParameters, f'joints.{name}'))
+        for name in JOINT_NAMES
+        if name in joints_given
+    }
+    sensors = SensorParameters(**_numbers(sections.get('sensors'), SensorParameters, 'sensors'))
+    listed = sections.get('effects') or []
+    if not isinstance(listed, list):
+        raise ValueError('effects must be a list')
+    plant = PlantDescription(joints, sensors, tuple(_effect(i, e) for i, e in enumerate(listed)))
+    pack(plant)
+    recording_faults(plant)
+    return plant
+
+
+def plant_to_mapping(plant: PlantDescription) -> dict[str, Any]:
+    """The content of the plant.yaml of a plant, with every key written out."""
+    return {
+        'joints': {
+            name: asdict(joint) | {'friction_profile': list(joint.friction_profile)}
+            for name, joint in plant.joints.items()
+        },
+        'sensors': asdict(plant.sensors),
+        'effects': [
+            {
+                'id': spec.id,
+                'joint': spec.joint,
+                'parameters': {name: float(v) for name, v in spec.parameters.items()},
+            }
+            for spec in plant.effects
+        ],
+    }
+
+
+def save_plant(plant: PlantDescription, path: str | Path) -> None:
+    """Write a plant.yaml that `load_plant` reads back to an equal plant.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+    path : str or Path
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    write_text(path, yaml.safe_dump(plant_to_mapping(plant), sort_keys=False))
+
+
+def _section(value: Any, where: str) -> Mapping[str, Any]:
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise ValueError(f'{where} must be a mapping of names to values, not {value!r}')
+    for key in value:
+        if not isinstance(key, str):
+            raise ValueError(f'unknown key {key!r} in {where}: keys are names')
+    return value
+
+
+def _check_keys(given: Mapping[str, Any], valid: tuple[str, ...], where: str) -> None:
+    for key in given:
+        if key not in valid:
+            raise ValueError(f'unknown key {key} in {where}: {nearest(str(key), valid)}')
+
+
+def _numbers(given: Any, kind: type, where: str) -> dict[str, Any]:
+    section = _section(given, where)
+    _check_keys(section, tuple(f.name for f in fields(kind)), where)
+    return {key: _value(key, value, f'{where}.{key}') for key, value in section.items()}
+
+
+def _value(key: str, value: Any, where: str) -> Any:
+    if key != 'friction_profile':
+        return _within_reach(key, value, where)
+    if not isinstance(value, list) or len(value) > PROFILE_TERMS:
+        raise ValueError(f'{where} is {value!r}: give a list of up to {PROFILE_TERMS} coefficients')
+    return tuple(_within_reach(key, c, f'{where}[{i}]') for i, c in enumerate(value))
+
+
+def _within_reach(key: str, value: Any, where: str) -> float:
+    number = _number(value, where)
+    low, high, unit = REACH[key]
+    # NaN passes: the parameters themselves refuse it, with a better word.
+    if number < low or number > high:
+        raise ValueError(f'{where} is {number:g}: give {low:g} to {high:g} {unit}'.rstrip())
+    return number
+
+
+def _number(value: Any, where: str) -> float:
+    # YAML 1.1 reads 1e-4 (no dot) as a string.
+    if isinstance(value, str):
+        try:
+            return float(value)
+        except ValueError:
+            pass
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f'{where} is {value!r}: give a number')
+    return float(value)
+
+
+def _effect(index: int, given: Any) -> EffectSpec:
+    where = f'effects[{index}]'
+    section = _section(given, where)
+    _check_keys(section, ('id', 'joint', 'parameters'), where)
+    for key in ('id', 'joint'):
+        if not isinstance(section.get(key), str):
+            raise ValueError(f'{where} has no {key}: give it as a name')
+    parameters = _section(section.get('parameters'), f'{where}.parameters')
+    return EffectSpec(
+        section['id'],
+        section['joint'],
+        {key: _number(value, f'{where}.parameters.{key}') for key, value in parameters.items()},
+    )

@@ -1,0 +1,223 @@
+"""The simulated rig: tick by tick for a node, or a whole command at once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.kernel import advance_tick, read_sensors, run_joints
+from endoscope_core.physics.layout import (
+    IN_COMMAND,
+    IN_MOTOR,
+    IN_OTHER_JOINT,
+    INPUTS,
+    OUT_BENDING,
+    OUT_EFFORT,
+    OUT_JOINT,
+    OUT_MOTOR,
+    OUT_MOTOR_SPEED,
+    OUT_TENSION_A,
+    OUT_TENSION_B,
+    OUTPUTS,
+)
+from endoscope_core.physics.packing import pack, rest_state
+
+TICK = 1.0e-3
+LARGEST_COMMAND = 1.0e6
+BEYOND = f'{LARGEST_COMMAND:g} rad'
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlantSample:
+    """What the noise-free sensors read at one instant, for J joints.
+
+    Attributes
+    ----------
+    time : float
+        Seconds since the start.
+    shaft_position, shaft_velocity, shaft_effort : array (J,)
+        Motor shaft in rad, rad/s and N m.
+    tension : array (J, 2)
+        Load cells of the positive and the negative wire in N.
+    bending : array (J,)
+        Bending angle in rad as the tracker reads it.
+    bending_true : array (J,)
+        Bending angle in rad of the joint itself.
+    """
+
+    time: float
+    shaft_position: Array
+    shaft_velocity: Array
+    shaft_effort: Array
+    tension: Array
+    bending: Array
+    bending_true: Array
+
+
+@dataclass(frozen=True)
+class PlantTrajectory:
+    """`PlantSample` at N ticks: `time` (N,), the others (N, J) and `tension` (N, J, 2).
+
+    Row k is the state at `time[k]`, before command k acts.
+    """
+
+    time: Array
+    shaft_position: Array
+    shaft_velocity: Array
+    shaft_effort: Array
+    tension: Array
+    bending: Array
+    bending_true: Array
+
+
+class PlantSimulator:
+    """A rig that is advanced tick by tick.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+        The rig, with its effects.
+    tick : float
+        Control period in s.
+
+    Raises
+    ------
+    ValueError
+        If the plant names an unknown effect, joint or parameter, or one out of bounds.
+    """
+
+    def __init__(self, plant: PlantDescription, tick: float = TICK) -> None:
+        self.joints = plant.joint_names()
+        self.tick = tick
+        self._parameters, self._on = pack(plant)
+        self._states, self._histories, self._sheaths = rest_state(self._parameters, self._on, tick)
+        self._inputs = np.zeros((len(self.joints), INPUTS))
+        self._inputs[:, IN_MOTOR] = np.nan
+        self._outputs = np.zeros((len(self.joints), OUTPUTS))
+        self._ticks = 0
+        self._read()
+
+    @property
+    def sample(self) -> PlantSample:
+        """What the noise-free sensors read now."""
+        out = self._outputs
+        return PlantSample(
+            self._ticks * self.tick,
+            out[:, OUT_MOTOR].copy(),
+            out[:, OUT_MOTOR_SPEED].copy(),
+            out[:, OUT_EFFORT].copy(),
+            out[:, OUT_TENSION_A : OUT_TENSION_B + 1].copy(),
+            out[:, OUT_BENDING].copy(),
+            out[:, OUT_JOINT].copy(),
+        )
+
+    def advance(self, shaft_command: ArrayLike, n_ticks: int = 1) -> PlantSample:
+        """Hold a command for some ticks.
+
+        Parameters
+        ----------
+        shaft_command : array (J,)
+            Motor shaft angle in rad.
+        n_ticks : int
+
+        Returns
+        -------
+        PlantSample
+            At the end of the ticks.
+
+        Raises
+        ------
+        ValueError
+            If the command has another shape, is not finite or beyond `LARGEST_COMMAND`; the plant
+            stays as it was.
+        """
+        command = np.asarray(shaft_command, dtype=float)
+        if command.shape != (len(self.joints),):
+            raise ValueError(f'a command for {self.joints} has shape {command.shape}')
+        if not (np.abs(command) <= LARGEST_COMMAND).all():
+            raise ValueError(f'the command {command} is not finite or beyond {BEYOND}')
+        self._inputs[:, IN_COMMAND] = command
+        for _ in range(n_ticks):
+            if len(self.joints) == 2:
+                self._inputs[:, IN_OTHER_JOINT] = self._outputs[::-1, OUT_JOINT]
+            for j, x in enumerate(self._inputs):
+                advance_tick(
+                    self._states[j],
+                    self._histories[j],
+                    self._sheaths[j],
+                    self._parameters[j],
+                    self._on[j],
+                    x,
+                    self.tick,
+                )
+            self._ticks += 1
+            self._read()
+        return self.sample
+
+    def _read(self) -> None:
+        for j, out in enumerate(self._outputs):
+            read_sensors(
+                self._states[j],
+                self._histories[j],
+                self._sheaths[j],
+                self._parameters[j],
+                self._on[j],
+                self.tick,
+                out,
+            )
+
+
+def simulate(
+    plant: PlantDescription,
+    shaft_command: ArrayLike,
+    tick: float = TICK,
+    start_shaft: ArrayLike | None = None,
+) -> PlantTrajectory:
+    """Answer of a rig, at rest at first, to a whole command.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+    shaft_command : array (N, J)
+        Motor shaft angle in rad, command k in force from tick k to tick k + 1.
+    tick : float
+        In s.
+    start_shaft : array (J,), optional
+        Shaft angle in rad where the rig rests before the first command; zero if not given.
+
+    Returns
+    -------
+    PlantTrajectory
+
+    Raises
+    ------
+    ValueError
+        If the command has the wrong shape or is not finite, or the plant is invalid.
+    """
+    command = np.asarray(shaft_command, dtype=float)
+    joints = len(plant.joints)
+    if command.ndim != 2 or command.shape[1] != joints or not len(command):
+        raise ValueError(f'a command for {joints} joints has shape {command.shape}')
+    if not (np.abs(command) <= LARGEST_COMMAND).all():
+        raise ValueError(f'the command is not finite or beyond {BEYOND}')
+    parameters, on = pack(plant)
+    start = None if start_shaft is None else np.asarray(start_shaft, dtype=float)
+    states, histories, sheaths = rest_state(parameters, on, tick, start)
+    inputs = np.zeros((joints, len(command), INPUTS))
+    inputs[:, :, IN_COMMAND] = command.T
+    inputs[:, :, IN_MOTOR] = np.nan
+    out = np.empty((joints, len(command), OUTPUTS))
+    run_joints(states, histories, sheaths, parameters, on, inputs, True, tick, out)
+    by_time = out.transpose(1, 0, 2)
+    return PlantTrajectory(
+        tick * np.arange(len(command), dtype=np.float64),
+        by_time[:, :, OUT_MOTOR],
+        by_time[:, :, OUT_MOTOR_SPEED],
+        by_time[:, :, OUT_EFFORT],
+        by_time[:, :, OUT_TENSION_A : OUT_TENSION_B + 1],
+        by_time[:, :, OUT_BENDING],
+        by_time[:, :, OUT_JOINT],
+    )
