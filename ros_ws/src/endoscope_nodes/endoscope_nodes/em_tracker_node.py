@@ -15,7 +15,7 @@ from endoscope_core.kinematics import (
     bending_from_orientation,
     tip_pose,
 )
-from endoscope_core.plant import SensorModel
+from endoscope_core.physics import SensorModel
 from endoscope_devices.em_tracker import (
     AuroraTracker,
     RegistrationWindow,

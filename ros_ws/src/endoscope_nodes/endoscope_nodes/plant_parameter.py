@@ -1,6 +1,6 @@
 """The plant that the nodes of a simulated slave share, named by a parameter."""
 
-from endoscope_core.plant import PlantDescription, PlantFileError, load_plant
+from endoscope_core.physics import PlantDescription, PlantFileError, load_plant
 from endoscope_nodes.names import JOINTS
 from endoscope_nodes.parameters import ParameterError
 
