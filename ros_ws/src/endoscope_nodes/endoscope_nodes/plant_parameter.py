@@ -29,7 +29,7 @@ def load_plant_parameter(node_name: str, path: str) -> PlantDescription:
     for spec in plant.effects:
         if describe(spec.id).stage is Stage.RECORDING:
             raise ParameterError(
-                f"{node_name}: parameter 'plant_file': {path} has the effect {spec.id}, which acts on "
-                'recordings: leave it out here, and let `endoscope simulate` apply it'
+                f"{node_name}: parameter 'plant_file': {path} has the effect {spec.id}, which acts "
+                'on recordings: leave it out here, and let `endoscope simulate` apply it'
             )
     return plant
