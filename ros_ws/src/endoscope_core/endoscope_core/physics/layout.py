@@ -109,6 +109,8 @@ TRAVEL = SLOTS.state_block(2)
 """By how much the pulley has wound up each wire, m."""
 EXTRA_LENGTH = SLOTS.state_block(2)
 """What effects have added to each wire's length, m."""
+REST_TENSION = SLOTS.state_block()
+"""Mean tension of a wire as it was tightened, N."""
 JOINT = SLOTS.joint_angle()
 """Bending angle of the joint, rad."""
 JOINT_STEP = SLOTS.state_block()
