@@ -22,7 +22,7 @@ from endoscope_core.identification.updated_table import (
     parameters_to_dict,
     shipped_table_path,
 )
-from endoscope_core.plant import JointParameters
+from endoscope_core.physics import JointParameters
 from endoscope_core.signals import CALIBRATION_RATE
 
 PLANT_SAMPLES = 3500

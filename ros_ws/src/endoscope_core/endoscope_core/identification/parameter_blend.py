@@ -15,7 +15,7 @@ from endoscope_core.hysteresis import (
     PrandtlIshlinskiiParameters,
 )
 from endoscope_core.hysteresis.inverse import MODELS
-from endoscope_core.plant import JointParameters
+from endoscope_core.physics import JointParameters
 
 KINDS: dict[str, type[LawParameters]] = {**MODELS, PHYSICAL: PhysicalParameters}
 """Kind of parameters by the name of the model; 'physical' is the plant itself."""
