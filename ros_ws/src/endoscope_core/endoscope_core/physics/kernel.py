@@ -58,6 +58,7 @@ from endoscope_core.physics.layout import (
     TIP,
     TRANSITION,
     TRAVEL,
+    WINDING_SPEED,
     WIRE_A,
     WIRE_B,
     WIRE_STIFFNESS,
@@ -324,10 +325,11 @@ def advance_tick(
     x[MOTOR], x[MOTOR_SPEED] = shaft, speed
 
     if exponent_varies(on):
-        _change_friction(x, sheath, p, on, abs(x[SLIDING_SPEED]), time, tick)
+        _change_friction(x, sheath, p, on, abs(x[WINDING_SPEED]), time, tick)
     if length_varies(on) or inputs[IN_PUSH_STRETCH] != x[EXTRA_LENGTH]:
         _grow(x, table, p, on, inputs[IN_PUSH_STRETCH], time)
     way = _wind_up(x, table, p, on, shaft)
+    x[WINDING_SPEED] = way / tick
     bend(x, table, p, on, way, other, inputs[IN_PUSH_MOMENT], time, tick)
     x[TIP] = tip_angle(on, p, x, x[JOINT])
     x[TICKS] += 1.0

@@ -121,6 +121,8 @@ JOINT_SLIDE = SLOTS.state_block(ELEMENTS)
 """Dahl states of the joint's friction."""
 SLIDING_SPEED = SLOTS.state_block()
 """Speed at which the positive wire slid towards the motor in the last tick, m/s."""
+WINDING_SPEED = SLOTS.state_block()
+"""Speed at which the pulley wound up the positive wire in the last tick, m/s."""
 FALLING_FACTOR = SLOTS.state_block()
 RISING_FACTOR = SLOTS.state_block()
 """Factors on the capstan exponent that the table of shapes holds."""
