@@ -13,6 +13,7 @@ from endoscope_core.control import (
     Feedforward,
     FeedforwardLaw,
     FeedforwardSettings,
+    MotorLimits,
 )
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.law_choice import BY_CLASS, CalibrationFindings, LawChoice
@@ -85,7 +86,12 @@ class CompensatorNode(EndoscopeNode):
             )
         )
         self._feedforward = Feedforward(
-            len(JOINTS), FeedforwardSettings(lead=p.lead, speed_limit=motors.speed / facts.gear)
+            len(JOINTS),
+            FeedforwardSettings(
+                lead=p.lead,
+                speed_limit=motors.speed / facts.gear,
+                limits=MotorLimits.of(self.rig),
+            ),
         )
         self._passing = Feedforward(len(JOINTS))
         self._desired = DesiredMotion(len(JOINTS))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from endoscope_core.control.internal_model import InternalModel
@@ -18,6 +19,24 @@ class Reach:
 
     low: float
     high: float
+
+    def keep(self, angle: float, velocity: float) -> tuple[float, float]:
+        """A desired angle within reach, and its velocity: zero where the angle is cut."""
+        within = min(self.high, max(self.low, angle))
+        return within, velocity if within == angle else 0.0
+
+
+def keep_within(
+    reaches: Sequence[Reach], angle: Sequence[float], velocity: Sequence[float]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Desired angles (rad) and velocities (rad/s) of J joints, cut where a tube's reach ends.
+
+    Nothing is cut where no reach is known.
+    """
+    if not reaches:
+        return tuple(angle), tuple(velocity)
+    kept = [r.keep(a, v) for r, a, v in zip(reaches, angle, velocity, strict=True)]
+    return tuple(a for a, _ in kept), tuple(v for _, v in kept)
 
 
 def reach(joint: JointParameters, limits: MotorLimits | None = None) -> Reach:
