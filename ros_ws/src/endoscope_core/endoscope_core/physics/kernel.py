@@ -126,7 +126,7 @@ def settle(
     x[FLOOR] = friction_floor(on, p, x)
     x[JOINT] = x[TIP] = p[JOINT_REST_ANGLE]
     history[ANGLE_HISTORY, :] = x[TIP]
-    _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, 0.0, tick))
+    _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, -0.5 * tick, tick))
     table = sheath[SHAPES : SHAPES + 5]
     for wire in (WIRE_A, WIRE_B):
         for i in range(CELLS + 1):
@@ -140,7 +140,7 @@ def settle(
     for k in range(1, steps + 1):
         x[MOTOR] = shaft * k / steps
         _wind_up(x, table, p, on, x[MOTOR])
-        bend(x, table, p, on, 0.0, 0.0, 0.0, 0.0, _SETTLING_TICK)
+        bend(x, table, p, on, 0.0, 0.0, 0.0, -0.5 * _SETTLING_TICK, _SETTLING_TICK)
     for wire in range(2):
         x[FILM + wire] = 0.0
     x[SLIDING_SPEED] = x[JOINT_STEP] = 0.0
