@@ -253,25 +253,25 @@ def _torque(x: Array, table: Array, p: Array, on: Flags, step: float) -> float:
 def _yield(x: Array, table: Array, p: Array, on: Flags, step: float, tick: float) -> float:
     """Step of the motor in rad, cut where the wires load it with more than it can bear.
 
-    The load grows with the step, the bearable falls with the speed: one step divides them.
+    The load grows with the step and the bearable falls with the speed of a motor that drives its
+    load: one step divides them.
     """
-    limit = torque_limit(on, p, x, abs(step) / tick)
     load = _torque(x, table, p, on, step)
-    if abs(load) <= limit:
-        return step
     way = 1.0 if load > 0.0 else -1.0
+    if way * load <= torque_limit(on, p, x, way * step / tick):
+        return step
     too_far = step
     back = max(1e-4, abs(step))
     far_enough = step
     for _ in range(_TRIES):
         far_enough -= way * back
         back *= 2.0
-        bearable = torque_limit(on, p, x, abs(far_enough) / tick)
+        bearable = torque_limit(on, p, x, way * far_enough / tick)
         if way * _torque(x, table, p, on, far_enough) <= bearable:
             break
     for _ in range(_TRIES):
         middle = 0.5 * (too_far + far_enough)
-        bearable = torque_limit(on, p, x, abs(middle) / tick)
+        bearable = torque_limit(on, p, x, way * middle / tick)
         if way * _torque(x, table, p, on, middle) > bearable:
             too_far = middle
         else:
