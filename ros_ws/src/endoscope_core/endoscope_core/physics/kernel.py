@@ -10,7 +10,7 @@ import numpy as np
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics import hooks
 from endoscope_core.physics.folds import acting, folded
-from endoscope_core.physics.joint import bend
+from endoscope_core.physics.joint import bend, stiffness_on_the_way
 from endoscope_core.physics.layout import (
     ANGLE_HISTORY,
     CAPSTAN_EXPONENT,
@@ -86,7 +86,6 @@ travel_of = folded(hooks.TRAVEL_OF)
 exponent_factor, exponent_varies = folded(hooks.EXPONENT), acting(hooks.EXPONENT)
 direction_factors = folded(hooks.DIRECTION)
 friction_floor = folded(hooks.FRICTION_FLOOR)
-stiffness_factor, stiffness_varies = folded(hooks.STIFFNESS), acting(hooks.STIFFNESS)
 added_length, length_varies = folded(hooks.LENGTH), acting(hooks.LENGTH)
 tip_angle = folded(hooks.TIP_ANGLE)
 effort_reading = folded(hooks.EFFORT)
@@ -127,7 +126,7 @@ def settle(
     x[FLOOR] = friction_floor(on, p, x)
     x[JOINT] = x[TIP] = p[JOINT_REST_ANGLE]
     history[ANGLE_HISTORY, :] = x[TIP]
-    _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, 0.0, tick))
+    _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, -0.5 * tick, tick))
     table = sheath[SHAPES : SHAPES + 5]
     for wire in (WIRE_A, WIRE_B):
         for i in range(CELLS + 1):
@@ -141,7 +140,7 @@ def settle(
     for k in range(1, steps + 1):
         x[MOTOR] = shaft * k / steps
         _wind_up(x, table, p, on, x[MOTOR])
-        bend(x, table, p, on, 0.0, 0.0, 0.0, 0.0, _SETTLING_TICK)
+        bend(x, table, p, on, 0.0, 0.0, 0.0, -0.5 * _SETTLING_TICK, _SETTLING_TICK)
     for wire in range(2):
         x[FILM + wire] = 0.0
     x[SLIDING_SPEED] = x[JOINT_STEP] = 0.0
@@ -206,14 +205,6 @@ def _change_friction(
 
 
 @compiled
-def _stiffness(x: Array, wire: int, table: Array, p: Array, on: Flags) -> float:
-    if not stiffness_varies(on):
-        return p[WIRE_STIFFNESS]
-    mean = mean_tension(x, wire, table) - x[FLOOR]
-    return p[WIRE_STIFFNESS] * stiffness_factor(on, p, x, mean)
-
-
-@compiled
 def _grow(x: Array, table: Array, p: Array, on: Flags, push: float, time: float) -> None:
     """Give both wires the length that effects have added to them by `time`, and a latent push."""
     for k in range(2):
@@ -221,7 +212,8 @@ def _grow(x: Array, table: Array, p: Array, on: Flags, push: float, time: float)
         length = added_length(on, p, x, k, time) + (push if k == 0 else -push)
         grown = length - x[EXTRA_LENGTH + k]
         if grown != 0.0:
-            lengthen(x, wire, table, _stiffness(x, wire, table, p, on) * grown, x[FLOOR])
+            force = stiffness_on_the_way(x, wire, table, p, on, -grown) * grown
+            lengthen(x, wire, table, force, x[FLOOR])
             x[EXTRA_LENGTH + k] = length
 
 
@@ -239,8 +231,9 @@ def _wind_up(x: Array, table: Array, p: Array, on: Flags, shaft: float) -> float
     for k in range(2):
         wire = WIRE_A if k == 0 else WIRE_B
         travel = travel_a if k == 0 else travel_b
-        force = _stiffness(x, wire, table, p, on) * (travel - x[TRAVEL + k])
-        if force != 0.0:
+        way = travel - x[TRAVEL + k]
+        if way != 0.0:
+            force = stiffness_on_the_way(x, wire, table, p, on, way) * way
             move(x, wire, table, MOTOR_END, force, x[FLOOR])
     way = 0.5 * (travel_a - x[TRAVEL] - travel_b + x[TRAVEL + 1])
     x[TRAVEL], x[TRAVEL + 1] = travel_a, travel_b
@@ -260,25 +253,25 @@ def _torque(x: Array, table: Array, p: Array, on: Flags, step: float) -> float:
 def _yield(x: Array, table: Array, p: Array, on: Flags, step: float, tick: float) -> float:
     """Step of the motor in rad, cut where the wires load it with more than it can bear.
 
-    The load grows with the step, the bearable falls with the speed: one step divides them.
+    The load grows with the step and the bearable falls with the speed of a motor that drives its
+    load: one step divides them.
     """
-    limit = torque_limit(on, p, x, abs(step) / tick)
     load = _torque(x, table, p, on, step)
-    if abs(load) <= limit:
-        return step
     way = 1.0 if load > 0.0 else -1.0
+    if way * load <= torque_limit(on, p, x, way * step / tick):
+        return step
     too_far = step
     back = max(1e-4, abs(step))
     far_enough = step
     for _ in range(_TRIES):
         far_enough -= way * back
         back *= 2.0
-        bearable = torque_limit(on, p, x, abs(far_enough) / tick)
+        bearable = torque_limit(on, p, x, way * far_enough / tick)
         if way * _torque(x, table, p, on, far_enough) <= bearable:
             break
     for _ in range(_TRIES):
         middle = 0.5 * (too_far + far_enough)
-        bearable = torque_limit(on, p, x, abs(middle) / tick)
+        bearable = torque_limit(on, p, x, way * middle / tick)
         if way * _torque(x, table, p, on, middle) > bearable:
             too_far = middle
         else:
