@@ -17,7 +17,7 @@ from endoscope_core.control.motor_limits import MotorLimits, shipped_limits
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
-from endoscope_core.control.reach import Reach, reach
+from endoscope_core.control.reach import Reach, keep_within, reach, reach_in_words
 from endoscope_core.control.recursive_hysteresis import (
     RecursiveHysteresisController,
     RecursiveHysteresisSettings,
@@ -48,6 +48,8 @@ __all__ = [
     'RecursiveHysteresisSettings',
     'TrackerFeedback',
     'TrackerMeasurement',
+    'keep_within',
     'reach',
+    'reach_in_words',
     'shipped_limits',
 ]
