@@ -9,13 +9,11 @@ from scipy.optimize import brentq
 
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics import PlantDescription, simulate
-from endoscope_core.physics.family import TubeFamily, shipped_family
+from endoscope_core.physics.family import MOST_BENT, TubeFamily, shipped_family
 from endoscope_core.rig import load_rig
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
 
 JOINTS = ('bend_x', 'bend_y')
-MOST_BENT = float(np.deg2rad(360.0))
-"""Sum of all bends of the tube in rad; beyond the recordings' 240 deg the family is continued."""
 
 RELATIVE_SPREAD = {
     'capstan_exponent': 0.5,
