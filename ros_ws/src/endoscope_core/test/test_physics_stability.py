@@ -23,8 +23,6 @@ BOUNDS = {
     'motor_bandwidth': (5.0, 300.0),
     'motor_damping_ratio': (0.3, 3.0),
 }
-SENSING = ('load_cell', 'tracker', 'joint_backlash', 'gear_friction')
-"""What changes readings alone."""
 
 
 @st.composite

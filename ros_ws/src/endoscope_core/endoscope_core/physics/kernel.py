@@ -64,6 +64,7 @@ from endoscope_core.physics.layout import (
     WIRE_STIFFNESS,
     WORK,
 )
+from endoscope_core.physics.servo import transition
 from endoscope_core.physics.sheath import (
     MOTOR_END,
     NODES,
@@ -76,7 +77,6 @@ from endoscope_core.physics.sheath import (
     spread,
     tabulate,
 )
-from endoscope_core.physics.servo import transition
 
 command_at_servo = folded(hooks.COMMAND)
 servo_error = folded(hooks.SERVO_ERROR)

@@ -12,8 +12,8 @@ EFFECT = Effect(
     physics="A part of the sheath's friction does not grow with the tension: seals, lubricant, "
     'normal force that a slack wire has too.',
     equation='dT/dphi = -+(T + force_n / Phi) where the wire slides: force_n over the whole sheath',
-    source='Adhesion beside load: Derjaguin, Z. Phys. 88, 1934, mu (N + N0); capstan with it: '
-    'Jung, Kang, Text. Res. J. 77(11), 2007',
+    source='Derjaguin, Z. Phys. 88, 1934 (mu (N + N0)); around a capstan: Jung, Pan, Kang, Mech. '
+    'Mach. Theory 43(6), 2008 (friction not proportional to the normal force)',
     parameters=(Parameter('force_n', 'N', 0.0, 20.0, 0.5, off=0.0, starts=(0.3, 1.5)),),
 )
 (FORCE,) = EFFECT.places
