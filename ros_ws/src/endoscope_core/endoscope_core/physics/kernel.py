@@ -80,7 +80,7 @@ from endoscope_core.physics.sheath import (
 
 command_at_servo = folded(hooks.COMMAND)
 servo_error = folded(hooks.SERVO_ERROR)
-torque_limit, torque_is_limited = folded(hooks.TORQUE), acting(hooks.TORQUE)
+largest_torque, torque_is_limited = folded(hooks.TORQUE), acting(hooks.TORQUE)
 pulley_angle = folded(hooks.PULLEY_ANGLE)
 travel_of = folded(hooks.TRAVEL_OF)
 exponent_factor, exponent_varies = folded(hooks.EXPONENT), acting(hooks.EXPONENT)
@@ -258,7 +258,7 @@ def _yield(x: Array, table: Array, p: Array, on: Flags, step: float, tick: float
     """
     load = _torque(x, table, p, on, step)
     way = 1.0 if load > 0.0 else -1.0
-    if way * load <= torque_limit(on, p, x, way * step / tick):
+    if way * load <= largest_torque(on, p, x, way * step / tick):
         return step
     too_far = step
     back = max(1e-4, abs(step))
@@ -266,12 +266,12 @@ def _yield(x: Array, table: Array, p: Array, on: Flags, step: float, tick: float
     for _ in range(_TRIES):
         far_enough -= way * back
         back *= 2.0
-        bearable = torque_limit(on, p, x, way * far_enough / tick)
+        bearable = largest_torque(on, p, x, way * far_enough / tick)
         if way * _torque(x, table, p, on, far_enough) <= bearable:
             break
     for _ in range(_TRIES):
         middle = 0.5 * (too_far + far_enough)
-        bearable = torque_limit(on, p, x, way * middle / tick)
+        bearable = largest_torque(on, p, x, way * middle / tick)
         if way * _torque(x, table, p, on, middle) > bearable:
             too_far = middle
         else:
