@@ -165,9 +165,11 @@ def _go_through_angles(
     settle(x, history, sheath, p, on, 0.0, TICK)
     for i in range(len(path)):
         target = path[i]
+        way = 1.0 if target > x[JOINT] else -1.0
         for _ in range(_STEPS):
             left = target - x[JOINT]
-            if abs(left) <= 2.0 * PRECISION:
+            # A hair beyond, where damping let go: to come back would cross the dead zone.
+            if way * left <= 2.0 * PRECISION:
                 break
             before = x[MOTOR]
             low = max(-travel, before - _SHAFT_STEP)

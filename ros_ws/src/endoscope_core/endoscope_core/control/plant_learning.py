@@ -26,17 +26,22 @@ from endoscope_core.physics.servo import transition
 Array = NDArray[np.float64]
 
 LEARNT = {
-    'capstan_exponent': 0.7,
+    'capstan_exponent': 0.25,
     'wire_stiffness': 0.1,
-    'pretension': 0.03,
+    'pretension': 0.1,
     'joint_friction': 0.1,
     'joint_stiffness': 0.1,
+    'joint_presliding': 0.15,
 }
 """What is learnt, and the standard deviation of its logarithm before anything was measured."""
 
 NOTABLE = 2e-3
 """Change of the logarithm of a parameter for which the models are set up anew."""
 
+_BENT_ANEW = 0.7
+"""Standard deviation of the logarithm of the capstan exponent once the tube was bent."""
+_LARGEST_STEP = 0.05
+"""Of a logarithm by one measurement: the sensitivities hold nearby."""
 _STRAIGHTEST, _MOST_BENT = 0.02, 4.5
 
 
@@ -79,7 +84,7 @@ class PlantLearning:
     random walk of the capstan exponent instead of forgetting, so that what motion does not excite
     is kept. With every notable change of the estimates all copies go through the shaft's turning
     points again, so that each is where its plant would be by now. After several surprises in a row
-    the exponent's variance returns to the prior (covariance resetting, Goodwin and Sin 1984,
+    the exponent's variance is set to a large one (covariance resetting, Goodwin and Sin 1984,
     section 3.3): the tube has been bent.
 
     Parameters
@@ -118,9 +123,8 @@ class PlantLearning:
         self.resets = 0
         self._first = parameters
         self._names = tuple(LEARNT)
-        self._prior = np.array(list(LEARNT.values())) ** 2
         self._logs = np.zeros(len(LEARNT))
-        self.covariance = np.diag(self._prior)
+        self.covariance = np.diag(np.array(list(LEARNT.values())) ** 2)
         self._gear = gear
         self._turns = TurningPoints(shafts)
         self._speed = 0.0
@@ -181,7 +185,8 @@ class PlantLearning:
         # A single reading may not move the estimates by more than three deviations (Huber).
         limit = 3.0 * math.sqrt(spread)
         bounded = min(limit, max(-limit, innovation))
-        self._logs = self._logs + gain_side / spread * bounded
+        step = gain_side / spread * bounded
+        self._logs = self._logs + step * min(1.0, _LARGEST_STEP / max(np.max(np.abs(step)), 1e-9))
         covariance = self.covariance - np.outer(gain_side, gain_side) / spread
         self.covariance = 0.5 * (covariance + covariance.T)
         self._bound()
@@ -202,7 +207,7 @@ class PlantLearning:
             self._last_reset = self._time
             self._unexplained = 1.0
             self.covariance[0, :] = self.covariance[:, 0] = 0.0
-            self.covariance[0, 0] = self._prior[0]
+            self.covariance[0, 0] = _BENT_ANEW**2
 
     def _at(self, time: float) -> tuple[Array, float] | None:
         """Tips that were predicted for `time` and the speed of the first, None if unknown."""
