@@ -73,3 +73,19 @@ def test_a_table_holds_no_plants(bag, tmp_path, capsys):
     command = ['identify', str(bag), '--model', 'physical', '--table', str(tmp_path / 't.json')]
     assert main(command) == 2
     assert '--table' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'said'),
+    [
+        (['family', 'FOLDER'], 'no recordings of tubes'),
+        (['somewhere', 'FOLDER'], 'identify family FOLDER'),
+        (['family', 'FOLDER', '--model', 'play'], 'no model'),
+        (['FOLDER'], 'no --model'),
+        (['FOLDER', '--model', 'play', '--output', 'x.yaml'], '--output and --figure'),
+    ],
+)
+def test_a_rig_is_not_identified_from_what_is_no_tube(arguments, said, tmp_path, capsys):
+    given = [str(tmp_path) if each == 'FOLDER' else each for each in arguments]
+    assert main(['identify', *given]) != 0
+    assert said in capsys.readouterr().err

@@ -1,4 +1,7 @@
-"""`endoscope identify`: hysteresis parameters from a bag, or a set for each class of a data set."""
+"""`endoscope identify`: hysteresis parameters from a bag, or a set for each class of a data set.
+
+`endoscope identify family` identifies the rig itself from recordings of its tubes.
+"""
 
 import argparse
 import sys
@@ -27,15 +30,27 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'identify',
         help='fit a hysteresis model to a recording',
         description='Fits a hysteresis model to each joint of a bag, or to each class of a data '
-        'set, and the feed-forward that goes with it. Prints JSON, or writes it to FILE.',
+        'set, and the feed-forward that goes with it. Prints JSON, or writes it to FILE. '
+        'With `family FOLDER`: identifies the rig from recordings of all its tubes (text files '
+        '0.txt, 60.txt, ... named by the bend in deg), fitted to the first cycle of each and '
+        'judged on the second, beside what other models leave.',
     )
     parser.add_argument(
         'source',
         type=Path,
-        metavar='BAG|DATASET',
-        help='rosbag2 folder, .mcap, or data set of `endoscope dataset`',
+        metavar='BAG|DATASET|family',
+        help='rosbag2 folder, .mcap, data set of `endoscope dataset`, or the word family',
     )
-    parser.add_argument('--model', choices=MODELS, required=True, help='the model')
+    parser.add_argument(
+        'folder', type=Path, nargs='?', metavar='FOLDER', help='recordings of tubes, for family'
+    )
+    parser.add_argument('--model', choices=MODELS, help='the model; needed but for family')
+    parser.add_argument(
+        '--output', type=Path, metavar='FILE', help='of family: YAML file for the numbers'
+    )
+    parser.add_argument(
+        '--figure', type=Path, metavar='FILE', help='of family: PNG of simulated on recorded loops'
+    )
     parser.add_argument(
         '--table',
         type=Path,
@@ -67,6 +82,12 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.dataset import is_dataset
     from endoscope_core.errors import EndoscopeError
 
+    if args.folder is not None:
+        return _of_tubes(args)
+    if args.output is not None or args.figure is not None:
+        raise EndoscopeError('--output and --figure are for `identify family FOLDER`')
+    if args.model is None:
+        raise EndoscopeError(f'no --model: choose one of {", ".join(MODELS)}')
     if args.table is not None and (is_dataset(args.source) or args.model == 'physical'):
         raise EndoscopeError('--table takes a bag and the name of a hysteresis model')
     content = _of_dataset(args) if is_dataset(args.source) else _of_bag(args)
@@ -76,6 +97,29 @@ def run(args: argparse.Namespace) -> int:
     else:
         write_text(args.out, text)
         print(f'{args.out}: written', file=sys.stderr)
+    return 0
+
+
+def _of_tubes(args: argparse.Namespace) -> int:
+    from endoscope_bringup.learning.family_of_recordings import drawn, identified, table
+    from endoscope_core.atomic_output import atomic_file
+    from endoscope_core.errors import EndoscopeError
+    from endoscope_core.trials.real_recordings import tube_recordings
+
+    if args.source != Path('family') or args.model is not None or args.table is not None:
+        raise EndoscopeError('a second place is taken by `identify family FOLDER` alone, no model')
+    recordings = tube_recordings(args.folder)
+    options = '' if args.output is None else f' --output {args.output.name}'
+    command = f'endoscope identify family {args.folder.name}{options} --seed {args.seed}'
+    found = identified(recordings, args.folder, args.seed, command, _report)
+    print(table(recordings, found))
+    if args.output is not None:
+        found.family.save(args.output)
+        _report(f'{args.output}: written')
+    if args.figure is not None:
+        with atomic_file(args.figure) as path:
+            drawn(recordings, found.family).savefig(path, format='png', dpi=90)
+        _report(f'{args.figure}: written')
     return 0
 
 

@@ -2,5 +2,6 @@
 
 from endoscope_core.metrics.backlash_size import width_at_mid_height
 from endoscope_core.metrics.tracking import tracking_rmse
+from endoscope_core.metrics.wrong_way import wrong_way_motion
 
-__all__ = ['tracking_rmse', 'width_at_mid_height']
+__all__ = ['tracking_rmse', 'width_at_mid_height', 'wrong_way_motion']

@@ -36,7 +36,8 @@ class JointParameters:
     joint_stiffness, joint_damping : float
         Elastic moment K in N m/rad and viscous moment c in N m s/rad of the bending section.
     joint_rest_angle : float
-        Angle q0 in rad at which the bending section is at rest without wires.
+        Angle q0 in rad at which the bending section is at rest without wires; they are tightened at
+        angle zero, where friction holds it.
     joint_friction, joint_presliding : float
         Dahl friction tau_f in N m of the joint and its pre-sliding angle qs in rad.
     joint_presliding_spread : float

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.hysteresis.inverse import HysteresisParameters
 from endoscope_core.identification import (
+    IdentificationError,
     ModelFit,
     TableEntry,
     UpdatedTable,
@@ -23,6 +24,7 @@ from endoscope_core.identification import (
     closed_cycle,
     fit_model,
 )
+from endoscope_core.identification.family_fit import TubeRecording
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.metrics.tension_loop import tension_loop_width
 
@@ -30,6 +32,8 @@ Array = NDArray[np.float64]
 
 CYCLE_S = 2.0 * np.pi
 """Seconds of one cycle, and its phase: the motion is a sine of 1 rad/s."""
+ROW_S = 5.0e-3
+"""Seconds between rows. The phase column counts loops and is no clock."""
 _SETTLED = (0.5 * np.pi, 2.5 * np.pi)
 _PHASE, _DESIRED, _ACTUAL, _POSITIVE, _NEGATIVE = 0, 1, 3, 4, 5
 
@@ -84,9 +88,9 @@ def recordings_folder() -> Path | None:
     return folder if folder.is_dir() else None
 
 
-def real_recordings() -> list[RealRecording]:
+def real_recordings(folder: Path | None = None) -> list[RealRecording]:
     """All recordings, sorted by the bend of the tube; none where they are not at hand."""
-    folder = recordings_folder()
+    folder = folder or recordings_folder()
     if folder is None:
         return []
     found = []
@@ -104,6 +108,40 @@ def real_recordings() -> list[RealRecording]:
                 table[:, [_POSITIVE, _NEGATIVE]],
             )
         )
+    return sorted(found, key=lambda recording: recording.bend)
+
+
+def tube_recordings(folder: Path) -> list[TubeRecording]:
+    """All tubes of a folder with two cycles each in real time, sorted by bend.
+
+    Parameters
+    ----------
+    folder : Path
+        With a file `BEND.txt` for each tube, bend in deg.
+
+    Raises
+    ------
+    IdentificationError
+        If there is none, or one has no two cycles.
+    """
+    found = []
+    for path in folder.glob('[0-9]*.txt'):
+        table = np.loadtxt(path, delimiter=',')
+        cycles = np.searchsorted(table[:, _PHASE], (0.0, CYCLE_S, 2.0 * CYCLE_S)).tolist()
+        if table[-1, _PHASE] < 2.0 * CYCLE_S or cycles[0] != 0:
+            raise IdentificationError(f'{path}: fewer than two whole cycles')
+        found.append(
+            TubeRecording(
+                float(np.deg2rad(float(path.stem))),
+                ROW_S,
+                np.deg2rad(table[:, _DESIRED]),
+                np.deg2rad(table[:, _ACTUAL]),
+                table[:, [_POSITIVE, _NEGATIVE]],
+                tuple(cycles),
+            )
+        )
+    if not found:
+        raise IdentificationError(f'{folder}: no recordings of tubes (files such as 60.txt)')
     return sorted(found, key=lambda recording: recording.bend)
 
 

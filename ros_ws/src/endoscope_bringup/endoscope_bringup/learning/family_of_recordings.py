@@ -1,0 +1,183 @@
+"""The rig identified from recordings of its tubes: fit, table and figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from endoscope_core.identification.family_fit import (
+    LUMPED,
+    TubeRecording,
+    figures,
+    fit_family,
+    misfit,
+    read,
+)
+from endoscope_core.physics.family import TubeFamily
+from endoscope_core.trials.real_recordings import models_on_real_recordings, real_recordings
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MODELS = ('bouc_wen', 'asymmetric_bouc_wen', 'prandtl_ishlinskii')
+LEFT = """\
+left, rms: angle in deg, tensions of both wires in N; first cycle (fitted) | second (judged)
+tube   family                            friction lumped at the ends       """
+BESIDE = """\
+
+simulated/recorded: loop width, RMSE to the command, range of the angle in deg; extremes of tension
+in N; loop 1 begins a quarter cycle after the start, loop 2 is the second cycle
+tube loop       width         RMSE             angle from, to               wire 1 from, to      \
+wire 2 from, to"""
+RECORDED = {
+    'recordings': 'flexible endoscopic surgery robot, tube bent by 0, 60, 120, 180, 240 deg',
+    'paper': 'Nho, Baek et al., ViO-Com, IEEE RA-L 2021',
+    'repository': 'nhoyh/hysteresis_compensation_ROS, commit 7c00843, optimization/selected',
+    'licence': 'none stated; no recording is part of this project',
+}
+_RAD = np.pi / 180.0
+
+
+@dataclass(frozen=True)
+class IdentifiedFamily:
+    """A family, the lumped plant fitted likewise, and models of the angle alone.
+
+    Attributes
+    ----------
+    family, lumped : TubeFamily
+    models : mapping of str to mapping of int to (float, float)
+        RMSE in rad on both cycles by model and bend in deg; each fitted to each tube alone.
+    """
+
+    family: TubeFamily
+    lumped: TubeFamily
+    models: Mapping[str, Mapping[int, tuple[float, float]]]
+
+
+def identified(
+    recordings: Sequence[TubeRecording],
+    folder: Path,
+    seed: int,
+    command: str,
+    say: Callable[[str], None],
+) -> IdentifiedFamily:
+    """Fit family, lumped plant and models to the first cycles."""
+    first = [recording.until(recording.cycles[1]) for recording in recordings]
+    say(f'{len(first)} tubes: the family')
+    family = fit_family(first, seed=seed)
+    say('friction lumped at the ends')
+    lumped = fit_family(first, friction_profile=LUMPED, seed=seed)
+    models = {}
+    for model in MODELS:
+        say(model)
+        models[model] = models_on_real_recordings(real_recordings(folder), model, seed)
+    left: dict[str, Any] = {
+        f'{_bend(recording)} deg': [
+            [round(misfits.angle / _RAD, 2), *np.round(misfits.tension, 2).tolist()]
+            for misfits in (misfit(family, recording, number) for number in (1, 2))
+        ]
+        for recording in recordings
+    }
+    provenance = {
+        **RECORDED,
+        'date': datetime.now(UTC).date().isoformat(),
+        'command': command,
+        'fitted_on': 'first cycle of every tube, all together',
+        'left (deg and N of both wires, rms; first cycle, second cycle)': left,
+    }
+    return IdentifiedFamily(replace(family, provenance=provenance), lumped, models)
+
+
+def table(recordings: Sequence[TubeRecording], found: IdentifiedFamily) -> str:
+    """What is left of each tube, and its figures simulated beside recorded."""
+    lines = [LEFT + '  '.join(MODELS)]
+    for recording in recordings:
+        plants = []
+        for family in (found.family, found.lumped):
+            cycles = [misfit(family, recording, number) for number in (1, 2)]
+            plants.append(
+                ' | '.join(
+                    f'{m.angle / _RAD:4.2f} {m.tension[0]:.2f} {m.tension[1]:.2f}' for m in cycles
+                )
+            )
+        models = '  '.join(
+            ' | '.join(f'{each / _RAD:.2f}' for each in found.models[model][_bend(recording)])
+            for model in MODELS
+        )
+        lines.append(f'{_bend(recording):4d}   {"     ".join(plants)}     {models}')
+    lines.append(BESIDE)
+    for recording in recordings:
+        angle, tension = read(found.family, recording.bend, recording.desired, recording.tick)
+        for number in (1, 2):
+            part = settled(recording, number)
+            pair = [
+                figures(recording.desired[part], a[part], t[part])
+                for a, t in ((angle, tension), (recording.angle, recording.tension))
+            ]
+            made, seen = pair
+            cells = [
+                _beside(made.loop_width / _RAD, seen.loop_width / _RAD, 1),
+                _beside(made.rmse / _RAD, seen.rmse / _RAD, 1),
+                _beside(made.least_angle / _RAD, seen.least_angle / _RAD, 1),
+                _beside(made.most_angle / _RAD, seen.most_angle / _RAD, 1),
+            ]
+            for wire in range(2):
+                cells.append(_beside(made.least_tension[wire], seen.least_tension[wire], 2))
+                cells.append(_beside(made.most_tension[wire], seen.most_tension[wire], 2))
+            lines.append(f'{_bend(recording):4d}   {number}   ' + '  '.join(cells))
+    return '\n'.join(lines)
+
+
+def settled(recording: TubeRecording, number: int) -> slice:
+    """A whole loop: the second cycle, or as much from the end of the first quarter.
+
+    The first quarter of a recording starts from rest and is on no loop.
+    """
+    if number > 1:
+        return recording.cycle(number)
+    quarter = recording.cycles[1] // 4
+    return slice(quarter, recording.cycles[1] + quarter)
+
+
+def drawn(recordings: Sequence[TubeRecording], family: TubeFamily) -> Figure:
+    """Loops of angle and of tensions, simulated on recorded, a column for each tube."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.2 * len(recordings), 11.0), layout='constrained')
+    axes = figure.subplots(3, len(recordings), squeeze=False)
+    for column, recording in zip(axes.T, recordings, strict=True):
+        angle, tension = read(family, recording.bend, recording.desired, recording.tick)
+        desired = recording.desired / _RAD
+        time = recording.tick * np.arange(len(desired))
+        column[0].plot(desired, recording.angle / _RAD, 'k', lw=0.8, label='recorded')
+        column[0].plot(desired, angle / _RAD, 'C3', lw=1.0, label='simulated')
+        for wire, colour in enumerate(('C0', 'C1')):
+            column[1].plot(desired, recording.tension[:, wire], 'k', lw=0.8)
+            column[1].plot(desired, tension[:, wire], colour, lw=1.0)
+            column[2].plot(time, tension[:, wire] - recording.tension[:, wire], colour, lw=0.8)
+        column[2].plot(time, (angle - recording.angle) / _RAD, 'C3', lw=0.8)
+        column[2].axvline(time[recording.cycles[1]], color='0.6', lw=0.8)
+        column[2].set_ylim(-6.0, 6.0)
+        column[0].set_title(f'tube bent by {_bend(recording)} deg')
+        for axis, label in zip(
+            column, ('angle, deg', 'tensions, N', 'left, deg and N'), strict=True
+        ):
+            axis.set_ylabel(label)
+            axis.grid(lw=0.4)
+        column[1].set_xlabel('command, deg')
+        column[2].set_xlabel('time, s (line: end of the fitted cycle)')
+    axes[0, 0].legend(frameon=False)
+    return figure
+
+
+def _bend(recording: TubeRecording) -> int:
+    return round(recording.bend / _RAD)
+
+
+def _beside(made: float, seen: float, digits: int) -> str:
+    return f'{made:.{digits}f}/{seen:.{digits}f}'.rjust(11)

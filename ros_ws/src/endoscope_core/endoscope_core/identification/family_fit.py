@@ -1,0 +1,318 @@
+"""One rig from recordings of all its tubes: what is the rig's, and what the bend changes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.metrics import width_at_mid_height
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.family import SIGNED, Readings, TubeFamily
+from endoscope_core.physics.simulator import simulate
+
+Array = NDArray[np.float64]
+
+GEAR = 0.5
+"""Shaft angle for one radian of desired bending."""
+LUMPED = (0.0, 5.0, 0.0, 3.0)
+"""A friction profile with all of it at the wire's ends: the lumped capstan plant."""
+
+PRIORS: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
+    'capstan_exponent': ((0.95, 0.35), (0.4, 0.3)),
+    'wire_stiffness': ((3000.0, -0.15), (0.3, 0.2)),
+    'joint_stiffness': ((0.0045, 0.1), (0.4, 0.2)),
+    'joint_friction': ((9e-4, 0.1), (0.5, 0.2)),
+    'joint_presliding': ((0.03, 0.0), (0.5, 0.1)),
+    'joint_rest_angle': ((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)),
+    'joint_presliding_spread': ((0.6,), (0.5,)),
+    'joint_radius': ((0.0008,), (0.3,)),
+    'pulley_radius': ((0.0024,), (0.1,)),
+    'pretension': ((4.7,), (0.1,)),
+    'pretension_profile': ((0.7,), (0.07,)),
+    'motor_bandwidth': ((30.0,), (0.03,)),
+    'friction_profile': ((0.0, 0.0, 0.0), (0.5, 0.5, 0.3)),
+    'load_cell_offset': ((0.0, 0.0), (0.5, 0.5)),
+    'load_cell_delay': ((0.07,), (0.005,)),
+    'tracker_delay': ((0.0125,), (0.003,)),
+}
+"""What is fitted: where the search begins, in the numbers of a family, and how far off each may be
+(of positive keys: of the logarithm). Servo and delays hold what is known of the recordings:
+the load cells' filter and period take 46 ms and, on average, 25 ms; the tracker holds for 25 ms."""
+ANGLE_SCALE = math.radians(1.0)
+TENSION_SCALE = 0.27
+LEAST_SCALE, MOST_SCALE = 0.06, 0.18
+"""What angle, tension and its extremes may be off: a plant without effects leaves so much."""
+_WORTH = 60.0
+"""Independent readings in a cycle: what is left is smooth over a tenth of a second."""
+_SCORED_EVERY = 2
+_REACH = 4.0
+_STEP = 0.03
+_OFF = 0.15
+_LINES = tuple(PRIORS)[:12]
+_SIGNED = (*SIGNED, 'friction_profile', 'load_cell_offset', 'load_cell_delay', 'tracker_delay')
+_JOINT = 'bend_x'
+
+
+class FamilyFitError(EndoscopeError, ValueError):
+    """Recordings from which no family can be identified."""
+
+
+@dataclass(frozen=True)
+class TubeRecording:
+    """One tube of a rig, moved from rest, sampled evenly: N samples.
+
+    Attributes
+    ----------
+    bend : float
+        Of the tube, rad.
+    tick : float
+        Between samples, s.
+    desired, angle : array (N,)
+        Commanded and measured bending angle, rad; the measured one is zero at the start.
+    tension : array (N, 2)
+        Load cells of the positive and the negative wire, N.
+    cycles : tuple of int
+        Samples at which the first cycle, the second and so on begin, and at which the last ends.
+    """
+
+    bend: float
+    tick: float
+    desired: Array
+    angle: Array
+    tension: Array
+    cycles: tuple[int, ...]
+
+    def cycle(self, number: int) -> slice:
+        """Samples of a cycle, the first being 1."""
+        return slice(*self.cycles[number - 1 : number + 1])
+
+    def until(self, sample: int) -> TubeRecording:
+        """The recording before a sample."""
+        ends = tuple(end for end in self.cycles if end <= sample)
+        return TubeRecording(
+            self.bend,
+            self.tick,
+            self.desired[:sample],
+            self.angle[:sample],
+            self.tension[:sample],
+            ends,
+        )
+
+
+@dataclass(frozen=True)
+class TubeFigures:
+    """What a loop shows: rad and N; extremes of tension (2,) are of the two wires."""
+
+    loop_width: float
+    rmse: float
+    least_angle: float
+    most_angle: float
+    least_tension: Array
+    most_tension: Array
+
+
+def figures(desired: Array, angle: Array, tension: Array) -> TubeFigures:
+    """Figures of one or more settled cycles."""
+    return TubeFigures(
+        float(width_at_mid_height(desired, angle)),
+        float(np.sqrt(np.mean((desired - angle) ** 2))),
+        float(angle.min()),
+        float(angle.max()),
+        tension.min(axis=0),
+        tension.max(axis=0),
+    )
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """RMS left of a cycle: angle in rad, tensions (2,) in N."""
+
+    angle: float
+    tension: Array
+
+
+def read(family: TubeFamily, bend: float, desired: Array, tick: float) -> tuple[Array, Array]:
+    """What the recorded rig would have read.
+
+    Parameters
+    ----------
+    family : TubeFamily
+    bend : float
+        Of the tube, rad.
+    desired : array (N,)
+        Commanded bending angle, rad.
+    tick : float
+        S.
+
+    Returns
+    -------
+    angle : array (N,)
+        Rad, from where the joint was at the start.
+    tension : array (N, 2)
+        N.
+    """
+    plant = PlantDescription(joints={_JOINT: family.joint(bend)})
+    made = simulate(plant, (GEAR * desired)[:, None], tick)
+    tip, readings = made.bending_true[:, 0], family.readings
+    angle = np.interp(made.time - readings.tracker_delay, made.time, tip - tip[0])
+    late = made.time - readings.load_cell_delay
+    wires = [
+        np.interp(late, made.time, made.tension[:, 0, k]) + offset
+        for k, offset in enumerate(readings.load_cell_offset)
+    ]
+    return angle, np.stack(wires, axis=1)
+
+
+def misfit(family: TubeFamily, recording: TubeRecording, number: int) -> Misfit:
+    """What a family leaves of one cycle of a recording."""
+    angle, tension = read(family, recording.bend, recording.desired, recording.tick)
+    part = recording.cycle(number)
+    return Misfit(
+        float(np.sqrt(np.mean((angle - recording.angle)[part] ** 2))),
+        np.sqrt(np.mean((tension - recording.tension)[part] ** 2, axis=0)),
+    )
+
+
+def fit_family(
+    recordings: Sequence[TubeRecording],
+    priors: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]] = PRIORS,
+    friction_profile: tuple[float, ...] | None = None,
+    starts: int = 3,
+    seed: int = 0,
+) -> TubeFamily:
+    """Fit a family to all samples of all recordings at once.
+
+    Bounded trust-region least squares (Branch, Coleman and Li 1999), with a Gaussian prior on every
+    number: tubes that are alike cannot tell a wire's stiffness from its joint's, and a line through
+    five tubes should say something of those between. Differences for its slopes are taken over a
+    few hundredths of a prior, since the plant has a kink where a wire becomes slack; for the same
+    reason the search is begun again from places near the best. A load cell shows no less than its
+    offset, which the least tension therefore bounds.
+
+    Parameters
+    ----------
+    recordings : sequence of TubeRecording
+    priors : mapping
+        As `PRIORS`; keys left out are nominal.
+    friction_profile : tuple of float, optional
+        Held, instead of fitted.
+    starts : int
+        Searches.
+    seed : int
+        Of where they begin.
+
+    Raises
+    ------
+    FamilyFitError
+        If there is no recording, or one is short, or holds what is not finite.
+    """
+    _check(recordings)
+    free = {k: v for k, v in priors.items() if friction_profile is None or k != 'friction_profile'}
+    begin = np.concatenate([_unknowns(key, line) for key, (line, _) in free.items()])
+    spread = np.concatenate([np.array(widths, dtype=float) for _, widths in free.values()])
+    high = np.full(len(begin), _REACH)
+    if 'load_cell_offset' in free:
+        least = np.min([recording.tension.min(axis=0) for recording in recordings], axis=0)
+        at = _places(free)['load_cell_offset']
+        high[at] = np.minimum(_REACH, (least - begin[at]) / spread[at])
+    low = np.minimum(-_REACH, high - 1.0)
+
+    def family(y: Array) -> TubeFamily:
+        return _family(begin + spread * y, free, friction_profile or ())
+
+    def residuals(y: Array) -> Array:
+        made = family(y)
+        return np.concatenate([*(_residuals(made, recording) for recording in recordings), y])
+
+    def slopes(y: Array) -> Array:
+        columns = []
+        for k in range(len(y)):
+            ahead, behind = y.copy(), y.copy()
+            ahead[k], behind[k] = min(y[k] + _STEP, high[k]), max(y[k] - _STEP, low[k])
+            rise = residuals(ahead) - residuals(behind)
+            columns.append(rise / (ahead[k] - behind[k]))
+        return np.array(columns).T
+
+    random = np.random.default_rng(seed)
+    best, cost = np.clip(np.zeros(len(begin)), low + 1e-6, high - 1e-6), math.inf
+    first = best
+    for _ in range(starts):
+        found = least_squares(
+            residuals, first, slopes, bounds=(low, high), ftol=1e-4, xtol=1e-5, max_nfev=25
+        )
+        if found.cost < cost:
+            best, cost = found.x, float(found.cost)
+        first = best + _OFF * random.standard_normal(len(best))
+        first = np.clip(first, low + 1e-6, high - 1e-6)
+    return family(best)
+
+
+def _residuals(family: TubeFamily, recording: TubeRecording) -> Array:
+    scored = slice(None, None, _SCORED_EVERY)
+    angle, tension = read(family, recording.bend, recording.desired, recording.tick)
+    off = (angle - recording.angle)[scored]
+    pulled = (tension - recording.tension)[scored]
+    weight = math.sqrt(_WORTH / len(off))
+    return np.concatenate(
+        [
+            weight * off / ANGLE_SCALE,
+            weight * pulled.ravel() / TENSION_SCALE,
+            (tension.min(axis=0) - recording.tension.min(axis=0)) / LEAST_SCALE,
+            (tension.max(axis=0) - recording.tension.max(axis=0)) / MOST_SCALE,
+        ]
+    )
+
+
+def _unknowns(key: str, line: tuple[float, ...]) -> Array:
+    unknowns = np.array(line, dtype=float)
+    if key not in _SIGNED:
+        unknowns[0] = math.log(unknowns[0])
+    return unknowns
+
+
+def _places(free: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]]) -> dict[str, slice]:
+    ends = np.cumsum([0, *(len(line) for line, _ in free.values())]).tolist()
+    return {key: slice(*pair) for key, pair in zip(free, pairwise(ends), strict=True)}
+
+
+def _family(
+    x: Array,
+    free: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]],
+    friction_profile: tuple[float, ...],
+) -> TubeFamily:
+    values: dict[str, tuple[float, ...]] = {}
+    for key, place in _places(free).items():
+        first, *growth = x[place].tolist()
+        values[key] = (first if key in _SIGNED else math.exp(first), *growth)
+    offset = values.get('load_cell_offset', (0.0, 0.0))
+    return TubeFamily(
+        {key: values[key] for key in _LINES if key in values},
+        values.get('friction_profile', friction_profile),
+        Readings(
+            (offset[0], offset[1]),
+            values.get('load_cell_delay', (0.0,))[0],
+            values.get('tracker_delay', (0.0,))[0],
+        ),
+    )
+
+
+def _check(recordings: Sequence[TubeRecording]) -> None:
+    if not recordings:
+        raise FamilyFitError('no recordings: give those of at least one tube')
+    for recording in recordings:
+        name = f'tube bent by {math.degrees(recording.bend):.0f} deg'
+        samples = len(recording.desired)
+        if recording.angle.shape != (samples,) or recording.tension.shape != (samples, 2):
+            raise FamilyFitError(f'{name}: angle or tension has another length than the command')
+        if samples < 100:
+            raise FamilyFitError(f'{name}: {samples} samples are too few')
+        for values in (recording.desired, recording.angle, recording.tension):
+            if not np.all(np.isfinite(values)):
+                raise FamilyFitError(f'{name}: a value is not finite')

@@ -1,0 +1,203 @@
+"""The family of tubes: one rig, and what bending its tube changes, from recordings of a real one.
+
+What belongs to the rig is one number for all tubes. What the bend of the tube changes is a line or
+a parabola over the bend; of positive quantities it is the logarithm that has this form, since
+friction and stiffness grow by factors (Euler's capstan equation).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from endoscope_core.atomic_output import write_text
+from endoscope_core.errors import EndoscopeError, nearest
+from endoscope_core.physics.description import JointParameters
+from endoscope_core.physics.layout import NOMINAL_KEYS
+from endoscope_core.strict_yaml import YamlError, load_yaml
+
+SHIPPED = Path(__file__).with_name('family.yaml')
+CENTRE = math.radians(120.0)
+"""Bend at which a line takes its first number."""
+SPAN = math.radians(120.0)
+"""Bend over which a line grows by its second number."""
+MOST_BENT = math.radians(300.0)
+"""The tubes recorded were bent by 0 to 240 deg; a line says little far beyond them."""
+SIGNED = ('pretension_profile', 'joint_rest_angle')
+"""Keys that follow their line themselves; the logarithm of every other key does."""
+_MOST_TERMS = 3
+_DIGITS = 6
+
+
+class FamilyError(EndoscopeError, ValueError):
+    """A family that cannot be read, or a tube that is none of it."""
+
+
+@dataclass(frozen=True)
+class Readings:
+    """How the recorded rig reads its plant.
+
+    Attributes
+    ----------
+    load_cell_offset : tuple of (float, float)
+        What each load cell shows without tension, N.
+    load_cell_delay, tracker_delay : float
+        By how much tensions and angle are recorded late, s.
+    """
+
+    load_cell_offset: tuple[float, float] = (0.0, 0.0)
+    load_cell_delay: float = 0.0
+    tracker_delay: float = 0.0
+
+
+@dataclass(frozen=True)
+class TubeFamily:
+    """Joints of one rig over the bend of its tube.
+
+    Attributes
+    ----------
+    lines : mapping of str to tuple of float
+        Of a nominal key: its value at `CENTRE`, then by how much it, or its logarithm, grows with
+        the bend and with its square, counted in `SPAN` from `CENTRE`. Keys left out are nominal.
+    friction_profile : tuple of float
+        Of all tubes.
+    readings : Readings
+    provenance : mapping
+        Where the numbers are from and what they leave; carried along, not used.
+
+    Raises
+    ------
+    FamilyError
+        If a key is unknown, or a line has no number, too many, or one that is not finite.
+    """
+
+    lines: Mapping[str, tuple[float, ...]]
+    friction_profile: tuple[float, ...] = ()
+    readings: Readings = field(default_factory=Readings)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for key, line in self.lines.items():
+            if key not in NOMINAL_KEYS:
+                raise FamilyError(f'unknown key {key}: {nearest(key, NOMINAL_KEYS)}')
+            if not 1 <= len(line) <= _MOST_TERMS or not np.all(np.isfinite(line)):
+                raise FamilyError(f'{key} is {list(line)}: give 1 to {_MOST_TERMS} finite numbers')
+            if key not in SIGNED and line[0] <= 0.0:
+                raise FamilyError(f'{key} is {line[0]} at the centre: it must be positive')
+
+    def joint(self, bend: float) -> JointParameters:
+        """The joint of a tube.
+
+        Parameters
+        ----------
+        bend : float
+            Of the tube, rad.
+
+        Returns
+        -------
+        JointParameters
+
+        Raises
+        ------
+        FamilyError
+            If the bend is outside of 0 to `MOST_BENT`, or a number is out of its bounds there.
+        """
+        if not 0.0 <= bend <= MOST_BENT:
+            raise FamilyError(
+                f'a tube bent by {math.degrees(bend):.0f} deg: the family reaches from 0 to '
+                f'{math.degrees(MOST_BENT):.0f} deg'
+            )
+        z = (bend - CENTRE) / SPAN
+        values: dict[str, Any] = {}
+        for key, (middle, *growth) in self.lines.items():
+            grown = sum(g * z ** (power + 1) for power, g in enumerate(growth))
+            values[key] = middle + grown if key in SIGNED else middle * math.exp(grown)
+        try:
+            return JointParameters(friction_profile=self.friction_profile, **values)
+        except ValueError as error:
+            raise FamilyError(f'tube bent by {math.degrees(bend):.0f} deg: {error}') from error
+
+    def save(self, path: str | Path) -> None:
+        """Write the family as YAML."""
+        content = {
+            'schema': 1,
+            'provenance': dict(self.provenance),
+            'readings': {
+                key: _rounded(value) for key, value in dataclasses.asdict(self.readings).items()
+            },
+            'friction_profile': _rounded(self.friction_profile),
+            'lines': {key: _rounded(line) for key, line in self.lines.items()},
+        }
+        text = yaml.safe_dump(content, sort_keys=False, width=100, default_flow_style=None)
+        write_text(path, text)
+
+
+def load_family(path: str | Path = SHIPPED) -> TubeFamily:
+    """Read a family; the one that is shipped if no path is given.
+
+    Raises
+    ------
+    FamilyError
+        If the file cannot be read or is no family; names the file and the key.
+    """
+    try:
+        content = load_yaml(path)
+    except YamlError as error:
+        raise FamilyError(f'family of tubes: {error}') from error
+    try:
+        return _family(content)
+    except (FamilyError, TypeError, ValueError) as error:
+        raise FamilyError(f'{path}: {error}') from error
+
+
+@cache
+def shipped_family() -> TubeFamily:
+    """The family that comes with the project."""
+    return load_family()
+
+
+def _family(content: Any) -> TubeFamily:
+    sections = ('schema', 'provenance', 'readings', 'friction_profile', 'lines')
+    if not isinstance(content, dict) or content.get('schema') != 1:
+        raise FamilyError('no family of tubes of schema 1')
+    for key in content:
+        if key not in sections:
+            raise FamilyError(f'unknown key {key}: {nearest(str(key), sections)}')
+    readings = content.get('readings') or {}
+    known = [item.name for item in dataclasses.fields(Readings)]
+    for key in readings:
+        if key not in known:
+            raise FamilyError(f'readings: unknown key {key}: {nearest(str(key), known)}')
+    offset = _numbers(readings.get('load_cell_offset', (0.0, 0.0)), 'load_cell_offset')
+    if len(offset) != 2:
+        raise FamilyError('load_cell_offset: give two numbers, of the positive and negative wire')
+    return TubeFamily(
+        {key: _numbers(line, key) for key, line in (content.get('lines') or {}).items()},
+        _numbers(content.get('friction_profile') or (), 'friction_profile'),
+        Readings(
+            (offset[0], offset[1]),
+            float(readings.get('load_cell_delay', 0.0)),
+            float(readings.get('tracker_delay', 0.0)),
+        ),
+        content.get('provenance') or {},
+    )
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, (list, tuple)):
+        return [_rounded(each) for each in value]
+    return float(f'{value:.{_DIGITS}g}')
+
+
+def _numbers(given: Sequence[Any], key: str) -> tuple[float, ...]:
+    if not isinstance(given, (list, tuple)):
+        raise FamilyError(f'{key} is {given!r}: give a list of numbers')
+    return tuple(float(value) for value in given)
