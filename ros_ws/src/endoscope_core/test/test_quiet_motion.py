@@ -11,14 +11,17 @@ from endoscope_core.control import (
     AdaptiveBacklashController,
     DesiredMotion,
     Feedforward,
-    FeedforwardLaw,
     Handle,
+    PhysicalParameters,
     RecursiveHysteresisController,
     TrackerMeasurement,
+    shipped_limits,
 )
 from endoscope_core.control.smoothing import COUNT
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
-from endoscope_core.plant import PlantDescription, PlantSimulator, SensorModel
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.sensing import SensorModel
+from endoscope_core.physics.simulator import PlantSimulator
 
 TICK = 1e-3
 RATES = (50, 100, 250, 500, 1000)
@@ -76,13 +79,11 @@ def tip_and_shafts(wanted, mode, feedback):
     """Tip angles (N, 2) and shaft commands (N, 2) of the nominal rig with a tracker of 40 Hz."""
     plant = PlantDescription()
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, 1)
-    gears = np.array([plant.joints[name].gear for name in rig.joints])
     motion, feedforward = DesiredMotion(2), Feedforward(2)
-    if mode != 'none':
-        choice = LawChoice(2)
-        feedforward.select(choice.law(mode, 'class', CalibrationFindings(class_deg=70)))
-    else:
-        feedforward.select(FeedforwardLaw())
+    plants = tuple(map(PhysicalParameters, plant.joints.values()))
+    by = 'plant' if 'physical' in mode else 'class'
+    findings = CalibrationFindings(class_deg=70, plants=plants)
+    feedforward.select(LawChoice(2).law(mode, by, findings))
     make = FEEDBACK[feedback]
     controller = make(2) if make else None
     if controller:
@@ -98,7 +99,7 @@ def tip_and_shafts(wanted, mode, feedback):
         if controller:
             drive = drive + controller.step(k * TICK, angle, speed, measurement)
         tips.append(sample.bending_true.copy())
-        shafts.append(drive * gears)
+        shafts.append(shipped_limits().gear * drive)
         rig.advance(shafts[-1])
     return np.array(tips), np.array(shafts)
 

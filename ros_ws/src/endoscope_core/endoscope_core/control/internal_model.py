@@ -9,6 +9,7 @@ memory: Mayergoyz, Mathematical Models of Hysteresis, 1991, ch. I).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ class TurningPoints:
         while len(v) > 3 and abs(v[-2] - v[-3]) <= min(abs(v[-1] - v[-2]), abs(v[-3] - v[-4])):
             del v[-3:-1]
         if len(v) > _MOST_TURNS:
-            swings = [abs(b - a) for a, b in zip(v[1:-2], v[2:-1], strict=True)]
+            swings = [abs(b - a) for a, b in pairwise(v[1:-1])]
             least = 1 + swings.index(min(swings))
             del v[least : least + 2]
 
@@ -161,7 +162,7 @@ def _go_through_angles(
     travel: float,
     tension_limit: float,
 ) -> None:
-    """From rest, bend the joint to one angle after the other, slowly; `path` becomes the shaft's."""
+    """From rest, bend the joint slowly to the angles of `path`, which become those of the shaft."""
     settle(x, history, sheath, p, on, 0.0, TICK)
     for i in range(len(path)):
         target = path[i]

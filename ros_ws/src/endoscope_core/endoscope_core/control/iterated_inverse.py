@@ -1,10 +1,10 @@
 """Inverse of a plant with any effects, for a motion that is known beforehand.
 
-The law of `physical_inverse_law` knows the nominal plant alone. A plant file may hold any effect of
-the catalogue, and the simulator that runs it is not to be inverted by a formula. Iterative learning
-control inverts it all the same: simulate, see how far the tip is from where it shall be a servo's
-lag later, correct the command there, and again (Arimoto, Kawamura, Miyazaki, Journal of Robotic
-Systems 1(2), 1984; Bristow, Tharayil, Alleyne, IEEE Control Systems Magazine 26(3), 2006).
+`PhysicalInverse` knows the nominal plant alone. A plant file may hold any effect of the catalogue.
+Iterative learning control inverts it all the same: simulate, see how far the tip is from where it
+shall be a servo's lag later, correct the command there, and again (Arimoto, Kawamura, Miyazaki,
+Journal of Robotic Systems 1(2), 1984; Bristow, Tharayil, Alleyne, IEEE Control Systems Magazine
+26(3), 2006).
 """
 
 from dataclasses import dataclass
@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from endoscope_core.control.motor_limits import shipped_limits
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.physical_parameters import PhysicalParameters
-from endoscope_core.plant import PlantDescription
-from endoscope_core.plant.simulator import TICK, simulate
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.simulator import TICK, simulate
 
 Array = NDArray[np.float64]
 
@@ -27,8 +28,6 @@ BOLDER, HALVED = 1.1, 0.5
 """Factors on that share after a correction that helped and one that did not."""
 SMOOTHING_S = 0.012
 """Standard deviation of the filter on each correction: nothing faster than the servo is learnt."""
-LARGEST_CORRECTION = 4.0
-"""rad; an angle that no command reaches, as beyond a stop, must not wind the command up."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,8 @@ def iterated_inverse(
     Returns
     -------
     PlannedCommand
-        The best of all iterations.
+        The best of all iterations; within the motor's travel, so that an angle that cannot be
+        reached does not wind it up.
 
     Raises
     ------
@@ -82,7 +82,8 @@ def iterated_inverse(
         )
     if not (np.isfinite(desired).all() and np.isfinite(velocity).all()):
         raise ValueError('the desired motion is not finite')
-    gear = np.array([plant.joints[name].gear for name in names])
+    limits = shipped_limits()
+    travel = limits.travel / limits.gear
     laws = [PhysicalInverse(PhysicalParameters(plant.joints[name])) for name in names]
     lead = [max(1, round(law.servo_lag / TICK)) for law in laws]
     command = np.stack(
@@ -92,31 +93,25 @@ def iterated_inverse(
     lowest = np.full(len(names), np.inf)
     gain = np.full(len(names), GAIN)
     for _ in range(max(iterations, 1)):
-        tip = simulate(plant, gear * command).bending_true
+        tip = simulate(plant, limits.gear * command).bending_true
         squares = np.mean((desired - tip) ** 2, axis=0)
         better = squares < lowest
         best, best_tip = np.where(better, command, best), np.where(better, tip, best_tip)
         lowest = np.where(better, squares, lowest)
-        # At a reversal the tip goes further the old way when the motor comes back: a correction
-        # that is too bold makes it worse, and is taken back.
         gain *= np.where(better, BOLDER, HALVED)
         ahead = np.stack(
             [_earlier(e, n) for e, n in zip((desired - best_tip).T, lead, strict=True)]
         )
         step = gaussian_filter1d(ahead, SMOOTHING_S / TICK, axis=1, mode='nearest').T
-        command = np.clip(
-            best + gain * step, desired - LARGEST_CORRECTION, desired + LARGEST_CORRECTION
-        )
+        command = np.clip(best + gain * step, -travel, travel)
     return PlannedCommand(best, best_tip, float(np.sqrt(np.mean(lowest))))
 
 
 def _by_law(law: PhysicalInverse, desired: Array, velocity: Array) -> Array:
     command = np.empty(len(desired))
-    command[0] = law.begin(0.0, float(desired[0]), float(velocity[0]), float(desired[0]))
-    law.sent(float(command[0]), TICK)
+    command[0] = law.begin(0.0, float(desired[0]), float(velocity[0]))
     for k in range(1, len(desired)):
         command[k] = law.wanted(float(desired[k]), float(velocity[k]), TICK)
-        law.sent(float(command[k]), TICK)
     return command
 
 
