@@ -212,8 +212,8 @@ def load_dataset(folder: str | Path) -> CalibrationDataset:
 
 def _draw(generator: np.random.Generator, class_deg: int) -> TubeConfiguration:
     size = np.deg2rad(class_deg + SIZE_SPREAD_DEG * generator.uniform(-1.0, 1.0))
-    unevenness = float(generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS))
     for _ in range(_MOST_RIGS):
+        unevenness = float(generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS))
         configuration = configuration_of_size(random_instrument(generator), float(size), unevenness)
         if configuration is not None:
             return configuration

@@ -59,8 +59,8 @@ def never_seen_tube(seed: int, number: int, size_deg: float | None = None) -> Ne
     generator = np.random.default_rng([_UNSEEN, seed, number])
     drawn = float(generator.uniform(SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG))
     size = np.deg2rad(drawn if size_deg is None else size_deg)
-    unevenness = float(generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS))
     for _ in range(_MOST_RIGS):
+        unevenness = float(generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS))
         found = configuration_of_size(random_instrument(generator), float(size), unevenness)
         if found is not None:
             return NeverSeenTube(found.plant, found.backlash_size, int(generator.integers(2**31)))
