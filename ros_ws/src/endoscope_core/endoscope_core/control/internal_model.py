@@ -33,10 +33,9 @@ TICK = 1e-3
 PRECISION = 1e-7
 """Rad by which the model's joint may miss an angle that it can reach."""
 _LONGEST_TICK = 1.0
-_SHAFT_STEP = 0.03
-_JOINT_STEP = 0.03
-"""Rad: with such steps a motion is gone through again; a step that reverses must be short against
-the dead zone."""
+_SHAFT_STEP = 0.1
+_JOINT_STEP = 0.1
+"""Rad: with such steps a motion is gone through again, within 0.01 deg of where small ones lead."""
 _TRIES = 60
 _STEPS = 1000
 _MOST_TURNS = 12

@@ -19,7 +19,7 @@ from endoscope_core.control.internal_model import (
 )
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.physics.description import JointParameters
-from endoscope_core.physics.layout import INPUTS, JOINT
+from endoscope_core.physics.layout import INPUTS, JOINT, NOMINAL_KEYS
 from endoscope_core.physics.packing import rest_state
 from endoscope_core.physics.servo import transition
 
@@ -128,8 +128,10 @@ class PlantLearning:
         self._gear = gear
         self._turns = TurningPoints(shafts)
         self._speed = 0.0
-        rows = [packed_joint(joint) for joint in self._joints()]
-        self._packed, self._on = (np.array(column) for column in zip(*rows, strict=True))
+        packed, on = packed_joint(parameters.joint)
+        self._packed, self._on = (np.tile(row, (len(LEARNT) + 1, 1)) for row in (packed, on))
+        self._places = [NOMINAL_KEYS.index(name) for name in LEARNT]
+        self._nominal = packed[self._places]
         self._models = rest_state(self._packed, self._on, TICK)
         self._inputs = np.zeros(INPUTS)
         self.modelled = parameters
@@ -232,22 +234,14 @@ class PlantLearning:
         if np.max(np.abs(self._logs - self._modelled_logs)) < NOTABLE:
             return
         self.modelled, self._modelled_logs = self.parameters, self._logs
-        self._packed[:] = [packed_joint(joint)[0] for joint in self._joints()]
         self._go_through_turns()
 
     def _go_through_turns(self) -> None:
+        self._packed[:, self._places] = self._nominal * np.exp(self._logs)
+        for i, place in enumerate(self._places):
+            self._packed[i + 1, place] *= math.exp(self._STEP)
         path = np.array(self._turns.values)
         go_through_shafts(*self._models, self._packed, self._on, self._inputs, path)
-
-    def _joints(self) -> list[JointParameters]:
-        """The joint as estimated, and one for each parameter that is moved."""
-        moved = [self._scaled(self._logs + self._step_of(i)) for i in range(len(self._names))]
-        return [self._scaled(self._logs), *moved]
-
-    def _step_of(self, number: int) -> Array:
-        step = np.zeros(len(self._names))
-        step[number] = self._STEP
-        return step
 
     def _scaled(self, logs: Array) -> JointParameters:
         first = self._first.joint
