@@ -5,8 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec, PlantDescription, SensorModel, simulate
+from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.sensing import SensorModel
+from endoscope_core.physics.simulator import simulate
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import (
     Estimate,

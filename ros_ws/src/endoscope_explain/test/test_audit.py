@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import Severity, audit_recording
 from endoscope_explain.audit.outliers import spike_chance
 from endoscope_explain.audit.receipt_clock import retimed

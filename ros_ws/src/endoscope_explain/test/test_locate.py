@@ -3,8 +3,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec, PlantDescription
+from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.explanation import Estimate, NamedEffect
 from endoscope_explain.latent_library import NODES
 from endoscope_explain.locate.chain_cut import cut_at_motor

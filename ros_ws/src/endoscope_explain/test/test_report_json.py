@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import load_plant
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.plant_file import load_plant
 from endoscope_explain.audit import AuditReport, Finding, Severity
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.combine import AUDITED_EFFECTS, combined_effects, combined_verdict

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from endoscope_core.effects import nearest
+from endoscope_core.physics.effect import nearest
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.strict_yaml import YamlError, load_yaml
 

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from endoscope_core.plant import PlantDescription, SensorModel, simulate
-from endoscope_core.plant.parameters import JointParameters
+from endoscope_core.physics.description import JointParameters, PlantDescription
+from endoscope_core.physics.sensing import SensorModel
+from endoscope_core.physics.simulator import simulate
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec
+from endoscope_core.physics.description import EffectSpec
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition, nominal_anchors, nominal_model
 from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.fit import fit, jacobian

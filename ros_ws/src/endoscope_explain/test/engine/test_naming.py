@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.plant import EffectSpec, PlantDescription
+from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME

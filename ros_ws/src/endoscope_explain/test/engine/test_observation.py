@@ -3,8 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.plant import PlantDescription
-from endoscope_core.plant.parameters import JointParameters
+from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_explain.evaluate import packed_joint, residuals, simulate_joint
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.observation import observe

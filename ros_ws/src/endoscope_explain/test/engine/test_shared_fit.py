@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec
+from endoscope_core.physics.description import EffectSpec
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.anchoring import anchored
 from endoscope_explain.fit import fit
 from endoscope_explain.observation import observe

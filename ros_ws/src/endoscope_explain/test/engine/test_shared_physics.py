@@ -2,8 +2,8 @@
 
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec
+from endoscope_core.physics.description import EffectSpec
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.anchoring import anchored
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict

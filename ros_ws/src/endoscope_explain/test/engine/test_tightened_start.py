@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.effects.slots import START_FRICTION
-from endoscope_core.plant.kernel import OUT_TENSION_A, OUT_TENSION_B
+from endoscope_core.physics.layout import OUT_TENSION_A, OUT_TENSION_B
 from endoscope_explain.compose import nominal_anchors
 from endoscope_explain.conclusions import start_friction
 from endoscope_explain.evaluate import packed_joint
