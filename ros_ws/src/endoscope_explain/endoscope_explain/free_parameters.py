@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.layout import (
     FRICTION_PROFILE,
@@ -138,18 +139,24 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
                 BAND_SPREAD * band / BAND,
             )
         )
-    free += [_of_form(key, float(base[index])) for key, index in FORM_INDICES.items()]
+    share = min(band / BAND, 1.0)
+    free += [_of_form(key, float(base[index]), share) for key, index in FORM_INDICES.items()]
     mean, spread = LEAD_PRIOR
     free.append(FreeParameter(LEAD, 'reading_lead', False, 1.0, 0.0, 1.0, mean, spread))
     return tuple(free)
 
 
-def _of_form(key: str, described: float) -> FreeParameter:
+def _of_form(key: str, described: float, share: float) -> FreeParameter:
     low, high, _ = REACH['friction_profile' if key in FRICTION_PROFILE_NAMES else key]
-    spread = FORM_SPREAD[key]
-    squared = key == 'joint_presliding_spread'
     item = FreeParameter(
-        FORM_INDICES[key], key, False, spread, low, high, spread=1.0, squared=squared
+        FORM_INDICES[key],
+        key,
+        False,
+        FORM_SPREAD[key],
+        low,
+        high,
+        spread=share,
+        squared=key == 'joint_presliding_spread',
     )
     return replace(item, mean=item.coordinate(described))
 
