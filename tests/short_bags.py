@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from endoscope_bags import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
-from endoscope_core.plant import (
+from endoscope_core.physics import (
     EffectSpec,
     JointParameters,
     PlantDescription,

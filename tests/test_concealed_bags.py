@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from endoscope_core.plant import load_plant
+from endoscope_core.physics import load_plant
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.pipeline import Sources, explain_case, read_inputs
 

@@ -10,7 +10,7 @@ from distributed import LocalCluster
 from short_bags import PLANT, one_joint, write_short_bag
 
 from endoscope_bringup import cli
-from endoscope_core.plant import EffectSpec, JointParameters, load_plant, save_plant
+from endoscope_core.physics import EffectSpec, JointParameters, load_plant, save_plant
 
 
 @pytest.fixture(scope='module')

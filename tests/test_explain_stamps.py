@@ -7,7 +7,7 @@ import pytest
 from short_bags import PLANT, write_short_bag
 
 from endoscope_bringup import cli
-from endoscope_core.plant import save_plant
+from endoscope_core.physics import save_plant
 from endoscope_explain.recording import recording_from_bag
 
 

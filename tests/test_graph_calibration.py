@@ -9,7 +9,7 @@ from simulated_graph import SimulatedGraph
 from tubes import NODES_WITH_A_PLANT, tube_of_size
 
 from endoscope_core.identification.law_choice import CalibrationFindings
-from endoscope_core.plant import EffectSpec, PlantDescription, save_plant
+from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
 from endoscope_core.rig import load_rig
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from simulated_graph import SimulatedGraph
 
-from endoscope_core.plant import PlantDescription, SensorModel, simulate
+from endoscope_core.physics import PlantDescription, SensorModel, simulate
 from endoscope_nodes.conductor_node import BarrierTimeout
 from endoscope_nodes.names import MOTORS, WIRES
 

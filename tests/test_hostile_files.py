@@ -15,7 +15,7 @@ from endoscope_bags.cdr_encoding import encode_string
 from endoscope_bags.message_types import STRING
 from endoscope_bringup.cli import main
 from endoscope_bringup.hostile_files.trial import KINDS, Outcomes, try_files
-from endoscope_core.plant import PlantDescription, save_plant
+from endoscope_core.physics import PlantDescription, save_plant
 
 MEMORY = 2_000_000_000
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from endoscope_core.dataset import configuration_of_size, random_rig
-from endoscope_core.plant import save_plant
+from endoscope_core.physics import save_plant
 
 NODES_WITH_A_PLANT = ('motor_driver', 'load_cells', 'em_tracker')
 

@@ -1,5 +1,8 @@
 """The one base of every error that a user, not a programmer, has to act on."""
 
+import difflib
+from collections.abc import Iterable
+
 _LONGEST = 2000
 
 
@@ -17,6 +20,13 @@ class EndoscopeError(Exception):
         # An OSError, which some derive from as well, would take its arguments for errno and text.
         text = ' '.join(Exception.__str__(self).splitlines())
         return printable(text if len(text) <= _LONGEST else f'{text[:_LONGEST]} ...')
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """A hint that names the valid name nearest to a wrong one, and else all of them."""
+    valid = list(valid)
+    close = difflib.get_close_matches(name, valid, n=1, cutoff=0.5)
+    return f'did you mean {close[0]}?' if close else 'valid are ' + ', '.join(valid)
 
 
 def printable(text: str) -> str:

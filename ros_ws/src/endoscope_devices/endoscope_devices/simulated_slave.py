@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from endoscope_core.plant import PlantDescription, PlantSample, PlantSimulator, SensorModel
+from endoscope_core.physics import PlantDescription, PlantSample, PlantSimulator, SensorModel
 from endoscope_devices.motor_device import MotorReading
 
 Numbers = tuple[float, ...]

@@ -15,7 +15,7 @@ from endoscope_core.kinematics import (
     bending_from_orientation,
     tip_pose,
 )
-from endoscope_core.plant import SensorModel
+from endoscope_core.physics import SensorModel, recording_faults
 from endoscope_devices.em_tracker import (
     AuroraTracker,
     RegistrationWindow,
@@ -98,9 +98,11 @@ class EmTrackerNode(EndoscopeNode):
         self._poses = self.create_publisher(PoseStamped, TRACKER_POSE, SENSOR_OFFERED)
         self._measured = JointPublisher(self, SLAVE_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
         if p.device == 'simulated':
-            sensors = load_plant_parameter('em_tracker', p.plant_file).sensors
-            self._sensors = SensorModel(sensors, p.seed)
-            self._sampling = SampleClock(sensors.tracker_rate)
+            plant = load_plant_parameter('em_tracker', p.plant_file)
+            self._sensors = SensorModel(plant.sensors, p.seed)
+            self._faults = recording_faults(plant)
+            self._first_ns: int | None = None
+            self._sampling = SampleClock(plant.sensors.tracker_rate)
             JointSubscription(self, SIMULATED_BENDING, JOINTS, self._on_bending, LOCK_STEP)
         else:
             self._tracker = self._connect(p)
@@ -133,7 +135,12 @@ class EmTrackerNode(EndoscopeNode):
     def _on_bending(self, sample: JointSample) -> None:
         if not self._sampling.due(sample.stamp_ns) or not self._settings.in_volume:
             return
-        reading = self._sensors.bending(sample.position)
+        if self._first_ns is None:
+            self._first_ns = sample.stamp_ns
+        since = (sample.stamp_ns - self._first_ns) * 1e-9
+        reading = self._faults.spoilt(
+            self._sensors.bending(sample.position), since, self._settings.seed
+        )
         if np.hypot(*reading) >= np.pi:
             self._out_of_reach += 1
             return

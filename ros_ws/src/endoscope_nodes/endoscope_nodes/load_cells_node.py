@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from std_srvs.srv import Trigger
 
-from endoscope_core.plant import SensorModel
+from endoscope_core.physics import SensorModel
 from endoscope_devices.load_cells import (
     CONNECTIONS,
     ModbusLoadCells,

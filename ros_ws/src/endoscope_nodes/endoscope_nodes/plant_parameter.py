@@ -1,6 +1,8 @@
 """The plant that the nodes of a simulated slave share, named by a parameter."""
 
-from endoscope_core.plant import PlantDescription, PlantFileError, load_plant
+from endoscope_core.physics import PlantDescription, PlantFileError, load_plant
+from endoscope_core.physics.effect import Stage
+from endoscope_core.physics.effects import describe
 from endoscope_nodes.names import JOINTS
 from endoscope_nodes.parameters import ParameterError
 
@@ -11,7 +13,7 @@ def load_plant_parameter(node_name: str, path: str) -> PlantDescription:
     Raises
     ------
     ParameterError
-        The file cannot be read as a plant of both joints.
+        The file cannot be read as a plant of both joints, or spoils recordings.
     """
     if not path:
         return PlantDescription()
@@ -24,4 +26,10 @@ def load_plant_parameter(node_name: str, path: str) -> PlantDescription:
             f"{node_name}: parameter 'plant_file': {path} describes {', '.join(plant.joints)}; "
             f'the nodes need {", ".join(JOINTS)} in this order'
         )
+    for spec in plant.effects:
+        if describe(spec.id).stage is Stage.RECORDING:
+            raise ParameterError(
+                f"{node_name}: parameter 'plant_file': {path} has the effect {spec.id}, which acts "
+                'on recordings: leave it out here, and let `endoscope simulate` apply it'
+            )
     return plant

@@ -14,7 +14,7 @@ def inference_time(classifier: 'Classifier') -> float:
     import numpy as np
 
     from endoscope_core.dataset import record_calibration
-    from endoscope_core.plant import PlantDescription
+    from endoscope_core.physics import PlantDescription
     from endoscope_core.signals import calibration_motion
 
     motion = calibration_motion(classifier.motion)

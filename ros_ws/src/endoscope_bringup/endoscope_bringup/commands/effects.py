@@ -6,7 +6,7 @@ import textwrap
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from endoscope_core.effects import EffectDefinition, EffectParameter
+    from endoscope_core.physics.effects import Effect, Parameter
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -21,8 +21,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the catalogue, or the effects asked for; return 0."""
-    from endoscope_core.effects import CATALOGUE, UnknownEffectError, describe
     from endoscope_core.errors import EndoscopeError
+    from endoscope_core.physics.effects import CATALOGUE, UnknownEffectError, describe
 
     try:
         chosen = [describe(effect_id) for effect_id in args.ids]
@@ -36,14 +36,14 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _told(definition: 'EffectDefinition') -> str:
+def _told(definition: 'Effect') -> str:
     lines = [f'{definition.id} ({definition.stage})']
     for text in (definition.physics, definition.equation, definition.source):
         lines += textwrap.wrap(text, 96, initial_indent='  ', subsequent_indent='    ')
     return '\n'.join([*lines, *(_parameter(p) for p in definition.parameters)])
 
 
-def _parameter(parameter: 'EffectParameter') -> str:
+def _parameter(parameter: 'Parameter') -> str:
     if parameter.choices:
         allowed = 'one of ' + ', '.join(f'{choice:g}' for choice in parameter.choices)
     elif parameter.counted:

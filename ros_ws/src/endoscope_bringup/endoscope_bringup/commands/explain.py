@@ -98,7 +98,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Explain and write; return 0."""
-    from endoscope_core.plant import load_plant
+    from endoscope_core.physics import load_plant
     from endoscope_explain.many_bags import explain_bags
     from endoscope_explain.pipeline import Sources
 

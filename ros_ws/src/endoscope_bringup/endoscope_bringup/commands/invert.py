@@ -32,8 +32,8 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from endoscope_core.control.iterated_inverse import iterated_inverse
-    from endoscope_core.plant import load_plant
-    from endoscope_core.plant.simulator import TICK
+    from endoscope_core.physics import load_plant
+    from endoscope_core.physics.simulator import TICK
     from endoscope_core.signals import motion_by_name
     from endoscope_core.signals.command_file import write_command_file
 

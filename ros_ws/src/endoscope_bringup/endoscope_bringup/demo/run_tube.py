@@ -22,7 +22,7 @@ from endoscope_bringup.demo.procedure import (
     Segment,
     Tube,
 )
-from endoscope_core.plant import PlantDescription, save_plant
+from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.signals import calibration_sinusoid, motion_by_name
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES

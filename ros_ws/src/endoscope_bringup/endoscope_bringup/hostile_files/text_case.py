@@ -15,8 +15,8 @@ from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bags.table_mapping import load_table_mapping
 from endoscope_bags.text_table import convert_table
 from endoscope_bringup.hostile_files.spoiling import spoiled_table, spoiled_yaml
-from endoscope_core.plant import EffectSpec, PlantDescription, load_plant, save_plant
-from endoscope_core.plant.plant_file import REACH
+from endoscope_core.physics import EffectSpec, PlantDescription, load_plant, save_plant
+from endoscope_core.physics.plant_file import REACH
 from endoscope_core.signals.command_file import read_command_file, write_command_file
 from endoscope_devices.load_cells.calibration_file import load_calibration
 

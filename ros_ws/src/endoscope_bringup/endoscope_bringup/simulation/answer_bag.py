@@ -19,15 +19,15 @@ from endoscope_bringup.simulation.commands_of_bag import (
     motor_name,
     wire_names,
 )
-from endoscope_core.plant import PlantDescription, SensorModel
-from endoscope_core.plant.on_stamps import (
+from endoscope_core.physics import PlantDescription, SensorModel
+from endoscope_core.physics.on_stamps import (
     NANOSECONDS,
     Answer,
     AnswerStamps,
     answer_commands,
 )
-from endoscope_core.plant.recording import TOPICS, recording_faults
-from endoscope_core.plant.simulator import TICK
+from endoscope_core.physics.recording import TOPICS, recording_faults
+from endoscope_core.physics.simulator import TICK
 
 MOTOR_TOPIC = 'motor/measured_js'
 WIRES_TOPIC = 'wires/measured_js'

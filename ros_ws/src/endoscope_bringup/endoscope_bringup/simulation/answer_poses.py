@@ -9,7 +9,7 @@ from endoscope_bags import MessageStream, PoseSeries
 from endoscope_bags.cdr_encoding import encode_poses
 from endoscope_bags.message_types import POSE_STAMPED
 from endoscope_core.kinematics import tip_pose
-from endoscope_core.plant.plant_file import JOINT_NAMES
+from endoscope_core.physics.plant_file import JOINT_NAMES
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from endoscope_bags import JointStateSeries, Recording
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics import PlantDescription
+from endoscope_core.rig import load_rig
 
 SHAFT_TOPIC = 'motor/servo_jp'
 ANGLE_TOPIC = 'slave/servo_jp'
@@ -87,13 +88,11 @@ def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommand
             f'the plant has {", ".join(names.values())}'
         )
     chosen = series.select([names[joint] for joint in joints])
-    return BagCommands(series.topic, joints, chosen.stamp_ns, _shaft_angles(chosen, joints, plant))
+    return BagCommands(series.topic, joints, chosen.stamp_ns, _shaft_angles(chosen))
 
 
-def _shaft_angles(
-    series: JointStateSeries, joints: tuple[str, ...], plant: PlantDescription
-) -> NDArray[np.float64]:
+def _shaft_angles(series: JointStateSeries) -> NDArray[np.float64]:
     position = series.require('position')
     if series.topic.endswith(SHAFT_TOPIC):
         return position
-    return position * np.array([plant.joints[joint].gear for joint in joints])
+    return position * load_rig().joints.gear

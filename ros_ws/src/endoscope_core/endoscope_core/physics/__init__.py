@@ -1,1 +1,34 @@
-"""The simulated slave: friction along the whole sheath, and the effects that can be added to it."""
+"""The simulated slave: friction along the whole sheath, and what can be added to it."""
+
+from endoscope_core.physics.description import (
+    EffectSpec,
+    JointParameters,
+    PlantDescription,
+    SensorParameters,
+)
+from endoscope_core.physics.plant_file import PlantFileError, load_plant, save_plant
+from endoscope_core.physics.recording import RecordingFaults, recording_faults
+from endoscope_core.physics.sensing import SensorModel
+from endoscope_core.physics.simulator import (
+    PlantSample,
+    PlantSimulator,
+    PlantTrajectory,
+    simulate,
+)
+
+__all__ = [
+    'EffectSpec',
+    'JointParameters',
+    'PlantDescription',
+    'PlantFileError',
+    'PlantSample',
+    'PlantSimulator',
+    'PlantTrajectory',
+    'RecordingFaults',
+    'SensorModel',
+    'SensorParameters',
+    'load_plant',
+    'recording_faults',
+    'save_plant',
+    'simulate',
+]

@@ -1,8 +1,6 @@
 """What an effect is: its parameters, equation, source, place, and what a search must know of it."""
 
-import difflib
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -11,13 +9,6 @@ from endoscope_core.physics.layout import SLOTS
 
 class UnknownEffectError(ValueError):
     """An effect, its joint or one of its parameters that the catalogue does not have."""
-
-
-def nearest(name: str, valid: Iterable[str]) -> str:
-    """A hint that names the valid name nearest to a wrong one, and else all of them."""
-    valid = list(valid)
-    close = difflib.get_close_matches(name, valid, n=1, cutoff=0.5)
-    return f'did you mean {close[0]}?' if close else 'valid are ' + ', '.join(valid)
 
 
 class Stage(StrEnum):

@@ -5,8 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.errors import nearest
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
-from endoscope_core.physics.effect import UnknownEffectError, nearest
+from endoscope_core.physics.effect import UnknownEffectError
 from endoscope_core.physics.effects import CATALOGUE, describe
 from endoscope_core.physics.kernel import settle
 from endoscope_core.physics.layout import (

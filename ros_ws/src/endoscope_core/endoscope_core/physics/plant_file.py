@@ -9,14 +9,13 @@ from typing import Any
 import yaml
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_core.physics.description import (
     EffectSpec,
     JointParameters,
     PlantDescription,
     SensorParameters,
 )
-from endoscope_core.physics.effect import nearest
 from endoscope_core.physics.layout import PROFILE_TERMS
 from endoscope_core.physics.packing import pack
 from endoscope_core.physics.recording import recording_faults

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from endoscope_core.physics.effect import nearest
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_core.strict_yaml import YamlError, load_yaml
 
 SHIPPED = Path(__file__).with_name('rig.yaml')

@@ -27,7 +27,7 @@ def rows(settings: PapersBench) -> list[Row]:
     )
     from endoscope_core.errors import EndoscopeError
     from endoscope_core.identification.law_choice import LawChoice
-    from endoscope_core.plant import EffectSpec
+    from endoscope_core.physics import EffectSpec
     from endoscope_core.signals import periodic_signal
     from endoscope_core.trials.never_seen_tube import calibrate, never_seen_tube, rmse_within
     from endoscope_core.trials.tracking_trial import run_tracking_trial

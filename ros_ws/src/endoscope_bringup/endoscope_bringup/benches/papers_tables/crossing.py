@@ -11,7 +11,7 @@ def rows(settings: PapersBench) -> list[Row]:
     import numpy as np
 
     from endoscope_core.control import PhysicalParameters
-    from endoscope_core.plant import JointParameters
+    from endoscope_core.physics import JointParameters
     from endoscope_core.trials.crossing_bound import crossing_bound
 
     bounds = []

@@ -17,7 +17,7 @@ def rows(settings: PapersBench) -> list[Row]:
     from endoscope_core.dataset import record_calibration
     from endoscope_core.dataset.rig_variation import in_tube
     from endoscope_core.identification import load_class_parameters
-    from endoscope_core.plant import PlantDescription
+    from endoscope_core.physics import PlantDescription
     from endoscope_core.trials.never_seen_tube import never_seen_tube
 
     classes = {}

@@ -7,7 +7,8 @@ needs. Modules without an effect hold laws that several share.
 import importlib
 import pkgutil
 
-from endoscope_core.physics.effect import Effect, UnknownEffectError, in_order_of_chain, nearest
+from endoscope_core.errors import nearest
+from endoscope_core.physics.effect import Effect, UnknownEffectError, in_order_of_chain
 
 for _module in sorted(module.name for module in pkgutil.iter_modules(__path__)):
     importlib.import_module(f'{__name__}.{_module}')
