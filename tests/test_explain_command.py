@@ -100,11 +100,8 @@ def test_sound_recordings_of_one_rig_share_no_missing_physics(rig, tmp_path, cap
     write_short_bag(tmp_path / 'other' / 'sound', seed=5)
     bags = (rig / 'sound', tmp_path / 'other' / 'sound')
     out = tmp_path / 'out'
-    assert explain(rig, out, *bags, '--quick', '--same-physics', '--tightened') == 0
+    assert explain(rig, out, *bags, '--quick', '--same-physics') == 0
     assert summary(out) == {'sound': 'consistent', 'sound_2': 'consistent'}
-    for name in ('sound', 'sound_2'):
-        held = json.loads((out / name / 'report.json').read_text())['start_friction']
-        assert held['bend_x'] == pytest.approx(0.0, abs=0.1)
     assert 'only noise is left beside nothing' in capsys.readouterr().out
 
 
