@@ -61,7 +61,8 @@ PULLEY_ANGLE = Hook('pulley_angle', Fold.THROUGH, 'p, x, shaft')
 TRAVEL_OF = Hook('travel_of', Fold.THROUGH, 'p, x, travel, wire')
 """By how much the pulley winds up wire 0 or 1, m; without a link radius times angle."""
 EXPONENT = Hook('exponent', Fold.FACTORS, 'p, x, speed, time, tick')
-"""Factor on the capstan exponent, mean over the tick; `speed` of sliding in m/s, not negative."""
+"""Factor on the capstan exponent, mean over the tick; `speed` of sliding in m/s, not negative: that
+at the motor, as the joint's answers at once to a friction that would answer to it."""
 DIRECTION = Hook('direction', Fold.FACTORS, 'p, x', results=2)
 """Factors on the exponent where a wire slides towards the motor, and towards the joint."""
 FRICTION_FLOOR = Hook('friction_floor', Fold.TERMS, 'p, x')

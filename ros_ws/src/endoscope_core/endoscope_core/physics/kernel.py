@@ -5,6 +5,8 @@ No effect is named here: what can be added to the nominal plant acts through the
 
 import math
 
+import numpy as np
+
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics import hooks
 from endoscope_core.physics.folds import acting, folded
@@ -47,13 +49,16 @@ from endoscope_core.physics.layout import (
     PROFILE_TERMS,
     PULLEY,
     PULLEY_RADIUS,
+    REST_TENSION,
     RISING_FACTOR,
     SHAPES,
     SLIDING_SPEED,
+    SLOTS,
     TICKS,
     TIP,
     TRANSITION,
     TRAVEL,
+    WINDING_SPEED,
     WIRE_A,
     WIRE_B,
     WIRE_STIFFNESS,
@@ -89,6 +94,7 @@ tracker_reading = folded(hooks.TRACKER)
 load_cell_reading = folded(hooks.LOAD_CELL)
 advance, something_follows = folded(hooks.ADVANCE), acting(hooks.ADVANCE)
 
+_SHAFT_ANGLES = np.array(SLOTS.shaft_angles)
 _STEPS_TO_START = 64
 _SETTLING_TICK = 1.0
 _TRIES = 40
@@ -112,6 +118,8 @@ def settle(
         That of all ticks to come, s.
     """
     x[:] = 0.0
+    for i in _SHAFT_ANGLES:
+        x[i] = shaft
     a11, a12, a21, a22 = transition(p[MOTOR_BANDWIDTH], p[MOTOR_DAMPING_RATIO], tick)
     x[TRANSITION], x[TRANSITION + 1], x[TRANSITION + 2], x[TRANSITION + 3] = a11, a12, a21, a22
     history[COMMAND_HISTORY, :] = shaft
@@ -126,6 +134,7 @@ def settle(
             start = p[PRETENSION] * math.exp(-p[PRETENSION_PROFILE] * sheath[EXPONENTS, i])
             x[wire + NODES + i] = start + x[FLOOR]
         relax(x, wire, table, sheath[WORK : WORK + 3])
+    x[REST_TENSION] = mean_tension(x, WIRE_A, table) - x[FLOOR]
     if length_varies(on):
         _grow(x, table, p, on, 0.0, 0.0)
     steps = _STEPS_TO_START if shaft != 0.0 else 1
@@ -316,10 +325,11 @@ def advance_tick(
     x[MOTOR], x[MOTOR_SPEED] = shaft, speed
 
     if exponent_varies(on):
-        _change_friction(x, sheath, p, on, abs(x[SLIDING_SPEED]), time, tick)
+        _change_friction(x, sheath, p, on, abs(x[WINDING_SPEED]), time, tick)
     if length_varies(on) or inputs[IN_PUSH_STRETCH] != x[EXTRA_LENGTH]:
         _grow(x, table, p, on, inputs[IN_PUSH_STRETCH], time)
     way = _wind_up(x, table, p, on, shaft)
+    x[WINDING_SPEED] = way / tick
     bend(x, table, p, on, way, other, inputs[IN_PUSH_MOMENT], time, tick)
     x[TIP] = tip_angle(on, p, x, x[JOINT])
     x[TICKS] += 1.0

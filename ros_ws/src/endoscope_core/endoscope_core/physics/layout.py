@@ -109,6 +109,8 @@ TRAVEL = SLOTS.state_block(2)
 """By how much the pulley has wound up each wire, m."""
 EXTRA_LENGTH = SLOTS.state_block(2)
 """What effects have added to each wire's length, m."""
+REST_TENSION = SLOTS.state_block()
+"""Mean tension of a wire as it was tightened, N."""
 JOINT = SLOTS.joint_angle()
 """Bending angle of the joint, rad."""
 JOINT_STEP = SLOTS.state_block()
@@ -119,6 +121,8 @@ JOINT_SLIDE = SLOTS.state_block(ELEMENTS)
 """Dahl states of the joint's friction."""
 SLIDING_SPEED = SLOTS.state_block()
 """Speed at which the positive wire slid towards the motor in the last tick, m/s."""
+WINDING_SPEED = SLOTS.state_block()
+"""Speed at which the pulley wound up the positive wire in the last tick, m/s."""
 FALLING_FACTOR = SLOTS.state_block()
 RISING_FACTOR = SLOTS.state_block()
 """Factors on the capstan exponent that the table of shapes holds."""

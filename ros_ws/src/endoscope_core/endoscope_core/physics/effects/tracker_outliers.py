@@ -1,0 +1,20 @@
+"""`tracker_outliers`: isolated wrong samples of the tracker.
+
+It changes samples and not the rig: nothing of it is in the compiled physics.
+"""
+
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
+
+EFFECT = Effect(
+    'tracker_outliers',
+    Stage.SENSING,
+    50,
+    physics='Isolated samples of the tracker are wrong.',
+    equation='reading = q +- size_rad in a share `rate` of the samples, drawn by sample and seed',
+    source='Tukey, A survey of sampling from contaminated distributions, 1960',
+    parameters=(
+        Parameter('rate', '-', 0.0, 0.5, 0.01, off=0.0),
+        Parameter('size_rad', 'rad', 0.0, 3.0, 0.2, off=0.0),
+    ),
+    traits=Traits(audited=True),
+)
