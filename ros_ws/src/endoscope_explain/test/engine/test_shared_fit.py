@@ -14,7 +14,7 @@ from endoscope_explain.screen import with_effect
 from endoscope_explain.shared_fit import SPREAD, fit_together, told_alone, with_common_numbers
 
 GAIN = 0.9
-STIFFNESS = 0.0036
+STIFFNESS = 0.005
 TUBES = (0.7, 1.1)
 
 

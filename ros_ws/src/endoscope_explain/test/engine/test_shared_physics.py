@@ -14,7 +14,7 @@ from endoscope_explain.screen import with_effect
 from endoscope_explain.shared_physics import shared_effects
 
 GAIN = 0.9
-TUBES = {0.7: 0.006, 1.0: 0.009}
+TUBES = {0.7: 0.0008, 1.0: 0.0012}
 """Capstan exponent, and the moment of gravity in N m in that pose."""
 
 
