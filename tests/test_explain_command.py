@@ -19,7 +19,7 @@ def rig(tmp_path_factory):
     folder = tmp_path_factory.mktemp('rig')
     save_plant(PLANT, folder / 'plant.yaml')
     write_short_bag(folder / 'sound')
-    stop = one_joint(EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.4}))
+    stop = one_joint(EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.12}))
     write_short_bag(folder / 'stopped.mcap', stop, seed=2)
     return folder
 
@@ -39,7 +39,7 @@ def test_a_stop_is_named_shown_and_exported(rig, tmp_path, capsys):
     (effect,) = report['effects']
     assert effect['id'] == 'joint_stop'
     angle = effect['parameters']['angle_rad']
-    assert angle['value'] == pytest.approx(0.4, rel=0.05)
+    assert angle['value'] == pytest.approx(0.12, rel=0.05)
     wire = 'wires/measured_js:wire_x_pos'
     for fit in (report['fit'], report['fit']['validation']):
         assert fit['augmented'][wire]['rmse_over_noise'] < 1.15
