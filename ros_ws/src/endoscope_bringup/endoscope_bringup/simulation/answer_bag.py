@@ -26,7 +26,8 @@ from endoscope_core.physics.on_stamps import (
     AnswerStamps,
     answer_commands,
 )
-from endoscope_core.physics.recording import TOPICS, recording_faults
+from endoscope_core.physics.recording import recording_faults
+from endoscope_core.physics.samples import TOPICS
 from endoscope_core.physics.simulator import TICK
 
 MOTOR_TOPIC = 'motor/measured_js'

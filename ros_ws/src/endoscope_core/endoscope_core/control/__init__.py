@@ -13,7 +13,7 @@ from endoscope_core.control.feedforward import (
     FeedforwardSettings,
 )
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
-from endoscope_core.control.physical_inverse import PhysicalInverse, PhysicalInverseSettings
+from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
 from endoscope_core.control.recursive_hysteresis import (
@@ -37,7 +37,6 @@ __all__ = [
     'HandleRefusal',
     'HandleSettings',
     'PhysicalInverse',
-    'PhysicalInverseSettings',
     'PhysicalParameters',
     'PlantLearning',
     'PlantLearningSettings',

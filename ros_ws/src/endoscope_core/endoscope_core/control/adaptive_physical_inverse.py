@@ -1,6 +1,7 @@
 """Physical inverse and tracker together: the plant is learnt while it is inverted."""
 
-from endoscope_core.control.physical_inverse import PhysicalInverse, PhysicalInverseSettings
+from endoscope_core.control.motor_limits import MotorLimits
+from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
 
@@ -16,31 +17,40 @@ class AdaptivePhysicalInverse(PhysicalInverse):
     ----------
     parameters : PhysicalParameters
         To begin with.
-    settings : PhysicalInverseSettings, optional
+    limits : MotorLimits, optional
     learning : PlantLearningSettings, optional
     """
 
     def __init__(
         self,
         parameters: PhysicalParameters,
-        settings: PhysicalInverseSettings | None = None,
+        limits: MotorLimits | None = None,
         learning: PlantLearningSettings | None = None,
     ) -> None:
-        super().__init__(parameters, settings)
+        super().__init__(parameters, limits)
         self._learning_settings = learning
-        self._learning = PlantLearning(parameters, self.model, learning)
+        self._learning = PlantLearning(parameters, self.limits.gear, settings=learning)
 
-    def begin(self, direction: float, desired: float, velocity: float, command: float) -> float:
+    def begin(self, direction: float, desired: float, velocity: float) -> float:
         """Start anew with what was learnt; return the command wanted now (rad)."""
-        wanted = super().begin(direction, desired, velocity, command)
-        self._learning = PlantLearning(self.parameters, self.model, self._learning_settings)
+        self.parameters = self._learning.parameters
+        wanted = super().begin(direction, desired, velocity)
+        self._learning = PlantLearning(
+            self.parameters, self.limits.gear, self.shafts, self._learning_settings
+        )
         return wanted
 
     def sent(self, command: float, dt: float) -> None:
         """What went out in the end, in force for `dt` s."""
-        super().sent(command, dt)
         self._learning.sent(command, dt)
 
     def measured(self, age: float, angle: float) -> None:
-        """Take a bending angle (rad) that held `age` s ago."""
-        self.parameters = self._learning.measured(age, angle)
+        """Take a bending angle (rad) that held `age` s ago.
+
+        What was learnt enters where the model's joint is where it shall be. In the middle of a dead
+        zone the command goes on with what was known before: a wider or narrower one has no place
+        for it.
+        """
+        self._learning.measured(age, angle)
+        if self.arrived and self._learning.modelled is not self.parameters:
+            self.take(self._learning.modelled)

@@ -181,7 +181,7 @@ class Feedforward:
         for j, joint in enumerate(self._joints):
             before = joint.inverse.direction
             joint.inverse = self._inverse(j)
-            joint.wanted = joint.inverse.begin(before, joint.desired, joint.velocity, joint.command)
+            joint.wanted = joint.inverse.begin(before, joint.desired, joint.velocity)
             joint.offset = joint.command - joint.wanted
 
     def rebase(self, command: Vector, desired: Vector | None = None) -> None:
@@ -211,7 +211,7 @@ class Feedforward:
         for joint, angle in zip(self._joints, start, strict=True):
             joint.command = angle
             joint.wanted = joint.inverse.begin(
-                joint.inverse.direction, joint.desired, joint.velocity, angle
+                joint.inverse.direction, joint.desired, joint.velocity
             )
             joint.offset = angle - joint.wanted
 
@@ -263,9 +263,9 @@ class Feedforward:
         angles = self._checked('angle', angle)
         for joint, measured in zip(self._joints, angles, strict=False):
             if isinstance(joint.inverse, AdaptivePhysicalInverse) and not joint.rested:
-                before = joint.inverse.would_want(joint.desired, joint.velocity)
+                before = joint.inverse.command
                 joint.inverse.measured(age, measured)
-                joint.offset += before - joint.inverse.would_want(joint.desired, joint.velocity)
+                joint.offset += before - joint.inverse.command
             joint.rested = True
 
     def _step(self, joint: _Joint, desired: float, velocity: float, dt: float) -> float:
@@ -284,8 +284,7 @@ class Feedforward:
         start = self._start
         for j, (angle, speed) in enumerate(zip(angles, speeds, strict=True)):
             inverse = self._inverse(j)
-            rests_at = angle if start is None else start[j]
-            wanted = inverse.begin(0.0, angle, speed, rests_at)
+            wanted = inverse.begin(0.0, angle, speed)
             command = wanted if start is None else start[j]
             self._joints.append(_Joint(inverse, angle, speed, wanted, command, command - wanted))
 

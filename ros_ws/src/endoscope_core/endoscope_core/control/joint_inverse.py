@@ -17,7 +17,7 @@ class JointInverse(Protocol):
         """Which way the motion has taken, in [-1, 1]; handed on when the mode changes."""
         ...
 
-    def begin(self, direction: float, desired: float, velocity: float, command: float) -> float:
+    def begin(self, direction: float, desired: float, velocity: float) -> float:
         """Start at a desired angle and velocity (rad, rad/s); return the command wanted (rad)."""
         ...
 
@@ -49,7 +49,7 @@ class Passing:
         """Which way the desired motion has taken."""
         return self._direction
 
-    def begin(self, direction: float, desired: float, velocity: float, command: float) -> float:
+    def begin(self, direction: float, desired: float, velocity: float) -> float:
         """Start; the desired angle is wanted."""
         self._direction, self._desired = direction, desired
         return desired
@@ -89,7 +89,7 @@ class HysteresisInverse:
         """Which way the desired motion has taken."""
         return self._inverse.direction
 
-    def begin(self, direction: float, desired: float, velocity: float, command: float) -> float:
+    def begin(self, direction: float, desired: float, velocity: float) -> float:
         """Start with the memory that `direction` says."""
         self._foreseen.value = desired + self._lead * velocity
         self._inverse = inverse_of(self._parameters, direction, self._foreseen.value)

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.control.physical_inverse import InternalModel
+from endoscope_core.control.internal_model import (
+    TICK,
+    TurningPoints,
+    go_through_shafts,
+    packed_joint,
+    turn_all,
+)
 from endoscope_core.control.physical_parameters import PhysicalParameters
+from endoscope_core.physics.description import JointParameters
+from endoscope_core.physics.layout import INPUTS, JOINT
+from endoscope_core.physics.packing import rest_state
+from endoscope_core.physics.servo import transition
 
 Array = NDArray[np.float64]
 
@@ -22,6 +33,9 @@ LEARNT = {
     'joint_stiffness': 0.1,
 }
 """What is learnt, and the standard deviation of its logarithm before anything was measured."""
+
+NOTABLE = 2e-3
+"""Change of the logarithm of a parameter for which the models are set up anew."""
 
 _STRAIGHTEST, _MOST_BENT = 0.02, 4.5
 
@@ -60,19 +74,32 @@ class PlantLearningSettings:
 class PlantLearning:
     """Recursive prediction-error estimator of one joint (Ljung 1999, section 11.4).
 
-    The internal model predicts the tip; copies with one parameter moved by 2 % each give the
-    sensitivities; the update is that of recursive least squares with a prior and a random walk of
-    the capstan exponent instead of forgetting, so that what motion does not excite is kept. After
-    several surprises in a row the exponent's variance returns to the prior (covariance resetting,
-    Goodwin and Sin 1984, section 3.3): the tube has been bent.
+    A model of the plant behind its servo predicts the tip; copies with one parameter moved by 2 %
+    each give the sensitivities; the update is that of recursive least squares with a prior and a
+    random walk of the capstan exponent instead of forgetting, so that what motion does not excite
+    is kept. With every notable change of the estimates all copies go through the shaft's turning
+    points again, so that each is where its plant would be by now. After several surprises in a row
+    the exponent's variance returns to the prior (covariance resetting, Goodwin and Sin 1984,
+    section 3.3): the tube has been bent.
 
     Parameters
     ----------
     parameters : PhysicalParameters
         To begin with.
-    model : InternalModel
-        Of these parameters, in its present state; goes on as the predictor.
+    gear : float
+        Shaft angle for one radian of a command.
+    shafts : sequence of float
+        Turning points of the shaft so far, from rest at zero to where it is, rad.
     settings : PlantLearningSettings, optional
+
+    Attributes
+    ----------
+    parameters : PhysicalParameters
+        As estimated.
+    modelled : PhysicalParameters
+        As last set up in the models, which follow the estimates by notable steps.
+    resets : int
+        How often the tube was taken to have changed.
     """
 
     _STEP = 0.02
@@ -82,7 +109,8 @@ class PlantLearning:
     def __init__(
         self,
         parameters: PhysicalParameters,
-        model: InternalModel,
+        gear: float,
+        shafts: Sequence[float] = (0.0,),
         settings: PlantLearningSettings | None = None,
     ) -> None:
         self.settings = settings or PlantLearningSettings()
@@ -93,10 +121,16 @@ class PlantLearning:
         self._prior = np.array(list(LEARNT.values())) ** 2
         self._logs = np.zeros(len(LEARNT))
         self.covariance = np.diag(self._prior)
-        self._model = model
-        self._shifted = [
-            model.copy_as(self._scaled(self._step_of(i))) for i in range(len(self._names))
-        ]
+        self._gear = gear
+        self._turns = TurningPoints(shafts)
+        self._speed = 0.0
+        rows = [packed_joint(joint) for joint in self._joints()]
+        self._packed, self._on = (np.array(column) for column in zip(*rows, strict=True))
+        self._models = rest_state(self._packed, self._on, TICK)
+        self._inputs = np.zeros(INPUTS)
+        self.modelled = parameters
+        self._modelled_logs = self._logs
+        self._go_through_turns()
         self._time = 0.0
         self._last = -math.inf
         self._history: deque[tuple[float, Array]] = deque()
@@ -104,13 +138,23 @@ class PlantLearning:
         self._last_reset = -math.inf
         self._unexplained = 1.0
 
+    @property
+    def tip(self) -> float:
+        """Bending angle predicted for now, rad."""
+        return float(self._models[0][0, JOINT])
+
     def sent(self, command: float, dt: float) -> None:
-        """Advance the copies by a command (rad) in force for `dt` s, after the predictor itself."""
-        for shifted in self._shifted:
-            shifted.advance(command, dt)
+        """Advance the models by a command (rad) in force for `dt` s."""
+        joint = self._first.joint
+        goal = self._gear * command
+        a11, a12, a21, a22 = transition(joint.motor_bandwidth, joint.motor_damping_ratio, dt)
+        behind = self._turns.values[-1] - goal
+        shaft = goal + a11 * behind + a12 * self._speed
+        self._speed = a21 * behind + a22 * self._speed
+        self._turns.follow(shaft)
+        turn_all(*self._models, self._packed, self._on, self._inputs, shaft, dt)
         self._time += dt
-        tips = np.array([self._model.tip, *(shifted.tip for shifted in self._shifted)])
-        self._history.append((self._time, tips))
+        self._history.append((self._time, self._models[0][:, JOINT].copy()))
         while self._history[0][0] < self._time - self._HISTORY:
             self._history.popleft()
 
@@ -179,20 +223,31 @@ class PlantLearning:
         self._logs = np.clip(self._logs, low, high)
 
     def _take(self) -> None:
-        self.parameters = self._scaled(self._logs)
-        self._model.change_joint(self.parameters.joint)
-        for i, shifted in enumerate(self._shifted):
-            shifted.change_joint(self._scaled(self._logs + self._step_of(i)).joint)
+        self.parameters = PhysicalParameters(self._scaled(self._logs))
+        if np.max(np.abs(self._logs - self._modelled_logs)) < NOTABLE:
+            return
+        self.modelled, self._modelled_logs = self.parameters, self._logs
+        self._packed[:] = [packed_joint(joint)[0] for joint in self._joints()]
+        self._go_through_turns()
+
+    def _go_through_turns(self) -> None:
+        path = np.array(self._turns.values)
+        go_through_shafts(*self._models, self._packed, self._on, self._inputs, path)
+
+    def _joints(self) -> list[JointParameters]:
+        """The joint as estimated, and one for each parameter that is moved."""
+        moved = [self._scaled(self._logs + self._step_of(i)) for i in range(len(self._names))]
+        return [self._scaled(self._logs), *moved]
 
     def _step_of(self, number: int) -> Array:
         step = np.zeros(len(self._names))
         step[number] = self._STEP
         return step
 
-    def _scaled(self, logs: Array) -> PhysicalParameters:
+    def _scaled(self, logs: Array) -> JointParameters:
         first = self._first.joint
         changes = {
             name: getattr(first, name) * math.exp(log)
             for name, log in zip(self._names, logs.tolist(), strict=True)
         }
-        return replace(self._first, joint=replace(first, **changes))
+        return replace(first, **changes)

@@ -13,7 +13,7 @@ from endoscope_core.dataset.calibration_recording import CalibrationRecording, r
 from endoscope_core.dataset.rig_variation import (
     TubeConfiguration,
     configuration_of_size,
-    random_rig,
+    random_instrument,
 )
 
 __all__ = [
@@ -26,7 +26,7 @@ __all__ = [
     'is_dataset',
     'load_dataset',
     'make_dataset',
-    'random_rig',
+    'random_instrument',
     'record_calibration',
     'save_dataset',
 ]

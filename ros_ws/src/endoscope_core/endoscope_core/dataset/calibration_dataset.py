@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from endoscope_core.atomic_output import atomic_directory
 from endoscope_core.dataset.calibration_recording import record_calibration
 from endoscope_core.dataset.rig_variation import (
-    GREATEST_EVENNESS,
+    GREATEST_UNEVENNESS,
     TubeConfiguration,
     configuration_of_size,
-    random_rig,
+    random_instrument,
 )
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.signals import SINUSOID, calibration_motion
@@ -139,7 +139,7 @@ def make_dataset(
         'configuration': np.arange(total, dtype=np.int64),
     }
     manifest = {
-        'schema': 2,
+        'schema': 3,
         'motion': motion,
         'seed': seed,
         'per_class': per_class,
@@ -151,8 +151,8 @@ def make_dataset(
                 'configuration': k,
                 'class_deg': classes[k],
                 'backlash_size': configuration.backlash_size,
-                'capstan_exponent': configuration.exponent,
-                'curvature_evenness': configuration.evenness,
+                'bend': configuration.bend,
+                'unevenness': configuration.unevenness,
                 'joints': {
                     name: asdict(joint) for name, joint in configuration.plant.joints.items()
                 },
@@ -212,12 +212,12 @@ def load_dataset(folder: str | Path) -> CalibrationDataset:
 
 def _draw(generator: np.random.Generator, class_deg: int) -> TubeConfiguration:
     size = np.deg2rad(class_deg + SIZE_SPREAD_DEG * generator.uniform(-1.0, 1.0))
-    evenness = float(generator.uniform(0.0, GREATEST_EVENNESS))
+    unevenness = float(generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS))
     for _ in range(_MOST_RIGS):
-        configuration = configuration_of_size(random_rig(generator), float(size), evenness)
+        configuration = configuration_of_size(random_instrument(generator), float(size), unevenness)
         if configuration is not None:
             return configuration
-    raise DatasetError(f'no rig of {_MOST_RIGS} reaches a backlash size of {class_deg} deg')
+    raise DatasetError(f'no instrument of {_MOST_RIGS} reaches a backlash size of {class_deg} deg')
 
 
 def _arrays_hash(arrays: dict[str, NDArray[Any]]) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.dataset.rig_variation import calibration_command
-from endoscope_core.plant import PlantDescription, SensorModel, simulate
+from endoscope_core.physics import PlantDescription, SensorModel, simulate
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
 
 

@@ -1,27 +1,27 @@
-"""Rigs as they come out of the workshop, in tubes as a patient bends them."""
+"""Instruments as they come out of the workshop, in tubes as a patient bends them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from endoscope_core.effects import distributed_friction
 from endoscope_core.metrics import width_at_mid_height
-from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription, simulate
+from endoscope_core.physics import PlantDescription, simulate
+from endoscope_core.physics.family import TubeFamily, shipped_family
+from endoscope_core.rig import load_rig
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
 
 JOINTS = ('bend_x', 'bend_y')
-SMALLEST_EXPONENT = 0.02
-USUAL_EXPONENT = 2.5
-# From somewhat more on the sinusoid no longer drags every joint round a closed loop.
-GREATEST_EXPONENT = 3.0
+MOST_BENT = float(np.deg2rad(360.0))
+"""Sum of all bends of the tube in rad; beyond the recordings' 240 deg the family is continued."""
 
-# Half-widths of uniform relative spreads from instrument to instrument, by manufacture and wear.
 RELATIVE_SPREAD = {
+    'capstan_exponent': 0.5,
     'wire_stiffness': 0.10,
     'joint_radius': 0.01,
-    'presliding_distance': 0.20,
+    'pulley_radius': 0.01,
     'joint_stiffness': 0.10,
     'joint_damping': 0.15,
     'joint_friction': 0.10,
@@ -29,34 +29,57 @@ RELATIVE_SPREAD = {
     'motor_bandwidth': 0.05,
     'motor_damping_ratio': 0.05,
 }
-# The joints of one instrument are made alike: they share all but this part of its spread.
+"""Half-widths of uniform relative spreads from instrument to instrument, by manufacture and wear.
+
+Friction of a wire in its sheath goes from that of a fresh lubricant to that of a dry one."""
+
 JOINT_SHARE = 0.2
-# So much that the tensions of one rig in tubes of like hysteresis differ by 0.05, 0.15 and 0.4 N
-# rms at 54, 85 and 105 deg, where the first paper has about 0.2 N (Table 1).
-GREATEST_EVENNESS = 0.25
+"""The joints of one instrument are made alike: they share all but this part of its spread."""
 PRETENSION_DEVIATION = 0.1
-EXPONENT_SPREAD = 0.02
+TIGHTENING_SPREAD = 0.1
+GREATEST_UNEVENNESS = 0.4
+"""Half-width of the first coefficient of the friction profile: where along its length the tube is
+bent; at the end, friction is twice what it is at the motor."""
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """How an instrument differs from the one that was recorded.
+
+    Attributes
+    ----------
+    factors : Mapping
+        For each joint, factors on its parameters by their names.
+    pretension : Mapping
+        For each joint, what its wires are tighter by, N.
+    tightening : Mapping
+        For each joint, what its pretension profile is higher by.
+    """
+
+    factors: Mapping[str, Mapping[str, float]]
+    pretension: Mapping[str, float]
+    tightening: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class TubeConfiguration:
-    """A rig in a tube of a certain shape.
+    """An instrument in a tube of a certain shape.
 
-    Parameters
+    Attributes
     ----------
     plant : PlantDescription
-        Both joints, with the capstan exponent that the shape gives.
-    exponent : float
-        Capstan exponent of the tube; each joint's own lies within 2 % of it.
-    evenness : float
-        How evenly the curvature is spread over the tube's segments, see `in_tube`.
+        Both joints.
+    bend : float
+        Sum of the tube's bends, rad.
+    unevenness : float
+        Where the tube is bent: what the first coefficient of the friction profile is higher by.
     joint_sizes : tuple of float
         Backlash size of each joint in rad under the calibration sinusoid.
     """
 
     plant: PlantDescription
-    exponent: float
-    evenness: float
+    bend: float
+    unevenness: float
     joint_sizes: tuple[float, ...]
 
     @property
@@ -65,56 +88,60 @@ class TubeConfiguration:
         return float(np.mean(self.joint_sizes))
 
 
-def random_rig(generator: np.random.Generator) -> PlantDescription:
-    """Two joints whose every parameter is off by what manufacture, wear and handling give.
+def random_instrument(generator: np.random.Generator) -> Instrument:
+    """An instrument that is off by what manufacture, wear and handling give.
 
     The relative spreads are `RELATIVE_SPREAD`, uniform, four fifths of each common to both joints;
-    pretension is set by hand to 5 N with a
-    standard deviation of 0.1 N. The pulley radius is kept with the joint radius, so that the gear
-    is the one that the controller knows. The capstan exponent of each joint is a factor near one
-    here, to be multiplied with the tube's.
+    pretension is set by hand with a standard deviation of 0.1 N.
     """
-    nominal = JointParameters()
     common = {key: generator.uniform(-1.0, 1.0) for key in RELATIVE_SPREAD}
-    joints = {}
-    for name in JOINTS:
-        changes = {
-            key: getattr(nominal, key)
-            * (
-                1.0
-                + spread
-                * ((1.0 - JOINT_SHARE) * common[key] + JOINT_SHARE * generator.uniform(-1.0, 1.0))
-            )
-            for key, spread in RELATIVE_SPREAD.items()
-        }
-        changes['pulley_radius'] = changes['joint_radius'] / nominal.gear
-        changes['pretension'] = nominal.pretension + PRETENSION_DEVIATION * generator.normal()
-        changes['capstan_exponent'] = 1.0 + EXPONENT_SPREAD * generator.uniform(-1.0, 1.0)
-        joints[name] = replace(nominal, **changes)
-    return PlantDescription(joints=joints)
+    own = {name: {key: generator.uniform(-1.0, 1.0) for key in RELATIVE_SPREAD} for name in JOINTS}
+    return Instrument(
+        {
+            name: {
+                key: 1.0 + spread * ((1.0 - JOINT_SHARE) * common[key] + JOINT_SHARE * each[key])
+                for key, spread in RELATIVE_SPREAD.items()
+            }
+            for name, each in own.items()
+        },
+        {name: PRETENSION_DEVIATION * generator.normal() for name in JOINTS},
+        {name: TIGHTENING_SPREAD * generator.uniform(-1.0, 1.0) for name in JOINTS},
+    )
 
 
-def in_tube(rig: PlantDescription, exponent: float, evenness: float = 0.0) -> PlantDescription:
-    """A rig of `random_rig` in a tube.
+def in_tube(
+    instrument: Instrument,
+    bend: float,
+    unevenness: float = 0.0,
+    family: TubeFamily | None = None,
+) -> PlantDescription:
+    """An instrument in a tube.
 
     Parameters
     ----------
-    rig : PlantDescription
-    exponent : float
-        Capstan exponent, the friction coefficient times the sum of all bends of the tube.
-    evenness : float
-        Share of the bends that is spread evenly over eight segments of the tube; the rest is at
-        its two ends. 0 is the nominal plant's transmission.
+    instrument : Instrument
+    bend : float
+        Sum of the tube's bends, rad.
+    unevenness : float
+        See `TubeConfiguration`.
+    family : TubeFamily, optional
+        The shipped one if not given.
     """
-    joints = {
-        name: replace(joint, capstan_exponent=exponent * joint.capstan_exponent)
-        for name, joint in rig.joints.items()
-    }
-    along: tuple[EffectSpec, ...] = ()
-    if evenness > 0.0:
-        identity = distributed_friction.DEFINITION.id
-        along = tuple(EffectSpec(identity, name, {'share': evenness}) for name in joints)
-    return replace(rig, joints=joints, effects=(*rig.effects, *along))
+    joint = (family or shipped_family()).joint(bend)
+    profile = joint.friction_profile or (0.0,)
+    joints = {}
+    for name, factors in instrument.factors.items():
+        scaled = {key: getattr(joint, key) * factor for key, factor in factors.items()}
+        joints[name] = replace(
+            joint,
+            pretension=joint.pretension + instrument.pretension[name],
+            pretension_profile=min(
+                1.0, max(-1.0, joint.pretension_profile + instrument.tightening[name])
+            ),
+            friction_profile=(profile[0] + unevenness, *profile[1:]),
+            **scaled,
+        )
+    return PlantDescription(joints=joints)
 
 
 def calibration_command(
@@ -126,8 +153,7 @@ def calibration_command(
     """
     motion = motion or calibration_motion()
     angle, _ = motion.signal(np.arange(motion.samples) / CALIBRATION_RATE)
-    gears = np.array([joint.gear for joint in plant.joints.values()])
-    return angle[:, None] * gears
+    return np.repeat(load_rig().joints.gear * angle[:, None], len(plant.joints), axis=1)
 
 
 def backlash_sizes(plant: PlantDescription) -> NDArray[np.float64]:
@@ -141,24 +167,21 @@ def backlash_sizes(plant: PlantDescription) -> NDArray[np.float64]:
 
 
 def configuration_of_size(
-    rig: PlantDescription, size: float, evenness: float = 0.0
+    instrument: Instrument, size: float, unevenness: float = 0.0
 ) -> TubeConfiguration | None:
     """Bend the tube until the mean backlash size of both joints is `size` (rad).
 
     Returns
     -------
     TubeConfiguration or None
-        None where no tube, straight or bent, gives this rig that size.
+        None where no tube, straight or bent, gives this instrument that size.
     """
 
-    def excess(exponent: float) -> float:
-        return float(np.mean(backlash_sizes(in_tube(rig, exponent, evenness)))) - size
+    def excess(bend: float) -> float:
+        return float(np.mean(backlash_sizes(in_tube(instrument, bend, unevenness)))) - size
 
-    between = (SMALLEST_EXPONENT, USUAL_EXPONENT)
-    if excess(USUAL_EXPONENT) < 0.0:
-        between = (USUAL_EXPONENT, GREATEST_EXPONENT)
-    if excess(between[0]) > 0.0 or excess(between[1]) < 0.0:
+    if excess(0.0) > 0.0 or excess(MOST_BENT) < 0.0:
         return None
-    exponent = float(brentq(excess, *between, xtol=1e-4, rtol=1e-4))
-    plant = in_tube(rig, exponent, evenness)
-    return TubeConfiguration(plant, exponent, evenness, tuple(backlash_sizes(plant).tolist()))
+    bend = float(brentq(excess, 0.0, MOST_BENT, xtol=1e-4, rtol=1e-4))
+    plant = in_tube(instrument, bend, unevenness)
+    return TubeConfiguration(plant, bend, unevenness, tuple(backlash_sizes(plant).tolist()))

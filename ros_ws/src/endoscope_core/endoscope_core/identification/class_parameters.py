@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,12 @@ from endoscope_core.dataset import CalibrationDataset
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.feedforward_fit import FeedforwardFit, fit_feedforward
 from endoscope_core.identification.hysteresis_fit import ModelFit, Recording, fit_model
-from endoscope_core.identification.parameter_blend import KINDS, PHYSICAL, LawParameters
+from endoscope_core.identification.parameter_blend import (
+    KINDS,
+    PHYSICAL,
+    LawParameters,
+    blend_joints,
+)
 from endoscope_core.identification.plant_fit import fit_plant
 from endoscope_core.identification.servo_lag import Servo
 from endoscope_core.identification.updated_table import (
@@ -22,7 +27,6 @@ from endoscope_core.identification.updated_table import (
     parameters_to_dict,
     shipped_table_path,
 )
-from endoscope_core.plant import JointParameters
 from endoscope_core.signals import CALIBRATION_RATE
 
 PLANT_SAMPLES = 3500
@@ -135,13 +139,14 @@ def _plant_of_class(
         for k in chosen.tolist()
         for j in range(dataset.tension.shape[2] // 2)
     ]
-    logs = np.mean([np.log(astuple(fit.parameters.joint)) for fit in fits], axis=0)
-    evenness = float(np.mean([fit.parameters.evenness for fit in fits]))
-    mean = PhysicalParameters(JointParameters(*np.exp(logs).tolist()), evenness)
+    joint = fits[0].parameters.joint
+    for number, fit in enumerate(fits[1:], start=2):
+        joint = blend_joints(joint, fit.parameters.joint, 1.0 / number)
+    mean = PhysicalParameters(joint)
     rmse = float(np.mean([fit.tension_rmse for fit in fits]))
     line = (
         f'class {class_deg}: plant, {rmse:.3f} N rms of its own recordings, capstan exponent '
-        f'{mean.joint.capstan_exponent:.3f}'
+        f'{joint.capstan_exponent:.3f}'
     )
     return ClassIdentification(class_deg, mean, mean, rmse), line
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import astuple
+from itertools import zip_longest
 
 from endoscope_core.control.feedforward import PHYSICAL, LawParameters
 from endoscope_core.control.physical_parameters import PhysicalParameters
@@ -15,7 +15,8 @@ from endoscope_core.hysteresis import (
     PrandtlIshlinskiiParameters,
 )
 from endoscope_core.hysteresis.inverse import MODELS
-from endoscope_core.plant import JointParameters
+from endoscope_core.physics import JointParameters
+from endoscope_core.physics.layout import NOMINAL_KEYS
 
 KINDS: dict[str, type[LawParameters]] = {**MODELS, PHYSICAL: PhysicalParameters}
 """Kind of parameters by the name of the model; 'physical' is the plant itself."""
@@ -70,16 +71,21 @@ def blend(first: LawParameters, second: LawParameters, weight: float) -> LawPara
             _between((first.offset,), (second.offset,), weight)[0],
         )
     if isinstance(first, PhysicalParameters) and isinstance(second, PhysicalParameters):
-        numbers = [
-            _geometric(a, b, weight)
-            for a, b in zip(astuple(first.joint), astuple(second.joint), strict=True)
-        ]
-        evenness = _between((first.evenness,), (second.evenness,), weight)[0]
-        return PhysicalParameters(JointParameters(*numbers), evenness)
+        return PhysicalParameters(blend_joints(first.joint, second.joint, weight))
     raise ValueError(f'{type(first).__name__} and {type(second).__name__} cannot be blended')
 
 
 Point = tuple[float, ...]
+
+
+def blend_joints(first: JointParameters, second: JointParameters, weight: float) -> JointParameters:
+    """Joint at `weight` in [0, 1] of the way between two, by the logarithms of its parameters."""
+    blended = {
+        key: _geometric(getattr(first, key), getattr(second, key), weight) for key in NOMINAL_KEYS
+    }
+    pairs = zip_longest(first.friction_profile, second.friction_profile, fillvalue=0.0)
+    profile = tuple(a + weight * (b - a) for a, b in pairs)
+    return JointParameters(**blended, friction_profile=profile)
 
 
 def _between(first: Point, second: Point, weight: float) -> list[float]:

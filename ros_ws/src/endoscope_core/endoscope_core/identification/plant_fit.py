@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
 from endoscope_core.control.physical_parameters import PhysicalParameters
-from endoscope_core.effects import distributed_friction
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription, simulate
+from endoscope_core.physics import JointParameters, PlantDescription, simulate
+from endoscope_core.rig import load_rig
 
 Array = NDArray[np.float64]
 
@@ -20,9 +20,7 @@ FITTED = {
     'capstan_exponent': 1.0,
     'pretension': 0.05,
     'wire_stiffness': 0.1,
-    'presliding_distance': 0.2,
     'joint_stiffness': 0.1,
-    'joint_damping': 0.15,
     'joint_friction': 0.1,
     'joint_presliding': 0.15,
 }
@@ -31,12 +29,13 @@ FITTED = {
 TENSION_SCALE = 0.05
 BENDING_SCALE = float(np.deg2rad(0.5))
 EXPONENT_BOUNDS = (0.02, 4.5)
-EVENNESS_PRIOR = (0.4, 0.4)
+SHAPED = {'pretension_profile': 0.15, 'friction_profile': 0.3}
+"""What is fitted as it is: how the wires were tightened, and where along the sheath friction is."""
 CALIBRATION_SAMPLES_NEEDED = 3500
 _STARTS = (0.25, 0.6, 1.0, 1.5, 2.1)
-_SCORED_EVERY = 10
-_TICK = 1.0e-3
-_SUBSTEPS = 3
+_SAMPLES_A_TICK = 5
+_TICK = 5.0e-3
+_SCORED_EVERY = 2
 _SHORTEST = 1000
 _SMALLEST_MOTION = float(np.deg2rad(20.0))
 _JOINT = 'bend_x'
@@ -75,9 +74,9 @@ def fit_plant(
 ) -> PlantFit:
     """Fit the nominal plant of one joint to a motion from rest, sampled at 1 kHz.
 
-    The tensions at the motor hold the friction and, through it, the tip: ``Ta exp(phi z / 2)`` and
-    ``Tb exp(-phi z / 2)`` with ``Ta + Tb = 2 T0`` give `phi`, and then ``Ta - T0 = k r (m - q)``
-    the tip angle. All nine parameters enter through the simulation: bounded trust-region least
+    The tensions at the motor hold the friction and, through it, the tip: how they rise and fall at
+    a reversal shows the exponent and the wire's stiffness, where they stop rising the joint begins
+    to move. All parameters enter through the simulation: bounded trust-region least
     squares (Branch, Coleman and Li 1999) on their logarithms, with priors of the width that
     `FITTED` says, from the best of five capstan exponents. It is deterministic; the optimum is
     smooth and single once the exponent is near, which a genetic algorithm would find a hundred
@@ -104,40 +103,46 @@ def fit_plant(
     first = start or JointParameters()
     names = tuple(FITTED)
     spreads = np.array([FITTED[name] for name in names])
-    rows = slice(None, None, _SCORED_EVERY)
+    shapes = np.array(list(SHAPED.values()))
+    gear = load_rig().joints.gear
+    ticks = len(u) // _SAMPLES_A_TICK
+    held = gear * u[: ticks * _SAMPLES_A_TICK].reshape(ticks, -1).mean(axis=1)
+    scored = slice(None, None, _SCORED_EVERY)
+    rows = slice(None, ticks * _SAMPLES_A_TICK, _SAMPLES_A_TICK * _SCORED_EVERY)
     seen = np.isfinite(angle[rows])
 
     def physical(x: Array) -> PhysicalParameters:
-        factors = np.exp(x[:-1]).tolist()
+        factors = np.exp(x[: len(names)]).tolist()
         scaled = {n: getattr(first, n) * f for n, f in zip(names, factors, strict=True)}
-        return PhysicalParameters(replace(first, **scaled), float(x[-1]))
+        tight = min(1.0, max(-1.0, first.pretension_profile + float(x[-2])))
+        profile = (float(x[-1]), *first.friction_profile[1:])
+        joint = replace(first, pretension_profile=tight, friction_profile=profile, **scaled)
+        return PhysicalParameters(joint)
 
     def misfits(x: Array) -> tuple[Array, Array]:
-        parameters = physical(x)
-        along = EffectSpec(
-            distributed_friction.DEFINITION.id, _JOINT, {'share': parameters.evenness}
-        )
-        effects = (along,) if parameters.evenness > 0.0 else ()
-        plant = PlantDescription(joints={_JOINT: parameters.joint}, effects=effects)
-        made = simulate(plant, (u * first.gear)[:, None], _TICK, _SUBSTEPS)
-        wires_off = (made.tension[rows, 0] - wires[rows]).ravel()
-        return wires_off, (made.bending_true[rows, 0] - angle[rows])[seen]
+        plant = PlantDescription(joints={_JOINT: physical(x).joint})
+        made = simulate(plant, held[:, None], _TICK)
+        wires_off = (made.tension[scored, 0] - wires[rows]).ravel()
+        return wires_off, (made.bending_true[scored, 0] - angle[rows])[seen]
+
+    expected = np.zeros(len(names) + len(SHAPED))
+    expected[-1] = first.friction_profile[0] if first.friction_profile else 0.0
 
     def residuals(x: Array) -> Array:
         wires_off, angle_off = misfits(x)
-        unlikely = np.append(x[:-1] / spreads, (x[-1] - EVENNESS_PRIOR[0]) / EVENNESS_PRIOR[1])
+        unlikely = (x - expected) / np.concatenate([spreads, shapes])
         return np.concatenate([wires_off / TENSION_SCALE, angle_off / BENDING_SCALE, unlikely])
 
     tried = []
     for exponent in _STARTS:
-        x = np.zeros(len(names) + 1)
+        x = expected.copy()
         x[0] = np.log(exponent / max(first.capstan_exponent, 1e-3))
         tried.append(x)
     begin = min(tried, key=lambda x: float(np.sum(residuals(x)[: -len(x)] ** 2)))
-    begin[-1] = EVENNESS_PRIOR[0]
     reach = np.log(np.array(EXPONENT_BOUNDS) / max(first.capstan_exponent, 1e-3))
-    low = np.concatenate(([reach[0]], -3.0 * spreads[1:], [0.0]))
-    high = np.concatenate(([reach[1]], 3.0 * spreads[1:], [1.0]))
+    wide = expected[1:] + 3.0 * np.concatenate([spreads[1:], shapes])
+    narrow = 2.0 * expected[1:] - wide
+    low, high = np.append(reach[0], narrow), np.append(reach[1], wide)
     found = least_squares(
         residuals, begin, bounds=(low, high), diff_step=1e-3, xtol=1e-4, ftol=1e-4, max_nfev=15
     )
@@ -146,7 +151,7 @@ def fit_plant(
         physical(found.x),
         float(np.sqrt(np.mean(wires_off**2))),
         float(np.sqrt(np.mean(angle_off**2))) if angle_off.size else None,
-        len(tried) + int(found.nfev) * (2 + len(names)),
+        len(tried) + int(found.nfev) * (1 + len(begin)),
     )
 
 

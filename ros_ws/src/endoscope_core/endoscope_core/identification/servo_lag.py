@@ -7,13 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
+from endoscope_core.physics import JointParameters
+
 
 @dataclass(frozen=True)
 class Servo:
     """Bandwidth in rad/s and damping ratio of the position loop."""
 
-    bandwidth: float = 60.0
-    damping_ratio: float = 0.9
+    bandwidth: float = JointParameters.motor_bandwidth
+    damping_ratio: float = JointParameters.motor_damping_ratio
 
     @property
     def lag(self) -> float:

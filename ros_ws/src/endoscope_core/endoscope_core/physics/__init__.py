@@ -7,7 +7,8 @@ from endoscope_core.physics.description import (
     SensorParameters,
 )
 from endoscope_core.physics.plant_file import PlantFileError, load_plant, save_plant
-from endoscope_core.physics.recording import RecordingFaults, recording_faults
+from endoscope_core.physics.recording import recording_faults
+from endoscope_core.physics.samples import RecordingFaults
 from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import (
     PlantSample,

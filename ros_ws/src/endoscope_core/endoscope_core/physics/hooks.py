@@ -6,12 +6,13 @@ fold: the value goes *through* all of them; their results are *factors*, or *ter
 *least* counts; or all are *called* for what they do to the states.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
 from endoscope_core.physics.effect import Effect
+from endoscope_core.physics.samples import RecordingFaults
 
 
 class Fold(StrEnum):
@@ -113,6 +114,23 @@ HOOKS = (
 Function = Callable[..., Any]
 LINKS: dict[str, list[tuple[Effect, Function]]] = {each.name: [] for each in HOOKS}
 """Effects and their functions by the hook's name, in no order."""
+
+
+ON_SAMPLES: dict[str, Callable[[Mapping[str, float], int], RecordingFaults]] = {}
+"""What effects do to samples and not to the rig: from the values of the parameters by their names
+and the joint's column to faults, by the effect's id."""
+
+
+def on_samples(
+    effect: Effect,
+) -> Callable[[Callable[[Mapping[str, float], int], RecordingFaults]], Function]:
+    """Link what an effect does to samples; a decorator that gives the function back."""
+
+    def link(function: Callable[[Mapping[str, float], int], RecordingFaults]) -> Function:
+        ON_SAMPLES[effect.id] = function
+        return function
+
+    return link
 
 
 def hook(effect: Effect, at: Hook) -> Callable[[Function], Function]:

@@ -43,6 +43,23 @@ _FIRST_STEP = 1e-14
 
 
 @compiled
+def stiffness_on_the_way(
+    x: Array, wire: int, table: Array, p: Array, on: Flags, way: float
+) -> float:
+    """Stiffness in N/m of a wire that is about to be stretched by `way` m, in the middle of that.
+
+    At its beginning it would be too small on every way out and too large on every way back, and
+    tension would leak away with every cycle.
+    """
+    stiffness = p[WIRE_STIFFNESS]
+    if not stiffness_varies(on):
+        return stiffness
+    tension = mean_tension(x, wire, table) - x[FLOOR]
+    middle = tension + 0.5 * way * stiffness * stiffness_factor(on, p, x, tension)
+    return stiffness * stiffness_factor(on, p, x, max(0.0, middle))
+
+
+@compiled
 def _slide(slide: float, step: float, presliding: float) -> tuple[float, float]:
     """Dahl state after a step, and its slope by the step."""
     way = 1.0 if step >= 0.0 else -1.0
@@ -174,10 +191,10 @@ def bend(
     time, tick : float
         Middle of the tick and its length, s.
     """
-    stiff_a = stiff_b = p[WIRE_STIFFNESS]
-    if stiffness_varies(on):
-        stiff_a *= stiffness_factor(on, p, x, mean_tension(x, WIRE_A, table) - x[FLOOR])
-        stiff_b *= stiffness_factor(on, p, x, mean_tension(x, WIRE_B, table) - x[FLOOR])
+    # The way at the joint is not known yet: it will be much like the last one.
+    ahead = p[JOINT_RADIUS] * x[JOINT_STEP]
+    stiff_a = stiffness_on_the_way(x, WIRE_A, table, p, on, -ahead)
+    stiff_b = stiffness_on_the_way(x, WIRE_B, table, p, on, ahead)
     shift = end_length(on, p, x, other)
     if shift != x[END_WAY]:
         move(x, WIRE_A, table, JOINT_END, stiff_a * (shift - x[END_WAY]), x[FLOOR])

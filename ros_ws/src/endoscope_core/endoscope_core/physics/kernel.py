@@ -10,7 +10,7 @@ import numpy as np
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics import hooks
 from endoscope_core.physics.folds import acting, folded
-from endoscope_core.physics.joint import bend
+from endoscope_core.physics.joint import bend, stiffness_on_the_way
 from endoscope_core.physics.layout import (
     ANGLE_HISTORY,
     CAPSTAN_EXPONENT,
@@ -86,7 +86,6 @@ travel_of = folded(hooks.TRAVEL_OF)
 exponent_factor, exponent_varies = folded(hooks.EXPONENT), acting(hooks.EXPONENT)
 direction_factors = folded(hooks.DIRECTION)
 friction_floor = folded(hooks.FRICTION_FLOOR)
-stiffness_factor, stiffness_varies = folded(hooks.STIFFNESS), acting(hooks.STIFFNESS)
 added_length, length_varies = folded(hooks.LENGTH), acting(hooks.LENGTH)
 tip_angle = folded(hooks.TIP_ANGLE)
 effort_reading = folded(hooks.EFFORT)
@@ -206,14 +205,6 @@ def _change_friction(
 
 
 @compiled
-def _stiffness(x: Array, wire: int, table: Array, p: Array, on: Flags) -> float:
-    if not stiffness_varies(on):
-        return p[WIRE_STIFFNESS]
-    mean = mean_tension(x, wire, table) - x[FLOOR]
-    return p[WIRE_STIFFNESS] * stiffness_factor(on, p, x, mean)
-
-
-@compiled
 def _grow(x: Array, table: Array, p: Array, on: Flags, push: float, time: float) -> None:
     """Give both wires the length that effects have added to them by `time`, and a latent push."""
     for k in range(2):
@@ -221,7 +212,8 @@ def _grow(x: Array, table: Array, p: Array, on: Flags, push: float, time: float)
         length = added_length(on, p, x, k, time) + (push if k == 0 else -push)
         grown = length - x[EXTRA_LENGTH + k]
         if grown != 0.0:
-            lengthen(x, wire, table, _stiffness(x, wire, table, p, on) * grown, x[FLOOR])
+            force = stiffness_on_the_way(x, wire, table, p, on, -grown) * grown
+            lengthen(x, wire, table, force, x[FLOOR])
             x[EXTRA_LENGTH + k] = length
 
 
@@ -239,8 +231,9 @@ def _wind_up(x: Array, table: Array, p: Array, on: Flags, shaft: float) -> float
     for k in range(2):
         wire = WIRE_A if k == 0 else WIRE_B
         travel = travel_a if k == 0 else travel_b
-        force = _stiffness(x, wire, table, p, on) * (travel - x[TRAVEL + k])
-        if force != 0.0:
+        way = travel - x[TRAVEL + k]
+        if way != 0.0:
+            force = stiffness_on_the_way(x, wire, table, p, on, way) * way
             move(x, wire, table, MOTOR_END, force, x[FLOOR])
     way = 0.5 * (travel_a - x[TRAVEL] - travel_b + x[TRAVEL + 1])
     x[TRAVEL], x[TRAVEL + 1] = travel_a, travel_b

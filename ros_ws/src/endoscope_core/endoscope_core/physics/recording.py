@@ -1,121 +1,12 @@
-"""What clocks and recorder do to a rig's samples: skewed stamps, gaps, single wrong samples.
+"""What a plant's effects do to its recordings, beside what they do to the rig."""
 
-None of this acts on the rig. Whoever makes samples out of the simulated readings, a sensor's node
-or `endoscope simulate`, asks a `RecordingFaults` for stamps, for samples to leave out and for
-samples to spoil. All answers depend on the time of the sample alone: sample by sample or all at
-once makes no difference.
-"""
+import functools
 
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.effects import describe
+from endoscope_core.physics.hooks import ON_SAMPLES
 from endoscope_core.physics.packing import effect_values
-
-Array = NDArray[np.float64]
-
-TOPICS = ('motor', 'wires', 'tracker')
-"""What `recording_gap` counts as topic 0, 1 and 2: `motor/measured_js`, `wires/measured_js`, and
-the tracker's `slave/measured_js` with `tracker/measured_cp`."""
-
-
-@dataclass(frozen=True)
-class Gap:
-    """A stretch of time without samples of one of `TOPICS`, in s since the start."""
-
-    topic: str
-    begin: float
-    duration: float
-
-
-@dataclass(frozen=True)
-class Outliers:
-    """Wrong samples of one joint's column: their share, and by how many rad they are wrong."""
-
-    column: int
-    rate: float
-    size: float
-
-
-@dataclass(frozen=True)
-class RecordingFaults:
-    """The faults of a rig's clocks and recorder.
-
-    Devices are shared by the joints: a skew or a gap given for one joint befalls all.
-
-    Attributes
-    ----------
-    skew : float
-        Relative rate of the tracker's clock, minus one.
-    gaps : tuple of Gap
-    outliers : tuple of Outliers
-    """
-
-    skew: float = 0.0
-    gaps: tuple[Gap, ...] = ()
-    outliers: tuple[Outliers, ...] = ()
-
-    def tracker_stamp(self, time: ArrayLike) -> Array:
-        """What the tracker's clock says at a time, both in s since the start."""
-        return np.asarray(time, dtype=np.float64) * (1.0 + self.skew)
-
-    def tracker_time(self, stamp: ArrayLike) -> Array:
-        """When the tracker's clock says `stamp`, both in s since the start."""
-        return np.asarray(stamp, dtype=np.float64) / (1.0 + self.skew)
-
-    def keeps(self, topic: str, time: ArrayLike) -> NDArray[np.bool_]:
-        """Whether samples of a topic are recorded.
-
-        Parameters
-        ----------
-        topic : str
-            One of `TOPICS`.
-        time : array of any shape
-            In s since the start.
-
-        Returns
-        -------
-        array of bool, shape of `time`
-
-        Raises
-        ------
-        ValueError
-            If there is no such topic.
-        """
-        if topic not in TOPICS:
-            raise ValueError(f'there is no topic {topic}: valid are {", ".join(TOPICS)}')
-        time = np.asarray(time, dtype=np.float64)
-        kept = np.ones(time.shape, dtype=np.bool_)
-        for gap in self.gaps:
-            if gap.topic == topic:
-                kept &= (time < gap.begin) | (time >= gap.begin + gap.duration)
-        return kept
-
-    def spoilt(self, bending: ArrayLike, time: ArrayLike, seed: int = 0) -> Array:
-        """The tracker's angles with the outliers in them.
-
-        Parameters
-        ----------
-        bending : array (N, J) or (J,)
-            In rad.
-        time : array (N,) or float
-            In s since the start; samples less than 1 us apart count as one.
-        seed : int
-            Another seed spoils other samples.
-
-        Returns
-        -------
-        array, shape of `bending`
-        """
-        angles = np.array(bending, dtype=np.float64)
-        microseconds = np.round(np.asarray(time, dtype=np.float64) * 1e6).astype(np.int64)
-        for outlier in self.outliers:
-            chance, side = _drawn(microseconds, seed, outlier.column)
-            wrong = np.where(side < 0.5, -outlier.size, outlier.size)
-            angles[..., outlier.column] += np.where(chance < outlier.rate, wrong, 0.0)
-        return angles
+from endoscope_core.physics.samples import RecordingFaults
 
 
 def recording_faults(plant: PlantDescription) -> RecordingFaults:
@@ -126,40 +17,11 @@ def recording_faults(plant: PlantDescription) -> RecordingFaults:
     ValueError
         If an effect is invalid, or its joints disagree about the tracker's one clock.
     """
-    skews = {float(effect_values(spec)[0]) for spec in _specs(plant, 'clock_skew')}
-    if len(skews) > 1:
-        raise ValueError(
-            'effect clock_skew is given twice with different skew: the tracker has one clock'
-        )
-    gaps = []
-    for spec in _specs(plant, 'recording_gap'):
-        begin, duration, topic = effect_values(spec).tolist()
-        gaps.append(Gap(TOPICS[round(topic)], begin, duration))
     joints = plant.joint_names()
-    outliers = [
-        Outliers(joints.index(spec.joint), *effect_values(spec).tolist())
-        for spec in _specs(plant, 'tracker_outliers')
-    ]
-    return RecordingFaults(skews.pop() if skews else 0.0, tuple(gaps), tuple(outliers))
-
-
-def _specs(plant: PlantDescription, effect_id: str) -> list[EffectSpec]:
-    return [spec for spec in plant.effects if spec.id == effect_id]
-
-
-def _drawn(microseconds: NDArray[np.int64], seed: int, column: int) -> tuple[Array, Array]:
-    """Two uniform numbers in [0, 1) for each sample, by its time alone (splitmix64)."""
-    start = ((seed % 2**31) * 2 + column + 1) * 0x9E3779B97F4A7C15 % 2**64
-    with np.errstate(over='ignore'):
-        key = _mixed(np.array([start], dtype=np.uint64))[0]
-        bits = _mixed(key ^ np.asarray(microseconds).astype(np.uint64))
-    return (
-        (bits >> np.uint64(40)).astype(np.float64) / 2**24,
-        (bits & np.uint64(0xFFFF)).astype(np.float64) / 2**16,
-    )
-
-
-def _mixed(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return bits ^ (bits >> np.uint64(31))
+    parts = []
+    for spec in plant.effects:
+        effect, values = describe(spec.id), effect_values(spec)
+        if spec.id in ON_SAMPLES:
+            named = {p.name: float(v) for p, v in zip(effect.parameters, values, strict=True)}
+            parts.append(ON_SAMPLES[spec.id](named, joints.index(spec.joint)))
+    return functools.reduce(RecordingFaults.joined, parts, RecordingFaults())

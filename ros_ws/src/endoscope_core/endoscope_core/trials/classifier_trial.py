@@ -7,13 +7,17 @@ from numpy.typing import NDArray
 
 from endoscope_core.classifier.classification import ClassificationResult, UnseenTensionError
 from endoscope_core.classifier.size_classifier import SizeClassifier
-from endoscope_core.dataset import random_rig, record_calibration
-from endoscope_core.dataset.rig_variation import GREATEST_EVENNESS, backlash_sizes, in_tube
-from endoscope_core.plant import PlantDescription
+from endoscope_core.dataset import random_instrument, record_calibration
+from endoscope_core.dataset.rig_variation import (
+    GREATEST_UNEVENNESS,
+    backlash_sizes,
+    in_tube,
+)
+from endoscope_core.physics import PlantDescription
 from endoscope_core.signals import calibration_motion
 from endoscope_core.trials.unusual_recordings import UNUSUAL
 
-EXPONENTS = (0.3, 1.75)
+BENDS = (0.0, float(np.deg2rad(270.0)))
 # Data sets draw from the seed alone; this keeps tubes judged on apart from tubes learnt from.
 _UNSEEN = 515_151
 
@@ -36,8 +40,9 @@ class SizeTrial:
 
 def random_tube(generator: np.random.Generator) -> PlantDescription:
     """A random rig in a random tube, as data sets hold them, but of any size."""
-    rig = random_rig(generator)
-    return in_tube(rig, generator.uniform(*EXPONENTS), generator.uniform(0.0, GREATEST_EVENNESS))
+    instrument = random_instrument(generator)
+    unevenness = generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS)
+    return in_tube(instrument, generator.uniform(*BENDS), unevenness)
 
 
 def judge_unseen_tubes(classifier: SizeClassifier, seed: int, tubes: int) -> list[SizeTrial]:

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.classifier.classification import Classifier, UnseenTensionError
-from endoscope_core.dataset import configuration_of_size, random_rig, record_calibration
-from endoscope_core.dataset.rig_variation import GREATEST_EVENNESS
+from endoscope_core.dataset import configuration_of_size, random_instrument, record_calibration
+from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.identification.plant_fit import plants_of_calibration
 from endoscope_core.metrics import width_at_mid_height
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics import PlantDescription
 from endoscope_core.signals import Signal
 from endoscope_core.trials.tracking_trial import TrackingTrial
 
@@ -59,9 +59,9 @@ def never_seen_tube(seed: int, number: int, size_deg: float | None = None) -> Ne
     generator = np.random.default_rng([_UNSEEN, seed, number])
     drawn = float(generator.uniform(SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG))
     size = np.deg2rad(drawn if size_deg is None else size_deg)
-    evenness = float(generator.uniform(0.0, GREATEST_EVENNESS))
+    unevenness = float(generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS))
     for _ in range(_MOST_RIGS):
-        found = configuration_of_size(random_rig(generator), float(size), evenness)
+        found = configuration_of_size(random_instrument(generator), float(size), unevenness)
         if found is not None:
             return NeverSeenTube(found.plant, found.backlash_size, int(generator.integers(2**31)))
     raise RuntimeError(f'no rig of {_MOST_RIGS} reaches {np.rad2deg(size):.0f} deg')

@@ -11,9 +11,14 @@ from endoscope_core.classifier.classification import (
     Classifier,
     UnseenTensionError,
 )
-from endoscope_core.dataset import CLASSES_DEG, TubeConfiguration, configuration_of_size, random_rig
-from endoscope_core.dataset.rig_variation import GREATEST_EVENNESS, calibration_command
-from endoscope_core.plant import SensorModel, simulate
+from endoscope_core.dataset import (
+    CLASSES_DEG,
+    TubeConfiguration,
+    configuration_of_size,
+    random_instrument,
+)
+from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS, calibration_command
+from endoscope_core.physics import SensorModel, simulate
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
 from endoscope_core.trials.classifier_trial import random_tube
 from endoscope_core.trials.unusual_recordings import UNUSUAL
@@ -75,9 +80,9 @@ def tubes_of_all_classes(seed: int, per_class: int, motion: CalibrationMotion) -
             generator = np.random.default_rng([_UNSEEN, seed, class_deg, number])
             found = None
             while found is None:
-                evenness = float(generator.uniform(0.0, GREATEST_EVENNESS))
+                unevenness = generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS)
                 found = configuration_of_size(
-                    random_rig(generator), float(np.deg2rad(class_deg)), evenness
+                    random_instrument(generator), float(np.deg2rad(class_deg)), unevenness
                 )
             trajectory = simulate(found.plant, calibration_command(found.plant, motion))
             wires = trajectory.tension.reshape(len(trajectory.time), -1)

@@ -15,7 +15,8 @@ from endoscope_core.control import (
     TrackerMeasurement,
 )
 from endoscope_core.metrics import tracking_rmse
-from endoscope_core.plant import PlantDescription, PlantSimulator, SensorModel
+from endoscope_core.physics import PlantDescription, PlantSimulator, SensorModel
+from endoscope_core.rig import load_rig
 from endoscope_core.signals import Signal
 
 TICK = 1.0e-3
@@ -69,7 +70,7 @@ def run_tracking_trial(
     """
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, seed)
     joints = len(rig.joints)
-    gears = np.array([plant.joints[name].gear for name in rig.joints])
+    gear = load_rig().joints.gear
     motion, feedforward = DesiredMotion(joints), Feedforward(joints)
     feedforward.select(law)
     learns = law.mode == ADAPTIVE_PHYSICAL
@@ -93,7 +94,7 @@ def run_tracking_trial(
                 feedforward.measure(0.0, measured.angle)
         correction = controller.step(now, desired, velocity, measured)
         command[k] = feedforward.step(desired, velocity, TICK) + correction
-        rig.advance(gears * command[k])
+        rig.advance(gear * command[k])
     steady = time >= signal.steady[0]
     wanted = np.repeat(angles[steady, None], joints, axis=1)
     rmse = tracking_rmse(wanted, bending[steady])

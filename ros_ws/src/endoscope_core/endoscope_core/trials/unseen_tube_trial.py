@@ -7,13 +7,13 @@ import numpy as np
 
 from endoscope_core.classifier.classification import Classifier, UnseenTensionError
 from endoscope_core.control import FeedforwardLaw
-from endoscope_core.dataset import random_rig, record_calibration
-from endoscope_core.dataset.rig_variation import backlash_sizes, in_tube
+from endoscope_core.dataset import record_calibration
+from endoscope_core.dataset.rig_variation import backlash_sizes
 from endoscope_core.identification import LawParameters, parameters_for_class
 from endoscope_core.signals import Signal
+from endoscope_core.trials.classifier_trial import random_tube
 from endoscope_core.trials.tracking_trial import run_tracking_trial
 
-EXPONENTS = (0.3, 1.75)
 # Data sets draw from the seed alone; this keeps tubes judged on apart from tubes learnt from.
 _UNSEEN = 424_242
 
@@ -25,7 +25,7 @@ class UnseenTubeTrial:
     Parameters
     ----------
     exponent : float
-        Capstan exponent of the tube.
+        Capstan exponent, mean of the joints.
     size : float
         True backlash size, mean of the joints, in rad.
     class_deg : int or None
@@ -71,8 +71,8 @@ def run_unseen_tube_trial(
         By class.
     """
     generator = np.random.default_rng([_UNSEEN, seed, number])
-    exponent = float(generator.uniform(*EXPONENTS))
-    plant = in_tube(random_rig(generator), exponent)
+    plant = random_tube(generator)
+    exponent = float(np.mean([joint.capstan_exponent for joint in plant.joints.values()]))
     noise = int(generator.integers(2**31))
     law = FeedforwardLaw()
     class_deg = None

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.dataset import record_calibration
-from endoscope_core.plant import EffectSpec, PlantDescription, SensorModel, simulate
+from endoscope_core.physics import EffectSpec, PlantDescription, SensorModel, simulate
+from endoscope_core.rig import load_rig
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion
 
 Array = NDArray[np.float64]
@@ -17,7 +18,7 @@ Generator = np.random.Generator
 def slack_wires(generator: Generator, plant: PlantDescription, motion: CalibrationMotion) -> Array:
     """Both wires of one joint are longer than their pretension takes up."""
     joint = str(generator.choice(list(plant.joints)))
-    slack = EffectSpec('wire_slack', joint, {'length_m': generator.uniform(0.003, 0.006)})
+    slack = EffectSpec('wire_slack', joint, {'length_m': generator.uniform(1e-3, 2e-3)})
     return _tension(generator, replace(plant, effects=(*plant.effects, slack)), motion)
 
 
@@ -58,8 +59,7 @@ def other_motion(generator: Generator, plant: PlantDescription, motion: Calibrat
         reach[generator.integers(len(reach))] = 0.0
     else:
         reach *= 0.0
-    gears = np.array([joint.gear for joint in plant.joints.values()])
-    command = motion.signal(pace * time)[0][:, None] * reach * gears
+    command = load_rig().joints.gear * motion.signal(pace * time)[0][:, None] * reach
     wires = simulate(plant, command).tension.reshape(len(time), -1)
     return SensorModel(plant.sensors, int(generator.integers(2**31))).tension(wires)
 

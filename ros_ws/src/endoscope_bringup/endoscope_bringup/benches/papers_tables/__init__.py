@@ -11,7 +11,6 @@ TABLES: tuple[str, ...] = (
     'colon_shapes',
     'compensators',
     'changing_tube',
-    'crossing',
     'calibration_time',
     'real_sizes',
     'real_recordings',

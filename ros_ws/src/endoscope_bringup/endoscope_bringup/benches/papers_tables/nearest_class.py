@@ -15,7 +15,6 @@ def rows(settings: PapersBench) -> list[Row]:
 
     from endoscope_core.control import PhysicalParameters
     from endoscope_core.dataset import record_calibration
-    from endoscope_core.dataset.rig_variation import in_tube
     from endoscope_core.identification import load_class_parameters
     from endoscope_core.physics import PlantDescription
     from endoscope_core.trials.never_seen_tube import never_seen_tube
@@ -23,8 +22,7 @@ def rows(settings: PapersBench) -> list[Row]:
     classes = {}
     for class_deg, plant in load_class_parameters(model='physical').items():
         if isinstance(plant, PhysicalParameters):
-            rig = PlantDescription({'bend_x': plant.joint, 'bend_y': plant.joint})
-            tube = in_tube(rig, 1.0, plant.evenness)
+            tube = PlantDescription({'bend_x': plant.joint, 'bend_y': plant.joint})
             classes[class_deg] = record_calibration(tube, settings.seed).actual_angle
     found = []
     for size_deg, papers in _SHAPES:

@@ -12,18 +12,18 @@ def rows(settings: PapersBench) -> list[Row]:
     """Simulate `tubes` shapes of each case: one rig, its bends spread otherwise, of equal size."""
     import numpy as np
 
-    from endoscope_core.dataset import configuration_of_size, random_rig, record_calibration
-    from endoscope_core.dataset.rig_variation import GREATEST_EVENNESS
+    from endoscope_core.dataset import configuration_of_size, random_instrument, record_calibration
+    from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS
 
     tensions = []
     for size_deg, _ in _CASES:
-        rig = random_rig(np.random.default_rng([settings.seed, 1]))
+        instrument = random_instrument(np.random.default_rng([settings.seed, 1]))
         shapes = []
         for k in range(settings.tubes):
-            evenness = GREATEST_EVENNESS * k / (settings.tubes - 1)
-            shape = configuration_of_size(rig, float(np.deg2rad(size_deg)), evenness)
+            unevenness = GREATEST_UNEVENNESS * (2.0 * k / (settings.tubes - 1) - 1.0)
+            shape = configuration_of_size(instrument, float(np.deg2rad(size_deg)), unevenness)
             if shape is None:
-                raise RuntimeError(f'no tube of evenness {evenness} gives {size_deg} deg')
+                raise RuntimeError(f'no tube bent unevenly by {unevenness} gives {size_deg} deg')
             shapes.append(record_calibration(shape.plant, settings.seed + k).tension)
         tensions.append(shapes)
         settings.report(f'table 1: {size_deg:g} deg simulated')

@@ -3,7 +3,11 @@
 It changes samples and not the rig: nothing of it is in the compiled physics.
 """
 
+from collections.abc import Mapping
+
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
+from endoscope_core.physics.hooks import on_samples
+from endoscope_core.physics.samples import RecordingFaults
 
 EFFECT = Effect(
     'clock_skew',
@@ -17,3 +21,9 @@ EFFECT = Effect(
     ),
     traits=Traits(depends_on_time=True, of_device=True),
 )
+
+
+@on_samples(EFFECT)
+def skewed(values: Mapping[str, float], column: int) -> RecordingFaults:
+    """The tracker's clock."""
+    return RecordingFaults(skew=values['skew'])

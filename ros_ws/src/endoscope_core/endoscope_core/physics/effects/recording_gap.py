@@ -3,7 +3,11 @@
 It changes samples and not the rig: nothing of it is in the compiled physics.
 """
 
+from collections.abc import Mapping
+
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
+from endoscope_core.physics.hooks import on_samples
+from endoscope_core.physics.samples import TOPICS, Gap, RecordingFaults
 
 EFFECT = Effect(
     'recording_gap',
@@ -19,3 +23,10 @@ EFFECT = Effect(
     ),
     traits=Traits(audited=True),
 )
+
+
+@on_samples(EFFECT)
+def gap(values: Mapping[str, float], column: int) -> RecordingFaults:
+    """The stretch that is missing."""
+    topic = TOPICS[round(values['topic'])]
+    return RecordingFaults(gaps=(Gap(topic, values['time_s'], values['duration_s']),))

@@ -3,7 +3,11 @@
 It changes samples and not the rig: nothing of it is in the compiled physics.
 """
 
+from collections.abc import Mapping
+
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
+from endoscope_core.physics.hooks import on_samples
+from endoscope_core.physics.samples import Outliers, RecordingFaults
 
 EFFECT = Effect(
     'tracker_outliers',
@@ -18,3 +22,9 @@ EFFECT = Effect(
     ),
     traits=Traits(audited=True),
 )
+
+
+@on_samples(EFFECT)
+def wrong(values: Mapping[str, float], column: int) -> RecordingFaults:
+    """The joint's wrong samples."""
+    return RecordingFaults(outliers=(Outliers(column, values['rate'], values['size_rad']),))

@@ -1,0 +1,305 @@
+"""The plant of one joint as a compensator keeps it in mind, and its inverse.
+
+The model is the nominal plant itself with the shaft given. Friction along the sheath, the joint's
+friction and its stiffness do not depend on speed, so a motion is known by its turning points: with
+other parameters the model is brought to where it would be by going through them again (return-point
+memory: Mayergoyz, Mathematical Models of Hysteresis, 1991, ch. I).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.compiled import Flags, compiled
+from endoscope_core.control.motor_limits import MotorLimits
+from endoscope_core.physics.description import JointParameters, PlantDescription
+from endoscope_core.physics.kernel import advance_tick, settle, tensions
+from endoscope_core.physics.layout import (
+    IN_MOTOR,
+    INPUTS,
+    JOINT,
+    MOTOR,
+)
+from endoscope_core.physics.packing import pack, rest_state
+from endoscope_core.physics.sheath import MOTOR_END
+
+Array = NDArray[np.float64]
+
+TICK = 1e-3
+PRECISION = 1e-7
+"""Rad by which the model's joint may miss an angle that it can reach."""
+_LONGEST_TICK = 1.0
+_SHAFT_STEP = 0.03
+_JOINT_STEP = 0.03
+"""Rad: with such steps a motion is gone through again; a step that reverses must be short against
+the dead zone."""
+_TRIES = 60
+_STEPS = 1000
+_MOST_TURNS = 12
+
+
+class TurningPoints:
+    """Where a motion turned round, as far as hysteresis without speed remembers it.
+
+    A loop within a larger one is forgotten once it is closed: the pair of turning points between
+    two larger swings, as in the counting of rainflow cycles (ASTM E1049). Should more than twelve
+    be left, the smallest swing goes.
+
+    Parameters
+    ----------
+    values : sequence of float
+        Begin, turning points and present value.
+    """
+
+    def __init__(self, values: Sequence[float]) -> None:
+        self.values = list(values)
+
+    def follow(self, value: float) -> None:
+        """Go on to a value."""
+        v = self.values
+        if len(v) > 1 and (v[-1] - v[-2]) * (value - v[-1]) >= 0.0:
+            v[-1] = value
+        elif value != v[-1]:
+            v.append(value)
+        while len(v) > 3 and abs(v[-2] - v[-3]) <= min(abs(v[-1] - v[-2]), abs(v[-3] - v[-4])):
+            del v[-3:-1]
+        if len(v) > _MOST_TURNS:
+            swings = [abs(b - a) for a, b in zip(v[1:-2], v[2:-1], strict=True)]
+            least = 1 + swings.index(min(swings))
+            del v[least : least + 2]
+
+
+@compiled
+def _try(
+    x: Array,
+    trial: Array,
+    history: Array,
+    sheath: Array,
+    p: Array,
+    on: Flags,
+    inputs: Array,
+    shaft: float,
+    tick: float,
+) -> float:
+    """Joint angle in rad after a tick in which the shaft turns to `shaft`, left in `trial`."""
+    for i in range(len(x)):
+        trial[i] = x[i]
+    inputs[IN_MOTOR] = shaft
+    advance_tick(trial, history, sheath, p, on, inputs, tick)
+    return trial[JOINT]
+
+
+@compiled
+def _seek(
+    x: Array,
+    trial: Array,
+    history: Array,
+    sheath: Array,
+    p: Array,
+    on: Flags,
+    inputs: Array,
+    target: float,
+    low: float,
+    high: float,
+    tension_limit: float,
+    tick: float,
+) -> None:
+    """Turn the shaft within [low, high] so that the joint is at `target` after a tick.
+
+    The joint's angle grows with the shaft's and stands still in the dead zone: a bracketed secant
+    (Dowell, Jarratt, BIT 11, 1971) finds the shaft's angle. What cannot be reached is approached as
+    far as bounds and tension allow.
+    """
+    near = x[MOTOR]
+    near_error = _try(x, trial, history, sheath, p, on, inputs, near, tick) - target
+    if abs(near_error) > PRECISION:
+        way = -1.0 if near_error > 0.0 else 1.0
+        far = high if way > 0.0 else low
+        error = _try(x, trial, history, sheath, p, on, inputs, far, tick) - target
+        shaft, far_error = far, error
+        if way * error > 0.0:
+            for _ in range(_TRIES):
+                if abs(error) <= PRECISION or abs(far - near) <= 1e-12:
+                    break
+                shaft = far - far_error * (far - near) / (far_error - near_error)
+                error = _try(x, trial, history, sheath, p, on, inputs, shaft, tick) - target
+                if error * far_error > 0.0:
+                    near_error *= 1.0 - error / far_error if error / far_error < 0.9 else 0.5
+                else:
+                    near, near_error = far, far_error
+                far, far_error = shaft, error
+        side = 0 if way > 0.0 else 1
+        if tensions(trial, sheath, MOTOR_END)[side] > tension_limit:
+            allowed, too_far = x[MOTOR], shaft
+            for _ in range(_TRIES):
+                if abs(too_far - allowed) <= 1e-9:
+                    break
+                shaft = 0.5 * (allowed + too_far)
+                _try(x, trial, history, sheath, p, on, inputs, shaft, tick)
+                if tensions(trial, sheath, MOTOR_END)[side] > tension_limit:
+                    too_far = shaft
+                else:
+                    allowed = shaft
+            _try(x, trial, history, sheath, p, on, inputs, allowed, tick)
+    for i in range(len(x)):
+        x[i] = trial[i]
+
+
+@compiled
+def _go_through_angles(
+    x: Array,
+    trial: Array,
+    history: Array,
+    sheath: Array,
+    p: Array,
+    on: Flags,
+    inputs: Array,
+    path: Array,
+    travel: float,
+    tension_limit: float,
+) -> None:
+    """From rest, bend the joint to one angle after the other, slowly; `path` becomes the shaft's."""
+    settle(x, history, sheath, p, on, 0.0, TICK)
+    for i in range(len(path)):
+        target = path[i]
+        for _ in range(_STEPS):
+            left = target - x[JOINT]
+            if abs(left) <= 2.0 * PRECISION:
+                break
+            before = x[MOTOR]
+            low = max(-travel, before - _SHAFT_STEP)
+            high = min(travel, before + _SHAFT_STEP)
+            angle = x[JOINT] + min(_JOINT_STEP, max(-_JOINT_STEP, left))
+            _seek(
+                x, trial, history, sheath, p, on, inputs, angle,
+                min(low, before), max(high, before), tension_limit, _LONGEST_TICK,
+            )  # fmt: skip
+            if abs(x[MOTOR] - before) <= 1e-9:
+                break
+        path[i] = x[MOTOR]
+
+
+@compiled
+def turn_all(
+    x: Array,
+    histories: Array,
+    sheaths: Array,
+    p: Array,
+    on: Flags,
+    inputs: Array,
+    shaft: float,
+    tick: float,
+) -> None:
+    """Turn the shafts of several models to one angle (rad) within a tick (s)."""
+    inputs[IN_MOTOR] = shaft
+    for i in range(len(x)):
+        advance_tick(x[i], histories[i], sheaths[i], p[i], on[i], inputs, tick)
+
+
+@compiled
+def go_through_shafts(
+    x: Array,
+    histories: Array,
+    sheaths: Array,
+    p: Array,
+    on: Flags,
+    inputs: Array,
+    path: Array,
+) -> None:
+    """From rest, turn the shafts of several models to one angle after the other, slowly."""
+    for i in range(len(x)):
+        settle(x[i], histories[i], sheaths[i], p[i], on[i], 0.0, TICK)
+        for target in path:
+            begin = x[i, MOTOR]
+            steps = int(abs(target - begin) / _SHAFT_STEP) + 1
+            for k in range(1, steps + 1):
+                inputs[IN_MOTOR] = begin + (target - begin) * k / steps
+                advance_tick(x[i], histories[i], sheaths[i], p[i], on[i], inputs, _LONGEST_TICK)
+
+
+def packed_joint(joint: JointParameters) -> tuple[Array, Flags]:
+    """Parameters (P,) and flags of a nominal joint, as the compiled plant takes them."""
+    parameters, on = pack(PlantDescription(joints={'joint': joint}))
+    return parameters[0], on[0]
+
+
+class InternalModel:
+    """The nominal plant of one joint, at rest at first; angles of motor are the shaft's.
+
+    Parameters
+    ----------
+    joint : JointParameters
+    limits : MotorLimits
+    """
+
+    def __init__(self, joint: JointParameters, limits: MotorLimits) -> None:
+        self._limits = limits
+        self._parameters, self._on = packed_joint(joint)
+        states, histories, sheaths = rest_state(self._parameters[None], self._on[None], TICK)
+        self._state, self._history, self._sheath = states[0], histories[0], sheaths[0]
+        self._trial = np.empty_like(self._state)
+        self._inputs = np.zeros(INPUTS)
+
+    @property
+    def angle(self) -> float:
+        """Joint angle, rad."""
+        return float(self._state[JOINT])
+
+    @property
+    def shaft(self) -> float:
+        """Shaft angle, rad."""
+        return float(self._state[MOTOR])
+
+    @property
+    def tensions(self) -> tuple[float, float]:
+        """Tensions of both wires at the motor, N."""
+        a, b = tensions(self._state, self._sheath, MOTOR_END)
+        return float(a), float(b)
+
+    @property
+    def _arrays(self) -> tuple[Array, Array, Array, Array, Flags, Array]:
+        return (
+            self._trial,
+            self._history,
+            self._sheath,
+            self._parameters,
+            self._on,
+            self._inputs,
+        )
+
+    def turn(self, shaft: float, dt: float) -> None:
+        """Turn the shaft to an angle (rad) within `dt` s."""
+        self._inputs[IN_MOTOR] = shaft
+        advance_tick(self._state, *self._arrays[1:], dt)
+
+    def seek(self, angle: float, dt: float) -> bool:
+        """Turn the shaft so that the joint is at `angle` (rad) after `dt` s.
+
+        Returns
+        -------
+        bool
+            Whether it is; otherwise the shaft has gone as far as its limits allow.
+        """
+        m, way = self._limits, self._limits.speed * dt
+        # A shaft that is beyond its travel may stay there, and come back.
+        low = min(self.shaft, max(-m.travel, self.shaft - way))
+        high = max(self.shaft, min(m.travel, self.shaft + way))
+        _seek(self._state, *self._arrays, angle, low, high, m.tension, dt)
+        return abs(self.angle - angle) <= 2.0 * PRECISION
+
+    def go_through(self, angles: Sequence[float]) -> list[float]:
+        """Begin at rest and bend the joint to one angle (rad) after the other, slowly.
+
+        Returns
+        -------
+        list of float
+            Shaft angle in rad at each.
+        """
+        path = np.array(angles, dtype=float)
+        _go_through_angles(
+            self._state, *self._arrays, path, self._limits.travel, self._limits.tension
+        )
+        return path.tolist()

@@ -1,0 +1,347 @@
+"""A joint pulled by wires in sheaths with friction all along, as slowly and plainly as it can be.
+
+A wire is a row of springs joined at nodes. Each node rubs on the sheath with its share of the
+capstan's exponent (Euler 1769, Eytelwein 1808), so the tensions on its two sides hold it as long as
+
+    |ln T_i - ln T_(i+1)| <= dphi_i,
+
+and where they do not, it slips just far enough that they do. One node after the other is put right
+and all again until none moves. Nothing here knows of fronts that run into the wire: they come out.
+
+A wire of `cells` nodes has its tensions at s = i / cells, i = 0 .. cells; the springs at its two
+ends are half as long as the others, so the sums over the wire are trapezoidal rules and its two end
+tensions are those of the first and the last spring, with the whole exponent between them.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import expm
+
+from endoscope_core.compiled import compiled
+
+Array = NDArray[np.float64]
+Plant = Mapping[str, float | Sequence[float]]
+
+NOMINAL: Plant = {
+    'pretension': 5.0,
+    'pretension_profile': 0.75,
+    'wire_stiffness': 3000.0,
+    'pulley_radius': 0.0024,
+    'joint_radius': 0.0008,
+    'capstan_exponent': 0.9,
+    'friction_profile': (),
+    'joint_stiffness': 0.0045,
+    'joint_rest_angle': 0.0,
+    'joint_friction': 9.0e-4,
+    'joint_presliding': 0.03,
+    'joint_presliding_spread': 0.0,
+    'joint_damping': 1.0e-5,
+    'motor_bandwidth': 30.0,
+    'motor_damping_ratio': 0.9,
+}
+
+MOST_SWEEPS = 200_000
+SETTLED = 1e-11  # N
+ANGLE_SETTLED = 1e-11  # rad
+BALANCED = 1e-12  # N m
+
+
+def simulate(
+    plant: Plant, shaft_command: ArrayLike, tick: float, cells: int
+) -> tuple[Array, Array, Array, Array]:
+    """Let a plant follow commands, each held for one tick.
+
+    Parameters
+    ----------
+    plant
+        By the keys of `NOMINAL`, SI units.
+    shaft_command
+        Commanded angle of the motor's shaft in rad, shape (N,).
+    tick
+        In s.
+    cells
+        Nodes of each wire.
+
+    Returns
+    -------
+    shaft, at_motor, at_joint, angle
+        Angle of the shaft in rad (N,), tensions of wires a and b in N at the motor (N, 2) and at
+        the joint (N, 2), bending angle in rad (N,). Row k is the state before command k acts.
+    """
+    shaft = motor_angle(plant, shaft_command, tick)
+    return shaft, *follow(plant, shaft, tick, cells)
+
+
+def motor_angle(plant: Plant, shaft_command: ArrayLike, tick: float) -> Array:
+    """Angle in rad (N,) of a second-order servo before each command; exact for held commands."""
+    bandwidth, damping = plant['motor_bandwidth'], plant['motor_damping_ratio']
+    # The held command is a third state that does not change (Van Loan 1978).
+    rate = [[0, 1, 0], [-(bandwidth**2), -2 * damping * bandwidth, bandwidth**2], [0, 0, 0]]
+    transition = expm(np.array(rate, dtype=float) * tick)
+    state, angle = np.zeros(3), []
+    for command in np.asarray(shaft_command, dtype=float):
+        angle.append(state[0])
+        state[2] = command
+        state = transition @ state
+    return np.array(angle)
+
+
+def follow(plant: Plant, shaft: ArrayLike, tick: float, cells: int) -> tuple[Array, Array, Array]:
+    """`at_motor, at_joint, angle` as `simulate` gives them, for a shaft whose angle is known."""
+    spread = float(plant['joint_presliding_spread'])
+    elements = np.exp(spread * np.array([-1.0, 0.0, 1.0])) if spread else np.ones(1)
+    grip, springs, tension = _wire(plant, cells)
+    shaft = np.asarray(shaft, dtype=float)
+    ends, angle = np.empty((2, len(shaft), 2)), np.empty(len(shaft))
+    names = (
+        'pulley_radius',
+        'joint_radius',
+        'joint_stiffness',
+        'joint_rest_angle',
+        'joint_friction',
+        'joint_damping',
+    )
+    settled = _follow(
+        shaft - shaft[0],
+        tick,
+        np.array([plant[name] for name in names], dtype=float),
+        float(plant['joint_presliding']) * elements,
+        grip,
+        springs,
+        np.stack([tension, tension]),
+        np.empty((2, cells + 1)),
+        np.zeros((2, cells + 2)),
+        np.full(2, np.sum(tension / springs)),
+        np.zeros(len(elements)),
+        *ends,
+        angle,
+    )
+    if not settled:
+        raise RuntimeError('nodes of a wire did not settle')
+    return ends[0], ends[1], angle
+
+
+def move_wire(plant: Plant, motor: ArrayLike, joint: ArrayLike, cells: int) -> Array:
+    """Tension in N along one wire, (N, cells + 1), for given displacements in m of its ends (N,).
+
+    Displacements are towards the motor; at the first ones the wire is as it was tightened.
+    """
+    grip, springs, tension = _wire(plant, cells)
+    motor, joint = np.asarray(motor, dtype=float), np.asarray(joint, dtype=float)
+    along = np.empty((len(motor), cells + 1))
+    along[0] = tension
+    if not _move_wire(motor, joint, grip, springs, np.zeros(cells + 2), along):
+        raise RuntimeError('nodes of a wire did not settle')
+    return along
+
+
+def _wire(plant: Plant, cells: int) -> tuple[Array, Array, Array]:
+    """Greatest ratios of tension over the nodes, springs in N/m, tension in N at the start."""
+    # Far finer than the nodes, at midpoints: the density of friction is smooth.
+    fine = 200
+    place = (np.arange(cells * fine) + 0.5) / (cells * fine)
+    harmonics = np.atleast_1d(np.asarray(plant['friction_profile'], dtype=float))
+    order = np.arange(1, len(harmonics) + 1)
+    density = np.exp(np.cos(np.pi * np.outer(place, order)) @ harmonics)
+    share = density.reshape(cells, fine).sum(axis=1) / density.sum()
+    exponent = float(plant['capstan_exponent']) * share
+    springs = np.full(cells + 1, float(plant['wire_stiffness']) * cells)
+    springs[[0, -1]] *= 2.0
+    passed = np.concatenate([[0.0], np.cumsum(exponent)])
+    # A spring spans the stretch between two nodes, the first and the last one half of that; its
+    # tension stands at the middle of that stretch, or at the wire's end.
+    tension = float(plant['pretension']) * np.exp(-float(plant['pretension_profile']) * passed)
+    return np.exp(exponent), springs, tension
+
+
+@compiled
+def _relax(before: Array, slip: Array, grip: Array, springs: Array, tension: Array) -> bool:
+    """Find the slip of all nodes of a taut wire, given that of its ends; `tension` is written.
+
+    Every node stays where it was at the start of the tick if the springs beside it allow that;
+    otherwise it slips to where they just do. Node by node, swept until nothing moves, with
+    over-relaxation (projected, Cryer 1971: it cannot carry a node across where it stood).
+    """
+    nodes = len(grip)
+    for i in range(nodes + 1):
+        tension[i] = before[i] + springs[i] * (slip[i] - slip[i + 1])
+    factor = 2.0 / (1.0 + math.sin(math.pi / nodes))
+    for sweep in range(MOST_SWEEPS):
+        # Over-relaxation that circles is given up for the plain, slower method.
+        over = factor if sweep < MOST_SWEEPS // 10 else 1.0
+        most = 0.0
+        for j in range(1, nodes + 1):
+            left, right, ratio = springs[j - 1], springs[j], grip[j - 1]
+            stuck_left = tension[j - 1] + left * slip[j]
+            stuck_right = tension[j] - right * slip[j]
+            new = 0.0
+            if stuck_left > stuck_right and stuck_left > ratio * stuck_right:
+                holds = (stuck_left - ratio * stuck_right) / (left + ratio * right)
+                new = max(slip[j] + over * (holds - slip[j]), 0.0)
+            elif stuck_right > stuck_left and stuck_right > ratio * stuck_left:
+                holds = (ratio * stuck_left - stuck_right) / (ratio * left + right)
+                new = min(slip[j] + over * (holds - slip[j]), 0.0)
+            moved = new - slip[j]
+            slip[j] = new
+            tension[j - 1] -= left * moved
+            tension[j] += right * moved
+            most = max(most, abs(moved) * max(left, right))
+        if most < SETTLED:
+            return True
+    return False
+
+
+@compiled
+def _pull(
+    extension: float,
+    motor: float,
+    joint: float,
+    before: Array,
+    slip: Array,
+    grip: Array,
+    springs: Array,
+    tension: Array,
+) -> bool:
+    """Move both ends of a wire by `motor` and `joint` in m; its extension below 0 is slack."""
+    after = extension + motor - joint
+    if after <= 0.0:
+        tension[:] = 0.0
+        return True
+    # A slack wire lies still until its length is used up; only what is moved after that stretches.
+    taut = 1.0 if extension >= 0.0 else after / (after - extension)
+    slip[0], slip[-1] = taut * motor, taut * joint
+    return _relax(before, slip, grip, springs, tension)
+
+
+@compiled
+def _move_wire(
+    motor: Array, joint: Array, grip: Array, springs: Array, slip: Array, along: Array
+) -> bool:
+    extension = 0.0
+    for i in range(len(springs)):
+        extension += along[0, i] / springs[i]
+    for k in range(1, len(motor)):
+        pull, give = motor[k] - motor[k - 1], joint[k] - joint[k - 1]
+        if not _pull(extension, pull, give, along[k - 1], slip, grip, springs, along[k]):
+            return False
+        extension += pull - give
+    return True
+
+
+@compiled
+def _imbalance(
+    step: float,
+    turn: float,
+    angle: float,
+    tick: float,
+    p: Array,
+    presliding: Array,
+    grip: Array,
+    springs: Array,
+    before: Array,
+    tension: Array,
+    slip: Array,
+    extension: Array,
+    deflection: Array,
+) -> float:
+    """Torque in N m that a joint step in rad would leave over; it rises with the step.
+
+    Both wires are moved by the motor's `turn` in rad and by the step. Not a number if a wire's
+    nodes do not settle.
+    """
+    pulley, radius, stiffness, rest, friction, damping = p
+    left_over = damping * step / tick + stiffness * (angle + step - rest)
+    for i in range(len(presliding)):
+        left_over += friction * _rubbed(deflection[i], step, presliding[i]) / len(presliding)
+    for wire in range(2):
+        sign = 1.0 - 2.0 * wire
+        if not _pull(
+            extension[wire],
+            sign * pulley * turn,
+            sign * radius * step,
+            before[wire],
+            slip[wire],
+            grip,
+            springs,
+            tension[wire],
+        ):
+            return math.nan
+        left_over -= sign * radius * tension[wire, -1]
+    return left_over
+
+
+@compiled
+def _rubbed(deflection: float, step: float, presliding: float) -> float:
+    """Dahl's friction (Dahl 1968), as a part of its limit, after a step of one sign."""
+    limit = math.copysign(1.0, step)
+    return limit + (deflection - limit) * math.exp(-abs(step) / presliding)
+
+
+@compiled
+def _follow(
+    shaft: Array,
+    tick: float,
+    p: Array,
+    presliding: Array,
+    grip: Array,
+    springs: Array,
+    before: Array,
+    tension: Array,
+    slip: Array,
+    extension: Array,
+    deflection: Array,
+    at_motor: Array,
+    at_joint: Array,
+    angles: Array,
+) -> bool:
+    angle, step = 0.0, 0.0
+    for k in range(len(shaft)):
+        angles[k] = angle
+        for wire in range(2):
+            at_motor[k, wire], at_joint[k, wire] = before[wire, 0], before[wire, -1]
+        if k + 1 == len(shaft):
+            break
+        turn = shaft[k + 1] - shaft[k]
+        wires = (p, presliding, grip, springs, before, tension, slip, extension, deflection)
+        # Brackets the step around the last one.
+        width = max(0.1 * abs(step), 1e-6)
+        low, high = step - width, step + width
+        over = _imbalance(high, turn, angle, tick, *wires)
+        while over < 0.0:
+            high += width
+            width *= 2.0
+            over = _imbalance(high, turn, angle, tick, *wires)
+        under = _imbalance(low, turn, angle, tick, *wires)
+        while under > 0.0:
+            low -= width
+            width *= 2.0
+            under = _imbalance(low, turn, angle, tick, *wires)
+        # Regula falsi as of Illinois (Dowell and Jarratt 1971).
+        side = 0
+        while high - low > ANGLE_SETTLED:
+            step = (low * over - high * under) / (over - under)
+            left_over = _imbalance(step, turn, angle, tick, *wires)
+            if abs(left_over) <= BALANCED:
+                break
+            if left_over > 0.0:
+                high, over = step, left_over
+                under *= 0.5 if side > 0 else 1.0
+                side = 1
+            elif left_over < 0.0:
+                low, under = step, left_over
+                over *= 0.5 if side < 0 else 1.0
+                side = -1
+            else:
+                return False
+        angle += step
+        for wire in range(2):
+            sign = 1.0 - 2.0 * wire
+            extension[wire] += sign * (p[0] * turn - p[1] * step)
+            for i in range(len(springs)):
+                before[wire, i] = tension[wire, i]
+        for i in range(len(presliding)):
+            deflection[i] = _rubbed(deflection[i], step, presliding[i])
+    return True

@@ -1,0 +1,99 @@
+"""The plant against a solver that shares no code with it, and what an endoscope never does."""
+
+import re
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+import sliding_nodes
+from numpy.testing import assert_allclose
+from scipy.interpolate import CubicSpline
+from test_sliding_nodes import REFERENCE
+
+from endoscope_core.physics import JointParameters, PlantDescription, simulate
+
+TICK = 1e-3
+TIME = np.arange(0.0, 3.0, TICK)
+TUBES = {
+    'nominal': JointParameters(),
+    'tight': JointParameters(capstan_exponent=2.2, pretension=3.0),
+    'of another form': JointParameters(
+        friction_profile=(0.4, -0.3), joint_presliding_spread=0.7, pretension_profile=0.3
+    ),
+    'loose': JointParameters(pretension=1.0, capstan_exponent=0.4),
+}
+
+
+def shaft_command(amplitude_deg: float, rate: float = 1.0, time=TIME):
+    return 0.5 * np.deg2rad(amplitude_deg) * np.sin(rate * time)[:, None]
+
+
+def run(joint: JointParameters, command, tick: float = TICK):
+    return simulate(PlantDescription(joints={'bend_x': joint}), command, tick)
+
+
+@pytest.mark.parametrize('joint', TUBES.values(), ids=TUBES)
+def test_the_plant_agrees_with_sliding_nodes(joint):
+    command = shaft_command(80.0, 3.0) + shaft_command(15.0, 11.0)
+    made = run(joint, command)
+    shaft, at_motor, _, angle = sliding_nodes.simulate(asdict(joint), command[:, 0], TICK, 50)
+    assert np.ptp(angle) > np.deg2rad(8.0)
+    assert_allclose(made.shaft_position[:, 0], shaft, atol=1e-9)
+    assert np.std(made.bending_true[:, 0] - angle) < np.deg2rad(0.02)
+    assert_allclose(made.bending_true[:, 0], angle, atol=np.deg2rad(0.06))
+    # The nodes' end spring follows a chord of the true curve just after a turn.
+    coarse = 0.5 * joint.capstan_exponent / 50 * at_motor.max()
+    assert np.std(made.tension[:, 0] - at_motor) < 0.5 * coarse
+    assert_allclose(made.tension[:, 0], at_motor, atol=1.5 * coarse)
+
+
+@pytest.mark.parametrize('exponent', [0.3, 0.9, 1.8])
+@pytest.mark.parametrize('amplitude_deg', [30.0, 60.0, 90.0])
+def test_the_tip_never_goes_the_other_way(exponent, amplitude_deg):
+    time = np.arange(0.0, 9.0, TICK)
+    made = run(JointParameters(capstan_exponent=exponent), shaft_command(amplitude_deg, time=time))
+    shaft, tip = made.shaft_position[:, 0], made.bending_true[:, 0]
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(shaft)))) + 1
+    assert len(turns) >= 2
+    for part in np.split(np.arange(len(time)), turns):
+        along = np.sign(shaft[part[-1]] - shaft[part[0]]) * tip[part]
+        assert np.max(np.maximum.accumulate(along) - along) < np.deg2rad(0.3)
+
+
+@pytest.mark.parametrize('joint', TUBES.values(), ids=TUBES)
+def test_a_coarse_tick_costs_little(joint):
+    coarse = np.arange(0.0, 8.0, 5 * TICK)
+    command = shaft_command(60.0, time=coarse) + shaft_command(10.0, 7.0, coarse)
+    fine = run(joint, np.repeat(command, 5, axis=0))
+    assert_allclose(
+        run(joint, command, 5 * TICK).bending_true,
+        fine.bending_true[::5],
+        atol=np.deg2rad(0.05),
+    )
+
+
+def test_nothing_moves_before_it_is_moved():
+    made = run(replace(JointParameters(), joint_rest_angle=0.2), np.zeros((500, 1)))
+    assert_allclose(made.bending_true, 0.2, atol=1e-6)
+    assert_allclose(made.tension, 5.0, rtol=1e-9)
+
+
+def test_a_held_shaft_holds_everything():
+    command = np.concatenate([shaft_command(60.0), np.full((3000, 1), shaft_command(60.0)[-1])])
+    made = run(JointParameters(), command)
+    assert np.ptp(made.bending_true[-2000:]) < np.deg2rad(0.02)
+    assert np.ptp(made.tension[-2000:], axis=0).max() < 2e-3
+
+
+@pytest.mark.skipif(not REFERENCE.is_dir(), reason=f'no {REFERENCE}; set ENDOSCOPE_SHARED')
+def test_answers_made_elsewhere():
+    for path in sorted(REFERENCE.glob('*.csv')):
+        differs = re.findall(r'(\w+)=([-\d.e]+)', path.read_text().split(';', 1)[0])
+        joint = replace(JointParameters(), **{key: float(value) for key, value in differs})
+        table = np.loadtxt(path, delimiter=',', skiprows=2)
+        time = np.arange(10 * (len(table) - 1) + 1) * TICK
+        made = run(joint, CubicSpline(table[:, 0], table[:, 1])(time)[:, None])
+        off = made.bending_true[::10, 0] - table[:, 7]
+        assert np.sqrt(np.mean(off**2)) < np.deg2rad(0.01), path.name
+        assert np.max(np.abs(off)) < np.deg2rad(0.03), path.name
+        assert np.sqrt(np.mean((made.tension[::10, 0] - table[:, 3:5]) ** 2)) < 0.02, path.name
