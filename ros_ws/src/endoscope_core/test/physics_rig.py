@@ -7,6 +7,7 @@ import numpy as np
 from endoscope_core.physics import kernel
 from endoscope_core.physics import layout as L
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.sheath import JOINT_END, MOTOR_END
 
 NOMINAL = {
     'pretension': 5.0,
@@ -25,6 +26,10 @@ NOMINAL = {
     'motor_damping_ratio': 0.9,
 }
 AUDITED = {effect.id for effect in CATALOGUE.values() if effect.traits.audited}
+BLOCKED = {'joint_stiffness': 1e3, 'capstan_exponent': 1e-6}
+"""Nominal parameters of wires without friction behind which nothing gives way."""
+LOOSE = {'pretension': 0.0, 'wire_stiffness': 1e-3, 'joint_friction': 0.0, 'capstan_exponent': 0.0}
+"""And of a bending section that answers to moments alone."""
 ACTING = tuple(effect_id for effect_id in CATALOGUE if effect_id not in AUDITED)
 
 
@@ -40,6 +45,18 @@ class Run(NamedTuple):
     joint: np.ndarray
     states: np.ndarray
     sheath: np.ndarray
+
+    def ends(self):
+        """Tensions in N of each wire at the motor and at the joint, at the end of the run."""
+        at_motor = kernel.tensions(self.states, self.sheath, MOTOR_END)
+        at_joint = kernel.tensions(self.states, self.sheath, JOINT_END)
+        return tuple(zip(at_motor, at_joint, strict=True))
+
+
+def sliding_ratio(ramp):
+    """Logarithm of the pulled wire's tensions at the motor and at the joint, after a ramp."""
+    (motor, joint), _ = ramp.ends()
+    return float(np.log(motor / joint))
 
 
 def hand(ticks, tick, size=0.5):

@@ -80,7 +80,7 @@ from endoscope_core.physics.sheath import (
 
 command_at_servo = folded(hooks.COMMAND)
 servo_error = folded(hooks.SERVO_ERROR)
-torque_limit, torque_is_limited = folded(hooks.TORQUE), acting(hooks.TORQUE)
+largest_torque, torque_is_limited = folded(hooks.TORQUE), acting(hooks.TORQUE)
 pulley_angle = folded(hooks.PULLEY_ANGLE)
 travel_of = folded(hooks.TRAVEL_OF)
 exponent_factor, exponent_varies = folded(hooks.EXPONENT), acting(hooks.EXPONENT)
@@ -126,7 +126,7 @@ def settle(
     x[FLOOR] = friction_floor(on, p, x)
     x[JOINT] = x[TIP] = p[JOINT_REST_ANGLE]
     history[ANGLE_HISTORY, :] = x[TIP]
-    _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, 0.0, tick))
+    _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, -0.5 * tick, tick))
     table = sheath[SHAPES : SHAPES + 5]
     for wire in (WIRE_A, WIRE_B):
         for i in range(CELLS + 1):
@@ -140,7 +140,7 @@ def settle(
     for k in range(1, steps + 1):
         x[MOTOR] = shaft * k / steps
         _wind_up(x, table, p, on, x[MOTOR])
-        bend(x, table, p, on, 0.0, 0.0, 0.0, 0.0, _SETTLING_TICK)
+        bend(x, table, p, on, 0.0, 0.0, 0.0, -0.5 * _SETTLING_TICK, _SETTLING_TICK)
     for wire in range(2):
         x[FILM + wire] = 0.0
     x[SLIDING_SPEED] = x[JOINT_STEP] = 0.0
@@ -253,25 +253,25 @@ def _torque(x: Array, table: Array, p: Array, on: Flags, step: float) -> float:
 def _yield(x: Array, table: Array, p: Array, on: Flags, step: float, tick: float) -> float:
     """Step of the motor in rad, cut where the wires load it with more than it can bear.
 
-    The load grows with the step, the bearable falls with the speed: one step divides them.
+    The load grows with the step and the bearable falls with the speed of a motor that drives its
+    load: one step divides them.
     """
-    limit = torque_limit(on, p, x, abs(step) / tick)
     load = _torque(x, table, p, on, step)
-    if abs(load) <= limit:
-        return step
     way = 1.0 if load > 0.0 else -1.0
+    if way * load <= largest_torque(on, p, x, way * step / tick):
+        return step
     too_far = step
     back = max(1e-4, abs(step))
     far_enough = step
     for _ in range(_TRIES):
         far_enough -= way * back
         back *= 2.0
-        bearable = torque_limit(on, p, x, abs(far_enough) / tick)
+        bearable = largest_torque(on, p, x, way * far_enough / tick)
         if way * _torque(x, table, p, on, far_enough) <= bearable:
             break
     for _ in range(_TRIES):
         middle = 0.5 * (too_far + far_enough)
-        bearable = torque_limit(on, p, x, abs(middle) / tick)
+        bearable = largest_torque(on, p, x, way * middle / tick)
         if way * _torque(x, table, p, on, middle) > bearable:
             too_far = middle
         else:

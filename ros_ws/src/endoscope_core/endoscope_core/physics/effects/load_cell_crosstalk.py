@@ -8,12 +8,12 @@ EFFECT = Effect(
     'load_cell_crosstalk',
     Stage.SENSING,
     60,
-    physics='One load cell sees a share of its neighbour.',
-    equation='reading of cell `wire` = T + share T_neighbour',
+    physics='One load cell sees a share of its neighbour, or both see a share of each other.',
+    equation='reading of cell `wire`, of both if that is 2, = T + share T_neighbour',
     source='VDI/VDE 2638, characteristics of force transducers (crosstalk)',
     parameters=(
         Parameter('share', '-', -0.9, 0.9, 0.1, off=0.0, starts=(0.05,)),
-        Parameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
+        Parameter('wire', '-', 0.0, 2.0, 0.0, choices=(0.0, 1.0, 2.0)),
     ),
 )
 SHARE, WIRE = EFFECT.places
@@ -23,4 +23,6 @@ SHARE, WIRE = EFFECT.places
 @compiled
 def mixed(p: Array, x: Array, reading: float, cell: int, neighbour: float, time: float) -> float:
     """Tension in N as the cell reads it."""
-    return reading + p[SHARE] * neighbour if cell == p[WIRE] else reading
+    if p[WIRE] == 2.0 or cell == p[WIRE]:
+        return reading + p[SHARE] * neighbour
+    return reading

@@ -9,8 +9,8 @@ EFFECT = Effect(
     Stage.ACTUATOR,
     40,
     physics='The servo stalls where the wires load it with its largest torque.',
-    equation="|tau| <= limit_nm - droop |m'|, tau = pulley_radius (Ta(0) - Tb(0)); the motor "
-    'yields there',
+    equation="|tau| <= limit_nm - droop max(0, m' sgn tau), tau = pulley_radius (Ta(0) - Tb(0)); "
+    'the motor yields there',
     source='Torque source with saturation: Siciliano et al., Robotics, 2009, sec. 5.2; speed-'
     'torque line of a DC motor: Krishnan, Electric Motor Drives, 2001, ch. 2',
     parameters=(
@@ -34,5 +34,5 @@ LIMIT, DROOP = EFFECT.places
 @hook(EFFECT, TORQUE)
 @compiled
 def bearable(p: Array, x: Array, speed: float) -> float:
-    """Largest torque in N m at a speed of the shaft in rad/s."""
-    return max(0.0, p[LIMIT] - p[DROOP] * speed)
+    """Largest torque in N m at a speed in rad/s; all of it where the load drives the motor."""
+    return max(0.0, p[LIMIT] - p[DROOP] * max(0.0, speed))

@@ -24,15 +24,16 @@ EFFECT = Effect(
 COEFFICIENT, LOAD_FACTOR, THINNING = EFFECT.places
 LARGEST_EXPONENT = 3.0
 """That speed may add."""
+LEAST_EXPONENT = 1e-6
+"""Of a sheath to whose friction speed adds any."""
 
 
 @hook(EFFECT, EXPONENT)
 @compiled
 def factor(p: Array, x: Array, speed: float, time: float, tick: float) -> float:
     """Factor on the capstan exponent at a sliding speed in m/s."""
-    if p[CAPSTAN_EXPONENT] <= 0.0:
-        return 1.0
-    return 1.0 + min(LARGEST_EXPONENT, p[LOAD_FACTOR] * speed) / p[CAPSTAN_EXPONENT]
+    added = min(LARGEST_EXPONENT, p[LOAD_FACTOR] * speed)
+    return 1.0 + added / max(p[CAPSTAN_EXPONENT], LEAST_EXPONENT)
 
 
 @hook(EFFECT, FILM_DRAG)

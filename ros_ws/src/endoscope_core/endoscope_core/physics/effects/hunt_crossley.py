@@ -1,4 +1,4 @@
-"""What pushes back only while something is pressed into it."""
+"""Law of Hunt and Crossley: what pushes back, with loss, while something is pressed into it."""
 
 from endoscope_core.compiled import compiled
 

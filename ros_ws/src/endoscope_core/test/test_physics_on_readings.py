@@ -1,0 +1,59 @@
+"""What the effects of the sensors do to their readings, and that they leave the rig alone."""
+
+import numpy as np
+import pytest
+from physics_rig import hand, run
+
+TICK = 1e-3
+TIME = TICK * np.arange(3000)
+COMMAND = hand(3000, TICK)
+
+
+@pytest.fixture(scope='module')
+def nominal():
+    return run(COMMAND)
+
+
+def test_tracker_bias_and_drift_add_up(nominal):
+    given = {'tracker_bias': {'bias_rad': 0.07}, 'tracker_drift': {'rate_rad_per_s': 0.01}}
+    done = run(COMMAND, given)
+    np.testing.assert_allclose(done.bending, nominal.joint + 0.07 + 0.01 * TIME, atol=1e-14)
+    np.testing.assert_array_equal(done.joint, nominal.joint)
+
+
+@pytest.mark.parametrize('ticks', [40, 12.5])
+def test_tracker_delay_delays_by_its_time(nominal, ticks):
+    late = run(COMMAND, {'tracker_delay': {'delay_s': ticks * TICK}})
+    now = np.arange(3000.0)
+    np.testing.assert_allclose(late.bending, np.interp(now - ticks, now, nominal.joint), atol=1e-12)
+
+
+def test_metal_distorts_what_is_late(nominal):
+    bend = {'linear': 0.1, 'quadratic': 0.2, 'cubic': -0.3, 'wave_rad': 0.05, 'wave_phase': 0.5}
+    given = {'tracker_distortion': bend | {'wave_number': 6.0}, 'tracker_delay': {'delay_s': 0.03}}
+    q = np.interp(TIME - 0.03, TIME, nominal.joint)
+    wave = 0.05 * (np.sin(6.0 * q + 0.5) - np.sin(0.5))
+    expected = q + 0.1 * q + 0.2 * q**2 - 0.3 * q**3 + wave
+    np.testing.assert_allclose(run(COMMAND, given).bending, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize('wire', [0, 1])
+def test_one_load_cell_reads_wrong(nominal, wire):
+    own, neighbour = (nominal.a, nominal.b) if wire == 0 else (nominal.b, nominal.a)
+    expected = {
+        'load_cell_crosstalk': ({'share': 0.2}, own + 0.2 * neighbour),
+        'load_cell_gain': ({'gain': 1.3}, 1.3 * own),
+        'load_cell_drift': ({'rate_n_per_s': 0.1}, own + 0.1 * TIME),
+        'load_cell_saturation': ({'limit_n': 6.0}, np.minimum(own, 6.0)),
+    }
+    assert own.max() > 6.5
+    for effect_id, (values, reading) in expected.items():
+        done = run(COMMAND, {effect_id: values | {'wire': float(wire)}})
+        mine, others = (done.a, done.b) if wire == 0 else (done.b, done.a)
+        np.testing.assert_allclose(mine, reading, atol=1e-12, err_msg=effect_id)
+        np.testing.assert_array_equal(others, neighbour, err_msg=effect_id)
+
+
+def test_a_cell_clips_last(nominal):
+    given = {'load_cell_gain': {'gain': 1.5}, 'load_cell_saturation': {'limit_n': 8.0}}
+    np.testing.assert_allclose(run(COMMAND, given).a, np.minimum(1.5 * nominal.a, 8.0), atol=1e-12)
