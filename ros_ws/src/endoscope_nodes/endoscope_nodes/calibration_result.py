@@ -1,5 +1,6 @@
 """The message ``calibration/result``: how it is written, and how it is read."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -7,7 +8,8 @@ from typing import TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
 
-from endoscope_core.control import PhysicalParameters
+from endoscope_core.control import PhysicalParameters, Reach, reach
+from endoscope_core.control.physical_parameters import PROFILE
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_nodes.diagnostics import ERROR, OK, status
 from endoscope_nodes.names import JOINTS
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 
 NAME = 'calibration: hysteresis class'
 NONE_OF_THEM = 'none'
+REACH = 'reach.'
 
 
 def successful_result(
@@ -59,6 +62,9 @@ def successful_result(
     values['duration'] = duration
     if plants:
         values |= plant_values(plants)
+        for joint, plant in zip(JOINTS, plants, strict=True):
+            tube = reach(plant.joint)
+            values |= {f'{REACH}{joint}.low': tube.low, f'{REACH}{joint}.high': tube.high}
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
     return _array(stamp_ns, OK, message, values)
 
@@ -117,6 +123,7 @@ def findings_of(message: DiagnosticArray) -> CalibrationFindings | None:
                 int(values['class_deg']),
                 None if size is None else float(size),
                 _plants_of(values),
+                _reaches_of(values),
             )
         except (KeyError, ValueError):
             return None
@@ -138,8 +145,18 @@ def _plants_of(values: Mapping[str, str]) -> tuple[PhysicalParameters, ...]:
         prefix = f'{joint}.'
         own = {key.removeprefix(prefix): v for key, v in values.items() if key.startswith(prefix)}
         if own:
-            plants.append(PhysicalParameters.from_dict(own))
+            profile = json.loads(own[PROFILE])
+            plants.append(PhysicalParameters.from_dict(own | {PROFILE: profile}))
     return tuple(plants)
+
+
+def _reaches_of(values: Mapping[str, str]) -> tuple[Reach, ...]:
+    if not any(key.startswith(REACH) for key in values):
+        return ()
+    return tuple(
+        Reach(*(float(values[f'{REACH}{joint}.{end}']) for end in ('low', 'high')))
+        for joint in JOINTS
+    )
 
 
 def _array(stamp_ns: int, level: bytes, text: str, values: dict[str, object]) -> DiagnosticArray:

@@ -13,6 +13,9 @@ from endoscope_core.control import (
     Feedforward,
     FeedforwardLaw,
     FeedforwardSettings,
+    MotorLimits,
+    keep_within,
+    reach_in_words,
 )
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.law_choice import BY_CLASS, CalibrationFindings, LawChoice
@@ -85,7 +88,12 @@ class CompensatorNode(EndoscopeNode):
             )
         )
         self._feedforward = Feedforward(
-            len(JOINTS), FeedforwardSettings(lead=p.lead, speed_limit=motors.speed / facts.gear)
+            len(JOINTS),
+            FeedforwardSettings(
+                lead=p.lead,
+                speed_limit=motors.speed / facts.gear,
+                limits=MotorLimits.of(self.rig),
+            ),
         )
         self._passing = Feedforward(len(JOINTS))
         self._desired = DesiredMotion(len(JOINTS))
@@ -101,6 +109,7 @@ class CompensatorNode(EndoscopeNode):
         self._drive_before = _NOTHING
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
+        self._beyond_reach = self._beyond_before = 0
         self._state_is_news = True
         self._motors = JointPublisher(self, MOTOR_COMMAND, MOTORS, ('position',), COMMAND)
         self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
@@ -264,12 +273,22 @@ class CompensatorNode(EndoscopeNode):
             self._feedforward.rebase(
                 self._drive_before - added, sample.position if dt == 0.0 else None
             )
-        angle, velocity = self._desired.follow(sample.position, sample.velocity, dt or TICK_S)
+        within = self._within_reach(sample)
+        angle, velocity = self._desired.follow(*within, dt or TICK_S)
         if self._news and not any(velocity):
             self._take_news()
         self._learn(sample.stamp_ns)
         drive = self._feedforward.step(angle, velocity, dt or TICK_S) + added
         self._put_out(sample.stamp_ns, drive, dt or TICK_S)
+
+    def _within_reach(self, sample: JointSample) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Desired angles and velocities, cut where the tube at hand lets the tip bend no more."""
+        if self.findings is None:
+            return sample.position, sample.velocity
+        angle, velocity = keep_within(self.findings.reaches, sample.position, sample.velocity)
+        if angle != sample.position:
+            self._beyond_reach += 1
+        return angle, velocity
 
     def _on_calibration(self, sample: JointSample) -> None:
         if not self._may_pass(sample, self._calibration_in, self.calibration_gate):
@@ -364,10 +383,17 @@ class CompensatorNode(EndoscopeNode):
     def _report(self) -> Report:
         waiting = self._settings.mode != 'none' and self.findings is None
         level = ERROR if self._trouble else WARN if waiting else OK
+        said = self._model_in_words()
+        beyond = self._beyond_reach - self._beyond_before
+        self._beyond_before = self._beyond_reach
+        if beyond and self.findings is not None:
+            level = max(level, WARN)
+            said += f'; {reach_in_words(self.findings.reaches, JOINTS)}, more was asked for'
         return (
             level,
-            self._model_in_words(),
+            said,
             {
+                'cut to the reach': self._beyond_reach,
                 'source': self._source,
                 'published': self._motors.count,
                 'corrected': self._corrected,

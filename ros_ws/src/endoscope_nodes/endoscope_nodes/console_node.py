@@ -4,14 +4,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState, Joy
 
-from endoscope_core.control import Handle, HandleRefusal, HandleSettings
+from endoscope_core.control import (
+    Handle,
+    HandleRefusal,
+    HandleSettings,
+    Reach,
+    keep_within,
+    reach_in_words,
+)
 from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.safety.motion_session import STALL_NS
 from endoscope_core.signals import MOTIONS
 from endoscope_core.signals.command_file import CommandFileError
+from endoscope_nodes.calibration_result import findings_of, is_of_no_class
 from endoscope_nodes.console_motion import (
     SampledMotion,
     approach,
@@ -23,13 +32,14 @@ from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
+    CALIBRATION_RESULT,
     JOINTS,
     MASTER_CLUTCH,
     MASTER_MEASURED,
     SLAVE_COMMAND,
 )
 from endoscope_nodes.parameters import ParameterError, parameter
-from endoscope_nodes.qos import COMMAND, EVENT, SENSOR_ASKED
+from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
 from endoscope_nodes.watches import (
@@ -93,6 +103,8 @@ class ConsoleNode(EndoscopeNode):
         self._sent_ns: int | None = None
         self._clutch_said = False
         self._refused_before = 0
+        self._reaches: tuple[Reach, ...] = ()
+        self._beyond_reach = self._beyond_before = 0
         facts = self.rig.joints
         reach = (facts.reach,) * len(JOINTS)
         low = tuple(-x for x in reach)
@@ -126,6 +138,9 @@ class ConsoleNode(EndoscopeNode):
             on_malformed=lambda reason: self._handle.refuse(HandleRefusal.MALFORMED, reason),
         )
         self._clutch = ClutchWatch(self)
+        self._results = self.create_subscription(
+            DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
+        )
         self._on_parameters(self._settings)
         self.diagnostics.add('commands', self._report)
         self.ticker.every(0.1, self._repeat_clutch)
@@ -175,6 +190,14 @@ class ConsoleNode(EndoscopeNode):
             self._session.leave(crowd)
             return
         self._handle.take(sample.stamp_ns, sample.position, self.ticker.monotonic_ns())
+
+    def _on_result(self, message: DiagnosticArray) -> None:
+        """Keep to what this session's own calibration found out about the tube's reach."""
+        if message.header.frame_id != self._session.name or rivals(self, self._results):
+            return
+        found = findings_of(message)
+        if found is not None or is_of_no_class(message):
+            self._reaches = () if found is None else found.reaches
 
     def _rest(self) -> None:
         """Stop moving: whatever comes next begins at the measured pose."""
@@ -286,6 +309,8 @@ class ConsoleNode(EndoscopeNode):
         stamp_ns: int,
         periods: int,
     ) -> None:
+        asked, (angle, velocity) = angle, keep_within(self._reaches, angle, velocity)
+        self._beyond_reach += angle != tuple(asked)
         shaped = shaper.shape(angle, periods * TICK_S)
         as_asked = all(abs(a - b) < 1e-9 for a, b in zip(angle, shaped, strict=True))
         self._sent_ns = self.ticker.monotonic_ns()
@@ -306,6 +331,10 @@ class ConsoleNode(EndoscopeNode):
         if fresh:
             said = f'{fresh} messages of {MASTER_MEASURED} refused, last: {handle.last_reason}'
             return WARN, said, values
+        beyond = self._beyond_reach - self._beyond_before
+        self._beyond_before = self._beyond_reach
+        if beyond:
+            return WARN, f'{reach_in_words(self._reaches, JOINTS)}, more was asked for', values
         if self._played is not None:
             values['progress [s]'] = min(self._next, len(self._played)) * TICK_S
             values['length [s]'] = len(self._played) * TICK_S

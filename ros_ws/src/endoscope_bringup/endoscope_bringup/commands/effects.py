@@ -6,7 +6,7 @@ import textwrap
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from endoscope_core.physics.effects import Effect, Parameter
+    from endoscope_core.physics.effect import Effect, Parameter
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:

@@ -13,9 +13,11 @@ from endoscope_core.control.feedforward import (
     FeedforwardSettings,
 )
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
+from endoscope_core.control.motor_limits import MotorLimits, shipped_limits
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
+from endoscope_core.control.reach import Reach, keep_within, reach, reach_in_words
 from endoscope_core.control.recursive_hysteresis import (
     RecursiveHysteresisController,
     RecursiveHysteresisSettings,
@@ -36,12 +38,18 @@ __all__ = [
     'Handle',
     'HandleRefusal',
     'HandleSettings',
+    'MotorLimits',
     'PhysicalInverse',
     'PhysicalParameters',
     'PlantLearning',
     'PlantLearningSettings',
+    'Reach',
     'RecursiveHysteresisController',
     'RecursiveHysteresisSettings',
     'TrackerFeedback',
     'TrackerMeasurement',
+    'keep_within',
+    'reach',
+    'reach_in_words',
+    'shipped_limits',
 ]

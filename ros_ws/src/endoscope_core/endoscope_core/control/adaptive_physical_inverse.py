@@ -4,6 +4,7 @@ from endoscope_core.control.motor_limits import MotorLimits
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
+from endoscope_core.control.smoothing import COUNT
 
 
 class AdaptivePhysicalInverse(PhysicalInverse):
@@ -18,6 +19,7 @@ class AdaptivePhysicalInverse(PhysicalInverse):
     parameters : PhysicalParameters
         To begin with.
     limits : MotorLimits, optional
+    dead_band : float
     learning : PlantLearningSettings, optional
     """
 
@@ -25,9 +27,10 @@ class AdaptivePhysicalInverse(PhysicalInverse):
         self,
         parameters: PhysicalParameters,
         limits: MotorLimits | None = None,
+        dead_band: float = 2.0 * COUNT,
         learning: PlantLearningSettings | None = None,
     ) -> None:
-        super().__init__(parameters, limits)
+        super().__init__(parameters, limits, dead_band)
         self._learning_settings = learning
         self._learning = PlantLearning(parameters, self.limits.gear, settings=learning)
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.control.adaptive_physical_inverse import AdaptivePhysicalInverse
 from endoscope_core.control.joint_inverse import HysteresisInverse, JointInverse, Passing
+from endoscope_core.control.motor_limits import MotorLimits, shipped_limits
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.control.smoothing import COUNT, limited, worked_off
@@ -90,6 +91,8 @@ class FeedforwardSettings:
         rad over which the memory of the direction builds up in mode 'none'.
     dead_band : float
         rad by which the foreseen angle may turn back without any effect: two counts of an encoder.
+    limits : MotorLimits
+        That the physical modes keep to.
     """
 
     lead: float = 0.06
@@ -98,6 +101,7 @@ class FeedforwardSettings:
     offset_time: float = 0.3
     resting_travel: float = math.radians(1.0)
     dead_band: float = 2.0 * COUNT
+    limits: MotorLimits = field(default_factory=shipped_limits)
 
     def __post_init__(self) -> None:
         if not (0.0 <= self.lead <= 0.5):
@@ -295,8 +299,8 @@ class Feedforward:
         if not isinstance(parameters, PhysicalParameters):
             return HysteresisInverse(parameters, self.settings.lead, self.settings.dead_band)
         if self.law.mode == PHYSICAL:
-            return PhysicalInverse(parameters)
-        return AdaptivePhysicalInverse(parameters)
+            return PhysicalInverse(parameters, self.settings.limits, self.settings.dead_band)
+        return AdaptivePhysicalInverse(parameters, self.settings.limits, self.settings.dead_band)
 
     def _checked(self, name: str, values: Vector) -> list[float]:
         numbers = [float(value) for value in values]

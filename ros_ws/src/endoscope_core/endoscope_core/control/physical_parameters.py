@@ -8,7 +8,7 @@ from typing import Any
 
 from endoscope_core.physics.description import JointParameters
 
-_PROFILE = 'friction_profile'
+PROFILE = 'friction_profile'
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class PhysicalParameters:
     def to_dict(self) -> dict[str, Any]:
         """All numbers by name; the friction profile is a list."""
         values = {item.name: getattr(self.joint, item.name) for item in fields(JointParameters)}
-        return values | {_PROFILE: list(self.joint.friction_profile)}
+        return values | {PROFILE: list(self.joint.friction_profile)}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> PhysicalParameters:
@@ -41,6 +41,6 @@ class PhysicalParameters:
         if set(values) != names:
             odd = ', '.join(sorted(set(values) ^ names))
             raise ValueError(f'parameters of the plant are wrong or missing: {odd}')
-        numbers = {name: float(values[name]) for name in names - {_PROFILE}}
-        profile = tuple(float(value) for value in values[_PROFILE])
+        numbers = {name: float(values[name]) for name in names - {PROFILE}}
+        profile = tuple(float(value) for value in values[PROFILE])
         return cls(JointParameters(**numbers, friction_profile=profile))

@@ -26,7 +26,7 @@ PER_CLASS = 30
 SIZE_SPREAD_DEG = 1.0
 ARRAYS_FILE = 'recordings.npz'
 MANIFEST_FILE = 'manifest.json'
-_MOST_RIGS = 50
+_MOST_RIGS = 1000
 
 
 class DatasetError(EndoscopeError, ValueError):

@@ -9,22 +9,20 @@ from scipy.optimize import brentq
 
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics import PlantDescription, simulate
-from endoscope_core.physics.family import TubeFamily, shipped_family
+from endoscope_core.physics.family import MOST_BENT, TubeFamily, shipped_family
 from endoscope_core.rig import load_rig
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
 
 JOINTS = ('bend_x', 'bend_y')
-MOST_BENT = float(np.deg2rad(360.0))
-"""Sum of all bends of the tube in rad; beyond the recordings' 240 deg the family is continued."""
 
 RELATIVE_SPREAD = {
     'capstan_exponent': 0.5,
     'wire_stiffness': 0.10,
     'joint_radius': 0.01,
     'pulley_radius': 0.01,
-    'joint_stiffness': 0.10,
+    'joint_stiffness': 0.15,
     'joint_damping': 0.15,
-    'joint_friction': 0.10,
+    'joint_friction': 0.20,
     'joint_presliding': 0.15,
     'motor_bandwidth': 0.05,
     'motor_damping_ratio': 0.05,

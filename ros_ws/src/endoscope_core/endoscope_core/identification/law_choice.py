@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from endoscope_core.control import ADAPTIVE_PHYSICAL, FeedforwardLaw, PhysicalParameters
+from endoscope_core.control import ADAPTIVE_PHYSICAL, FeedforwardLaw, PhysicalParameters, Reach
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.class_parameters import (
     load_class_parameters,
@@ -37,11 +37,14 @@ class CalibrationFindings:
         Backlash size in rad.
     plants : tuple of PhysicalParameters
         Of each joint; empty where the plant was not identified.
+    reaches : tuple of Reach
+        How far each joint can be bent in this tube; empty where that is not known.
     """
 
     class_deg: int | None = None
     size: float | None = None
     plants: tuple[PhysicalParameters, ...] = ()
+    reaches: tuple[Reach, ...] = ()
 
 
 class LawChoice:

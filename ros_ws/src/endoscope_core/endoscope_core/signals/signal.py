@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -54,6 +54,15 @@ class Signal:
         moving = (flat >= 0.0) & (flat <= self.duration)
         velocity = np.where(moving, velocity, 0.0)
         return angle.reshape(asked.shape), velocity.reshape(asked.shape)
+
+    def scaled(self, factor: float) -> Signal:
+        """The same motion, `factor` times as far and as fast."""
+
+        def evaluate(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+            angle, velocity = self.evaluate(time)
+            return factor * angle, factor * velocity
+
+        return replace(self, evaluate=evaluate)
 
 
 @dataclass(frozen=True)

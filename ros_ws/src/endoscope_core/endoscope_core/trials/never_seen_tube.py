@@ -20,7 +20,7 @@ from endoscope_core.trials.tracking_trial import TrackingTrial
 SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG = 42.0, 98.0
 # Data sets draw from the seed alone; this keeps tubes judged on apart from tubes learnt from.
 _UNSEEN = 424_243
-_MOST_RIGS = 50
+_MOST_RIGS = 1000
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from endoscope_core.control import (
     RecursiveHysteresisController,
     TrackerMeasurement,
 )
+from endoscope_core.control.motor_limits import shipped_limits
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.physics import PlantDescription, PlantSimulator, SensorModel
-from endoscope_core.rig import load_rig
 from endoscope_core.signals import Signal
 
 TICK = 1.0e-3
@@ -70,7 +70,7 @@ def run_tracking_trial(
     """
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, seed)
     joints = len(rig.joints)
-    gear = load_rig().joints.gear
+    gear = shipped_limits().gear
     motion, feedforward = DesiredMotion(joints), Feedforward(joints)
     feedforward.select(law)
     learns = law.mode == ADAPTIVE_PHYSICAL
