@@ -41,6 +41,7 @@ NOMINAL_UNITS = {
     'joint_presliding': 'rad',
     'joint_presliding_spread': '-',
     'pretension_profile': '-',
+    'joint_rest_angle': 'rad',
     **dict.fromkeys(FRICTION_PROFILE_NAMES, '-'),
     'motor_bandwidth': 'rad/s',
     'motor_damping_ratio': '-',

@@ -11,6 +11,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.layout import (
     FRICTION_PROFILE,
     JOINT_PRESLIDING_SPREAD,
+    JOINT_REST_ANGLE,
     NOMINAL_KEYS,
     PRETENSION_PROFILE,
 )
@@ -32,18 +33,20 @@ SCALED_NOMINAL = (
     'motor_bandwidth',
     'motor_damping_ratio',
 )
-"""Numbers of the plant that are known but for a factor. Radii are drawn and machined; an angle at
-which the joint rests is a bias of the tracker until a recording tells the two apart."""
+"""Numbers of the plant that are known but for a factor. Radii are drawn and machined."""
 FRICTION_PROFILE_NAMES = tuple(f'friction_profile_{term}' for term in (1, 2, 3))
 """Coefficients of the sheath's friction profile that are fitted."""
 FORM_SPREAD = {
     'pretension_profile': 0.25,
+    'joint_rest_angle': 0.05,
     **dict.fromkeys(FRICTION_PROFILE_NAMES, 0.5),
     'joint_presliding_spread': 0.5,
 }
-"""By how much (rms) the form of a healthy rig differs from its description."""
+"""By how much (rms) the form of a healthy rig differs from its description, and the angle in rad at
+which its joint rests."""
 FORM_INDICES = {
     'pretension_profile': PRETENSION_PROFILE,
+    'joint_rest_angle': JOINT_REST_ANGLE,
     **{name: FRICTION_PROFILE + i for i, name in enumerate(FRICTION_PROFILE_NAMES)},
     'joint_presliding_spread': JOINT_PRESLIDING_SPREAD,
 }

@@ -30,7 +30,6 @@ from endoscope_core.physics.layout import (
     IN_PUSH_MOMENT,
     IN_PUSH_STRETCH,
     JOINT,
-    JOINT_REST_ANGLE,
     JOINT_STEP,
     MOTOR,
     MOTOR_BANDWIDTH,
@@ -124,8 +123,7 @@ def settle(
     history[COMMAND_HISTORY, :] = shaft
     _lay_out(sheath, p)
     x[FLOOR] = friction_floor(on, p, x)
-    x[JOINT] = x[TIP] = p[JOINT_REST_ANGLE]
-    history[ANGLE_HISTORY, :] = x[TIP]
+    history[ANGLE_HISTORY, :] = 0.0
     _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, -0.5 * tick, tick))
     table = sheath[SHAPES : SHAPES + 5]
     for wire in (WIRE_A, WIRE_B):
