@@ -41,7 +41,7 @@ def test_a_number_far_from_its_description_is_no_physics(one_joint):
     assert explanation.verdict is Verdict.PARAMETERS_DIFFER
     assert explanation.effects == ()
     estimate = explanation.parameters['bend_x']['wire_stiffness']
-    assert estimate.value == pytest.approx(1300.0, rel=0.01)
+    assert estimate.value == pytest.approx(2000.0, rel=0.01)
     assert not estimate.in_band
     assert explanation.refitted.joints['bend_x'].wire_stiffness == estimate.value
     assert max(fit.ratio for fit in explanation.fit['refitted'].values()) < 1.3
@@ -53,7 +53,7 @@ def test_a_number_far_from_its_description_is_no_physics(one_joint):
         ('joint_stop', {'angle_rad': 0.2, 'stiffness': 0.1}, Verdict.MISSING_PHYSICS),
         ('load_cell_gain', {'gain': 0.9, 'wire': 1.0}, Verdict.SENSOR_FAULT),
         ('tracker_delay', {'delay_s': 0.05}, Verdict.SENSOR_FAULT),
-        ('gravity', {'moment_nm': 1e-3}, Verdict.MISSING_PHYSICS),
+        ('gravity', {'moment_nm': 1.5e-3, 'phase_rad': 1.0}, Verdict.MISSING_PHYSICS),
     ],
 )
 def test_the_effect_that_was_left_out_is_named(effect_id, parameters, verdict, one_joint):
