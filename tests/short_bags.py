@@ -16,6 +16,7 @@ from endoscope_core.physics import (
     SensorModel,
     simulate,
 )
+from endoscope_core.rig import load_rig
 
 Stamps = NDArray[np.int64]
 
@@ -63,7 +64,7 @@ def write_short_bag(
     angle = np.where(
         time < 0.7 * duration, 0.9 * np.sin(2.2 * time), 0.4 * np.sign(np.sin(6.0 * time))
     )
-    command = angle[:, None] * plant.joints['bend_x'].gear
+    command = angle[:, None] * load_rig().joints.gear
     truth, sensors = simulate(plant, command), SensorModel(plant.sensors, seed)
     bending = sensors.bending(truth.bending[::25])
     if spoil is not None:

@@ -73,9 +73,11 @@ def test_a_coarse_tick_costs_little(joint):
 
 
 def test_nothing_moves_before_it_is_moved():
-    made = run(JointParameters(), np.zeros((500, 1)))
-    assert_allclose(made.bending_true, 0.0, atol=1e-9)
-    assert_allclose(made.tension, 5.0, rtol=1e-9)
+    made = run(replace(JointParameters(), joint_rest_angle=0.2), np.zeros((500, 1)))
+    # Wires and friction hold the joint near the angle at which the wires were tightened.
+    assert 0.0 < made.bending_true[0, 0] < 0.1
+    assert np.ptp(made.bending_true) < 1e-5
+    assert_allclose(made.tension, 5.0, rtol=1e-2)
 
 
 def test_a_held_shaft_holds_everything():

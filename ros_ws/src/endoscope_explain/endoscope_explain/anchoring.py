@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.plant import PlantDescription
-from endoscope_core.plant.kernel import OUT_JOINT
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.layout import OUT_JOINT
 from endoscope_explain.compose import nominal_anchors, nominal_model
 from endoscope_explain.evaluate import packed_joint, simulate_joint
 from endoscope_explain.fit import Fit
@@ -24,8 +24,6 @@ def anchored(
     plant: PlantDescription,
     band: float,
     jobs: int,
-    *,
-    tightened: bool = False,
 ) -> tuple[tuple[JointObservation, ...], list[tuple[Fit, Fit]]]:
     """Fit the nominal plant, and once more where that shows isolated wrong samples.
 
@@ -41,8 +39,6 @@ def anchored(
         Relative tolerance of its parameters.
     jobs : int
         Processes side by side.
-    tightened : bool
-        Whether friction may hold the wires at the start.
 
     Returns
     -------
@@ -52,11 +48,11 @@ def anchored(
         Of each joint, refitted and as described.
     """
     packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
-    anchors = all_anchors(observations, packed, jobs, band, tightened=tightened)
+    anchors = all_anchors(observations, packed, jobs, band)
     cleaned = without_isolated(recording, observations, tuple(fitted for fitted, _ in anchors))
     if cleaned is observations:
         return observations, anchors
-    return cleaned, all_anchors(cleaned, packed, jobs, band, tightened=tightened)
+    return cleaned, all_anchors(cleaned, packed, jobs, band)
 
 
 def all_anchors(
@@ -64,15 +60,13 @@ def all_anchors(
     packed: dict[str, tuple[Array, Flags]],
     jobs: int,
     band: float = BAND,
-    *,
-    tightened: bool = False,
 ) -> list[tuple[Fit, Fit]]:
     """Refit the nominal plant of every joint, and let the joints see each other's angle."""
 
     def numbers(index: int) -> tuple[tuple[Array, Array, Array, float], ...]:
         observation = observations[index]
         plant = packed[observation.joint]
-        fits = nominal_anchors(observation, *plant, band, tightened=tightened)
+        fits = nominal_anchors(observation, *plant, band)
         return tuple((f.theta, f.residuals, f.jacobian, f.cost) for f in fits)
 
     anchors = []
@@ -80,7 +74,7 @@ def all_anchors(
         observations, parallel_map(numbers, range(len(observations)), jobs), strict=True
     ):
         plant = packed[observation.joint]
-        model = nominal_model(observation, *plant, band, tightened=tightened)
+        model = nominal_model(observation, *plant, band)
         anchors.append((Fit(model, *found[0]), Fit(model, *found[1])))
     couple(observations, tuple(simulated_bending(fitted) for fitted, _ in anchors))
     return anchors

@@ -10,7 +10,7 @@ import numpy as np
 
 from endoscope_explain.compose import Composition
 from endoscope_explain.fit import Fit, fit
-from endoscope_explain.free_parameters import FITTED_NOMINAL, FreeParameter
+from endoscope_explain.free_parameters import SCALED_NOMINAL, FreeParameter
 from endoscope_explain.score import score
 
 FURTHEST = 4.0
@@ -25,7 +25,7 @@ def leans(fitted: Fit) -> bool:
     low, high = fitted.model.bounds()
     at_the_end = np.minimum(fitted.theta - low, high - fitted.theta) < AT_THE_END
     free = fitted.model.free
-    return any(e and i.name in FITTED_NOMINAL for e, i in zip(at_the_end, free, strict=True))
+    return any(e and i.name in SCALED_NOMINAL for e, i in zip(at_the_end, free, strict=True))
 
 
 def beyond_band(composition: Composition) -> Composition:
@@ -42,11 +42,11 @@ def beyond_band(composition: Composition) -> Composition:
 def leaves_band_of(fitted: Fit, nominal: Fit) -> bool:
     """Return whether all nominal numbers of a fit may leave the band that a nominal fit has."""
     pairs = zip(fitted.model.free, nominal.model.free, strict=False)
-    return all(a != b for a, b in pairs if a.name in FITTED_NOMINAL)
+    return all(a != b for a, b in pairs if a.name in SCALED_NOMINAL)
 
 
 def _widened(item: FreeParameter) -> FreeParameter:
-    if item.name not in FITTED_NOMINAL:
+    if item.name not in SCALED_NOMINAL:
         return item
     described = float(np.exp(item.mean))
     return replace(

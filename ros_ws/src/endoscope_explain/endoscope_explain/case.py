@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport
 from endoscope_explain.explanation import ChannelFit, Explanation, NamedEffect, Verdict
 from endoscope_explain.locate.chain_cut import ChainCut

@@ -4,34 +4,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec, PlantDescription
+from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import AuditReport, Finding
-from endoscope_explain.conclusions import CHANGED
+from endoscope_explain.conclusions import has_changed
 from endoscope_explain.explanation import Explanation, NamedEffect, NominalEstimate, Verdict
-
-AUDITED_EFFECTS = {
-    'recording_gap': (
-        'samples absent in [time_s, time_s + duration_s]',
-        'intervals of header stamps against their median',
-    ),
-    'clock_skew': (
-        'stamp = t0 + (1 + skew) (t - t0)',
-        'IEEE 1588 terms; times of receipt against stamps, quickest delivery in each second',
-    ),
-    'tracker_outliers': (
-        'reading = q + wrong, in isolated samples',
-        'Hampel, J. Am. Stat. Assoc. 69, 1974, with the chance of a spike of white noise',
-    ),
-    'load_cell_saturation': (
-        'reading = min(T, limit_n)',
-        'VDI/VDE 2638, characteristics of force transducers (overload)',
-    ),
-}
-"""Equation and source of what the audit itself can name."""
-
-LASTING = ('clock_skew', 'load_cell_saturation')
-"""What a rig will show again; gaps and wrong samples are this recording's alone."""
+from endoscope_explain.free_parameters import FORM_SPREAD
 
 PHYSICAL = ('actuator', 'transmission', 'joint')
 
@@ -52,7 +30,7 @@ def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[Name
     effects = list(explanation.effects)
     known = {(e.id, e.joint) for e in effects}
     for finding in audit.faults():
-        if finding.id in AUDITED_EFFECTS and (finding.id, finding.joint) not in known:
+        if finding.id in CATALOGUE and (finding.id, finding.joint) not in known:
             effects.append(_effect_of(finding))
     return tuple(sorted(effects, key=lambda e: -e.probability))
 
@@ -82,9 +60,12 @@ def improved_plant(explanation: Explanation, audit: AuditReport) -> PlantDescrip
     present = {(e.id, e.joint) for e in plant.effects}
     added = []
     for finding in audit.faults():
-        if finding.id not in LASTING or (finding.id, finding.joint) in present:
+        definition = CATALOGUE.get(finding.id)
+        # Gaps and wrong samples are this recording's alone: the rig will not show them again.
+        if definition is None or definition.traits.audited:
             continue
-        definition = CATALOGUE[finding.id]
+        if (finding.id, finding.joint) in present:
+            continue
         names = {parameter.name for parameter in definition.parameters}
         values = {n: e.value for n, e in finding.parameters.items() if n in names}
         added.append(EffectSpec(finding.id, finding.joint, values))
@@ -103,28 +84,26 @@ def changed_parameters(estimates: Mapping[str, NominalEstimate]) -> dict[str, No
     -------
     dict of str to NominalEstimate
     """
-    changed = {
-        name: e
-        for name, e in estimates.items()
-        if e.nominal > 0.0
-        and e.value > 0.0
-        and not e.low <= e.nominal <= e.high
-        and abs(math.log(e.value / e.nominal)) > CHANGED
-    }
-    return dict(
-        sorted(changed.items(), key=lambda item: -abs(math.log(item[1].value / item[1].nominal)))
-    )
+    changed = {name: e for name, e in estimates.items() if has_changed(name, e)}
+
+    def reach(item: tuple[str, NominalEstimate]) -> float:
+        name, e = item
+        if name in FORM_SPREAD:
+            return abs(e.value - e.nominal)
+        return abs(math.log(e.value / e.nominal))
+
+    return dict(sorted(changed.items(), key=lambda item: -reach(item)))
 
 
 def _effect_of(finding: Finding) -> NamedEffect:
-    equation, source = AUDITED_EFFECTS[finding.id]
+    definition = CATALOGUE[finding.id]
     return NamedEffect(
         finding.id,
         finding.joint,
         finding.stage,
         finding.probability,
-        equation,
-        source,
+        definition.equation,
+        definition.source,
         finding.parameters,
         (),
         finding.evidence,

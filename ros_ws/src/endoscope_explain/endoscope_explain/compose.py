@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.fit import Fit, JointModel, fit, jacobian
 from endoscope_explain.free_parameters import BAND, nominal_parameters
 from endoscope_explain.glance import Glance, glance
@@ -21,8 +21,6 @@ from endoscope_explain.whiteness import is_noise
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-AUDITED = frozenset({'recording_gap', 'tracker_outliers'})
-"""Effects that lose or replace single samples: the audit finds them, no simulation can."""
 LOOKED_AT = 14
 """Effects that get a cheap fit beside another one, of all that were screened. Alone, every effect
 gets one: a plant refitted far from its description promises little of the right one."""
@@ -69,7 +67,7 @@ Parent = tuple[Composition, tuple[Fit, ...]]
 
 def searchable_effects() -> tuple[str, ...]:
     """Effects of the catalogue that a simulation can show, in the order of the chain."""
-    return tuple(effect_id for effect_id in CATALOGUE if effect_id not in AUDITED)
+    return tuple(effect.id for effect in CATALOGUE.values() if not effect.traits.audited)
 
 
 def nominal_model(
@@ -77,11 +75,9 @@ def nominal_model(
     base: Array,
     flags: Flags,
     band: float = BAND,
-    *,
-    tightened: bool = False,
 ) -> JointModel:
     """Return the plant as described, its nominal parameters free within a band."""
-    return JointModel(observation, base, flags, nominal_parameters(base, band, tightened=tightened))
+    return JointModel(observation, base, flags, nominal_parameters(base, band))
 
 
 def nominal_anchors(
@@ -89,8 +85,6 @@ def nominal_anchors(
     base: Array,
     flags: Flags,
     band: float = BAND,
-    *,
-    tightened: bool = False,
 ) -> tuple[Fit, Fit]:
     """The nominal plant refitted, and as described, each with its derivative.
 
@@ -101,14 +95,12 @@ def nominal_anchors(
         Packed plant as described, with what effects it has.
     band : float
         Relative deviation of a healthy rig from its description.
-    tightened : bool
-        Whether friction may hold the wires at the start.
 
     Returns
     -------
     refitted, described : Fit
     """
-    model = nominal_model(observation, base, flags, band, tightened=tightened)
+    model = nominal_model(observation, base, flags, band)
     theta = np.array([item.mean for item in model.free])
     residuals = model.residuals(theta)
     described = Fit(

@@ -1,15 +1,16 @@
 """What is concluded from the decisions on all joints: names, verdict, plants, ladder of fits."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
-from endoscope_core.effects import CATALOGUE, Stage
-from endoscope_core.effects.slots import START_FRICTION
-from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription
+from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.effect import Stage
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.beyond_band import leaves_band_of
 from endoscope_explain.compose import Composition
 from endoscope_explain.decision import Decision
+from endoscope_explain.evaluate import joint_of
 from endoscope_explain.explanation import (
     Candidate,
     ChannelFit,
@@ -18,6 +19,7 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit import Fit
+from endoscope_explain.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
 from endoscope_explain.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.observation import JointObservation
@@ -33,20 +35,17 @@ NOMINAL_UNITS = {
     'joint_radius': 'm',
     'pulley_radius': 'm',
     'capstan_exponent': '-',
-    'presliding_distance': 'm',
     'joint_stiffness': 'N m/rad',
     'joint_damping': 'N m s/rad',
     'joint_friction': 'N m',
     'joint_presliding': 'rad',
+    'joint_presliding_spread': '-',
+    'pretension_profile': '-',
+    'joint_rest_angle': 'rad',
+    **dict.fromkeys(FRICTION_PROFILE_NAMES, '-'),
     'motor_bandwidth': 'rad/s',
     'motor_damping_ratio': '-',
 }
-
-
-def start_friction(fit: Fit) -> float:
-    """Share of the sheath's friction that held a fitted joint's wires at the start."""
-    packed, _ = fit.model.packed(fit.theta)
-    return float(packed[START_FRICTION])
 
 
 def named(
@@ -112,15 +111,20 @@ def verdict_of(effects: tuple[NamedEffect, ...], decisions: list[Decision]) -> V
     if Stage.RECORDING in stages:
         return Verdict.RECORDING_FAULT
     changed = any(
-        _has_changed(e)
+        has_changed(name, e)
         for d in decisions
-        for e in nominal_estimates(d.chosen.fit, d.chosen.fit.model.base, NOMINAL_UNITS).values()
+        for name, e in nominal_estimates(
+            d.chosen.fit, d.chosen.fit.model.base, NOMINAL_UNITS
+        ).items()
     )
     return Verdict.PARAMETERS_DIFFER if changed else Verdict.CONSISTENT
 
 
-def _has_changed(estimate: NominalEstimate) -> bool:
+def has_changed(name: str, estimate: NominalEstimate) -> bool:
+    """Whether a nominal parameter differs from its description by more than chance and matter."""
     outside = estimate.low > estimate.nominal or estimate.high < estimate.nominal
+    if name in FORM_SPREAD:
+        return outside and not estimate.in_band
     return outside and abs(np.log(estimate.value / estimate.nominal)) > CHANGED
 
 
@@ -132,10 +136,7 @@ def plant_of(
     for f, added in zip(fits, effects, strict=True):
         joint = f.model.observation.joint
         packed, _ = f.model.packed(f.theta)
-        names = [item.name for item in fields(JointParameters)]
-        joints[joint] = JointParameters(
-            **{name: float(value) for name, value in zip(names, packed, strict=False)}
-        )
+        joints[joint] = joint_of(packed)
         for effect_id in added:
             definition = CATALOGUE[effect_id]
             first = definition.first_parameter

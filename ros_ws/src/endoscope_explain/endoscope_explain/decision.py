@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition
 from endoscope_explain.score import NEARLY_NOISE, PARAMETER_PRICE
 from endoscope_explain.search import JointSearch
@@ -28,8 +29,6 @@ BARELY = 0.2
 """Share below which a name would mislead: the physics is another one, and none is named."""
 EXPLAINED_IN_SLIPS = 0.25
 """The same where wires stick and slip: the instant of a slip is nobody's to predict."""
-OF_A_DEVICE = frozenset({'clock_skew', 'tracker_delay'})
-"""Effects of a device that reads all joints."""
 LIKE_RAW_NOISE = 1.12
 """Rmse over noise of raw samples up to which an improved plant predicts as well as anyone needs."""
 RIVAL = 25.0
@@ -137,7 +136,7 @@ def with_devices_agreed(
         effect_id
         for decision in decisions
         for effect_id in decision.chosen.effects
-        if effect_id in OF_A_DEVICE and not decision.alternatives[effect_id]
+        if CATALOGUE[effect_id].traits.of_device and not decision.alternatives[effect_id]
     }
     return [
         _agreed(search, decision, certain)

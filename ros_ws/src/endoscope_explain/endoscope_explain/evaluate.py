@@ -3,18 +3,19 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.plant import PlantDescription
-from endoscope_core.plant.kernel import OUTPUTS, run_joints
-from endoscope_core.plant.packing import pack, rest_state
+from endoscope_core.physics.description import JointParameters, PlantDescription
+from endoscope_core.physics.kernel import run_joints
+from endoscope_core.physics.layout import (
+    FRICTION_PROFILE,
+    NOMINAL_KEYS,
+    OUTPUTS,
+    PROFILE_TERMS,
+)
+from endoscope_core.physics.packing import pack, rest_state
 from endoscope_explain.observation import TICK, JointObservation
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-SUBSTEPS = 3
-"""Integration steps in a tick: 2e-3 N and 1e-4 rad from the exact solution."""
-COARSE_SUBSTEPS = 1
-"""The same where a plant is compared with one that differs little from it."""
 
 
 def simulate_joint(
@@ -22,7 +23,6 @@ def simulate_joint(
     parameters: Array,
     flags: Flags,
     inputs: Array | None = None,
-    substeps: int = SUBSTEPS,
 ) -> Array:
     """Noise-free readings of one joint under the recorded commands.
 
@@ -35,18 +35,16 @@ def simulate_joint(
         Effects that are on.
     inputs : array (1, N, INPUTS), optional
         Instead of the observation's own, for latent pushes or cut chains.
-    substeps : int
-        Integration steps in a tick.
 
     Returns
     -------
     array (N, OUTPUTS)
     """
     inputs = observation.inputs if inputs is None else inputs
-    packed = parameters[None]
-    states, histories = rest_state(packed, np.array([observation.start]))
+    packed, on = parameters[None], flags[None]
+    at_rest = rest_state(packed, on, TICK, np.array([observation.start]))
     out = np.empty((1, inputs.shape[1], OUTPUTS))
-    run_joints(states, histories, packed, flags[None], inputs, False, TICK, substeps, out)
+    run_joints(*at_rest, packed, on, inputs, False, TICK, out)
     return out[0]
 
 
@@ -74,3 +72,11 @@ def packed_joint(plant: PlantDescription, joint: str) -> tuple[Array, Flags]:
     parameters, flags = pack(plant)
     index = plant.joint_names().index(joint)
     return parameters[index], flags[index]
+
+
+def joint_of(parameters: Array) -> JointParameters:
+    """The nominal parameters of a joint packed as `parameters` (parameters,)."""
+    numbers = dict(zip(NOMINAL_KEYS, parameters.tolist(), strict=False))
+    profile = parameters[FRICTION_PROFILE : FRICTION_PROFILE + PROFILE_TERMS]
+    terms = int(np.max(np.flatnonzero(profile), initial=-1)) + 1
+    return JointParameters(**numbers, friction_profile=tuple(profile[:terms].tolist()))

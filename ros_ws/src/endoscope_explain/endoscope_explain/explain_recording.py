@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.anchoring import all_anchors, anchored, simulated_bending
 from endoscope_explain.baseline import against_baseline
 from endoscope_explain.conclusions import (
@@ -15,7 +15,6 @@ from endoscope_explain.conclusions import (
     named,
     plant_of,
     refitted,
-    start_friction,
     verdict_of,
 )
 from endoscope_explain.decision import Decision, decide, with_devices_agreed
@@ -33,7 +32,8 @@ from endoscope_explain.search import MOST_EFFECTS, JointSearch, search
 Progress = Callable[[str], None]
 
 LEAST_DURATION_S = 2.0
-LEAST_MOTION_RAD = 0.02
+LEAST_MOTION_RAD = 0.01
+"""Of the shaft."""
 SAME_RIG = 0.03
 """Relative tolerance of a nominal parameter from one recording of a rig to the next."""
 SIBLINGS = 3
@@ -46,7 +46,6 @@ def explain_recording(
     baseline: Recording | None = None,
     band: float = BAND,
     most_effects: int = MOST_EFFECTS,
-    tightened: bool = False,
     given: GivenJoints | None = None,
     jobs: int = 2,
     progress: Progress | None = None,
@@ -65,9 +64,6 @@ def explain_recording(
         Relative tolerance by which a healthy rig's parameters may differ from the plant's.
     most_effects : int
         Largest number of effects on a joint that are looked for.
-    tightened : bool
-        Whether the wires were tightened from the motor's side, so that friction may hold them at
-        the start.
     given : mapping of joint to GivenPhysics, optional
         The physics of each joint, if it is not to be searched.
     jobs : int
@@ -100,7 +96,7 @@ def explain_recording(
         tell('searching what the baseline lacks')
         observations, well, known = _healthy(observations, baseline, plant, band, jobs)
         band = SAME_RIG
-    observations, anchors = anchored(recording, observations, well, band, jobs, tightened=tightened)
+    observations, anchors = anchored(recording, observations, well, band, jobs)
 
     def searched(index: int) -> JointSearch:
         joint = observations[index].joint
@@ -149,7 +145,6 @@ def explain_recording(
         all(d.adequate for d in decisions),
         {f'explained_{o.joint}': d.explained for o, d in pairs},
         baseline is not None,
-        {o.joint: start_friction(d.chosen.fit) for o, d in pairs},
         time.monotonic() - begun,
     )
 

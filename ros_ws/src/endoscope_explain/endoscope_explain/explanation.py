@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics.description import PlantDescription
 
 Array = NDArray[np.float64]
 
@@ -200,8 +200,6 @@ class Explanation:
     adequacy : mapping of str to float
         Numbers behind `adequate`.
     baseline_used : bool
-    start_friction : mapping of joint name to float
-        Share of the sheath's friction that held the wires at the start.
     runtime_s : float
     """
 
@@ -217,5 +215,4 @@ class Explanation:
     adequate: bool = True
     adequacy: Mapping[str, float] = field(default_factory=dict)
     baseline_used: bool = False
-    start_friction: Mapping[str, float] = field(default_factory=dict)
     runtime_s: float = 0.0

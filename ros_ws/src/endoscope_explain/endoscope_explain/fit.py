@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE, stribeck_friction
-from endoscope_explain.evaluate import SUBSTEPS, residuals, simulate_joint
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.evaluate import residuals, simulate_joint
 from endoscope_explain.free_parameters import LEAD, FreeParameter
 from endoscope_explain.observation import JointObservation
 
@@ -39,7 +39,7 @@ class JointModel:
     flags : array (flags,) of bool
     free : tuple of FreeParameter
     wide_step : float
-        Difference step of a coordinate where wires stick and slip.
+        Difference step of a coordinate where an effect makes the misfit rugged.
     """
 
     observation: JointObservation
@@ -71,18 +71,18 @@ class JointModel:
         kept = [k for k, item in enumerate(self.free) if item.index not in places]
         return replace(self, free=tuple(self.free[k] for k in kept)), theta[kept]
 
-    def residuals(self, theta: Array, substeps: int = SUBSTEPS) -> Array:
-        """Residuals in noise units, all channels in a row; `substeps` are those of a tick."""
+    def residuals(self, theta: Array) -> Array:
+        """Residuals in noise units, all channels in a row."""
         parameters, lead = self.packed(theta)
         skew = parameters[CLOCK_SKEW.first_parameter] if self.flags[CLOCK_SKEW.flag] else 0.0
-        outputs = simulate_joint(self.observation, parameters, self.flags, substeps=substeps)
+        outputs = simulate_joint(self.observation, parameters, self.flags)
         return residuals(self.observation, outputs, lead, skew)
 
     @property
     def step(self) -> float:
         """Difference step of a logarithmic coordinate."""
-        sticks = self.flags[stribeck_friction.ON] and self.base[stribeck_friction.LAGGING] > 0.0
-        return self.wide_step if sticks else STEP
+        rugged = any(e.traits.rugged and self.flags[e.flag] for e in CATALOGUE.values())
+        return self.wide_step if rugged else STEP
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest coordinates."""

@@ -6,16 +6,51 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE, EffectParameter
-from endoscope_core.effects.slots import NOMINAL_KEYS, START_FRICTION
+from endoscope_core.physics.effect import Parameter
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.layout import (
+    FRICTION_PROFILE,
+    JOINT_PRESLIDING_SPREAD,
+    JOINT_REST_ANGLE,
+    NOMINAL_KEYS,
+    PRETENSION_PROFILE,
+)
+from endoscope_core.physics.plant_file import REACH
 
 Array = NDArray[np.float64]
 
 LEAD = -1
 """Index that stands for the reading's lead, which is not a parameter of the plant."""
 LEAD_PRIOR = (1.0, 0.5)
-FITTED_NOMINAL = tuple(key for key in NOMINAL_KEYS if key not in ('joint_radius', 'pulley_radius'))
-"""Radii are drawn and machined; every other number of the plant is only known roughly."""
+SCALED_NOMINAL = (
+    'pretension',
+    'wire_stiffness',
+    'capstan_exponent',
+    'joint_stiffness',
+    'joint_friction',
+    'joint_presliding',
+    'joint_damping',
+    'motor_bandwidth',
+    'motor_damping_ratio',
+)
+"""Numbers of the plant that are known but for a factor. Radii are drawn and machined."""
+FRICTION_PROFILE_NAMES = tuple(f'friction_profile_{term}' for term in (1, 2, 3))
+"""Coefficients of the sheath's friction profile that are fitted."""
+FORM_SPREAD = {
+    'pretension_profile': 0.25,
+    'joint_rest_angle': 0.05,
+    **dict.fromkeys(FRICTION_PROFILE_NAMES, 0.5),
+    'joint_presliding_spread': 0.5,
+}
+"""By how much (rms) the form of a healthy rig differs from its description, and the angle in rad at
+which its joint rests."""
+FORM_INDICES = {
+    'pretension_profile': PRETENSION_PROFILE,
+    'joint_rest_angle': JOINT_REST_ANGLE,
+    **{name: FRICTION_PROFILE + i for i, name in enumerate(FRICTION_PROFILE_NAMES)},
+    'joint_presliding_spread': JOINT_PRESLIDING_SPREAD,
+}
+FITTED_NOMINAL = (*SCALED_NOMINAL, *FORM_INDICES)
 BAND = 0.15
 """Relative tolerance by which a healthy rig differs from its description."""
 BAND_SPREAD = 0.09
@@ -35,11 +70,14 @@ class FreeParameter:
     logarithmic : bool
         Whether the fit's coordinate is the logarithm; else it is the value over `unit`.
     unit : float
-        Size of one coordinate step on a linear scale.
+        Size of one coordinate step on a scale that is not logarithmic.
     low, high : float
         Bounds of the value.
     mean, spread : float
         Gaussian prior of the coordinate; an infinite spread is no prior.
+    squared : bool
+        Whether the fit's coordinate is the square of the value over `unit`: of what does nothing
+        in the first order.
     """
 
     index: int
@@ -50,28 +88,28 @@ class FreeParameter:
     high: float
     mean: float = 0.0
     spread: float = math.inf
+    squared: bool = False
 
     def coordinate(self, value: float) -> float:
         """The fit's coordinate of a value."""
         value = min(max(value, self.low), self.high)
-        return math.log(value) if self.logarithmic else value / self.unit
+        if self.logarithmic:
+            return math.log(value)
+        return (value / self.unit) ** 2 if self.squared else value / self.unit
 
     def value(self, coordinate: float) -> float:
         """The value of a coordinate, kept within the bounds."""
         if self.logarithmic:
             # What the recording does not determine at all has bounds far beyond any number.
-            coordinate = min(coordinate, math.log(self.high))
-        value = math.exp(coordinate) if self.logarithmic else coordinate * self.unit
+            value = math.exp(min(coordinate, math.log(self.high)))
+        elif self.squared:
+            value = math.sqrt(max(coordinate, 0.0)) * self.unit
+        else:
+            value = coordinate * self.unit
         return min(max(value, self.low), self.high)
 
 
-TIGHTENED = FreeParameter(START_FRICTION, 'start_friction', False, 1.0, -1.0, 1.0, 0.5, 0.5)
-"""Friction that tightening the wires from the motor's side may have left at the start."""
-
-
-def nominal_parameters(
-    base: Array, band: float = BAND, *, tightened: bool = False
-) -> tuple[FreeParameter, ...]:
+def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, ...]:
     """The nominal plant's parameters around packed values `base`, and the reading's lead.
 
     Parameters
@@ -80,15 +118,13 @@ def nominal_parameters(
         Packed parameters as described.
     band : float
         Relative deviation that the fit may not leave by more than a third.
-    tightened : bool
-        Whether friction may hold the wires at the start.
 
     Returns
     -------
     tuple of FreeParameter
     """
     free = []
-    for key in FITTED_NOMINAL:
+    for key in SCALED_NOMINAL:
         index = NOMINAL_KEYS.index(key)
         centre = float(base[index])
         if centre <= 0.0:
@@ -106,9 +142,26 @@ def nominal_parameters(
                 BAND_SPREAD * band / BAND,
             )
         )
+    share = min(band / BAND, 1.0)
+    free += [_of_form(key, float(base[index]), share) for key, index in FORM_INDICES.items()]
     mean, spread = LEAD_PRIOR
     free.append(FreeParameter(LEAD, 'reading_lead', False, 1.0, 0.0, 1.0, mean, spread))
-    return (*free, TIGHTENED) if tightened else tuple(free)
+    return tuple(free)
+
+
+def _of_form(key: str, described: float, share: float) -> FreeParameter:
+    low, high, _ = REACH['friction_profile' if key in FRICTION_PROFILE_NAMES else key]
+    item = FreeParameter(
+        FORM_INDICES[key],
+        key,
+        False,
+        FORM_SPREAD[key],
+        low,
+        high,
+        spread=share,
+        squared=key == 'joint_presliding_spread',
+    )
+    return replace(item, mean=item.coordinate(described))
 
 
 def with_free_reference(
@@ -137,7 +190,7 @@ def effect_parameters(effect_id: str) -> tuple[FreeParameter, ...]:
     )
 
 
-def _of_effect(index: int, parameter: EffectParameter) -> FreeParameter:
+def _of_effect(index: int, parameter: Parameter) -> FreeParameter:
     positive = parameter.low > 0.0 and not math.isfinite(parameter.off)
     unit = parameter.scale or abs(parameter.typical) or 0.1 * (parameter.high - parameter.low)
     return FreeParameter(index, parameter.name, positive, unit, parameter.low, parameter.high)

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects.slots import NOMINAL_KEYS
 from endoscope_explain.explanation import Estimate, NominalEstimate
 from endoscope_explain.fit import Fit
-from endoscope_explain.free_parameters import BAND
+from endoscope_explain.free_parameters import BAND, FITTED_NOMINAL, FORM_SPREAD
 from endoscope_explain.whiteness import is_noise
 
 Array = NDArray[np.float64]
@@ -103,13 +102,19 @@ def nominal_estimates(
             float(high),
             units.get(name, ''),
             float(described[index]),
-            bool(abs(np.log(value / described[index])) <= np.log1p(BAND)),
+            _in_band(name, float(value), float(described[index])),
         )
         for name, index, value, low, high in zip(
             found.names, found.indices, found.values, found.low, found.high, strict=True
         )
-        if name in NOMINAL_KEYS and 0 <= index < len(NOMINAL_KEYS)
+        if name in FITTED_NOMINAL
     }
+
+
+def _in_band(name: str, value: float, described: float) -> bool:
+    if name in FORM_SPREAD:
+        return abs(value - described) <= NINETY_PERCENT * FORM_SPREAD[name]
+    return bool(abs(np.log(value / described)) <= np.log1p(BAND))
 
 
 def effect_estimates(fit: Fit, first: int, units: dict[str, str]) -> dict[str, Estimate]:

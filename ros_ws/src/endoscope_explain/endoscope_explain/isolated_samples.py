@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.fit import Fit
 from endoscope_explain.observation import Channel, JointObservation
 from endoscope_explain.predicted_signals import view

@@ -6,15 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from endoscope_core.effects.slots import JOINT_RADIUS
-from endoscope_core.plant.kernel import (
+from endoscope_core.physics.layout import (
     IN_OTHER_JOINT,
+    JOINT_RADIUS,
     OUT_EFFORT,
     OUT_JOINT,
     OUT_MOTOR,
     OUT_MOTOR_SPEED,
     OUT_TENSION_A,
     OUT_TENSION_B,
+    PULLEY_RADIUS,
 )
 from endoscope_explain.observation import TICK, JointObservation
 
@@ -24,8 +25,8 @@ STATE_NAMES = {
     't': 'time since the first command, s',
     'q': 'bending angle, rad',
     'dq': 'bending speed, rad/s',
-    'm': 'motor angle, joint-equivalent, rad',
-    'dm': 'motor speed, joint-equivalent, rad/s',
+    'm': 'motor angle, as the bending of a wire without stretch, rad',
+    'dm': 'motor speed, as that of a wire without stretch, rad/s',
     'v': 'sliding speed of the wire, m/s',
     'T': 'mean tension at the load cells, N',
     'tau': 'motor torque, N m',
@@ -62,14 +63,15 @@ def joint_states(observation: JointObservation, parameters: Array, outputs: Arra
     """
     q = outputs[:, OUT_JOINT]
     dq: Array = np.asarray(np.gradient(q, TICK), dtype=float)
-    dm = outputs[:, OUT_MOTOR_SPEED]
+    rigid = parameters[PULLEY_RADIUS] / parameters[JOINT_RADIUS]
+    dm = rigid * outputs[:, OUT_MOTOR_SPEED]
     tension = 0.5 * (outputs[:, OUT_TENSION_A] + outputs[:, OUT_TENSION_B])
     return JointStates(
         {
             't': np.asarray(TICK * np.arange(len(q)), dtype=float),
             'q': q,
             'dq': dq,
-            'm': outputs[:, OUT_MOTOR],
+            'm': rigid * outputs[:, OUT_MOTOR],
             'dm': dm,
             'v': 0.5 * parameters[JOINT_RADIUS] * (dm + dq),
             'T': tension,

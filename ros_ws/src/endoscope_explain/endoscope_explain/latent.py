@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.plant.kernel import (
+from endoscope_core.physics.layout import (
     IN_PUSH_COMMAND,
     IN_PUSH_MOMENT,
     IN_PUSH_STRETCH,
@@ -28,7 +28,7 @@ from endoscope_explain.parallel import parallel_map
 Array = NDArray[np.float64]
 
 COLUMNS = {'command': IN_PUSH_COMMAND, 'stretch': IN_PUSH_STRETCH, 'moment': IN_PUSH_MOMENT}
-PROBE = {'command': 0.01, 'stretch': 2e-5, 'moment': 2e-4, 'reading': 0.005}
+PROBE = {'command': 0.005, 'stretch': 2e-5, 'moment': 2e-4, 'reading': 0.005}
 """Rms of a term when it is tried: well above the integrator's error, small for the physics."""
 LARGEST_LAW = 3
 WORTH_ADDING = 0.06

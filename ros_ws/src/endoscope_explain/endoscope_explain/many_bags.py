@@ -205,8 +205,6 @@ def parameter_table(reports: Mapping[str, Reported]) -> str:
         for joint, estimates in content['parameters'].items():
             for parameter, estimate in estimates.items():
                 columns.setdefault((joint, 'plant', parameter), {})[name] = estimate['value']
-        for joint, value in content.get('start_friction', {}).items():
-            columns.setdefault((joint, 'start', 'start_friction'), {})[name] = value
         for effect in content['effects']:
             for parameter, estimate in effect['parameters'].items():
                 key = (effect['joint'], effect['id'], parameter)

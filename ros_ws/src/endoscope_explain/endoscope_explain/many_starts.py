@@ -8,8 +8,6 @@ from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.score import score
 from endoscope_explain.screen import starting_points, with_effect
 
-RUGGED = 'stribeck_friction'
-"""The effect under which the joint sticks and slips."""
 ITERATIONS = 12
 REFINED = 2
 """Best fits that are gone on with by derivatives over other widths."""
@@ -18,7 +16,7 @@ WIDTHS = (0.05, 0.02, 0.05, 0.02)
 
 
 def from_many_starts(composition: Composition, anchor: Fit, jobs: int) -> Composition:
-    """The best fit of a single effect over all starts that make the wire stick and slip.
+    """The best fit of a single rugged effect over all its starts.
 
     A slip that begins earlier or later moves all that follows it, so that a fit ends in the valley
     it began in, and one look at each start does not tell which valley is the deepest.
@@ -26,7 +24,7 @@ def from_many_starts(composition: Composition, anchor: Fit, jobs: int) -> Compos
     Parameters
     ----------
     composition : Composition
-        Has `RUGGED` alone.
+        Has one effect.
     anchor : Fit
         The nominal plant as described: refitted to slips that it cannot make, it lies in a corner.
     jobs : int
@@ -37,11 +35,8 @@ def from_many_starts(composition: Composition, anchor: Fit, jobs: int) -> Compos
     Composition
         The one given where no start leads to a better one.
     """
-    models = [
-        with_effect(anchor.model, RUGGED, start)
-        for start in starting_points(RUGGED)
-        if start['lagging'] > 0.0
-    ]
+    (effect_id,) = composition.effects
+    models = [with_effect(anchor.model, effect_id, start) for start in starting_points(effect_id)]
 
     def fitted(index: int) -> Fit:
         model = models[index]

@@ -11,8 +11,8 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.plant import PlantDescription, SensorParameters
-from endoscope_core.plant.kernel import (
+from endoscope_core.physics.description import PlantDescription, SensorParameters
+from endoscope_core.physics.layout import (
     IN_COMMAND,
     IN_MOTOR,
     IN_OTHER_JOINT,
@@ -23,7 +23,7 @@ from endoscope_core.plant.kernel import (
     OUT_TENSION_A,
     OUT_TENSION_B,
 )
-from endoscope_core.plant.on_stamps import hold_on_ticks
+from endoscope_core.physics.on_stamps import hold_on_ticks
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.signals import QUANTITY_UNITS, signal_name
 from endoscope_explain.unresolved import fast_scatter
@@ -46,8 +46,6 @@ class Channel:
         Name as the report writes it, series of the recording, SI unit.
     output : int
         Column of the compiled physics' output that this sensor reads.
-    scale : float
-        Unit of this channel for one unit of that output.
     tick : array (R,) of int, share : array (R,)
         Place of each raw sample between simulated ticks `tick` and `tick + 1`.
     first : array (M,) of int
@@ -62,7 +60,6 @@ class Channel:
     quantity: str
     unit: str
     output: int
-    scale: float
     tick: Indices
     share: Array
     first: Indices
@@ -86,7 +83,7 @@ class Channel:
             share = place - tick
         left = column[tick]
         raw = left + share * (column[tick + 1] - left)
-        return np.asarray(self.scale * np.add.reduceat(raw, self.first) / self.count)
+        return np.asarray(np.add.reduceat(raw, self.first) / self.count)
 
 
 @dataclass(frozen=True)
@@ -99,17 +96,14 @@ class JointObservation:
     inputs : array (1, N, INPUTS)
         Input of the compiled physics on 1 ms ticks.
     start : float
-        Joint-equivalent motor angle in rad at which the joint rests at first.
+        Shaft angle in rad at which the motor rests at first.
     channels : tuple of Channel
-    start_friction : float
-        Share of the sheath's friction that holds the wires at first.
     """
 
     joint: str
     inputs: Array
     start: float
     channels: tuple[Channel, ...]
-    start_friction: float = 0.0
 
     @property
     def size(self) -> int:
@@ -142,7 +136,7 @@ def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObserva
     recording : Recording
         Stamps increasing; samples that must not be judged are marked invalid.
     plant : PlantDescription
-        Gives gear and sensor noise; joints that it does not have are left out.
+        Gives the noise of the sensors; joints that it does not have are left out.
 
     Returns
     -------
@@ -156,14 +150,12 @@ def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObserva
     for j, joint in enumerate(recording.joints):
         if joint not in plant.joints:
             continue
-        gear = plant.joints[joint].gear
         inputs = np.zeros((1, ticks, INPUTS))
-        inputs[0, :, IN_COMMAND] = held[:, j] / gear
+        inputs[0, :, IN_COMMAND] = held[:, j]
         inputs[0, :, IN_MOTOR] = np.nan
-        channels = _channels(recording, j, joint, gear, plant.sensors, begin, ticks)
-        held_at_start = recording.start_friction.get(joint, 0.0)
+        channels = _channels(recording, j, joint, plant.sensors, begin, ticks)
         start = float(inputs[0, 0, IN_COMMAND])
-        joints.append(JointObservation(joint, inputs, start, channels, held_at_start))
+        joints.append(JointObservation(joint, inputs, start, channels))
     return tuple(joints)
 
 
@@ -171,22 +163,21 @@ def _channels(
     recording: Recording,
     j: int,
     joint: str,
-    gear: float,
     sensors: SensorParameters,
     begin: float,
     ticks: int,
 ) -> tuple[Channel, ...]:
     encoder_step = 2.0 * pi / sensors.encoder_counts
     plan = (
-        ('shaft_position', 0, OUT_MOTOR, gear, 0.0, encoder_step),
-        ('shaft_effort', 0, OUT_EFFORT, 1.0, sensors.effort_noise, sensors.effort_resolution),
-        ('tension', 0, OUT_TENSION_A, 1.0, sensors.load_cell_noise, sensors.load_cell_resolution),
-        ('tension', 1, OUT_TENSION_B, 1.0, sensors.load_cell_noise, sensors.load_cell_resolution),
-        ('bending', 0, OUT_BENDING, 1.0, sensors.tracker_noise, 0.0),
+        ('shaft_position', 0, OUT_MOTOR, 0.0, encoder_step),
+        ('shaft_effort', 0, OUT_EFFORT, sensors.effort_noise, sensors.effort_resolution),
+        ('tension', 0, OUT_TENSION_A, sensors.load_cell_noise, sensors.load_cell_resolution),
+        ('tension', 1, OUT_TENSION_B, sensors.load_cell_noise, sensors.load_cell_resolution),
+        ('bending', 0, OUT_BENDING, sensors.tracker_noise, 0.0),
     )
     measured = recording.measured()
     channels = []
-    for quantity, wire, output, scale, white, step in plan:
+    for quantity, wire, output, white, step in plan:
         if quantity not in measured:
             continue
         period = 0.0 if quantity == 'bending' else ANALYSIS_PERIOD
@@ -200,7 +191,6 @@ def _channels(
                 signal_name(quantity, joint, wire),
                 quantity,
                 output,
-                scale,
                 time,
                 values,
                 period,
@@ -226,7 +216,6 @@ def _channel(
     signal: str,
     quantity: str,
     output: int,
-    scale: float,
     time: Array,
     values: Array,
     period: float,
@@ -254,7 +243,6 @@ def _channel(
         quantity,
         QUANTITY_UNITS[quantity],
         output,
-        scale,
         tick,
         place - tick,
         first,

@@ -7,7 +7,6 @@ holds the joint it has none at all; a fit stays in the valley in which it starte
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.evaluate import COARSE_SUBSTEPS
 from endoscope_explain.fit import Fit, fit
 
 Array = NDArray[np.float64]
@@ -79,7 +78,7 @@ def _better(found: Fit, place: int, times: Array) -> Fit:
 
     def left(theta: Array) -> float:
         """Squares that the other parameters could not take away."""
-        residuals = found.model.residuals(theta, COARSE_SUBSTEPS)
+        residuals = found.model.residuals(theta)
         return float(residuals @ residuals - np.sum((span.T @ residuals) ** 2))
 
     def dated(time: float) -> Array:

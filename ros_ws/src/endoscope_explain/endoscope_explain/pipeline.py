@@ -8,7 +8,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from endoscope_bags.errors import BagError
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import ExplainedCase, NextExperiment, Place
 from endoscope_explain.combine import combined_effects, combined_verdict, improved_plant
@@ -59,8 +59,6 @@ class Sources:
         Relative tolerance of the plant's parameters.
     most_effects : int
         Largest number of effects on a joint that are looked for.
-    tightened : bool
-        Whether the wires were tightened from the motor's side before the recording.
     given : mapping of joint to GivenPhysics, or None
         The physics of each joint, if it is not to be searched.
     namespace : str or None
@@ -75,7 +73,6 @@ class Sources:
     quick: bool = False
     band: float = BAND
     most_effects: int = MOST_EFFECTS
-    tightened: bool = False
     given: GivenJoints | None = None
     namespace: str | None = None
 
@@ -95,7 +92,7 @@ class Inputs:
         Relative tolerance of the plant's parameters.
     most_effects : int
         Largest number of effects on a joint that are looked for.
-    tightened, given
+    given
         As in `Sources`.
     """
 
@@ -105,7 +102,6 @@ class Inputs:
     validation: Recording | None
     band: float = BAND
     most_effects: int = MOST_EFFECTS
-    tightened: bool = False
     given: GivenJoints | None = None
 
     @property
@@ -159,7 +155,6 @@ def read_inputs(sources: Sources) -> Inputs:
         second(sources.validate),
         sources.band,
         sources.most_effects,
-        sources.tightened,
         sources.given,
     )
 
@@ -203,14 +198,13 @@ def explain_case(
             baseline=inputs.baseline,
             band=inputs.band,
             most_effects=inputs.most_effects,
-            tightened=inputs.tightened,
             given=inputs.given,
             jobs=jobs,
             progress=progress,
         )
     tell('locating')
     plant = improved_plant(explanation, audit)
-    recording = replace(audit.recording, start_friction=explanation.start_friction)
+    recording = audit.recording
     case = ExplainedCase(
         recording,
         audit,
@@ -229,7 +223,6 @@ def explain_case(
     tell('judging beside black boxes' if extras else 'judging')
     validation = inputs.validation
     if validation is not None:
-        validation = replace(validation, start_friction=explanation.start_friction)
         validation = with_isolated_marked(validation, plant)
     held_out, second = ladders(recording, explanation, validation, extras, jobs)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)

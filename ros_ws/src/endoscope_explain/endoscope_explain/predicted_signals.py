@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects.slots import START_FRICTION
-from endoscope_core.plant import PlantDescription
-from endoscope_core.plant.kernel import OUTPUTS, run_joints
-from endoscope_core.plant.packing import pack, rest_state
-from endoscope_core.plant.recording import recording_faults
-from endoscope_explain.evaluate import SUBSTEPS
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.kernel import run_joints
+from endoscope_core.physics.layout import OUTPUTS
+from endoscope_core.physics.packing import pack, rest_state
+from endoscope_core.physics.recording import recording_faults
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.observation import TICK, JointObservation, observe
 from endoscope_explain.recording import Recording
@@ -84,12 +83,10 @@ class RecordedView:
 def packed_rig(
     observations: tuple[JointObservation, ...], plant: PlantDescription
 ) -> tuple[Array, Flags]:
-    """Parameters (J, parameters), with the start of each recorded joint, and flags (J, flags)."""
+    """Parameters (J, parameters) and flags (J, flags) of the recorded joints."""
     parameters, flags = pack(plant)
     rows = [plant.joint_names().index(o.joint) for o in observations]
-    parameters, flags = parameters[rows], flags[rows]
-    parameters[:, START_FRICTION] = [o.start_friction for o in observations]
-    return parameters, flags
+    return parameters[rows], flags[rows]
 
 
 def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescription) -> Array:
@@ -107,11 +104,10 @@ def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescrip
     """
     parameters, flags = packed_rig(observations, plant)
     inputs = np.concatenate([o.inputs for o in observations])
-    states, histories = rest_state(parameters, np.array([o.start for o in observations]))
+    start = np.array([o.start for o in observations])
+    at_rest = rest_state(parameters, flags, TICK, start)
     out = np.empty((len(observations), inputs.shape[1], OUTPUTS))
-    run_joints(
-        states, histories, parameters, flags, inputs, len(observations) > 1, TICK, SUBSTEPS, out
-    )
+    run_joints(*at_rest, parameters, flags, inputs, len(observations) > 1, TICK, out)
     return out
 
 

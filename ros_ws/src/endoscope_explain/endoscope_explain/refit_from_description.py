@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from endoscope_core.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition, polished
 from endoscope_explain.fit import Fit, JointModel
 from endoscope_explain.parallel import parallel_map

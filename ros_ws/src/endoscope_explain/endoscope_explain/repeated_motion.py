@@ -3,23 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.plant.kernel import IN_COMMAND
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.layout import IN_COMMAND
 from endoscope_explain.observation import TICK, JointObservation
 
 Array = NDArray[np.float64]
 
-DEPENDS_ON_TIME = frozenset(
-    {
-        'breathing',
-        'clock_skew',
-        'configuration_change',
-        'external_load',
-        'friction_run_in',
-        'load_cell_drift',
-        'pretension_loss',
-        'tracker_drift',
-    }
-)
+DEPENDS_ON_TIME = frozenset(e.id for e in CATALOGUE.values() if e.traits.depends_on_time)
 """Effects that make the same motion look different at another time."""
 EVERY = 20
 """Ticks between the moments compared."""

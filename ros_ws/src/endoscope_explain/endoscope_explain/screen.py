@@ -12,8 +12,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_explain.evaluate import COARSE_SUBSTEPS
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.fit import Fit, JointModel
 from endoscope_explain.free_parameters import effect_parameters, with_free_reference
 
@@ -73,14 +72,11 @@ class Unexplained:
         Orthonormal directions in which the parameters move the residual and the priors' deviations.
     left : array (size + n,)
         Residuals and deviations across these directions.
-    coarse : array (size,)
-        Residuals at the few integration steps at which effects are screened.
     """
 
     fit: Fit
     span: Array = field(repr=False)
     left: Array = field(repr=False)
-    coarse: Array = field(repr=False)
 
 
 def unexplained(anchor: Fit) -> Unexplained:
@@ -89,8 +85,7 @@ def unexplained(anchor: Fit) -> Unexplained:
     span, _ = np.linalg.qr(np.vstack([anchor.jacobian, np.diag(model.prior_weight())]))
     here = np.concatenate([anchor.residuals, model.prior(anchor.theta)])
     left = here - span @ (span.T @ here)
-    coarse = model.residuals(anchor.theta, COARSE_SUBSTEPS)
-    return Unexplained(anchor, span, left, coarse)
+    return Unexplained(anchor, span, left)
 
 
 def promises(background: Unexplained, effect_id: str) -> list[Promise]:
@@ -113,10 +108,7 @@ def promises(background: Unexplained, effect_id: str) -> list[Promise]:
         model = with_effect(anchor.model, effect_id, start)
         theta = model.begun_at(anchor.theta)
         moved = np.concatenate(
-            [
-                model.residuals(theta, COARSE_SUBSTEPS) - background.coarse,
-                np.zeros(len(anchor.theta)),
-            ]
+            [model.residuals(theta) - anchor.residuals, np.zeros(len(anchor.theta))]
         )
         moved -= span @ (span.T @ moved)
         size = float(moved @ moved)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.beyond_band import beyond_band, leans
 from endoscope_explain.compose import (
     Composition,
@@ -11,7 +12,7 @@ from endoscope_explain.compose import (
     searchable_effects,
 )
 from endoscope_explain.fit import Fit
-from endoscope_explain.many_starts import RUGGED, from_many_starts
+from endoscope_explain.many_starts import from_many_starts
 from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.reconsider import reconsidered
 from endoscope_explain.refit_from_description import from_description, promised_by_description
@@ -99,7 +100,7 @@ def search(
             grown = list(_sorted(grown, from_description(grown, anchors[1], jobs)))
         if level > 0 and _may_be_led_astray(grown):
             grown = list(_sorted(grown, _grown_robustly(parents, effects, jobs)))
-        if grown and grown[0].effects == (RUGGED,) and not is_noise(grown[0].fit):
+        if grown and _is_rugged(grown[0]) and not is_noise(grown[0].fit):
             grown[0] = from_many_starts(grown[0], anchors[1], jobs)
         if grown:
             grown[0] = with_counted_numbers(grown[0], jobs)
@@ -121,6 +122,11 @@ def search(
     if beyond is not None and not any(is_noise(c.fit) for c in levels[-1][:1]):
         levels[0] = _sorted(levels[0], _grown_beyond(beyond, anchors[1], effects, jobs))
     return JointSearch(nominal, tuple(levels), beyond)
+
+
+def _is_rugged(composition: Composition) -> bool:
+    alone = len(composition.effects) == 1
+    return alone and CATALOGUE[composition.effects[0]].traits.rugged
 
 
 def _grown_beyond(

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import searchable_effects
 from endoscope_explain.fit import Fit, JointModel
 from endoscope_explain.glance import Glance, glance

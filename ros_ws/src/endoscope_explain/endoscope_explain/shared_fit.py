@@ -14,8 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE, Stage
-from endoscope_core.effects.slots import NOMINAL_KEYS, START_FRICTION
+from endoscope_core.physics.effect import Stage
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.layout import (
+    CAPSTAN_EXPONENT,
+    FRICTION_PROFILE,
+    MOTOR_BANDWIDTH,
+    MOTOR_DAMPING_RATIO,
+    PRETENSION_PROFILE,
+    PROFILE_TERMS,
+)
 from endoscope_explain.fit import STEP, Fit, JointModel, bounded_step, central_jacobian
 from endoscope_explain.free_parameters import LEAD, FreeParameter
 
@@ -27,9 +35,7 @@ SPREAD = 0.1
 FIRST_SPREAD = 0.5
 """Scatter that is allowed at first, so that a recording finds its way to the others."""
 
-_OF_A_DEVICE = frozenset(
-    NOMINAL_KEYS.index(key) for key in ('motor_bandwidth', 'motor_damping_ratio')
-) | {
+_OF_A_DEVICE = frozenset({MOTOR_BANDWIDTH, MOTOR_DAMPING_RATIO}) | {
     place
     for definition in CATALOGUE.values()
     if definition.stage in (Stage.ACTUATOR, Stage.SENSING)
@@ -37,8 +43,10 @@ _OF_A_DEVICE = frozenset(
 }
 _OF_A_SHAPE = frozenset(
     {
-        START_FRICTION,
-        *(NOMINAL_KEYS.index(key) for key in ('capstan_exponent', 'presliding_distance')),
+        CAPSTAN_EXPONENT,
+        PRETENSION_PROFILE,
+        *range(FRICTION_PROFILE, FRICTION_PROFILE + PROFILE_TERMS),
+        *(p for e in CATALOGUE.values() if e.traits.of_shape for p in e.places),
     }
 )
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.anchoring import anchored
 from endoscope_explain.given_physics import GivenJoints, GivenPhysics, without_recording
 from endoscope_explain.held_noise import with_held_noise
@@ -64,7 +64,6 @@ def physics_of_all(
                 inputs.plant,
                 inputs.band,
                 jobs,
-                tightened=inputs.tightened,
             )
             joints = recording.joints
             if recordings and set(joints) != set(recordings[0]):

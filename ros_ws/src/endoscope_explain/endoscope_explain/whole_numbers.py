@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from endoscope_core.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition
 from endoscope_explain.fit import Fit, fit
 from endoscope_explain.parallel_fits import parallel_fits

@@ -5,8 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec, PlantDescription, SensorModel, simulate
+from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.sensing import SensorModel
+from endoscope_core.physics.simulator import simulate
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import (
     Estimate,
@@ -18,6 +20,7 @@ from endoscope_explain.explanation import (
 from endoscope_explain.pipeline import Inputs, explain_case
 from endoscope_explain.predicted_signals import rung, view
 from endoscope_explain.recording import Recording, Series
+from endoscope_explain.recording.signals import gear
 
 TICK = 1e-3
 TRACKER_EVERY = 25
@@ -31,10 +34,10 @@ def make_recording(
     n = int(duration / TICK)
     time = TICK * np.arange(n)
     joints = plant.joint_names()
-    gear = np.array([plant.joints[j].gear for j in joints])
     swept = 0.9 * np.sin(1.3 * time)
     stepped = np.where((time % 3.0) < 1.5, 0.5, -0.4)
-    command = np.stack([swept if k == 0 else stepped for k in range(len(joints))], axis=1) * gear
+    command = np.stack([swept if k == 0 else stepped for k in range(len(joints))], axis=1)
+    command *= gear()
     truth = simulate(plant, command)
     sensors = SensorModel(plant.sensors, seed)
     tracker = slice(None, None, TRACKER_EVERY)

@@ -3,8 +3,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec, PlantDescription
+from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.next_experiment.distance import distance
 from endoscope_explain.next_experiment.imagined import imagine, is_safe

@@ -6,11 +6,11 @@ import math
 
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import load_plant
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.plant_file import load_plant
 from endoscope_explain.audit import AuditReport, Finding, Severity
 from endoscope_explain.case import NextExperiment
-from endoscope_explain.combine import AUDITED_EFFECTS, combined_effects, combined_verdict
+from endoscope_explain.combine import combined_effects, combined_verdict
 from endoscope_explain.explanation import Estimate, UnknownTerm, Verdict
 from endoscope_explain.report.report_mapping import report_mapping
 from endoscope_explain.report.writing import write_report
@@ -191,5 +191,5 @@ def test_the_audits_faults_enter_the_verdict(stribeck_case, findings, effects, v
     assert combined_verdict(explanation, audit) == verdict
     named = {e.id for e in combined_effects(explanation, audit)}
     assert named == ({'stribeck_friction'} if effects else set()) | (
-        {f for f, _ in findings} & set(AUDITED_EFFECTS)
+        {f for f, _ in findings} & set(CATALOGUE)
     )

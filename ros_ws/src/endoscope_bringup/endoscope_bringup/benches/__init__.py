@@ -4,8 +4,6 @@ BENCHES: tuple[str, ...] = (
     'graph',
     'recorder',
     'explain',
-    'closed_loop',
-    'real_rig',
     'simulate',
     'compensation',
     'calibration_rate',

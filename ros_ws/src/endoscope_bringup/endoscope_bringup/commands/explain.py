@@ -78,12 +78,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'explain all of them together',
     )
     parser.add_argument(
-        '--tightened',
-        action='store_true',
-        help="the wires were tightened from the motor's side: estimate the friction that holds "
-        'them at the start',
-    )
-    parser.add_argument(
         '--jobs', type=_positive, default=2, metavar='N', help='processes side by side (default 2)'
     )
     parser.add_argument(
@@ -113,7 +107,6 @@ def run(args: argparse.Namespace) -> int:
             args.quick,
             args.band,
             args.effects,
-            args.tightened,
             namespace=args.namespace,
         )
         for bag, second in zip(args.bags, _seconds(args), strict=True)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from endoscope_core.plant import PlantDescription, SensorParameters
+from endoscope_core.physics.description import PlantDescription, SensorParameters
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
 from endoscope_explain.audit.held_samples import held, held_before_jump, held_findings
 from endoscope_explain.audit.outliers import find_outliers, motor_travel, outlier_finding
@@ -21,7 +21,7 @@ from endoscope_explain.audit.stamps import (
     usual_interval,
 )
 from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.signals import signal_name
+from endoscope_explain.recording.signals import gear, signal_name
 
 SETTLING_S = 0.5
 """How long after a gap in the commands the rig's answer is not judged."""
@@ -182,9 +182,7 @@ def _audited_bending(
         values = series.values[:, j]
         repeated, _ = held(values, plant.sensors.tracker_noise, 0.0, interval)
         findings += held_findings(joint, signal, series.time, repeated)
-        travel = motor_travel(
-            series.time, motor.time, motor.values[:, j] / plant.joints[joint].gear, 3.0 * interval
-        )
+        travel = motor_travel(series.time, motor.time, motor.values[:, j] / gear(), 3.0 * interval)
         spikes = find_outliers(values, plant.sensors.tracker_noise, travel)
         wrong[:, j] = repeated
         isolated[:, j] = spikes

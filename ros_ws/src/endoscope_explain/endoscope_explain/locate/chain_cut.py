@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from endoscope_core.plant import PlantDescription
-from endoscope_core.plant.kernel import IN_MOTOR
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.layout import IN_MOTOR
 from endoscope_explain.evaluate import simulate_joint
 from endoscope_explain.observation import TICK, JointObservation, observe
 from endoscope_explain.predicted_signals import packed_rig, reading_lead, simulate_rig
@@ -70,7 +70,6 @@ def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCu
         inputs[0, :, IN_MOTOR] = _measured_motor(
             recording,
             recording.joints.index(observation.joint),
-            plant.joints[observation.joint].gear,
             lead,
             inputs.shape[1],
         )
@@ -85,13 +84,13 @@ def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCu
     return tuple(cuts)
 
 
-def _measured_motor(recording: Recording, j: int, gear: float, lead: float, ticks: int) -> Array:
+def _measured_motor(recording: Recording, j: int, lead: float, ticks: int) -> Array:
     shaft = recording.shaft_position
     if shaft is None:
         raise ValueError('the shaft was not recorded')
     period = float(np.median(np.diff(shaft.time)))
     width = max(5, 2 * int(0.5 * SMOOTHED_S / period) + 1)
-    angle = savgol_filter(shaft.values[:, j] / gear, width, 2)
+    angle = savgol_filter(shaft.values[:, j], width, 2)
     begin = float(recording.command.time[0])
     # The angle that the motor shall have reached at the end of each tick.
     ends = TICK * np.arange(1, ticks + 1)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from endoscope_explain.locate.time_windows import WINDOW_S
 from endoscope_explain.recording import Recording
+from endoscope_explain.recording.signals import gear
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -33,7 +34,7 @@ class Condition:
     active: Mask
 
 
-def conditions(recording: Recording, j: int, gear: float) -> list[Condition]:
+def conditions(recording: Recording, j: int) -> list[Condition]:
     """List the states that a joint was in.
 
     Parameters
@@ -42,7 +43,6 @@ def conditions(recording: Recording, j: int, gear: float) -> list[Condition]:
         As audited.
     j : int
         Column of the joint.
-    gear : float
 
     Returns
     -------
@@ -50,7 +50,7 @@ def conditions(recording: Recording, j: int, gear: float) -> list[Condition]:
         Those that hold for some, not all of the time.
     """
     grid = np.arange(0.0, recording.duration, GRID_S)
-    motor = _motor(recording, j, gear, grid)
+    motor = _motor(recording, j, grid)
     speed = _speed(motor)
     bending = np.interp(grid, recording.bending.time, _smoothed(recording.bending.values[:, j], 5))
     tension = recording.tension.values[:, j].sum(axis=1)
@@ -89,7 +89,7 @@ def conditions(recording: Recording, j: int, gear: float) -> list[Condition]:
     found.append(Condition(f'where the wires carry more than {high:.1f} N', tension > high))
     for other, name in enumerate(recording.joints):
         if other != j:
-            its_speed = _speed(_motor(recording, other, gear, grid))
+            its_speed = _speed(_motor(recording, other, grid))
             found.append(Condition(f'while {name} moves', np.abs(its_speed) > STANDING_RAD_PER_S))
     for share in (0.25, 0.5, 0.75):
         time = share * recording.duration
@@ -97,14 +97,13 @@ def conditions(recording: Recording, j: int, gear: float) -> list[Condition]:
     return [c for c in found if 0.02 < c.active.mean() < 0.98]
 
 
-def drive(recording: Recording, j: int, gear: float, end: float) -> Array:
+def drive(recording: Recording, j: int, end: float) -> Array:
     """Measure how much was asked of a joint in windows of time.
 
     Parameters
     ----------
     recording : Recording
     j : int
-    gear : float
     end : float
         In s.
 
@@ -116,15 +115,15 @@ def drive(recording: Recording, j: int, gear: float, end: float) -> Array:
     """
     count = int(np.ceil(end / WINDOW_S))
     grid = (np.arange(count * int(WINDOW_S / GRID_S), dtype=np.float64) + 0.5) * GRID_S
-    motor = _motor(recording, j, gear, grid)
+    motor = _motor(recording, j, grid)
     bending = np.interp(grid, recording.bending.time, recording.bending.values[:, j])
     every = np.abs(np.c_[motor, _speed(motor), bending]).reshape(count, -1, 3)
     return np.asarray(every.max(axis=1))
 
 
-def _motor(recording: Recording, j: int, gear: float, grid: Array) -> Array:
+def _motor(recording: Recording, j: int, grid: Array) -> Array:
     source = recording.shaft_position or recording.command
-    return np.interp(grid, source.time, source.values[:, j]) / gear
+    return np.interp(grid, source.time, source.values[:, j]) / gear()
 
 
 def _speed(angle: Array) -> Array:

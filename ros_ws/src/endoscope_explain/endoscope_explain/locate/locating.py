@@ -3,11 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport, Finding
 from endoscope_explain.case import Place
 from endoscope_explain.combine import changed_parameters
 from endoscope_explain.explanation import Explanation, NamedEffect
+from endoscope_explain.free_parameters import FRICTION_PROFILE_NAMES
 from endoscope_explain.locate.band import band_hz
 from endoscope_explain.locate.conditions import conditions, drive
 from endoscope_explain.locate.excess import SignalExcess, excess_between, shares
@@ -22,11 +23,14 @@ STAGE_OF_PARAMETER = {
     'joint_radius': 'transmission',
     'pulley_radius': 'transmission',
     'capstan_exponent': 'transmission',
-    'presliding_distance': 'transmission',
+    'pretension_profile': 'transmission',
+    **dict.fromkeys(FRICTION_PROFILE_NAMES, 'transmission'),
     'joint_stiffness': 'joint',
     'joint_damping': 'joint',
     'joint_friction': 'joint',
     'joint_presliding': 'joint',
+    'joint_presliding_spread': 'joint',
+    'joint_rest_angle': 'joint',
     'motor_bandwidth': 'actuator',
     'motor_damping_ratio': 'actuator',
 }
@@ -71,7 +75,6 @@ def locate_effects(
         located.append(
             place(
                 recording,
-                plant,
                 found,
                 effect.stage,
                 effect.joint,
@@ -88,7 +91,7 @@ def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place
     found = excess_between(list(recorded.signals.values()), 'refitted', None)
     joint = term.joint if term is not None else found[0].view.joint
     stage = STAGE_OF_NODE[term.node] if term is not None else 'joint'
-    return [place(recording, explanation.refitted, found, stage, joint)]
+    return [place(recording, found, stage, joint)]
 
 
 def locate_parameters(recording: Recording, explanation: Explanation) -> list[Place]:
@@ -100,7 +103,7 @@ def locate_parameters(recording: Recording, explanation: Explanation) -> list[Pl
         for joint, estimates in explanation.parameters.items()
         for name in changed_parameters(estimates)
     }
-    return [place(recording, explanation.refitted, found, stage, joint) for stage, joint in stages]
+    return [place(recording, found, stage, joint) for stage, joint in stages]
 
 
 def locate_findings(audit: AuditReport) -> list[Place]:
@@ -110,7 +113,6 @@ def locate_findings(audit: AuditReport) -> list[Place]:
 
 def place(
     recording: Recording,
-    plant: PlantDescription,
     found: Sequence[SignalExcess],
     stage: str,
     joint: str,
@@ -121,8 +123,6 @@ def place(
     Parameters
     ----------
     recording : Recording
-    plant : PlantDescription
-        For the gear.
     found : sequence of SignalExcess
         Largest first; those of both joints.
     stage, joint : str
@@ -135,12 +135,12 @@ def place(
     Place
     """
     by_signal = shares(found)
-    j, gear = recording.joints.index(joint), plant.joints[joint].gear
+    j = recording.joints.index(joint)
     telling = [e for e in found if e.view.signal in by_signal] or list(found[:1])
     end = recording.duration
-    regime = regime_in_words(telling, conditions(recording, j, gear))
+    regime = regime_in_words(telling, conditions(recording, j))
     if began is None:
-        began = onset(telling, drive(recording, j, gear, end), end)
+        began = onset(telling, drive(recording, j, end), end)
     if began is not None:
         rest = '' if regime == 'throughout' or regime.startswith('after') else f', {regime}'
         regime = f'from {began:.1f} s on{rest}'

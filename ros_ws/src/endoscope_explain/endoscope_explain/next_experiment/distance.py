@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec, JointParameters, PlantDescription
-from endoscope_explain.evaluate import packed_joint
+from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.evaluate import joint_of, packed_joint
 from endoscope_explain.fit import Fit, JointModel, fit
 from endoscope_explain.free_parameters import LEAD, effect_parameters, nominal_parameters
 from endoscope_explain.observation import JointObservation, observe
@@ -61,9 +61,7 @@ def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescriptio
     PlantDescription
     """
     packed, _ = found.model.packed(found.theta)
-    names = list(JointParameters.__dataclass_fields__)
-    joints = dict(plant.joints)
-    joints[joint] = JointParameters(**dict(zip(names, map(float, packed), strict=False)))
+    joints = {**plant.joints, joint: joint_of(packed)}
     effects = []
     for spec in plant.effects:
         if spec.joint != joint:

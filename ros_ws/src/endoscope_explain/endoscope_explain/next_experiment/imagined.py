@@ -3,10 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.plant import PlantDescription, simulate
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.simulator import simulate
 from endoscope_explain.next_experiment.waveforms import Waveform
 from endoscope_explain.observation import TICK
 from endoscope_explain.recording import Recording, Series
+from endoscope_explain.recording.signals import gear
 
 Array = NDArray[np.float64]
 
@@ -26,16 +28,15 @@ def imagine(plant: PlantDescription, waveform: Waveform) -> Recording:
     """
     time = np.arange(0.0, waveform.time[-1], TICK)
     joints = plant.joint_names()
-    gear = np.array([plant.joints[name].gear for name in joints])
     desired = np.zeros((len(time), len(joints)))
     desired[:, joints.index(waveform.joint)] = np.interp(time, waveform.time, waveform.angle)
-    answer = simulate(plant, desired * gear, substeps=3)
+    answer = simulate(plant, desired * gear())
     slow = slice(None, None, max(1, round(1.0 / (plant.sensors.tracker_rate * TICK))))
     return Recording(
         waveform.name,
         0.0,
         joints,
-        Series.of('motor/servo_jp', time, desired * gear),
+        Series.of('motor/servo_jp', time, desired * gear()),
         Series.of('wires/measured_js', time, answer.tension),
         Series.of('slave/measured_js', time[slow], answer.bending[slow]),
         Series.of('motor/measured_js', time, answer.shaft_position),

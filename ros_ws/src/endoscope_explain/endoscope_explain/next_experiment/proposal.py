@@ -12,8 +12,8 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec, PlantDescription
+from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.explanation import NamedEffect
@@ -23,6 +23,7 @@ from endoscope_explain.next_experiment.waveforms import Waveform, family
 from endoscope_explain.observation import observe
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording
+from endoscope_explain.recording.signals import gear
 from endoscope_explain.screen import promises, unexplained
 
 Array = NDArray[np.float64]
@@ -138,8 +139,7 @@ def safe_family(
     list of Waveform
     """
     j = recording.joints.index(joint)
-    gear = plants[0].joints[joint].gear
-    reach = float(np.abs(recording.command.values[:, j]).max()) / gear
+    reach = float(np.abs(recording.command.values[:, j]).max()) / gear()
     tension = MARGIN * float(recording.tension.values[recording.tension.valid].max())
     bending = MARGIN * float(np.abs(recording.bending.values[recording.bending.valid]).max())
     others = tuple(name for name in recording.joints if name != joint)

@@ -10,7 +10,7 @@ from endoscope_bags.errors import BagError, MissingJointError, MissingTopicError
 from endoscope_bags.joint_state_series import JointStateSeries
 from endoscope_bags.recording import Recording as Bag
 from endoscope_bags.recording import open_bag
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.recording.series import (
     BENDING,
     COMMAND,
@@ -20,7 +20,7 @@ from endoscope_explain.recording.series import (
     Recording,
     Series,
 )
-from endoscope_explain.recording.signals import motor_name, wire_names
+from endoscope_explain.recording.signals import gear, motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_common_time, without_stray
 
 WAIVABLE = (MOTOR,)
@@ -45,8 +45,7 @@ def recording_from_bag(
     path : str or Path
         rosbag2 folder or `.mcap`.
     plant : PlantDescription
-        Its joints are looked for; its gear turns a bending command into a shaft command where
-        `motor/servo_jp` was not recorded.
+        Its joints are looked for.
     without : collection of str
         Topics of `WAIVABLE` that may be missing.
     namespace : str, optional
@@ -124,8 +123,7 @@ def recording_from_bag(
 
     shaft = series(command.topic, command, [command_names[j] for j in joints], 'position')
     if not bag.has(COMMAND, namespace):
-        gears = np.array([plant.joints[j].gear for j in joints])
-        shaft = Series.of(DESIRED, shaft.time, shaft.values * gears, shaft.received)
+        shaft = Series.of(DESIRED, shaft.time, shaft.values * gear(), shaft.received)
     else:
         shaft = replace(shaft, topic=COMMAND)
     motors = dict.fromkeys(('position', 'velocity', 'effort'))

@@ -88,8 +88,6 @@ class Recording:
         Motor shaft in rad, rad/s, N m; None where not recorded.
     notes : tuple of str
         What is missing or was taken from elsewhere, in words.
-    start_friction : mapping of str to float
-        By joint, the share of the sheath's friction that held its wires at first; 0 if not given.
     """
 
     name: str
@@ -102,7 +100,6 @@ class Recording:
     shaft_velocity: Series | None = None
     shaft_effort: Series | None = None
     notes: tuple[str, ...] = field(default=())
-    start_friction: Mapping[str, float] = field(default_factory=dict)
 
     def measured(self) -> dict[str, Series]:
         """Return the recorded measured series by their name in this class."""

@@ -1,5 +1,8 @@
 """Names of signals as the report writes them."""
 
+from functools import cache
+
+from endoscope_core.rig import load_rig
 from endoscope_explain.recording.series import BENDING, MOTOR, WIRES
 
 QUANTITY_TOPICS = {
@@ -18,6 +21,12 @@ QUANTITY_UNITS = {
     'tension': 'N',
     'bending': 'rad',
 }
+
+
+@cache
+def gear() -> float:
+    """Angle of a motor's shaft for one radian of desired bending, of the rig as shipped."""
+    return load_rig().joints.gear
 
 
 def axis(joint: str) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from endoscope_explain.case import ExplainedCase, Ladder, Place
 from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.predicted_signals import RecordedView, view
+from endoscope_explain.recording.signals import gear
 from endoscope_explain.report.chain_drawing import chain_svg
 from endoscope_explain.report.figures.experiment import experiment_figure, unknown_figure
 from endoscope_explain.report.figures.ladder import RUNGS, ladder_figure, parameters_figure
@@ -67,8 +68,7 @@ def html_page(case: ExplainedCase) -> str:
     )
     joint = _joint_of_interest(case, recorded)
     j = case.recording.joints.index(joint)
-    gear = explanation.nominal.joints[joint].gear
-    command = (case.recording.command.time, case.recording.command.values[:, j] / gear)
+    command = (case.recording.command.time, case.recording.command.values[:, j] / gear())
     passage = telling_passage(recorded, joint)
     experiment, unknown = case.next_experiment, explanation.unknown
     environment = Environment(

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from endoscope_core.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.case import ExplainedCase, Ladder, Place
 from endoscope_explain.explanation import (
     ChannelFit,
@@ -32,7 +32,7 @@ def report_mapping(case: ExplainedCase) -> dict[str, Any]:
     ValueError
         If a number that has no bound to fall back on is not finite.
     """
-    content: dict[str, Any] = {
+    return {
         'schema': SCHEMA,
         'verdict': str(case.verdict),
         'where': [_place(place) for place in case.places],
@@ -46,9 +46,6 @@ def report_mapping(case: ExplainedCase) -> dict[str, Any]:
         'next_experiment': _experiment(case),
         'runtime_s': _finite(case.runtime_s, 'runtime_s'),
     }
-    held = {j: s for j, s in case.explanation.start_friction.items() if s != 0.0}
-    # Only where it was asked for: other programs do not expect this key.
-    return content | {'start_friction': held} if held else content
 
 
 def _place(place: Place) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The verdict in one sentence."""
 
-from endoscope_core.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.case import ExplainedCase, Ladder
 from endoscope_explain.combine import changed_parameters
 from endoscope_explain.explanation import NamedEffect, Verdict

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from endoscope_core.plant import save_plant
+from endoscope_core.physics.plant_file import save_plant
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.report.html_page import html_page

@@ -5,14 +5,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from endoscope_core.plant import PlantDescription, SensorModel, simulate
-from endoscope_core.plant.parameters import JointParameters
+from endoscope_core.physics.description import JointParameters, PlantDescription
+from endoscope_core.physics.sensing import SensorModel
+from endoscope_core.physics.simulator import simulate
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
+from endoscope_explain.recording.signals import gear
 
 
 def short_motion(duration: float = 12.0) -> np.ndarray:
-    """Joint-equivalent command (N,): sinusoid, steps with holds, chirp."""
+    """Desired bending (N,) in rad: sinusoid, steps with holds, chirp."""
     t = np.arange(int(duration * 1000)) * 1e-3
     sinusoid = 1.2 * np.sin(2.0 * t)
     steps = 0.5 * np.sign(np.sin(2.5 * (t - 5.0)))
@@ -21,10 +23,9 @@ def short_motion(duration: float = 12.0) -> np.ndarray:
 
 
 def record(plant: PlantDescription, command: np.ndarray, seed: int = 1) -> Recording:
-    """What a rig's sensors read under a joint-equivalent command: (N,), or (N, joints)."""
+    """What a rig's sensors read that is asked to bend: (N,), or (N, joints)."""
     joints = plant.joint_names()
-    gears = np.array([plant.joints[joint].gear for joint in joints])
-    shaft = command.reshape(len(command), len(joints)) * gears
+    shaft = command.reshape(len(command), len(joints)) * gear()
     answer = simulate(plant, shaft)
     sensors = SensorModel(plant.sensors, seed)
     slow = slice(None, None, 25)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from endoscope_core.plant import PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.anchoring import all_anchors
 from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.isolated_samples import with_isolated_marked, without_isolated

@@ -3,8 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.plant import PlantDescription
-from endoscope_core.plant.parameters import JointParameters
+from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_explain.evaluate import packed_joint, residuals, simulate_joint
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.observation import observe
@@ -85,7 +84,7 @@ def test_when_readings_were_taken_is_told_by_the_motor_that_is_predicted_best(on
     known = PlantDescription(joints={'bend_x': JointParameters(), 'bend_y': JointParameters()})
     command = np.stack([one_joint.motion(), 0.5 * one_joint.motion()], axis=1)
     recording = one_joint.record(known, command)
-    slower = replace(known.joints['bend_y'], motor_bandwidth=54.0)
+    slower = replace(known.joints['bend_y'], motor_bandwidth=27.0)
     half = replace(known, joints={**known.joints, 'bend_y': slower})
 
     def lead(plant):

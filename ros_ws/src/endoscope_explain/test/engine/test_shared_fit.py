@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec
+from endoscope_core.physics.description import EffectSpec
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.anchoring import anchored
 from endoscope_explain.fit import fit
 from endoscope_explain.observation import observe
@@ -14,7 +14,7 @@ from endoscope_explain.screen import with_effect
 from endoscope_explain.shared_fit import SPREAD, fit_together, told_alone, with_common_numbers
 
 GAIN = 0.9
-STIFFNESS = 0.0036
+STIFFNESS = 0.005
 TUBES = (0.7, 1.1)
 
 

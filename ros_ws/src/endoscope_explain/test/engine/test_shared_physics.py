@@ -2,8 +2,8 @@
 
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import EffectSpec
+from endoscope_core.physics.description import EffectSpec
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.anchoring import anchored
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
@@ -14,7 +14,7 @@ from endoscope_explain.screen import with_effect
 from endoscope_explain.shared_physics import shared_effects
 
 GAIN = 0.9
-TUBES = {0.7: 0.006, 1.0: 0.009}
+TUBES = {0.7: 0.0008, 1.0: 0.0012}
 """Capstan exponent, and the moment of gravity in N m in that pose."""
 
 

@@ -19,7 +19,7 @@ EFFECT = Effect(
     parameters=(
         Parameter('skew', '-', -0.05, 0.05, 1e-3, off=0.0, starts=(-5e-4, 5e-4), comparable=True),
     ),
-    traits=Traits(depends_on_time=True, of_device=True, audited=True),
+    traits=Traits(depends_on_time=True, of_device=True),
 )
 
 

@@ -1,1 +1,0 @@
-"""How often an explanation is right, on concealed cases of an independent generator."""

@@ -1,0 +1,37 @@
+"""A recording of the nominal plant that an independent program made, where there is one."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from endoscope_core.physics import load_plant
+from endoscope_explain.anchoring import anchored
+from endoscope_explain.free_parameters import BAND, FORM_SPREAD
+from endoscope_explain.observation import observe
+from endoscope_explain.recording import recording_from_bag
+from endoscope_explain.whiteness import worst_against_raw_noise
+
+SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))
+FOLDER = SHARED / 'cases' / 'sheath'
+CASE = FOLDER / 'nominal.mcap'
+
+pytestmark = pytest.mark.skipif(
+    not CASE.exists(), reason=f'no {CASE}; set ENDOSCOPE_SHARED to where the cases are'
+)
+
+
+def test_the_plant_as_described_leaves_the_noise_and_its_refit_stays_there():
+    plant = load_plant(FOLDER / 'plant.yaml')
+    recording = recording_from_bag(CASE, plant)
+    _, anchors = anchored(recording, observe(recording, plant), plant, BAND, 1)
+    for refitted, described in anchors:
+        assert worst_against_raw_noise(refitted) < 1.1
+        for item, coordinate, truth in zip(
+            refitted.model.free, refitted.theta, described.theta, strict=True
+        ):
+            found, true = item.value(float(coordinate)), item.value(float(truth))
+            if item.name in ('pretension', 'wire_stiffness', 'capstan_exponent'):
+                assert found == pytest.approx(true, rel=0.02)
+            elif item.name in FORM_SPREAD:
+                assert abs(found - true) < 0.5 * FORM_SPREAD[item.name]
