@@ -98,8 +98,8 @@ class ShaftTrace:
         -------
         tuple
             Seconds from ``since_ns`` to the first reading from which on the shafts stayed for 0.3
-            s, None if they never did; and the largest distance in rad that they went until the enable
-            once they had come to rest and no session had been open for 0.2 s.
+            s, None if they never did; and the largest distance in rad that they went until the
+            enable once they had come to rest and no session had been open for 0.2 s.
         """
         inside = (self._stamps >= since_ns) & (self._stamps < until_ns)
         stamps, angles = self._stamps[inside], self._angles[inside]
