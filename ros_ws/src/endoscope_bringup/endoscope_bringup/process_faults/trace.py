@@ -84,9 +84,7 @@ class ShaftTrace:
         took = (self._stamps[ends] - self._stamps[inside]) * 1e-9
         return float((way / took).max())
 
-    def standstill(
-        self, since_ns: int, open_ns: int, until_ns: int
-    ) -> tuple[float | None, float]:
+    def standstill(self, since_ns: int, open_ns: int, until_ns: int) -> tuple[float | None, float]:
         """When the shafts came to rest, and how far they went without anybody's enable.
 
         Parameters
