@@ -94,18 +94,18 @@ class ConsoleNode(EndoscopeNode):
         self._clutch_said = False
         self._refused_before = 0
         facts = self.rig.joints
-        reach = (facts.reach,) * len(JOINTS)
-        low = tuple(-x for x in reach)
-        self._playing_shaper = MotionShaper(
-            MotionLimits(low, reach, facts.speed, facts.acceleration, facts.entry_step)
+        limits, hand_limits = (
+            MotionLimits.either_way(
+                len(JOINTS), facts.reach, speed, facts.acceleration, facts.entry_step
+            )
+            for speed in (facts.speed, facts.hand_speed)
         )
-        self._hand_shaper = MotionShaper(
-            MotionLimits(low, reach, facts.hand_speed, facts.acceleration, facts.entry_step)
-        )
+        self._playing_shaper = MotionShaper(limits)
+        self._hand_shaper = MotionShaper(hand_limits)
         self._settings = self.parameters(ConsoleParameters, self._on_parameters, self._load)
         self._handle = Handle(
-            low,
-            reach,
+            limits.low,
+            limits.high,
             self._settings.scale,
             HandleSettings(self.rig.handle.resolution, timeout=self.rig.timeouts.handle),
         )
@@ -199,8 +199,8 @@ class ConsoleNode(EndoscopeNode):
 
     @property
     def _may_move(self) -> bool:
-        return bool(self._session.name) and bool(
-            self._calibration.trouble(self.rig.timeouts.command_ns)
+        return bool(self._session.name) and not self._calibration.heard(
+            self.rig.timeouts.command_ns
         )
 
     def _begin(self) -> bool:

@@ -162,7 +162,7 @@ class ControllerNode(EndoscopeNode):
         self._corrections.publish(sample.stamp_ns, *correction.tolist())
 
     def _choose_whether_to_act(self) -> None:
-        calibrating = not self._calibration.trouble(self._timeout_ns)
+        calibrating = self._calibration.heard(self._timeout_ns)
         changing = self._settings.law != self._law
         if changing and self.controller.faded:
             self._law, changing = self._settings.law, False
