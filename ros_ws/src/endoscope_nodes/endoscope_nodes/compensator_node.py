@@ -39,7 +39,6 @@ from endoscope_nodes.watches import (
     TURN_S,
     ClutchWatch,
     CommandReport,
-    MeasuredPose,
     SessionWatch,
     rivals,
 )
@@ -102,7 +101,7 @@ class CompensatorNode(EndoscopeNode):
         self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
         self._session = SessionWatch(self, self._start_anew, self._start_anew)
         self._clutch = ClutchWatch(self, self._end_stream)
-        self._pose = MeasuredPose(self)
+        self._pose = runtime.pose_of(self)
         self._calibration_in = self._listen(
             CALIBRATION_COMMAND, self._on_calibration, self.calibration_gate
         )

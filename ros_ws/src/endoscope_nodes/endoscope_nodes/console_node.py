@@ -34,7 +34,6 @@ from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
 from endoscope_nodes.watches import (
     ClutchWatch,
-    MeasuredPose,
     SessionWatch,
     StreamWatch,
     rivals,
@@ -112,7 +111,7 @@ class ConsoleNode(EndoscopeNode):
         self._commands: JointPublisher | None = None
         self._clutch_out: Publisher | None = None
         self._session = SessionWatch(self, self._rest, self._rest)
-        self._pose = MeasuredPose(self)
+        self._pose = runtime.pose_of(self)
         self._calibration = StreamWatch(self.ticker, CALIBRATION_COMMAND)
         self.create_subscription(
             JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True

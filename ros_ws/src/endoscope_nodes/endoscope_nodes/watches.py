@@ -223,10 +223,15 @@ class MeasuredPose:
     The bending is that of the tracker while it is fresh, and else what the shafts would have bent
     it to without any loss.
 
+    One serves all nodes of a process, because a subscription of each node's own would cost more
+    than most nodes do; :meth:`listen` lets another of them host the subscriptions.
+
     Attributes
     ----------
     tracked
         Newest bending angles of the tracker; None before the first.
+    host
+        Node that subscribes.
     """
 
     def __init__(self, node: EndoscopeNode) -> None:
@@ -240,6 +245,11 @@ class MeasuredPose:
         self._joints_reader = JointReader(JOINTS)
         self.tracked: JointSample | None = None
         self._tracked_ns = 0
+        self.listen(node)
+
+    def listen(self, node: EndoscopeNode) -> None:
+        """Subscribe by this node from now on."""
+        self.host = node
         node.create_subscription(
             JointState, MOTOR_MEASURED, self._keep_shafts, SENSOR_ASKED, raw=True
         )
