@@ -39,7 +39,6 @@ from endoscope_nodes.watches import (
     TURN_S,
     ClutchWatch,
     CommandReport,
-    MeasuredPose,
     SessionWatch,
     rivals,
 )
@@ -78,12 +77,8 @@ class CompensatorNode(EndoscopeNode):
         self.correction_gate = CommandGate(
             CommandLimits(facts.correction, motors.speed / facts.gear, facts.correction, timeout_ns)
         )
-        reach = (facts.drive * facts.gear,) * len(MOTORS)
-        self.shaper = MotionShaper(
-            MotionLimits(
-                tuple(-x for x in reach), reach, motors.speed, motors.acceleration, motors.step
-            )
-        )
+        limits = (facts.drive * facts.gear, motors.speed, motors.acceleration, motors.step)
+        self.shaper = MotionShaper(MotionLimits.either_way(len(MOTORS), *limits))
         self._feedforward = Feedforward(
             len(JOINTS), FeedforwardSettings(lead=p.lead, speed_limit=motors.speed / facts.gear)
         )
@@ -98,7 +93,7 @@ class CompensatorNode(EndoscopeNode):
         self._learnt_ns = 0
         self._source = NOBODY
         self._last_stamp_ns = 0
-        self._drive_before = _NOTHING
+        self._sent = _AT_ZERO
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
         self._state_is_news = True
@@ -106,7 +101,7 @@ class CompensatorNode(EndoscopeNode):
         self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
         self._session = SessionWatch(self, self._start_anew, self._start_anew)
         self._clutch = ClutchWatch(self, self._end_stream)
-        self._pose = MeasuredPose(self)
+        self._pose = runtime.pose_of(self)
         self._calibration_in = self._listen(
             CALIBRATION_COMMAND, self._on_calibration, self.calibration_gate
         )
@@ -262,7 +257,7 @@ class CompensatorNode(EndoscopeNode):
         if dt == 0.0 or self._corrected != (correction is not None):
             self._corrected = correction is not None
             self._feedforward.rebase(
-                self._drive_before - added, sample.position if dt == 0.0 else None
+                self._drive_before() - added, sample.position if dt == 0.0 else None
             )
         angle, velocity = self._desired.follow(sample.position, sample.velocity, dt or TICK_S)
         if self._news and not any(velocity):
@@ -281,7 +276,7 @@ class CompensatorNode(EndoscopeNode):
             return
         self._calibrated_in = self._session.name
         if dt == 0.0:
-            self._passing.rebase(self._drive_before, sample.position)
+            self._passing.rebase(self._drive_before(), sample.position)
         velocity = sample.velocity or (0.0,) * len(JOINTS)
         drive = self._passing.step(sample.position, velocity, dt or TICK_S)
         self._put_out(sample.stamp_ns, drive, dt or TICK_S)
@@ -307,7 +302,7 @@ class CompensatorNode(EndoscopeNode):
         self._source = source
         if goes_on:
             return dt
-        self._drive_before = np.array(shafts) / self.rig.joints.gear
+        self._sent = shafts
         self.shaper.restart(shafts)
         return 0.0
 
@@ -326,9 +321,12 @@ class CompensatorNode(EndoscopeNode):
 
     def _put_out(self, stamp_ns: int, drive: np.ndarray, dt: float) -> None:
         gear = self.rig.joints.gear
-        shafts = self.shaper.shape((drive * gear).tolist(), dt)
-        self._drive_before = np.array(shafts) / gear
-        self._motors.publish(stamp_ns, *shafts)
+        self._sent = self.shaper.shape([gear * angle for angle in drive.tolist()], dt)
+        self._motors.publish(stamp_ns, *self._sent)
+
+    def _drive_before(self) -> np.ndarray:
+        """Joint-equivalent angles that went out last, or that a stream begins at, in rad."""
+        return np.array(self._sent) / self.rig.joints.gear
 
     def _publish_state(self) -> None:
         now = self.ticker.now_ns()
