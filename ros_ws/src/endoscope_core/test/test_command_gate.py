@@ -124,12 +124,12 @@ def test_an_allowance_is_spent_once():
 
 def test_reset_forgets_the_stream_but_not_the_counts():
     gate = gate_after(5)
-    gate.refuse(Refusal.NOT_ENABLED)
+    gate.refuse(Refusal.CLUTCH)
     gate.reset()
     assert not gate.is_fresh(505 * MS)
     assert gate.check(MS, HERE, 0, HERE) is None
     assert gate.accepted == 6
-    assert gate.refused[Refusal.NOT_ENABLED] == 1
+    assert gate.refused[Refusal.CLUTCH] == 1
 
 
 def test_commands_lost_on_the_way_are_told_from_a_sender_that_jitters():

@@ -136,6 +136,22 @@ def test_shafts_start_where_they_are_and_stop_where_they_are():
     assert motion.goal == pytest.approx((0.4, -0.2))
 
 
+def test_what_was_refused_as_too_fast_is_not_made_up_for():
+    motion = ShaftMotion(COMMANDS, LIMITS)
+    motion.measure((0.0, 0.0))
+    motion.session.hear('', 0)
+    motion.session.hear('session-1', MS)
+    asked = [0.0] * 10 + [0.015 * k for k in range(50)] + [0.735] * 300
+    refused = 0
+    for t, angle in enumerate(asked, start=2):
+        before = motion.turn(t * MS, 1e-3)
+        refused += motion.command('session-1', t * MS, (angle, 0.0), (), t * MS) is not None
+        motion.session.hear('session-1', t * MS)
+        assert abs(motion.goal[0] - before[0]) <= SPEED * 1e-3 + 1e-9
+    assert refused > 20
+    assert motion.goal[0] == pytest.approx(0.735)
+
+
 class AnyInterleaving(RuleBasedStateMachine):
     """Supervisor, compensator, driver and shafts, and whatever may happen to them.
 

@@ -19,7 +19,6 @@ calls = st.lists(
     st.one_of(
         st.tuples(st.just('shape'), st.tuples(anywhere, near), periods),
         st.tuples(st.just('shape'), st.tuples(near, near), st.floats(1e-3, 2e-3)),
-        st.tuples(st.just('hold'), st.none(), periods),
         st.tuples(st.just('restart'), start, st.none()),
     ),
     max_size=80,
@@ -45,7 +44,7 @@ def test_no_sequence_of_calls_leads_beyond_a_bound(begin, sequence):
             shaper.restart(value)
             position, velocity = value, (0.0, 0.0)
             continue
-        after = shaper.shape(value, period) if call == 'shape' else shaper.hold(period)
+        after = shaper.shape(value, period)
         if period > LIMITS.longest_period:
             period, velocity = LIMITS.longest_period, (0.0, 0.0)
         for j in range(2):
@@ -97,17 +96,6 @@ def test_a_motion_too_fast_for_the_bounds_is_caught_up_with():
     assert np.max(np.abs(positions - ramp)) > 0.3
     assert np.max(np.abs(positions - ramp)[1000:]) < 1e-12
     assert np.max(positions) < 1.25
-
-
-def test_hold_brakes_to_rest_within_the_bounds_and_stays():
-    shaper = shaper_at((-1.0, 0.0))
-    run(shaper, [(1.0, 0.0)] * 200)
-    assert shaper.velocity[0] == pytest.approx(5.0)
-    before = shaper.position[0]
-    held = np.array([shaper.hold(TICK) for _ in range(100)])[:, 0]
-    assert held[-1] - before == pytest.approx(5.0**2 / (2 * 100.0), abs=5.0 * TICK)
-    assert np.all(held[50:] == held[-1])
-    assert shaper.velocity == (0.0, 0.0)
 
 
 def test_after_a_stall_it_goes_on_from_rest():

@@ -51,7 +51,7 @@ from endoscope_nodes.parameters import ParameterError, parameter
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_NS
-from endoscope_nodes.watches import MeasuredPose, SessionWatch, StreamWatch
+from endoscope_nodes.watches import SessionWatch, StreamWatch
 
 _Judgement = tuple[ClassificationResult, tuple[PhysicalParameters, ...]]
 
@@ -113,7 +113,7 @@ class CalibrationNode(EndoscopeNode):
         )
         self._results = self.create_publisher(DiagnosticArray, CALIBRATION_RESULT, RESULT)
         self._session = SessionWatch(self, None, self._on_leave)
-        self._pose = MeasuredPose(self)
+        self._pose = runtime.pose_of(self)
         self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
         JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
         JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_bending, SENSOR_ASKED)

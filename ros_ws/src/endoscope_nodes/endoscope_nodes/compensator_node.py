@@ -42,7 +42,6 @@ from endoscope_nodes.watches import (
     TURN_S,
     ClutchWatch,
     CommandReport,
-    MeasuredPose,
     SessionWatch,
     rivals,
 )
@@ -81,12 +80,8 @@ class CompensatorNode(EndoscopeNode):
         self.correction_gate = CommandGate(
             CommandLimits(facts.correction, motors.speed / facts.gear, facts.correction, timeout_ns)
         )
-        reach = (facts.drive * facts.gear,) * len(MOTORS)
-        self.shaper = MotionShaper(
-            MotionLimits(
-                tuple(-x for x in reach), reach, motors.speed, motors.acceleration, motors.step
-            )
-        )
+        limits = (facts.drive * facts.gear, motors.speed, motors.acceleration, motors.step)
+        self.shaper = MotionShaper(MotionLimits.either_way(len(MOTORS), *limits))
         self._feedforward = Feedforward(
             len(JOINTS),
             FeedforwardSettings(
@@ -106,7 +101,7 @@ class CompensatorNode(EndoscopeNode):
         self._learnt_ns = 0
         self._source = NOBODY
         self._last_stamp_ns = 0
-        self._drive_before = _NOTHING
+        self._sent = _AT_ZERO
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
         self._beyond_reach = self._beyond_before = 0
@@ -115,7 +110,7 @@ class CompensatorNode(EndoscopeNode):
         self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
         self._session = SessionWatch(self, self._start_anew, self._start_anew)
         self._clutch = ClutchWatch(self, self._end_stream)
-        self._pose = MeasuredPose(self)
+        self._pose = runtime.pose_of(self)
         self._calibration_in = self._listen(
             CALIBRATION_COMMAND, self._on_calibration, self.calibration_gate
         )
@@ -271,7 +266,7 @@ class CompensatorNode(EndoscopeNode):
         if dt == 0.0 or self._corrected != (correction is not None):
             self._corrected = correction is not None
             self._feedforward.rebase(
-                self._drive_before - added, sample.position if dt == 0.0 else None
+                self._drive_before() - added, sample.position if dt == 0.0 else None
             )
         within = self._within_reach(sample)
         angle, velocity = self._desired.follow(*within, dt or TICK_S)
@@ -300,7 +295,7 @@ class CompensatorNode(EndoscopeNode):
             return
         self._calibrated_in = self._session.name
         if dt == 0.0:
-            self._passing.rebase(self._drive_before, sample.position)
+            self._passing.rebase(self._drive_before(), sample.position)
         velocity = sample.velocity or (0.0,) * len(JOINTS)
         drive = self._passing.step(sample.position, velocity, dt or TICK_S)
         self._put_out(sample.stamp_ns, drive, dt or TICK_S)
@@ -326,7 +321,7 @@ class CompensatorNode(EndoscopeNode):
         self._source = source
         if goes_on:
             return dt
-        self._drive_before = np.array(shafts) / self.rig.joints.gear
+        self._sent = shafts
         self.shaper.restart(shafts)
         return 0.0
 
@@ -345,9 +340,12 @@ class CompensatorNode(EndoscopeNode):
 
     def _put_out(self, stamp_ns: int, drive: np.ndarray, dt: float) -> None:
         gear = self.rig.joints.gear
-        shafts = self.shaper.shape((drive * gear).tolist(), dt)
-        self._drive_before = np.array(shafts) / gear
-        self._motors.publish(stamp_ns, *shafts)
+        self._sent = self.shaper.shape([gear * angle for angle in drive.tolist()], dt)
+        self._motors.publish(stamp_ns, *self._sent)
+
+    def _drive_before(self) -> np.ndarray:
+        """Joint-equivalent angles that went out last, or that a stream begins at, in rad."""
+        return np.array(self._sent) / self.rig.joints.gear
 
     def _publish_state(self) -> None:
         now = self.ticker.now_ns()

@@ -44,7 +44,6 @@ from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
 from endoscope_nodes.watches import (
     ClutchWatch,
-    MeasuredPose,
     SessionWatch,
     StreamWatch,
     rivals,
@@ -106,25 +105,25 @@ class ConsoleNode(EndoscopeNode):
         self._reaches: tuple[Reach, ...] = ()
         self._beyond_reach = self._beyond_before = 0
         facts = self.rig.joints
-        reach = (facts.reach,) * len(JOINTS)
-        low = tuple(-x for x in reach)
-        self._playing_shaper = MotionShaper(
-            MotionLimits(low, reach, facts.speed, facts.acceleration, facts.entry_step)
+        limits, hand_limits = (
+            MotionLimits.either_way(
+                len(JOINTS), facts.reach, speed, facts.acceleration, facts.entry_step
+            )
+            for speed in (facts.speed, facts.hand_speed)
         )
-        self._hand_shaper = MotionShaper(
-            MotionLimits(low, reach, facts.hand_speed, facts.acceleration, facts.entry_step)
-        )
+        self._playing_shaper = MotionShaper(limits)
+        self._hand_shaper = MotionShaper(hand_limits)
         self._settings = self.parameters(ConsoleParameters, self._on_parameters, self._load)
         self._handle = Handle(
-            low,
-            reach,
+            limits.low,
+            limits.high,
             self._settings.scale,
             HandleSettings(self.rig.handle.resolution, timeout=self.rig.timeouts.handle),
         )
         self._commands: JointPublisher | None = None
         self._clutch_out: Publisher | None = None
         self._session = SessionWatch(self, self._rest, self._rest)
-        self._pose = MeasuredPose(self)
+        self._pose = runtime.pose_of(self)
         self._calibration = StreamWatch(self.ticker, CALIBRATION_COMMAND)
         self.create_subscription(
             JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True
@@ -222,8 +221,8 @@ class ConsoleNode(EndoscopeNode):
 
     @property
     def _may_move(self) -> bool:
-        return bool(self._session.name) and bool(
-            self._calibration.trouble(self.rig.timeouts.command_ns)
+        return bool(self._session.name) and not self._calibration.heard(
+            self.rig.timeouts.command_ns
         )
 
     def _begin(self) -> bool:

@@ -29,7 +29,7 @@ from endoscope_nodes.parameters import parameter
 from endoscope_nodes.qos import COMMAND, RESULT
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
-from endoscope_nodes.watches import CommandReport, MeasuredPose, SessionWatch, StreamWatch, rivals
+from endoscope_nodes.watches import CommandReport, SessionWatch, StreamWatch, rivals
 
 Controller = AdaptiveBacklashController | RecursiveHysteresisController
 LAWS: dict[str, type[Controller]] = {
@@ -93,7 +93,7 @@ class ControllerNode(EndoscopeNode):
         self._forget = False
         self._corrections = JointPublisher(self, CORRECTION, JOINTS, ('position',), COMMAND)
         self._session = SessionWatch(self, self._start_anew, self._start_anew)
-        self._pose = MeasuredPose(self)
+        self._pose = runtime.pose_of(self)
         self._calibration = StreamWatch(self.ticker, CALIBRATION_COMMAND)
         self.create_subscription(
             JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True
@@ -162,7 +162,7 @@ class ControllerNode(EndoscopeNode):
         self._corrections.publish(sample.stamp_ns, *correction.tolist())
 
     def _choose_whether_to_act(self) -> None:
-        calibrating = not self._calibration.trouble(self._timeout_ns)
+        calibrating = self._calibration.heard(self._timeout_ns)
         changing = self._settings.law != self._law
         if changing and self.controller.faded:
             self._law, changing = self._settings.law, False

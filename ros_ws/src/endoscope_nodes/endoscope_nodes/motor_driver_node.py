@@ -69,11 +69,8 @@ class MotorDriverNode(EndoscopeNode):
         # The allowance of the gate holds for the time of receipt, which jitters, and the shaper
         # bounds what it lets pass.
         commands = CommandLimits(facts.reach, 1.25 * facts.speed, facts.entry_step, timeout_ns)
-        reach = (facts.reach,) * len(MOTORS)
-        low = tuple(-x for x in reach)
-        self.motion = ShaftMotion(
-            commands, MotionLimits(low, reach, facts.speed, facts.acceleration, facts.step)
-        )
+        limits = (facts.reach, facts.speed, facts.acceleration, facts.step)
+        self.motion = ShaftMotion(commands, MotionLimits.either_way(len(MOTORS), *limits))
         self._slave = self._simulated() if p.device == 'simulated' else None
         self._device: MotorDevice = self._slave or self._dynamixel(bus)
         try:
@@ -149,14 +146,14 @@ class MotorDriverNode(EndoscopeNode):
             rivals(self, self._commands.subscription),
         )
         if refusal is Refusal.SENDER:
-            self._session.turn()
+            self._session.tell()
         elif refusal is None and not self.ticker.simulated:
             self.latency_ns.append(self.ticker.now_ns() - sample.stamp_ns)
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         self._notice_trouble()
         goal = self.motion.turn(self.ticker.monotonic_ns(), periods * TICK_S)
-        self._session.turn()
+        self._session.tell()
         reading = self._device.exchange(goal or (0.0,) * len(MOTORS), periods)
         if reading is None:
             return

@@ -42,6 +42,7 @@ from endoscope_nodes.real_time import (
 )
 from endoscope_nodes.stop_signals import StopSignals
 from endoscope_nodes.ticker import Ticker
+from endoscope_nodes.watches import MeasuredPose
 
 # An unbounded spin of the EventsExecutor never returns in the Jazzy wheels; a bounded one does.
 # Eleven days.
@@ -128,6 +129,8 @@ class Runtime(ClosedOnExit):
         self.executor = EventsExecutor(context=self.context)
         self.nodes: list[EndoscopeNode] = []
         self._ticker: Ticker | None = None
+        self._pose: MeasuredPose | None = None
+        self._asked_pose: list[EndoscopeNode] = []
         self._rig = rig
         self._real_time = RealTimeParameters()
         self._overrides = overrides or {}
@@ -151,8 +154,17 @@ class Runtime(ClosedOnExit):
             self._exit_codes.append(node.exit_code)
             if self._ticker is not None:
                 self._ticker.forget((node, node.diagnostics))
+            self._leave_pose(node)
             self.executor.remove_node(node)
             node.destroy_node()
+
+    def _leave_pose(self, node: EndoscopeNode) -> None:
+        self._asked_pose = [other for other in self._asked_pose if other is not node]
+        if self._pose is not None and self._pose.host is node:
+            if self._asked_pose:
+                self._pose.listen(self._asked_pose[0])
+            else:
+                self._pose = None
 
     def overrides_of(self, name: str) -> list[Parameter]:
         """Parameter values that this process was told to give the node called ``name``."""
@@ -181,6 +193,13 @@ class Runtime(ClosedOnExit):
             # rclpy would subscribe each node to /clock, at the price of a node's own work.
             node._time_source.detach_node()
         return self._ticker
+
+    def pose_of(self, node: EndoscopeNode) -> MeasuredPose:
+        """Give the process's view of where the slave is; a node that asks for it hosts it."""
+        if self._pose is None:
+            self._pose = MeasuredPose(node)
+        self._asked_pose.append(node)
+        return self._pose
 
     def _stride_and_rig(self, node: EndoscopeNode) -> int:
         self._real_time = declare_parameters(node, RealTimeParameters)

@@ -104,12 +104,12 @@ class SessionWatch:
     def leave(self, reason: str) -> None:
         """End the node's part in the session, and say so at once: the slave goes to FAULT."""
         self._session.leave(reason)
-        self._tell()
+        self.tell()
 
     def turn(self) -> None:
         """Take a turn of the node's loop; a node that beats calls this more often."""
         self._session.beat(self._node.ticker.monotonic_ns())
-        self._tell()
+        self.tell()
 
     def _hear(self, message: Header) -> None:
         doubt = rivals(self._node, self._subscription)
@@ -119,9 +119,10 @@ class SessionWatch:
             if self._on_enter is not None:
                 self._on_enter()
             return
-        self._tell()
+        self.tell()
 
-    def _tell(self) -> None:
+    def tell(self) -> None:
+        """Say how the node's part in the session has changed, if it has."""
         told = (self._session.name, self._session.trouble)
         if told == self._told:
             return
@@ -197,14 +198,21 @@ class StreamWatch:
         self._heard_ns = self._ticker.monotonic_ns()
         self._late_ns = self._ticker.late_ns
 
+    def heard(self, timeout_ns: int) -> bool:
+        """Whether the stream was heard within ``timeout_ns``."""
+        if self._heard_ns is None:
+            return False
+        age = self._ticker.monotonic_ns() - self._heard_ns
+        return age - min(self._ticker.late_ns - self._late_ns, timeout_ns) <= timeout_ns
+
     def trouble(self, timeout_ns: int) -> str:
         """Say what is wrong with the stream; empty if it was heard within ``timeout_ns``."""
+        if self.heard(timeout_ns):
+            return ''
         if self._heard_ns is None:
             return f'{self.topic} has not been received'
         age = self._ticker.monotonic_ns() - self._heard_ns
         deaf = self._ticker.late_ns - self._late_ns
-        if age - min(deaf, timeout_ns) <= timeout_ns:
-            return ''
         late = f', {deaf * 1e-6:.0f} ms of which this process was not run itself' if deaf else ''
         return f'{self.topic} has been silent for {age * 1e-6:.0f} ms{late}'
 
@@ -215,10 +223,15 @@ class MeasuredPose:
     The bending is that of the tracker while it is fresh, and else what the shafts would have bent
     it to without any loss.
 
+    One serves all nodes of a process, because a subscription of each node's own would cost more
+    than most nodes do; :meth:`listen` lets another of them host the subscriptions.
+
     Attributes
     ----------
     tracked
         Newest bending angles of the tracker; None before the first.
+    host
+        Node that subscribes.
     """
 
     def __init__(self, node: EndoscopeNode) -> None:
@@ -232,6 +245,11 @@ class MeasuredPose:
         self._joints_reader = JointReader(JOINTS)
         self.tracked: JointSample | None = None
         self._tracked_ns = 0
+        self.listen(node)
+
+    def listen(self, node: EndoscopeNode) -> None:
+        """Subscribe by this node from now on."""
+        self.host = node
         node.create_subscription(
             JointState, MOTOR_MEASURED, self._keep_shafts, SENSOR_ASKED, raw=True
         )

@@ -1,4 +1,5 @@
 import struct
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ class Recorder:
 
     def create_publisher(self, kind, topic, qos):
         assert kind is JointState
-        return type('Publisher', (), {'publish': staticmethod(self._sent.append)})
+        return SimpleNamespace(handle=SimpleNamespace(publish_raw=self._sent.append))
 
 
 def message_of(names, stamp_ns, **fields):

@@ -73,6 +73,8 @@ class Operator(ClosedOnExit):
         Operating states with the time of receipt in ns.
     session
         Motion session as last heard.
+    open_ns
+        When the supervisor was last heard to say that a session is open.
     values, heard_ns
         What was said last on `/diagnostics`, by status, and when each node was heard there.
     """
@@ -87,6 +89,7 @@ class Operator(ClosedOnExit):
         self.late_ns = 0
         self.states: list[tuple[int, str]] = []
         self.session = ''
+        self.open_ns = 0
         self.values: dict[str, dict[str, str]] = {}
         self.heard_ns: dict[str, int] = {}
         self._bending: JointSample | None = None
@@ -125,8 +128,10 @@ class Operator(ClosedOnExit):
     def _note_state(self, data: bytes, received_ns: int) -> None:
         self.states.append((received_ns, deserialize_message(data, String).data))
 
-    def _note_session(self, data: bytes, _: int) -> None:
+    def _note_session(self, data: bytes, received_ns: int) -> None:
         self.session = deserialize_message(data, Header).frame_id
+        if self.session:
+            self.open_ns = received_ns
 
     def _note_health(self, data: bytes, received_ns: int) -> None:
         for status in deserialize_message(data, DiagnosticArray).status:

@@ -78,7 +78,7 @@ class Outcome:
     still_s
         From the fault to standstill; None where the motion went on, or the plant died.
     unasked
-        How far shafts went after standstill and before the next enable.
+        How far shafts went at rest, with no session open, before the next enable.
     gap_s
         Longest time between two readings of the shafts, by their stamps.
     enabled_s
@@ -131,14 +131,14 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
         since_ns = time.time_ns()
     rig.revive()
     operator.serve(_AFTERMATH_S)
-    state, cause = operator.state, operator.cause
+    state, cause, open_ns = operator.state, operator.cause, operator.open_ns
     enable_ns = time.time_ns()
     enabled_s = rig.enable_and_move()
     operator.serve(0.3)
     if enabled_s is None:
         rig.kill_all()
     shafts = ShaftTrace(operator.shafts)
-    still_s, unasked = shafts.standstill(since_ns, enable_ns)
+    still_s, unasked = shafts.standstill(since_ns, open_ns, enable_ns)
     step, share = goal_step(operator.goals, rig.facts.motors)
     return Outcome(
         state,

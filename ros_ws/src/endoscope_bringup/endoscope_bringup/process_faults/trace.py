@@ -14,6 +14,7 @@ STILL = 2.0 * 2.0 * np.pi / 4096
 
 # The slowest motion of the bench leaves STILL within this, its reversals included.
 _WINDOW_NS = 300_000_000
+_HOLD_NS = 200_000_000
 _STREAM_NS = 100_000_000
 _SPEED_NS = 10_000_000
 
@@ -83,19 +84,20 @@ class ShaftTrace:
         took = (self._stamps[ends] - self._stamps[inside]) * 1e-9
         return float((way / took).max())
 
-    def standstill(self, since_ns: int, until_ns: int) -> tuple[float | None, float]:
-        """When the shafts came to rest, and how far they went afterwards.
+    def standstill(self, since_ns: int, open_ns: int, until_ns: int) -> tuple[float | None, float]:
+        """When the shafts came to rest, and how far they went without anybody's enable.
 
         Parameters
         ----------
-        since_ns, until_ns
-            Stamps of the fault and of the next enable.
+        since_ns, open_ns, until_ns
+            Stamps of the fault, of the last word that a session was open, and of the next enable.
 
         Returns
         -------
         tuple
             Seconds from ``since_ns`` to the first reading from which on the shafts stayed for 0.3
-            s, None if they never did; and the largest distance in rad from there until the enable.
+            s, None if they never did; and the largest distance in rad that they went until the
+            enable once they had come to rest and no session had been open for 0.2 s.
         """
         inside = (self._stamps >= since_ns) & (self._stamps < until_ns)
         stamps, angles = self._stamps[inside], self._angles[inside]
@@ -104,6 +106,8 @@ class ShaftTrace:
             if end >= len(stamps):
                 break
             if np.abs(angles[k:end] - angles[k]).max() <= STILL:
-                gone = float(np.abs(angles[k:] - angles[k]).max())
-                return float(stamps[k] - since_ns) * 1e-9, gone
+                # Within an open session a hand that was not heard for a while may go on.
+                closed = max(k, int(np.searchsorted(stamps, open_ns + _HOLD_NS)))
+                gone = np.abs(angles[closed:] - angles[closed : closed + 1]).max(initial=0.0)
+                return float(stamps[k] - since_ns) * 1e-9, float(gone)
         return None, 0.0

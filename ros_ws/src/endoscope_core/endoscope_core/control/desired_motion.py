@@ -122,6 +122,6 @@ class DesiredMotion:
             for joint, p, v in zip(self._joints, position, said, strict=True):
                 joint.follow(p, v, dt)
         return (
-            tuple(joint.play.value for joint in self._joints),
-            tuple(joint.smooth.velocity for joint in self._joints),
+            tuple([joint.play.value for joint in self._joints]),
+            tuple([joint.smooth.velocity for joint in self._joints]),
         )

@@ -303,7 +303,7 @@ class Feedforward:
         return AdaptivePhysicalInverse(parameters, self.settings.limits, self.settings.dead_band)
 
     def _checked(self, name: str, values: Vector) -> list[float]:
-        numbers = [float(value) for value in values]
+        numbers = list(map(float, values))
         if len(numbers) != self._count or not all(map(math.isfinite, numbers)):
             raise ValueError(f'{name} must be {self._count} finite numbers, not {numbers}')
         return numbers

@@ -37,7 +37,10 @@ class Play:
     def follow(self, value: float) -> float:
         """What comes out for a new value."""
         half = self._half_width
-        self.value = min(max(self.value, value - half), value + half)
+        if value - half > self.value:
+            self.value = value - half
+        elif value + half < self.value:
+            self.value = value + half
         return self.value
 
 
@@ -74,7 +77,7 @@ class SmoothFollower:
 
 def limited(value: float, bound: float) -> float:
     """The value, held within a bound either way."""
-    return min(bound, max(-bound, value))
+    return bound if value > bound else -bound if value < -bound else value
 
 
 def worked_off(value: float, travel: float, bound: float) -> float:

@@ -331,7 +331,7 @@ class TrackerFeedback[Law: JointLaw]:
         return self._history[index] if index >= 0 else None
 
     def _checked(self, name: str, values: Vector) -> list[float]:
-        numbers = [float(value) for value in values]
+        numbers = list(map(float, values))
         if len(numbers) != self._joints or not all(map(math.isfinite, numbers)):
             raise ValueError(f'{name} must be {self._joints} finite numbers, not {numbers}')
         return numbers

@@ -99,8 +99,8 @@ __all__ = [
     'OUT_MOTOR_SPEED',
     'OUT_TENSION_A',
     'OUT_TENSION_B',
+    'advance_joints',
     'advance_tick',
-    'read_sensors',
     'run_joints',
 ]
 
@@ -280,6 +280,45 @@ def advance_tick(
         state, p, on, pretension_now(p, on, end), phi, v, r * (pulley - wire_end) + shift, shift
     )
     state[TENSION_A], state[TENSION_B] = loads[0], loads[1]
+
+
+@compiled
+def advance_joints(
+    states: Array,
+    histories: Array,
+    p: Array,
+    on: Flags,
+    inputs: Array,
+    ticks: int,
+    tick: float,
+    substeps: int,
+    out: Array,
+) -> None:
+    """Advance all joints side by side by some ticks, with the same input in each.
+
+    Parameters
+    ----------
+    states, histories : array (J, states), array (J, 2, HISTORY)
+        Changed in place.
+    p, on : array (J, parameters), array (J, flags) of bool
+    inputs : array (J, INPUTS)
+        Two joints see each other's angle, which is written into it.
+    ticks : int
+        0 only reads the sensors.
+    tick : float
+    substeps : int
+    out : array (J, OUTPUTS)
+        What the sensors read after the ticks.
+    """
+    joints = inputs.shape[0]
+    for n in range(ticks + 1):
+        for j in range(joints):
+            read_sensors(states[j], histories[j], p[j], on[j], tick, out[j])
+        for j in range(joints if n < ticks else 0):
+            x = inputs[j]
+            if joints == 2:
+                x[IN_OTHER_JOINT] = out[1 - j, OUT_JOINT]
+            advance_tick(states[j], histories[j], p[j], on[j], x[IN_COMMAND], x, tick, substeps)
 
 
 @compiled

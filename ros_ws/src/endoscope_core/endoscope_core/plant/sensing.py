@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 def quantise(values: ArrayLike, step: float) -> Array:
     """Round to multiples of `step`; a step of zero leaves the values as they are."""
     values = np.asarray(values, dtype=float)
-    return values if step == 0 else np.round(values / step) * step
+    return values if step == 0 else np.rint(values / step) * step
 
 
 class SensorModel:

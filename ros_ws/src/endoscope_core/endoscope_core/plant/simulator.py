@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 from endoscope_core.plant.kernel import (
     IN_COMMAND,
     IN_MOTOR,
-    IN_OTHER_JOINT,
     INPUTS,
     OUT_BENDING,
     OUT_EFFORT,
@@ -18,8 +17,7 @@ from endoscope_core.plant.kernel import (
     OUT_TENSION_A,
     OUT_TENSION_B,
     OUTPUTS,
-    advance_tick,
-    read_sensors,
+    advance_joints,
     run_joints,
 )
 from endoscope_core.plant.packing import pack, rest_state
@@ -107,7 +105,7 @@ class PlantSimulator:
         self._inputs[:, IN_MOTOR] = np.nan
         self._outputs = np.zeros((len(self.joints), OUTPUTS))
         self._ticks = 0
-        self._read()
+        self._advance(0)
 
     @property
     def sample(self) -> PlantSample:
@@ -146,37 +144,25 @@ class PlantSimulator:
         command = np.asarray(shaft_command, dtype=float)
         if command.shape != self._gear.shape:
             raise ValueError(f'a command for {self.joints} has shape {command.shape}')
-        if not (np.abs(command) <= LARGEST_COMMAND).all():
+        if not all(abs(angle) <= LARGEST_COMMAND for angle in command.tolist()):
             raise ValueError(f'the command {command} is not finite or beyond {BEYOND}')
         self._inputs[:, IN_COMMAND] = command / self._gear
-        for _ in range(n_ticks):
-            if len(self.joints) == 2:
-                self._inputs[:, IN_OTHER_JOINT] = self._outputs[::-1, OUT_JOINT]
-            for j, x in enumerate(self._inputs):
-                advance_tick(
-                    self._states[j],
-                    self._histories[j],
-                    self._parameters[j],
-                    self._on[j],
-                    x[IN_COMMAND],
-                    x,
-                    self.tick,
-                    self._substeps,
-                )
-            self._ticks += 1
-            self._read()
+        self._advance(n_ticks)
         return self.sample
 
-    def _read(self) -> None:
-        for j, out in enumerate(self._outputs):
-            read_sensors(
-                self._states[j],
-                self._histories[j],
-                self._parameters[j],
-                self._on[j],
-                self.tick,
-                out,
-            )
+    def _advance(self, n_ticks: int) -> None:
+        advance_joints(
+            self._states,
+            self._histories,
+            self._parameters,
+            self._on,
+            self._inputs,
+            n_ticks,
+            self.tick,
+            self._substeps,
+            self._outputs,
+        )
+        self._ticks += n_ticks
 
 
 def simulate(

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -94,12 +95,12 @@ class Timeouts:
     stream: float = _fact(0.005, 10.0)
     handle: float = _fact(0.01, 1.0)
 
-    @property
+    @cached_property
     def command_ns(self) -> int:
         """`command` in ns."""
         return round(self.command * 1e9)
 
-    @property
+    @cached_property
     def stream_ns(self) -> int:
         """`stream` in ns."""
         return round(self.stream * 1e9)

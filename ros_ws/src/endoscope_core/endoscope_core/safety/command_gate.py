@@ -1,6 +1,7 @@
 """Decides for each motion command whether it may be obeyed, and counts what it refuses."""
 
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,7 +16,6 @@ _GAPS = 50
 class Refusal(StrEnum):
     """Why a command is not obeyed."""
 
-    NOT_ENABLED = 'not enabled'
     SESSION = 'not of this motion session'
     SENDER = 'more than one sender'
     CLUTCH = 'clutch not held'
@@ -194,6 +194,8 @@ class CommandGate:
     ) -> Refusal | None:
         """From beyond the reach, which a measured pose may be, there is a way back only."""
         reach = self.limits.reach
+        if max(map(abs, position)) <= reach:
+            return None
         for value, now in zip(position, here, strict=True):
             if abs(value) > reach and abs(value) > abs(now) + (
                 0.0 if streaming else self.limits.max_step
@@ -230,7 +232,7 @@ class CommandGate:
         limits = self.limits
         elapsed = (received_ns - (self._received_ns or 0)) * _S_PER_NS
         allowance = self._allowance + limits.max_speed * elapsed
-        travel = max(abs(a - b) for a, b in zip(position, self._position, strict=True))
+        travel = _distance(position, self._position)
         if travel > allowance:
             return self.refuse(
                 Refusal.RATE, f'{travel:.4g} rad where {allowance:.4g} rad were allowed'
@@ -240,8 +242,12 @@ class CommandGate:
         return None
 
     def _check_entry(self, position: Sequence[float], measured: Sequence[float]) -> Refusal | None:
-        step = max(abs(a - b) for a, b in zip(position, measured, strict=True))
+        step = _distance(position, measured)
         if step > self.limits.max_step:
             return self.refuse(Refusal.STEP, f'{step:.4g} rad from where it is')
         self._allowance = self.limits.max_speed * _JITTER_S
         return None
+
+
+def _distance(a: Sequence[float], b: Sequence[float]) -> float:
+    return max(map(abs, map(operator.sub, a, b)))

@@ -96,9 +96,10 @@ class MotionSession:
         if turn > self._stall_ns:
             self.leave(f'stood still for {turn * 1e-6:.0f} ms')
             return
-        unheard = min(max(0, turn - _USUAL_TURN_NS), self._lenience_ns)
-        self._lenience_ns -= unheard
-        self._heard_ns += unheard
+        if turn > _USUAL_TURN_NS:
+            unheard = min(turn - _USUAL_TURN_NS, self._lenience_ns)
+            self._lenience_ns -= unheard
+            self._heard_ns += unheard
         if now_ns - self._heard_ns > self._silence_ns:
             self.leave(f'the supervisor was silent for {(now_ns - self._heard_ns) * 1e-6:.0f} ms')
 

@@ -14,6 +14,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+# rad: what sums of angles differ by.
+_ROUNDING = 1e-12
+
 
 @dataclass(frozen=True)
 class MotionLimits:
@@ -51,6 +54,13 @@ class MotionLimits:
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f'{name} = {value} must be positive and finite')
 
+    @classmethod
+    def either_way(
+        cls, joints: int, reach: float, speed: float, acceleration: float, step: float
+    ) -> 'MotionLimits':
+        """The same for every joint, up to `reach` in rad either way."""
+        return cls((-reach,) * joints, (reach,) * joints, speed, acceleration, step)
+
     @property
     def longest_period(self) -> float:
         """Time in s in which the greatest speed makes the greatest step; more is a stall."""
@@ -61,7 +71,7 @@ class MotionShaper:
     """Turns targets into a motion within the limits.
 
     Call :meth:`shape` once for each accepted target with the time between the *stamps* of this one
-    and the one before: by arrival, jitter would look like acceleration.  :meth:`hold` brakes.
+    and the one before: by arrival, jitter would look like acceleration.
 
     A period longer than :attr:`MotionLimits.longest_period` is a stall: nothing was commanded
     meanwhile, so that the joint stands where it was sent last, and the motion starts from rest.
@@ -141,36 +151,12 @@ class MotionShaper:
                 goals, befores, self._position, self._velocity, self._ranges, strict=True
             )
         ]
-        self._position = tuple(position for position, _ in moves)
-        self._velocity = tuple(velocity for _, velocity in moves)
+        self._position, self._velocity = zip(*moves, strict=True)
         self._target = goals
-        tolerance = 1e-6 * self.limits.step
-        if any(abs(g - p) > tolerance for g, p in zip(goals, self._position, strict=True)):
-            self.bounded += 1
-        return self._position
-
-    def hold(self, period: float) -> tuple[float, ...]:
-        """Next position while braking to rest, in rad, shape (J,).
-
-        Parameters
-        ----------
-        period
-            s since the call before, positive.
-
-        Raises
-        ------
-        RuntimeError
-            There was no :meth:`restart`.
-        ValueError
-            If the period is not positive and finite; nothing changes then.
-        """
-        dt = self._begin_period(period)
-        change = self.limits.acceleration * dt
-        self._velocity = tuple(v - min(change, max(-change, v)) for v in self._velocity)
-        self._position = tuple(
-            p + v * dt for p, v in zip(self._position, self._velocity, strict=True)
-        )
-        self._target = None
+        if self._position != goals:
+            tolerance = 1e-6 * self.limits.step
+            away = (abs(g - p) for g, p in zip(goals, self._position, strict=True))
+            self.bounded += max(away) > tolerance
         return self._position
 
     def _begin_period(self, period: float) -> float:
@@ -196,15 +182,25 @@ class MotionShaper:
     ) -> tuple[float, float]:
         """Position and velocity of one joint after the period."""
         limits = self.limits
+        low, high = reach
+        change = limits.acceleration * dt
+        left = before - position
+        if abs(left) <= _ROUNDING and low <= goal <= high:
+            # As in nearly every call: what keeps to the bounds passes.
+            own = (goal - position) / dt
+            room = high - goal if own > 0.0 else goal - low
+            if (
+                abs(own) <= limits.speed
+                and abs(own - velocity) <= change
+                and own * own <= 2.0 * limits.acceleration * room
+            ):
+                return goal, own
         own = (goal - before) / dt
         if abs(own) > limits.speed:
-            own, before = 0.0, goal
-        left = before - position
-        low, high = reach
+            own, left = 0.0, goal - position
         wanted = own + math.copysign(self._stoppable(abs(left), dt), left)
         wanted = min(wanted, limits.speed, self._stoppable(high - position, dt))
         wanted = max(wanted, -limits.speed, -self._stoppable(position - low, dt))
-        change = limits.acceleration * dt
         wanted = min(velocity + change, max(velocity - change, wanted))
         moved = position + wanted * dt
         # Rounding alone may lead over the end of the range.
@@ -221,7 +217,7 @@ class MotionShaper:
         return 2.0 * way / (dt + math.sqrt(dt * dt + 2.0 * way / a))
 
     def _checked(self, name: str, values: Sequence[float]) -> tuple[float, ...]:
-        numbers = tuple(float(value) for value in values)
+        numbers = tuple(map(float, values))
         if len(numbers) != len(self._ranges) or not all(map(math.isfinite, numbers)):
             raise ValueError(f'{name} must be {len(self._ranges)} finite numbers, not {numbers}')
         return numbers

@@ -97,14 +97,18 @@ class ShaftMotion:
             return self.gate.refuse(Refusal.STEP, 'no measured position yet')
         refusal = self.gate.check(stamp_ns, position, now_ns, self._measured, velocity)
         if refusal is not None:
+            if refusal is Refusal.RATE:
+                # It was not obeyed, but it came: the next one may not make up for its time.
+                self._stamp_ns = max(self._stamp_ns, stamp_ns)
             return refusal
-        period = (stamp_ns - self._stamp_ns) * _NS
-        self._stamp_ns = stamp_ns
+        period = max(0, stamp_ns - self._stamp_ns) * _NS
+        self._stamp_ns = max(self._stamp_ns, stamp_ns)
         if self._held or self.gate.began:
             self._begin()
             period = _FIRST_PERIOD_S
         self._held = ()
-        self._goal = self.shaper.shape(position, period)
+        if period > 0.0:
+            self._goal = self.shaper.shape(position, period)
         return None
 
     def turn(self, now_ns: int, period: float) -> tuple[float, ...]:
