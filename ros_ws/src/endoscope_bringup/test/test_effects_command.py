@@ -1,7 +1,7 @@
 """`endoscope effects`."""
 
 from endoscope_bringup.cli import main
-from endoscope_core.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE
 
 
 def test_lists_every_effect(capsys):

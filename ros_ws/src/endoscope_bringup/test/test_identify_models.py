@@ -11,7 +11,7 @@ from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bringup.cli import main
 from endoscope_core.control import PhysicalParameters
 from endoscope_core.identification import UpdatedTable
-from endoscope_core.plant import PlantDescription, simulate
+from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.signals import motion_by_name
 
 START = 1_700_000_000_000_000_000

@@ -15,7 +15,7 @@ from endoscope_core.dataset import load_dataset
 from endoscope_core.hysteresis import BoucWenParameters, bouc_wen_forward
 from endoscope_core.identification import Servo, load_class_parameters
 from endoscope_core.metrics import width_at_mid_height
-from endoscope_core.plant import PlantDescription, simulate
+from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.signals import motion_by_name
 
 

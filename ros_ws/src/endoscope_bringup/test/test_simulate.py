@@ -10,7 +10,7 @@ from endoscope_bags.cdr_encoding import encode_joint_states, encode_poses
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED
 from endoscope_bringup.cli import main
 from endoscope_core.kinematics import bending_from_orientation, tip_pose
-from endoscope_core.plant import PlantDescription, SensorModel, save_plant, simulate
+from endoscope_core.physics import PlantDescription, SensorModel, save_plant, simulate
 
 TICKS = 1200
 STAMPS = 1_700_000_000_000_000_000 + np.arange(TICKS) * 1_000_000

@@ -16,7 +16,7 @@ from endoscope_core.dataset import (
 from endoscope_core.dataset.calibration_dataset import ARRAYS_FILE, MANIFEST_FILE
 from endoscope_core.dataset.rig_variation import GREATEST_EVENNESS, backlash_sizes
 from endoscope_core.metrics import width_at_mid_height
-from endoscope_core.plant import JointParameters
+from endoscope_core.physics import JointParameters
 from endoscope_core.signals import UnknownCalibrationError, calibration_sinusoid
 
 

@@ -4,8 +4,7 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from endoscope_core.effects import CATALOGUE
-from endoscope_core.plant import (
+from endoscope_core.physics import (
     EffectSpec,
     JointParameters,
     PlantDescription,
@@ -14,7 +13,8 @@ from endoscope_core.plant import (
     load_plant,
     save_plant,
 )
-from endoscope_core.plant.plant_file import REACH
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.plant_file import REACH
 
 
 def written(tmp_path, text):

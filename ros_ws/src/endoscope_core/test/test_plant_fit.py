@@ -3,7 +3,7 @@ import pytest
 
 from endoscope_core.dataset.rig_variation import in_tube, random_rig
 from endoscope_core.identification.plant_fit import FITTED, PlantFitError, fit_plant
-from endoscope_core.plant import SensorModel, simulate
+from endoscope_core.physics import SensorModel, simulate
 
 TIME = np.arange(3500) * 1e-3
 COMMAND = 0.5 * np.pi * np.sin(TIME)

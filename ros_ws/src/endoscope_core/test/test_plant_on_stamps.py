@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from endoscope_core.plant import PlantDescription, simulate
-from endoscope_core.plant.on_stamps import AnswerStamps, answer_commands, hold_on_ticks
+from endoscope_core.physics import PlantDescription, simulate
+from endoscope_core.physics.on_stamps import AnswerStamps, answer_commands, hold_on_ticks
 
 START_NS = 1_700_000_000_123_456_789
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from endoscope_core.plant import SensorModel, SensorParameters
-from endoscope_core.plant.sensing import quantise
+from endoscope_core.physics import SensorModel, SensorParameters
+from endoscope_core.physics.sensing import quantise
 
 SENSORS = SensorParameters()
 MANY = np.full(200_000, 3.0)

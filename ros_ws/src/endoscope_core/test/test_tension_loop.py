@@ -7,7 +7,7 @@ import pytest
 from endoscope_core.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.metrics.tension_loop import leave_one_out_errors, tension_loop_width
-from endoscope_core.plant import PlantDescription, simulate
+from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.signals import calibration_motion
 
 SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))

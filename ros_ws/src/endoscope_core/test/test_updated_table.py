@@ -23,7 +23,7 @@ from endoscope_core.identification import (
     blend,
     load_class_parameters,
 )
-from endoscope_core.plant import JointParameters
+from endoscope_core.physics import JointParameters
 
 OTHER = {
     'bouc_wen': BoucWenParameters.from_shape(0.8, 0.8, 0.06, 0.4, 3.5),

@@ -56,8 +56,8 @@ COMMAND = Hook('command', Fold.THROUGH, 'p, x, command, history, tick')
 SERVO_ERROR = Hook('servo_error', Fold.THROUGH, 'p, x, error, from_error, kept')
 """Servo's error, rad; its speed becomes ``from_error * error + kept * speed``."""
 TORQUE = Hook('torque', Fold.LEAST, 'p, x, speed')
-"""Largest torque in N m of the motor at a speed of the shaft in rad/s, negative where its load drives
-it; infinite without a link."""
+"""Largest torque in N m of the motor at a speed of the shaft in rad/s, negative where its load
+drives it; infinite without a link."""
 PULLEY_ANGLE = Hook('pulley_angle', Fold.THROUGH, 'p, x, shaft')
 """Pulley's angle behind the shaft, rad."""
 TRAVEL_OF = Hook('travel_of', Fold.THROUGH, 'p, x, travel, wire')

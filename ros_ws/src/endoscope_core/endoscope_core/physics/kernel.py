@@ -359,6 +359,43 @@ def read_sensors(
 
 
 @compiled
+def advance_joints(
+    x: Array,
+    histories: Array,
+    sheaths: Array,
+    p: Array,
+    on: Flags,
+    inputs: Array,
+    ticks: int,
+    tick: float,
+    out: Array,
+) -> None:
+    """Advance all joints side by side by some ticks, with the same input in each.
+
+    Parameters
+    ----------
+    x, histories, sheaths : array (J, ...)
+        As in `advance_tick`; changed in place.
+    p, on : array (J, parameters), array (J, flags) of bool
+    inputs : array (J, INPUTS)
+        Two joints see each other's angle, which is written into it.
+    ticks : int
+        0 only reads the sensors.
+    tick : float
+    out : array (J, OUTPUTS)
+        What the sensors read after the ticks.
+    """
+    joints = inputs.shape[0]
+    for n in range(ticks + 1):
+        for j in range(joints):
+            read_sensors(x[j], histories[j], sheaths[j], p[j], on[j], tick, out[j])
+        for j in range(joints if n < ticks else 0):
+            if joints == 2:
+                inputs[j, IN_OTHER_JOINT] = out[1 - j, OUT_JOINT]
+            advance_tick(x[j], histories[j], sheaths[j], p[j], on[j], inputs[j], tick)
+
+
+@compiled
 def run_joints(
     x: Array,
     histories: Array,

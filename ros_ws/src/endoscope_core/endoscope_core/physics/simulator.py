@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.kernel import advance_tick, read_sensors, run_joints
+from endoscope_core.physics.kernel import advance_joints, run_joints
 from endoscope_core.physics.layout import (
     IN_COMMAND,
     IN_MOTOR,
-    IN_OTHER_JOINT,
     INPUTS,
     OUT_BENDING,
     OUT_EFFORT,
@@ -98,7 +97,7 @@ class PlantSimulator:
         self._inputs[:, IN_MOTOR] = np.nan
         self._outputs = np.zeros((len(self.joints), OUTPUTS))
         self._ticks = 0
-        self._read()
+        self._advance(0)
 
     @property
     def sample(self) -> PlantSample:
@@ -137,37 +136,25 @@ class PlantSimulator:
         command = np.asarray(shaft_command, dtype=float)
         if command.shape != (len(self.joints),):
             raise ValueError(f'a command for {self.joints} has shape {command.shape}')
-        if not (np.abs(command) <= LARGEST_COMMAND).all():
+        if not all(abs(angle) <= LARGEST_COMMAND for angle in command.tolist()):
             raise ValueError(f'the command {command} is not finite or beyond {BEYOND}')
         self._inputs[:, IN_COMMAND] = command
-        for _ in range(n_ticks):
-            if len(self.joints) == 2:
-                self._inputs[:, IN_OTHER_JOINT] = self._outputs[::-1, OUT_JOINT]
-            for j, x in enumerate(self._inputs):
-                advance_tick(
-                    self._states[j],
-                    self._histories[j],
-                    self._sheaths[j],
-                    self._parameters[j],
-                    self._on[j],
-                    x,
-                    self.tick,
-                )
-            self._ticks += 1
-            self._read()
+        self._advance(n_ticks)
         return self.sample
 
-    def _read(self) -> None:
-        for j, out in enumerate(self._outputs):
-            read_sensors(
-                self._states[j],
-                self._histories[j],
-                self._sheaths[j],
-                self._parameters[j],
-                self._on[j],
-                self.tick,
-                out,
-            )
+    def _advance(self, n_ticks: int) -> None:
+        advance_joints(
+            self._states,
+            self._histories,
+            self._sheaths,
+            self._parameters,
+            self._on,
+            self._inputs,
+            n_ticks,
+            self.tick,
+            self._outputs,
+        )
+        self._ticks += n_ticks
 
 
 def simulate(
