@@ -129,7 +129,8 @@ class PlantLearning:
         self._turns = TurningPoints(shafts)
         self._speed = 0.0
         packed, on = packed_joint(parameters.joint)
-        self._packed, self._on = (np.tile(row, (len(LEARNT) + 1, 1)) for row in (packed, on))
+        models = (len(LEARNT) + 1, 1)
+        self._packed, self._on = np.tile(packed, models), np.tile(on, models)
         self._places = [NOMINAL_KEYS.index(name) for name in LEARNT]
         self._nominal = packed[self._places]
         self._models = rest_state(self._packed, self._on, TICK)
