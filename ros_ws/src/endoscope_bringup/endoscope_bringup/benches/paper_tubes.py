@@ -28,20 +28,18 @@ def run(args: argparse.Namespace) -> int:
         ]
     )
     found = nearest_tubes(np.deg2rad(paper))
-    print(
-        f'{"tube":18} {"":14}'
-        + ''.join(f'{m + " RMSE":>20}{"backlash":>10}' for m in PAPER_MOTIONS)
-    )
+    print(_line('tube', '', [f'{m} {f}' for m in PAPER_MOTIONS for f in ('RMSE', 'backlash')]))
     for tube, joint, printed in zip(TUBES, found, paper, strict=True):
         for name, row in (
             ('paper', printed),
             ('found', np.degrees(figures(joint))),
             ('demonstration', np.degrees(figures(tube.joint))),
         ):
-            print(
-                f'{tube.name:18} {name:14}'
-                + ''.join(f'{v:20.2f}' if k % 2 == 0 else f'{v:10.2f}' for k, v in enumerate(row))
-            )
+            print(_line(tube.name, name, [f'{value:.2f}' for value in row]))
     for tube, joint in zip(TUBES, found, strict=True):
         print(f'{tube.name}: {joint}')
     return 0
+
+
+def _line(tube: str, name: str, columns: list[str]) -> str:
+    return f'{tube:18} {name:14}' + ''.join(f'{column:>23}' for column in columns)
