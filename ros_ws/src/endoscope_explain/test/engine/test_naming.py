@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_explain.compose import nominal_anchors
+from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
+from endoscope_explain.latent import unknown_term
+from endoscope_explain.observation import observe
 
 OTHER = {'wire_stiffness': 3300.0, 'capstan_exponent': 0.83, 'joint_friction': 8.2e-4}
 
@@ -72,7 +76,7 @@ def test_the_effect_that_was_left_out_is_named(effect_id, parameters, verdict, o
     assert worst < 1.3 < max(fit.ratio for fit in explanation.fit['refitted'].values())
 
 
-def test_physics_outside_the_catalogue_is_unknown_and_given_as_a_formula(monkeypatch, one_joint):
+def test_physics_outside_the_catalogue_is_given_as_a_formula(monkeypatch, one_joint):
     from endoscope_core.physics import simulator
     from endoscope_core.physics.layout import IN_PUSH_MOMENT, OUT_JOINT
 
@@ -92,13 +96,14 @@ def test_physics_outside_the_catalogue_is_unknown_and_given_as_a_formula(monkeyp
     recording = one_joint.record(one_joint.rig(), command)
     monkeypatch.undo()
     assert np.abs(recording.bending.values - nominal.bending.values).max() > 0.05
-    explanation = explain_recording(recording, one_joint.rig(), jobs=2)
-    assert explanation.verdict is Verdict.UNKNOWN_PHYSICS
-    unknown = explanation.unknown
+    (observation,) = observe(recording, one_joint.rig())
+    refitted, _ = nominal_anchors(observation, *packed_joint(one_joint.rig(), 'bend_x'))
+    unknown = unknown_term(refitted, 1, ('contact',))
     assert unknown is not None
     assert unknown.node == 'moment'
     assert 'q' in unknown.states
     assert unknown.explained > 0.4
+    assert unknown.siblings == ('contact',)
 
 
 def test_what_was_there_in_health_is_not_explained_again(one_joint):
