@@ -1,9 +1,7 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.description import EffectSpec
 from endoscope_explain.compose import nominal_anchors
 from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.explain_recording import explain_recording
@@ -127,18 +125,3 @@ def test_a_rig_that_was_not_moved_cannot_be_explained(one_joint):
         one_joint.record(one_joint.rig(), np.zeros(3000)), one_joint.rig(), jobs=2
     )
     assert explanation.verdict is Verdict.INSUFFICIENT_DATA
-
-
-def test_a_joint_moved_by_another_one_that_is_not_nominal_either(one_joint):
-    stopped = EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.15, 'stiffness': 0.1})
-    coupled = EffectSpec('cross_coupling', 'bend_y', {'moment_per_rad': -0.003})
-    described = PlantDescription()
-    motion = np.column_stack([one_joint.motion(6.0), 0.7 * one_joint.motion(6.0)[::-1]])
-    motion -= motion[0]
-    recording = one_joint.record(replace(described, effects=(stopped, coupled)), motion)
-    explanation = explain_recording(recording, described, jobs=2)
-    assert explanation.adequate
-    assert {(e.id, e.joint) for e in explanation.effects} == {
-        ('joint_stop', 'bend_x'),
-        ('cross_coupling', 'bend_y'),
-    }
