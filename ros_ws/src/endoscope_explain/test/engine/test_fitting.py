@@ -10,11 +10,9 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition, nominal_anchors, nominal_model
 from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.fit import fit, jacobian
-from endoscope_explain.free_parameters import SCALED_NOMINAL
 from endoscope_explain.observation import observe
 from endoscope_explain.onset_scan import redated
 from endoscope_explain.refit_from_description import from_description, promised_by_description
-from endoscope_explain.robust_refit import robustly_refitted
 from endoscope_explain.score import score
 from endoscope_explain.screen import promises, unexplained, with_effect
 from endoscope_explain.whiteness import is_noise
@@ -64,15 +62,6 @@ def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(one_j
     gains = {p.start['limit_nm']: p.gain for p in found}
     assert gains[max(gains)] == pytest.approx(0.0, abs=1e-6)
     assert gains[min(gains)] < 0.99 * found[0].gain
-
-
-def test_what_a_stop_does_beyond_an_angle_bends_no_parameters_of_a_robust_fit(one_joint):
-    refitted, true = anchors(one_joint, 'joint_stop', {'angle_rad': 0.3, 'stiffness': 0.1})
-    robust = robustly_refitted(refitted)
-    wires = slice(0, SCALED_NOMINAL.index('capstan_exponent') + 1)
-    assert np.abs(refitted.theta - true.theta)[wires].max() > 0.1
-    assert np.abs(robust.theta - true.theta)[wires].max() < 0.06
-    assert robust.cost > refitted.cost
 
 
 def test_two_effects_are_found_from_the_described_plant_with_the_other_choice(one_joint):

