@@ -8,7 +8,6 @@ BENCHES: tuple[str, ...] = (
     'compensation',
     'calibration_rate',
     'papers',
-    'paper_tubes',
     'motor_bus',
     'motor_faults',
     'faults',

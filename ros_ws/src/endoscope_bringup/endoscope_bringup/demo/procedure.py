@@ -1,9 +1,8 @@
 """What the demonstration does, in order, and what the first paper reports for the same."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 from enum import StrEnum
-
-from endoscope_core.physics import JointParameters
 
 
 class Mode(StrEnum):
@@ -22,12 +21,12 @@ class Tube:
     ----------
     name : str
         The colon section of the first paper's experiment (section 4) whose backlash it has.
-    joint : JointParameters
-        Both joints in that shape.
+    bend : float
+        Sum of the tube's bends in that shape, rad; both joints are the recorded family's.
     """
 
     name: str
-    joint: JointParameters
+    bend: float
 
 
 @dataclass(frozen=True)
@@ -78,42 +77,11 @@ class PaperFigure:
 
 MOTIONS = ('periodic', 'non_periodic')
 
-# `endoscope bench paper_tubes`: the instrument and the two shapes of its tube whose uncompensated
-# columns come nearest to those of Table 5.
-_INSTRUMENT = JointParameters(
-    pretension=5.65,
-    pretension_profile=0.618,
-    pulley_radius=2.77e-3,
-    joint_radius=6.5e-4,
-    joint_rest_angle=0.175,
-    joint_presliding_spread=0.359,
-    joint_damping=6.3e-6,
-    motor_bandwidth=29.5,
-    friction_profile=(0.009, -0.207, -0.174),
-)
+# Tubes of the recorded family whose backlash under 60 sin(t) deg is that of Table 5 without
+# compensation, 50 and 68 deg: by that signal, not by the calibration's.
 TUBES = (
-    Tube(
-        'descending colon',
-        replace(
-            _INSTRUMENT,
-            capstan_exponent=0.937,
-            wire_stiffness=4430.0,
-            joint_stiffness=2.87e-3,
-            joint_friction=6.41e-4,
-            joint_presliding=0.0342,
-        ),
-    ),
-    Tube(
-        'transverse colon',
-        replace(
-            _INSTRUMENT,
-            capstan_exponent=1.235,
-            wire_stiffness=3815.0,
-            joint_stiffness=1.826e-3,
-            joint_friction=1.05e-3,
-            joint_presliding=0.0269,
-        ),
-    ),
+    Tube('descending colon', math.radians(33.0)),
+    Tube('transverse colon', math.radians(133.0)),
 )
 
 # First paper, Table 5: (tube, motion) -> RMSE none, RMSE proposed, backlash none, proposed.

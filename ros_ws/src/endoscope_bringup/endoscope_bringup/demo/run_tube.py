@@ -23,6 +23,7 @@ from endoscope_bringup.demo.procedure import (
     Tube,
 )
 from endoscope_core.physics import PlantDescription, save_plant
+from endoscope_core.physics.family import shipped_family
 from endoscope_core.signals import calibration_sinusoid, motion_by_name
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
@@ -77,7 +78,8 @@ def run_tube(
     """
     name = tube.name.replace(' ', '_')
     plant_file = folder / f'{name}.plant.yaml'
-    save_plant(PlantDescription(dict.fromkeys(JOINTS, tube.joint)), plant_file)
+    joint = shipped_family().joint(tube.bend)
+    save_plant(PlantDescription(dict.fromkeys(JOINTS, joint)), plant_file)
     bag = folder / name
     with _GraphSession(plant_file, bag, domain, seed, real_time) as session:
         session.start()
