@@ -7,6 +7,7 @@ import numpy as np
 from endoscope_core.physics import kernel
 from endoscope_core.physics import layout as L
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.hooks import ON_SAMPLES
 from endoscope_core.physics.sheath import JOINT_END, MOTOR_END
 
 NOMINAL = {
@@ -25,12 +26,11 @@ NOMINAL = {
     'motor_bandwidth': 30.0,
     'motor_damping_ratio': 0.9,
 }
-AUDITED = {effect.id for effect in CATALOGUE.values() if effect.traits.audited}
 BLOCKED = {'joint_stiffness': 1e3, 'capstan_exponent': 1e-6}
 """Nominal parameters of wires without friction behind which nothing gives way."""
 LOOSE = {'pretension': 0.0, 'wire_stiffness': 1e-3, 'joint_friction': 0.0, 'capstan_exponent': 0.0}
 """And of a bending section that answers to moments alone."""
-ACTING = tuple(effect_id for effect_id in CATALOGUE if effect_id not in AUDITED)
+ACTING = tuple(effect_id for effect_id in CATALOGUE if effect_id not in ON_SAMPLES)
 
 
 class Run(NamedTuple):

@@ -9,14 +9,13 @@ from endoscope_core.dataset import (
     configuration_of_size,
     load_dataset,
     make_dataset,
-    random_rig,
+    random_instrument,
     record_calibration,
     save_dataset,
 )
 from endoscope_core.dataset.calibration_dataset import ARRAYS_FILE, MANIFEST_FILE
-from endoscope_core.dataset.rig_variation import GREATEST_EVENNESS, backlash_sizes
+from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS, backlash_sizes, in_tube
 from endoscope_core.metrics import width_at_mid_height
-from endoscope_core.physics import JointParameters
 from endoscope_core.signals import UnknownCalibrationError, calibration_sinusoid
 
 
@@ -25,28 +24,35 @@ def small():
     return make_dataset(seed=3, per_class=1)
 
 
-@pytest.mark.parametrize('size_deg', [45.0, 73.0, 102.0])
+@pytest.mark.parametrize('size_deg', [65.0, 78.0, 92.0])
 def test_a_tube_is_found_for_a_wanted_size(size_deg):
-    rig = random_rig(np.random.default_rng(int(size_deg)))
-    found = configuration_of_size(rig, np.deg2rad(size_deg))
+    instrument = random_instrument(np.random.default_rng(0))
+    found = configuration_of_size(instrument, np.deg2rad(size_deg), 0.2)
     sizes = np.rad2deg(backlash_sizes(found.plant))
+    assert found.plant == in_tube(instrument, found.bend, 0.2)
     assert np.mean(sizes) == pytest.approx(size_deg, abs=0.05)
     assert np.rad2deg(found.backlash_size) == pytest.approx(size_deg, abs=0.05)
     assert np.ptp(sizes) < 9.0
 
 
-def test_no_tube_makes_the_joints_own_friction_vanish():
-    assert configuration_of_size(random_rig(np.random.default_rng(0)), np.deg2rad(5.0)) is None
+def test_no_tube_makes_the_friction_of_a_straight_one_vanish():
+    instrument = random_instrument(np.random.default_rng(0))
+    assert configuration_of_size(instrument, np.deg2rad(5.0)) is None
 
 
-def test_rigs_differ_but_keep_their_gear():
-    rigs = [random_rig(np.random.default_rng(seed)) for seed in range(20)]
-    frictions = [rig.joints['bend_x'].joint_friction for rig in rigs]
-    assert np.std(frictions) > 0.02 * np.mean(frictions)
-    for rig in rigs:
-        for joint in rig.joints.values():
-            assert joint.gear == pytest.approx(JointParameters().gear)
-            assert 4.5 < joint.pretension < 5.5
+def test_an_instrument_that_the_most_bent_tube_holds_is_drawn_again():
+    held = random_instrument(np.random.default_rng(4))
+    assert configuration_of_size(held, np.deg2rad(70.0), -GREATEST_UNEVENNESS) is None
+
+
+def test_instruments_differ_and_tubes_bend_them():
+    instruments = [random_instrument(np.random.default_rng(seed)) for seed in range(20)]
+    joints = [in_tube(each, 2.0).joints['bend_x'] for each in instruments]
+    frictions = [joint.joint_friction for joint in joints]
+    assert np.std(frictions) > 0.05 * np.mean(frictions)
+    assert all(4.1 < joint.pretension < 4.8 for joint in joints)
+    bent = [in_tube(each, 3.0).joints['bend_x'].capstan_exponent for each in instruments]
+    assert all(b > 1.15 * joint.capstan_exponent for b, joint in zip(bent, joints, strict=True))
 
 
 def test_every_class_is_there_with_the_size_it_names(small):
@@ -69,21 +75,23 @@ def test_the_recorded_loop_has_the_size_of_its_class(small):
 
 def test_tensions_begin_at_pretension_and_carry_sensor_noise(small):
     start = small.tension[:, :100]
-    assert np.all(np.abs(np.mean(start, axis=1) - 5.0) < 0.6)
+    for entry, wires in zip(small.manifest['recordings'], np.mean(start, axis=1), strict=True):
+        tightened = np.repeat([joint['pretension'] for joint in entry['joints'].values()], 2)
+        np.testing.assert_allclose(wires, tightened, atol=0.15)
     assert np.all(np.std(np.diff(start, axis=1), axis=1) > 0.01)
 
 
-def test_tubes_differ_in_how_their_curvature_is_spread(small):
-    evenness = [entry['curvature_evenness'] for entry in small.manifest['recordings']]
-    assert len(set(evenness)) == 7
-    assert 0.0 <= min(evenness) < max(evenness) <= GREATEST_EVENNESS
+def test_tubes_differ_in_where_they_are_bent(small):
+    unevenness = [entry['unevenness'] for entry in small.manifest['recordings']]
+    assert len(set(unevenness)) == 7
+    assert max(np.abs(unevenness)) <= GREATEST_UNEVENNESS
 
 
-def test_spread_curvature_changes_the_tensions_of_a_tube_of_the_same_size():
-    rig = random_rig(np.random.default_rng(4))
-    ends, along = (configuration_of_size(rig, 1.2, evenness) for evenness in (0.0, 1.0))
-    first, second = (record_calibration(tube.plant, 1).tension for tube in (ends, along))
-    assert np.sqrt(np.mean((first - second) ** 2)) > 0.02
+def test_where_a_tube_is_bent_changes_its_tensions_at_the_same_size():
+    instrument = random_instrument(np.random.default_rng(1))
+    tubes = (configuration_of_size(instrument, 1.2, u) for u in (-0.4, 0.4))
+    first, second = (record_calibration(tube.plant, 1).tension for tube in tubes)
+    assert np.sqrt(np.mean((first - second) ** 2)) > 0.1
 
 
 def test_a_brief_calibration_is_of_the_same_tubes(small):
@@ -94,7 +102,7 @@ def test_a_brief_calibration_is_of_the_same_tubes(small):
 
 
 def test_another_seed_of_noise_changes_only_noise():
-    plant = random_rig(np.random.default_rng(1))
+    plant = in_tube(random_instrument(np.random.default_rng(1)), 2.0)
     first, second = record_calibration(plant, 1), record_calibration(plant, 2)
     difference = first.tension - second.tension
     assert np.std(difference) == pytest.approx(0.02 * np.sqrt(2.0), rel=0.1)

@@ -65,8 +65,11 @@ def test_the_feed_forward_makes_the_model_follow():
 
 def test_the_servo_settles_on_its_command_and_lags_by_its_damping():
     time = np.arange(0.0, 4.0, 0.004)
-    ramp = Servo().answer(0.7 * time, 0.004)
-    assert 0.7 * time[-1] - ramp[-1] == pytest.approx(0.7 * (2.0 * 0.9 / 60.0 + 0.002), rel=0.05)
+    servo = Servo()
+    ramp = servo.answer(0.7 * time, 0.004)
+    # A command held for 4 ms is itself half of that late.
+    late = 2.0 * servo.damping_ratio / servo.bandwidth + 0.002
+    assert 0.7 * time[-1] - ramp[-1] == pytest.approx(0.7 * late, rel=1e-3)
     still = Servo().answer(np.full(500, 0.3), 0.004)
     np.testing.assert_allclose(still, 0.3)
 
@@ -86,11 +89,13 @@ def test_a_recording_without_hysteresis_is_refused(recordings, complaint):
         fit_model(recordings)
 
 
-def test_shipped_sets_cover_every_class_and_grow_with_it():
+def test_shipped_sets_cover_every_class_and_lag_more_in_tighter_tubes():
     sets = load_class_parameters()
     assert sorted(sets) == sorted(CLASSES_DEG)
     lags = [sets[c].lag for c in CLASSES_DEG]
-    assert np.all(np.diff(lags) > 0.0)
+    # 0.22 to 0.37 rad over the first five; beyond, amplitude rather than lag takes the width.
+    assert np.all(np.diff(lags[:5]) > 0.0)
+    assert min(lags[5:]) > lags[2]
     assert parameters_for_class(sets, 70) is sets[70]
 
 

@@ -21,11 +21,10 @@ from endoscope_core.classifier.weights_file import save_size_classifier, sealed
 from endoscope_core.dataset import (
     CLASSES_DEG,
     CalibrationDataset,
-    configuration_of_size,
-    random_rig,
     record_calibration,
 )
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
+from endoscope_core.trials.never_seen_tube import never_seen_tube
 from endoscope_core.trials.unusual_recordings import UNUSUAL
 
 
@@ -62,15 +61,10 @@ def easy():
     )
 
 
-def tube(size_deg, evenness=0.15, seed=0):
-    rig = random_rig(np.random.default_rng(int(10 * size_deg) + 700_000 + seed))
-    return configuration_of_size(rig, np.deg2rad(size_deg), evenness)
-
-
 @pytest.mark.parametrize('size_deg', [42.0, 57.0, 73.5, 88.0, 101.0])
 def test_it_regresses_the_size_of_a_tube_it_has_not_seen(shipped, size_deg):
-    configuration = tube(size_deg)
-    tension = record_calibration(configuration.plant, 5, calibration_motion(shipped.motion)).tension
+    tube = never_seen_tube(0, int(10 * size_deg), size_deg)
+    tension = record_calibration(tube.plant, 5, calibration_motion(shipped.motion)).tension
     result = shipped.classify(tension)
     assert np.rad2deg(result.size) == pytest.approx(size_deg, abs=3.0)
     low, high = result.interval
@@ -86,7 +80,7 @@ def test_it_regresses_the_size_of_a_tube_it_has_not_seen(shipped, size_deg):
 def test_unusual_tensions_are_refused_with_a_reason(shipped, kind):
     generator = np.random.default_rng(3)
     motion = calibration_motion(shipped.motion)
-    tension = UNUSUAL[kind](generator, tube(70.0).plant, motion)
+    tension = UNUSUAL[kind](generator, never_seen_tube(0, 70, 70.0).plant, motion)
     with pytest.raises(UnseenTensionError, match='none of the classes: '):
         shipped.classify(tension)
 

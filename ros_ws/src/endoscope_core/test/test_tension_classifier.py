@@ -25,10 +25,9 @@ from endoscope_core.classifier.weights_file import WeightsFileError, save_networ
 from endoscope_core.dataset import (
     CLASSES_DEG,
     CalibrationDataset,
-    configuration_of_size,
-    random_rig,
     record_calibration,
 )
+from endoscope_core.trials.never_seen_tube import never_seen_tube
 
 SHORT = TrainingSettings(batch_size=14, epochs=60, learning_rate=3e-3, decay=0.97)
 
@@ -66,8 +65,7 @@ def easy():
 
 @pytest.mark.parametrize('class_deg', [40, 70, 100])
 def test_it_names_the_class_of_a_tube_it_has_not_seen(classifier, class_deg):
-    rig = random_rig(np.random.default_rng(class_deg + 900_000))
-    tube = configuration_of_size(rig, np.deg2rad(class_deg))
+    tube = never_seen_tube(0, class_deg, class_deg)
     result = classifier.classify(record_calibration(tube.plant, seed=5).tension)
     assert result.class_deg == class_deg
     assert result.probability == max(result.probabilities.values())

@@ -4,10 +4,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from endoscope_core.dataset import random_instrument
 from endoscope_core.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.metrics.tension_loop import leave_one_out_errors, tension_loop_width
-from endoscope_core.physics import PlantDescription, simulate
+from endoscope_core.physics import simulate
 from endoscope_core.signals import calibration_motion
 
 SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))
@@ -27,8 +28,9 @@ def test_on_the_simulated_rig_much_friction_makes_it_narrower():
     settled = slice(motion.settled, motion.samples)
     desired = motion.signal(np.arange(motion.samples) * 1e-3)[0][settled]
     sizes, widths = [], []
-    for exponent in (0.7, 1.1, 1.5):
-        plant = in_tube(PlantDescription(), exponent)
+    instrument = random_instrument(np.random.default_rng(0))
+    for bend in (0.0, 1.5, 3.0):
+        plant = in_tube(instrument, bend)
         tension = simulate(plant, calibration_command(plant, motion)).tension[settled, 0]
         sizes.append(backlash_sizes(plant)[0])
         widths.append(tension_loop_width(desired, *tension.T))

@@ -35,9 +35,13 @@ OTHER = {
     'prandtl_ishlinskii': PrandtlIshlinskiiParameters(
         (0.0, 0.3, 0.6, 1.2), (0.026, 0.2, 0.4, 0.6), 0.0
     ),
-    'physical': PhysicalParameters(JointParameters(capstan_exponent=1.8), 0.2),
+    'physical': PhysicalParameters(JointParameters(capstan_exponent=1.8, joint_rest_angle=-0.1)),
 }
-FIRST = SAFE | {'physical': PhysicalParameters(JointParameters(capstan_exponent=0.4), 0.8)}
+FIRST = SAFE | {
+    'physical': PhysicalParameters(
+        JointParameters(capstan_exponent=0.4, joint_rest_angle=0.1, friction_profile=(0.3,))
+    )
+}
 
 
 @pytest.mark.parametrize('model', KINDS)
@@ -48,6 +52,13 @@ def test_between_safe_parameters_all_are_safe(model, weight):
     if model != 'physical':
         steepest = max(FIRST[model].inverse_slope, OTHER[model].inverse_slope)
         assert between.inverse_slope <= min(steepest, GREATEST_INVERSE_SLOPE) * (1.0 + 1e-6)
+
+
+def test_a_plant_between_two_has_the_friction_and_the_rest_angle_between_theirs():
+    joint = blend(FIRST['physical'], OTHER['physical'], 0.25).joint
+    assert joint.capstan_exponent == pytest.approx(0.4**0.75 * 1.8**0.25)
+    assert joint.joint_rest_angle == pytest.approx(0.05)
+    assert joint.friction_profile == pytest.approx((0.225,))
 
 
 @pytest.mark.parametrize('model', KINDS)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from endoscope_core.metrics import width_at_mid_height
+from endoscope_core.metrics import NoLoopError, width_at_mid_height
 from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.physics.family import MOST_BENT, TubeFamily, shipped_family
 from endoscope_core.rig import load_rig
@@ -172,13 +172,17 @@ def configuration_of_size(
     Returns
     -------
     TubeConfiguration or None
-        None where no tube, straight or bent, gives this instrument that size.
+        None where the straight tube gives this instrument a greater size, or the most bent one a
+        smaller one or no loop at all, because friction holds the joint.
     """
 
     def excess(bend: float) -> float:
         return float(np.mean(backlash_sizes(in_tube(instrument, bend, unevenness)))) - size
 
-    if excess(0.0) > 0.0 or excess(MOST_BENT) < 0.0:
+    try:
+        if excess(0.0) > 0.0 or excess(MOST_BENT) < 0.0:
+            return None
+    except NoLoopError:
         return None
     bend = float(brentq(excess, 0.0, MOST_BENT, xtol=1e-4, rtol=1e-4))
     plant = in_tube(instrument, bend, unevenness)

@@ -16,6 +16,7 @@ from endoscope_core.hysteresis import (
 )
 from endoscope_core.hysteresis.inverse import MODELS
 from endoscope_core.physics import JointParameters
+from endoscope_core.physics.family import SIGNED
 from endoscope_core.physics.layout import NOMINAL_KEYS
 
 KINDS: dict[str, type[LawParameters]] = {**MODELS, PHYSICAL: PhysicalParameters}
@@ -79,10 +80,14 @@ Point = tuple[float, ...]
 
 
 def blend_joints(first: JointParameters, second: JointParameters, weight: float) -> JointParameters:
-    """Joint at `weight` in [0, 1] of the way between two, by the logarithms of its parameters."""
-    blended = {
-        key: _geometric(getattr(first, key), getattr(second, key), weight) for key in NOMINAL_KEYS
-    }
+    """Joint at `weight` in [0, 1] of the way between two.
+
+    By the logarithms of its parameters; those that may have either sign go straight.
+    """
+    blended = {}
+    for key in NOMINAL_KEYS:
+        a, b = getattr(first, key), getattr(second, key)
+        blended[key] = a + weight * (b - a) if key in SIGNED else _geometric(a, b, weight)
     pairs = zip_longest(first.friction_profile, second.friction_profile, fillvalue=0.0)
     profile = tuple(a + weight * (b - a) for a, b in pairs)
     return JointParameters(**blended, friction_profile=profile)

@@ -20,19 +20,19 @@ Array = NDArray[np.float64]
 FITTED = {
     'capstan_exponent': 1.0,
     'pretension': 0.05,
-    'wire_stiffness': 0.11,
-    'joint_stiffness': 0.2,
-    'joint_friction': 0.3,
-    'joint_presliding': 0.17,
+    'wire_stiffness': 0.1,
+    'joint_stiffness': 0.1,
+    'joint_friction': 0.1,
+    'joint_presliding': 0.15,
 }
-"""What is fitted, and the standard deviation of its logarithm: over the bends of the recorded
-family's tubes, and from instrument to instrument."""
+"""What is fitted, and the standard deviation of its logarithm from instrument to instrument."""
 
 TENSION_SCALE = 0.05
 BENDING_SCALE = float(np.deg2rad(0.5))
 EXPONENT_BOUNDS = (0.02, 4.5)
-SHAPED = {'pretension_profile': 0.15, 'friction_profile': 0.3}
-"""What is fitted as it is: how the wires were tightened, and where along the sheath friction is."""
+SHAPED = {'joint_rest_angle': 0.1, 'pretension_profile': 0.15, 'friction_profile': 0.3}
+"""What is fitted as it is: where the joint rests, how the wires were tightened, and where along the
+sheath friction is."""
 CALIBRATION_SAMPLES_NEEDED = 3500
 _STARTS = (0.25, 0.6, 1.0, 1.5, 2.1)
 _SAMPLES_A_TICK = 5
@@ -80,9 +80,10 @@ def fit_plant(
     a reversal shows the exponent and the wire's stiffness, where they stop rising the joint begins
     to move. All parameters enter through the simulation: bounded trust-region least
     squares (Branch, Coleman and Li 1999) on their logarithms, with priors of the width that
-    `FITTED` says, from the best of five capstan exponents. It is deterministic; the optimum is
-    smooth and single once the exponent is near, which a genetic algorithm would find a hundred
-    times slower.
+    `FITTED` says, from the best of five capstan exponents. Radii and servo are not fitted but the
+    rig's: that of the shipped family, or the nominal one where it explains the tensions better. It
+    is deterministic; the optimum is smooth and single once the exponent is near, which a genetic
+    algorithm would find a hundred times slower.
 
     Parameters
     ----------
@@ -93,8 +94,7 @@ def fit_plant(
     bending : array_like, shape (N,), optional
         Bending angle in rad; NaN where there is none.
     start : JointParameters, optional
-        Where the search begins and what the priors are about; the recorded rig's in a tube of
-        middling bend if not given.
+        Where the search begins and what the priors are about; both rigs if not given.
 
     Raises
     ------
@@ -103,7 +103,13 @@ def fit_plant(
         command moves by less than 20 deg.
     """
     u, wires, angle = _checked(command, tension, bending)
-    first = start or shipped_family().joint(CENTRE)
+    if start is not None:
+        return _fit_about(start, u, wires, angle)
+    rigs = (shipped_family().joint(CENTRE), JointParameters())
+    return min((_fit_about(rig, u, wires, angle) for rig in rigs), key=lambda fit: fit.tension_rmse)
+
+
+def _fit_about(first: JointParameters, u: Array, wires: Array, angle: Array) -> PlantFit:
     names = tuple(FITTED)
     spreads = np.array([FITTED[name] for name in names])
     shapes = np.array(list(SHAPED.values()))
@@ -118,8 +124,13 @@ def fit_plant(
         factors = np.exp(x[: len(names)]).tolist()
         scaled = {n: getattr(first, n) * f for n, f in zip(names, factors, strict=True)}
         tight = min(1.0, max(-1.0, first.pretension_profile + float(x[-2])))
-        profile = (float(x[-1]), *first.friction_profile[1:])
-        joint = replace(first, pretension_profile=tight, friction_profile=profile, **scaled)
+        joint = replace(
+            first,
+            joint_rest_angle=first.joint_rest_angle + float(x[-3]),
+            pretension_profile=tight,
+            friction_profile=(float(x[-1]), *first.friction_profile[1:]),
+            **scaled,
+        )
         return PhysicalParameters(joint)
 
     def misfits(x: Array) -> tuple[Array, Array]:

@@ -5,6 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from endoscope_core.errors import EndoscopeError
+
+
+class NoLoopError(EndoscopeError, ValueError):
+    """The actual angle does not pass its middle both upwards and downwards."""
+
 
 def width_at_mid_height(desired: ArrayLike, actual: ArrayLike) -> float:
     """Width of the hysteresis loop at the middle of its height.
@@ -26,9 +32,10 @@ def width_at_mid_height(desired: ArrayLike, actual: ArrayLike) -> float:
 
     Raises
     ------
+    NoLoopError
+        If the actual angle does not pass its middle both upwards and downwards.
     ValueError
-        If the shapes are wrong, a value is not finite, or the actual angle does not pass its middle
-        both upwards and downwards.
+        If the shapes are wrong or a value is not finite.
     """
     u = np.asarray(desired, dtype=float)
     q = np.asarray(actual, dtype=float)
@@ -39,7 +46,7 @@ def width_at_mid_height(desired: ArrayLike, actual: ArrayLike) -> float:
     if not (np.all(np.isfinite(u)) and np.all(np.isfinite(q))):
         raise ValueError('desired or actual holds values that are not finite')
     if u.size < 3 or np.ptp(q) == 0.0:
-        raise ValueError('the actual angle does not move: there is no loop to measure')
+        raise NoLoopError('the actual angle does not move: there is no loop to measure')
     height = np.ptp(q)
     offset = q - 0.5 * (np.max(q) + np.min(q))
     band = 0.1 * height
@@ -49,7 +56,7 @@ def width_at_mid_height(desired: ArrayLike, actual: ArrayLike) -> float:
         u, offset = np.roll(u, turn), np.roll(offset, turn)
     rising, falling = _crossings(u, offset, band)
     if rising.size == 0 or falling.size == 0:
-        raise ValueError(
+        raise NoLoopError(
             'the recording holds no whole loop: the actual angle passes its middle one way only'
         )
     return float(np.mean(rising) - np.mean(falling))

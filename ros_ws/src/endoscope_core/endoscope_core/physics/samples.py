@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 TOPICS = ('motor', 'wires', 'tracker')
-"""What `recording_gap` counts as topic 0, 1 and 2: `motor/measured_js`, `wires/measured_js`, and
+"""What a gap counts as topic 0, 1 and 2: `motor/measured_js`, `wires/measured_js`, and
 the tracker's `slave/measured_js` with `tracker/measured_cp`."""
 
 

@@ -54,7 +54,7 @@ def never_seen_tube(seed: int, number: int, size_deg: float | None = None) -> Ne
     Raises
     ------
     RuntimeError
-        If none of fifty rigs reaches the size.
+        If no rig of a thousand reaches the size.
     """
     generator = np.random.default_rng([_UNSEEN, seed, number])
     drawn = float(generator.uniform(SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG))
