@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 from simulated_graph import SimulatedGraph
-from tubes import NODES_WITH_A_PLANT, tube_of_size
+from tubes import slave_of, tube_of_size
 
 from endoscope_core.identification.law_choice import CalibrationFindings
-from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
+from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.rig import load_rig
 
 
@@ -49,10 +49,8 @@ def test_a_brief_calibration_takes_less_than_five_seconds_to_compensated_motion(
 
 
 def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_path):
-    plant = PlantDescription()
     slack = EffectSpec('wire_slack', 'bend_y', {'length_m': 0.004})
-    save_plant(dataclasses.replace(plant, effects=(slack,)), tmp_path / 'slack.yaml')
-    overrides = {node: {'plant_file': str(tmp_path / 'slack.yaml')} for node in NODES_WITH_A_PLANT}
+    overrides = slave_of(PlantDescription(effects=(slack,)), tmp_path / 'slack.yaml')
     overrides['calibration'] = {'motion': 'brief'}
     with SimulatedGraph(overrides=overrides) as graph:
         graph.nodes['compensator'].findings = CalibrationFindings(60)
