@@ -130,12 +130,12 @@ def test_leaving_enabled_aborts():
 
 def test_over_tension_aborts_and_is_a_fault():
     rig = load_rig()
-    low = dataclasses.replace(rig.tension, ceiling=9.0, calibration_ceiling=8.0)
+    low = dataclasses.replace(rig.tension, ceiling=8.0, calibration_ceiling=7.8)
     with SimulatedGraph(rig=dataclasses.replace(rig, tension=low)) as graph:
         graph.enable()
         assert graph.call_calibration().success
         graph.advance(4.0)
-        assert 'over the ceiling of 8.0 N' in abort_reason(graph)
+        assert 'over the ceiling of 7.8 N' in abort_reason(graph)
         assert 'wire_' in abort_reason(graph)
         assert graph.states[-1] == 'FAULT'
         assert not graph.nodes['calibration'].active

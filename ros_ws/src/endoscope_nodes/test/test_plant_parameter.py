@@ -18,7 +18,7 @@ from endoscope_nodes.plant_parameter import load_plant_parameter
             PlantDescription(effects=(EffectSpec('recording_gap', 'bend_y'),)),
             'effect recording_gap, which acts on recordings: leave it out',
         ),
-        (PlantDescription(joints={'bend_x': JointParameters()}), 'describes bend_x; the nodes need'),
+        (PlantDescription({'bend_x': JointParameters()}), 'describes bend_x; the nodes need'),
     ],
 )
 def test_what_no_slave_in_motion_can_be_is_refused(tmp_path, plant, said):
