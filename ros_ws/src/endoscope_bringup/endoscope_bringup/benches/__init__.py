@@ -8,6 +8,7 @@ BENCHES: tuple[str, ...] = (
     'compensation',
     'calibration_rate',
     'papers',
+    'paper_tubes',
     'motor_bus',
     'motor_faults',
     'faults',

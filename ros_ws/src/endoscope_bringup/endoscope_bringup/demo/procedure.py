@@ -1,7 +1,9 @@
 """What the demonstration does, in order, and what the first paper reports for the same."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+
+from endoscope_core.physics import JointParameters
 
 
 class Mode(StrEnum):
@@ -20,12 +22,12 @@ class Tube:
     ----------
     name : str
         The colon section of the first paper's experiment (section 4) whose backlash it has.
-    capstan_exponent : float
-        Friction of the sheath in that shape, the same for both joints.
+    joint : JointParameters
+        Both joints in that shape.
     """
 
     name: str
-    capstan_exponent: float
+    joint: JointParameters
 
 
 @dataclass(frozen=True)
@@ -76,9 +78,43 @@ class PaperFigure:
 
 MOTIONS = ('periodic', 'non_periodic')
 
-# Chosen so that the loop under 90 sin(t) deg is 94 and 102 deg wide at mid-height, the backlash
-# sizes of the two colon shapes (Table 4); none of the classes was fitted to these exponents.
-TUBES = (Tube('descending colon', 1.534), Tube('transverse colon', 1.861))
+# `endoscope bench paper_tubes`: the instrument and the two shapes of its tube whose uncompensated
+# columns come nearest to those of Table 5.
+_INSTRUMENT = JointParameters(
+    pretension=5.65,
+    pretension_profile=0.618,
+    pulley_radius=2.77e-3,
+    joint_radius=6.5e-4,
+    joint_rest_angle=0.175,
+    joint_presliding_spread=0.359,
+    joint_damping=6.3e-6,
+    motor_bandwidth=29.5,
+    friction_profile=(0.009, -0.207, -0.174),
+)
+TUBES = (
+    Tube(
+        'descending colon',
+        replace(
+            _INSTRUMENT,
+            capstan_exponent=0.937,
+            wire_stiffness=4430.0,
+            joint_stiffness=2.87e-3,
+            joint_friction=6.41e-4,
+            joint_presliding=0.0342,
+        ),
+    ),
+    Tube(
+        'transverse colon',
+        replace(
+            _INSTRUMENT,
+            capstan_exponent=1.235,
+            wire_stiffness=3815.0,
+            joint_stiffness=1.826e-3,
+            joint_friction=1.05e-3,
+            joint_presliding=0.0269,
+        ),
+    ),
+)
 
 # First paper, Table 5: (tube, motion) -> RMSE none, RMSE proposed, backlash none, proposed.
 TABLE_5: dict[tuple[str, str], tuple[PaperFigure, PaperFigure, PaperFigure, PaperFigure]] = {

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.signals import calibration_sinusoid, motion_by_name
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
+from endoscope_nodes.names import JOINTS
 from endoscope_nodes.recorder_node import RecorderNode
 from endoscope_nodes.runtime import FOREVER_S, Runtime
 
@@ -75,13 +76,8 @@ def run_tube(
         If a node refuses, or the graph stands still.
     """
     name = tube.name.replace(' ', '_')
-    plant = PlantDescription()
-    joints = {
-        joint: replace(p, capstan_exponent=tube.capstan_exponent)
-        for joint, p in plant.joints.items()
-    }
     plant_file = folder / f'{name}.plant.yaml'
-    save_plant(replace(plant, joints=joints), plant_file)
+    save_plant(PlantDescription(dict.fromkeys(JOINTS, tube.joint)), plant_file)
     bag = folder / name
     with _GraphSession(plant_file, bag, domain, seed, real_time) as session:
         session.start()
