@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import JointParameters, PlantDescription, simulate
+from endoscope_core.physics.family import CENTRE, shipped_family
 from endoscope_core.rig import load_rig
 
 Array = NDArray[np.float64]
@@ -19,12 +20,13 @@ Array = NDArray[np.float64]
 FITTED = {
     'capstan_exponent': 1.0,
     'pretension': 0.05,
-    'wire_stiffness': 0.1,
-    'joint_stiffness': 0.1,
-    'joint_friction': 0.1,
-    'joint_presliding': 0.15,
+    'wire_stiffness': 0.11,
+    'joint_stiffness': 0.2,
+    'joint_friction': 0.3,
+    'joint_presliding': 0.17,
 }
-"""What is fitted, and the standard deviation of its logarithm from instrument to instrument."""
+"""What is fitted, and the standard deviation of its logarithm: over the bends of the recorded
+family's tubes, and from instrument to instrument."""
 
 TENSION_SCALE = 0.05
 BENDING_SCALE = float(np.deg2rad(0.5))
@@ -91,7 +93,8 @@ def fit_plant(
     bending : array_like, shape (N,), optional
         Bending angle in rad; NaN where there is none.
     start : JointParameters, optional
-        Where the search begins and what the priors are about; the nominal joint if not given.
+        Where the search begins and what the priors are about; the recorded rig's in a tube of
+        middling bend if not given.
 
     Raises
     ------
@@ -100,7 +103,7 @@ def fit_plant(
         command moves by less than 20 deg.
     """
     u, wires, angle = _checked(command, tension, bending)
-    first = start or JointParameters()
+    first = start or shipped_family().joint(CENTRE)
     names = tuple(FITTED)
     spreads = np.array([FITTED[name] for name in names])
     shapes = np.array(list(SHAPED.values()))
