@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 from simulated_graph import SimulatedGraph
-from tubes import NODES_WITH_A_PLANT, tube_of_size
+from tubes import slave_of, tube_of_size
 
 from endoscope_core.identification.law_choice import CalibrationFindings
-from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
+from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.rig import load_rig
 
 
@@ -49,10 +49,8 @@ def test_a_brief_calibration_takes_less_than_five_seconds_to_compensated_motion(
 
 
 def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_path):
-    plant = PlantDescription()
     slack = EffectSpec('wire_slack', 'bend_y', {'length_m': 0.004})
-    save_plant(dataclasses.replace(plant, effects=(slack,)), tmp_path / 'slack.yaml')
-    overrides = {node: {'plant_file': str(tmp_path / 'slack.yaml')} for node in NODES_WITH_A_PLANT}
+    overrides = slave_of(PlantDescription(effects=(slack,)), tmp_path / 'slack.yaml')
     overrides['calibration'] = {'motion': 'brief'}
     with SimulatedGraph(overrides=overrides) as graph:
         graph.nodes['compensator'].findings = CalibrationFindings(60)
@@ -132,12 +130,12 @@ def test_leaving_enabled_aborts():
 
 def test_over_tension_aborts_and_is_a_fault():
     rig = load_rig()
-    low = dataclasses.replace(rig.tension, ceiling=9.0, calibration_ceiling=8.0)
+    low = dataclasses.replace(rig.tension, ceiling=8.0, calibration_ceiling=7.8)
     with SimulatedGraph(rig=dataclasses.replace(rig, tension=low)) as graph:
         graph.enable()
         assert graph.call_calibration().success
         graph.advance(4.0)
-        assert 'over the ceiling of 8.0 N' in abort_reason(graph)
+        assert 'over the ceiling of 7.8 N' in abort_reason(graph)
         assert 'wire_' in abort_reason(graph)
         assert graph.states[-1] == 'FAULT'
         assert not graph.nodes['calibration'].active

@@ -1,8 +1,11 @@
-"""A tracker that goes blind, or dies."""
+"""A tracker that goes blind, dies, or reads single samples wrong."""
 
 import numpy as np
 import pytest
 from simulated_graph import SimulatedGraph
+from tubes import slave_of
+
+from endoscope_core.physics import EffectSpec, PlantDescription
 
 # In real time, on a machine that may stall for longer than a device may be silent.
 pytestmark = pytest.mark.flaky(reruns=2)
@@ -55,3 +58,19 @@ def test_a_dead_tracker_node_leaves_the_feed_forward_going():
         assert len(drives) == 2000
         assert weight(graph) == 0.0
         assert graph.states[-1] == 'ENABLED'
+
+
+def test_wrong_samples_are_in_the_readings_and_not_in_the_rig(tmp_path):
+    wrong = EffectSpec('tracker_outliers', 'bend_y', {'rate': 0.1, 'size_rad': 0.3})
+    overrides = slave_of(PlantDescription(effects=(wrong,)), tmp_path / 'plant.yaml')
+    with SimulatedGraph(overrides=overrides) as graph:
+        read, true = (graph.listen(t) for t in ('slave/measured_js', 'simulation/bending'))
+        graph.advance(5.0)
+    bending = {sample.stamp_ns: sample.position for sample in true}
+    off = np.array([np.subtract(s.position, bending[s.stamp_ns]) for s in read])
+    assert len(off) == 200
+    assert np.abs(off[:, 0]).max() < 0.05
+    spoilt = np.abs(off[:, 1]) > 0.15
+    # 20 of 200 are expected, with a standard deviation of 4.
+    assert 8 <= np.count_nonzero(spoilt) <= 32
+    np.testing.assert_allclose(np.abs(off[spoilt, 1]), 0.3, atol=0.03)

@@ -1,6 +1,7 @@
 """The README's tables and picture of nodes, topics and parameters are those of the nodes."""
 
 import re
+from contextlib import ExitStack
 from pathlib import Path
 
 import parameter_table
@@ -36,17 +37,25 @@ TOPICS = _table('### Topics')
 
 @pytest.fixture(scope='module')
 def nodes():
-    """Every node of the simulated graph but the recorder, which takes what there is."""
-    runtime = Runtime(
-        args=['--ros-args', '--log-level', 'fatal'],
-        context=Context(),
-        domain_id=private_domain(),
-        overrides={'console': {'source': 'motion'}},
-    )
-    for factory in (*SLAVE_NODES, *CONTROL_NODES):
-        runtime.add(factory)
-    yield {node.get_name(): node for node in runtime.nodes}
-    runtime.close()
+    """Every node of the simulated graph but the recorder, which takes what there is.
+
+    Each has a runtime of its own, as in a process of its own: those of one process share what they
+    hear of the slave's pose.
+    """
+    domain = private_domain()
+    with ExitStack() as runtimes:
+        started = [
+            runtimes.enter_context(
+                Runtime(
+                    args=['--ros-args', '--log-level', 'fatal'],
+                    context=Context(),
+                    domain_id=domain,
+                    overrides={'console': {'source': 'motion'}},
+                )
+            ).add(factory)
+            for factory in (*SLAVE_NODES, *CONTROL_NODES)
+        ]
+        yield {node.get_name(): node for node in started}
 
 
 def _short(name: str) -> str:

@@ -16,14 +16,14 @@ def test_tells_equation_source_and_parameters(capsys):
     definition = CATALOGUE['joint_stop']
     assert definition.equation in told
     assert definition.source in told
-    assert '0.05 to 2.5 rad, typical 0.6, off at 2.5' in told
+    assert '0.05 to 2.5 rad, typical 0.25, off at 2.5' in told
     assert 'one of 0, 1' in told
 
 
 def test_tells_which_parameters_are_counted(capsys):
-    assert main(['effects', 'distributed_friction']) == 0
+    assert main(['effects', 'configuration_change']) == 0
     told = ' '.join(capsys.readouterr().out.split())
-    assert 'nodes a whole number from 2 to 12, typical 8' in told
+    assert 'smooth a whole number from 0 to 1, typical 0' in told
 
 
 def test_an_unknown_effect_is_one_line_and_exit_2(capsys):

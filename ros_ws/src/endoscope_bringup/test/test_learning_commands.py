@@ -16,6 +16,7 @@ from endoscope_core.hysteresis import BoucWenParameters, bouc_wen_forward
 from endoscope_core.identification import Servo, load_class_parameters
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics import PlantDescription, simulate
+from endoscope_core.rig import load_rig
 from endoscope_core.signals import motion_by_name
 
 
@@ -29,10 +30,8 @@ def data(tmp_path_factory):
 @pytest.fixture(scope='module')
 def calibration():
     """Stamps, desired angle and the answer of the nominal rig to the calibration motion."""
-    plant = PlantDescription()
     angle, _ = motion_by_name('calibration').sample(np.arange(0.0, 10.0, 1e-3))
-    gears = np.array([joint.gear for joint in plant.joints.values()])
-    trajectory = simulate(plant, angle * gears)
+    trajectory = simulate(PlantDescription(), angle * load_rig().joints.gear)
     stamps = 1_700_000_000_000_000_000 + np.arange(0, 10_000) * 1_000_000
     return stamps, angle, trajectory
 

@@ -15,7 +15,13 @@ from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bags.table_mapping import load_table_mapping
 from endoscope_bags.text_table import convert_table
 from endoscope_bringup.hostile_files.spoiling import spoiled_table, spoiled_yaml
-from endoscope_core.physics import EffectSpec, PlantDescription, load_plant, save_plant
+from endoscope_core.physics import (
+    EffectSpec,
+    JointParameters,
+    PlantDescription,
+    load_plant,
+    save_plant,
+)
 from endoscope_core.physics.plant_file import REACH
 from endoscope_core.signals.command_file import read_command_file, write_command_file
 from endoscope_devices.load_cells.calibration_file import load_calibration
@@ -87,7 +93,8 @@ class PlantCase:
     def __init__(self, folder: Path) -> None:
         self._path = folder / 'plant.yaml'
         gravity = EffectSpec('gravity', 'bend_x', {'moment_nm': 0.01})
-        save_plant(PlantDescription(effects=(gravity,)), self._path)
+        joint = JointParameters(friction_profile=(0.3, -0.1))
+        save_plant(PlantDescription({'bend_x': joint}, effects=(gravity,)), self._path)
         self._text = self._path.read_text()
 
     def spoil(self, rng: Generator) -> None:
@@ -99,9 +106,10 @@ class PlantCase:
         plant = load_plant(self._path)
         sets = [asdict(joint) for joint in plant.joints.values()] + [asdict(plant.sensors)]
         return all(
-            REACH[key][0] <= value <= REACH[key][1]
+            REACH[key][0] <= number <= REACH[key][1]
             for parameters in sets
             for key, value in parameters.items()
+            for number in np.atleast_1d(value)
         )
 
 

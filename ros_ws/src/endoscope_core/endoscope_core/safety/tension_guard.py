@@ -11,8 +11,8 @@ class TensionGuard:
 
     A wire is over the ceiling once ``samples`` readings in a row are: a single spike of a load cell
     is not a tension.  A reading that is not a number counts as over the ceiling, for it hides one.
-    That is over only at nine tenths of the ceiling, for a motor that stops keeps the tension about
-    where it was.
+    That is over only at nine tenths of the ceiling, for readings that scatter about the ceiling are
+    still of a wire that is pulled too hard.
 
     Parameters
     ----------

@@ -1,0 +1,59 @@
+"""A tube lets the tip be bent only so far: calibration finds it, and what asks for more is cut."""
+
+import numpy as np
+import pytest
+from simulated_graph import SimulatedGraph
+from tubes import tube_of_size
+
+from endoscope_core.control import Reach, reach
+from endoscope_core.identification.law_choice import CalibrationFindings
+from endoscope_core.physics import load_plant
+from endoscope_nodes.diagnostics import WARN
+from endoscope_nodes.names import JOINTS, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
+
+# In real time, on a machine that may stall for longer than a device may be silent.
+pytestmark = pytest.mark.flaky(reruns=2)
+
+
+def warnings(graph, name):
+    return [told.message for told in graph.diagnostics[name] if told.level == WARN]
+
+
+def test_a_calibration_finds_the_reach_and_the_console_keeps_to_it(tmp_path):
+    overrides = tube_of_size(tmp_path, 90, 904)
+    plant = load_plant(overrides['motor_driver']['plant_file'])
+    overrides |= {'calibration': {'motion': 'brief', 'identify_plant': True}}
+    with SimulatedGraph(overrides=overrides) as graph:
+        graph.enable()
+        values = graph.calibrate()
+        found = [
+            Reach(*(float(values[f'reach.{joint}.{end}']) for end in ('low', 'high')))
+            for joint in JOINTS
+        ]
+        for tube, joint in zip(found, plant.joints.values(), strict=True):
+            true = reach(joint)
+            assert np.degrees(tube.low) == pytest.approx(np.degrees(true.low), abs=2.0)
+            assert np.degrees(tube.high) == pytest.approx(np.degrees(true.high), abs=2.0)
+        commands = graph.listen(SLAVE_COMMAND)
+        graph.set('console', source='motion')
+        graph.advance(4.0)
+        asked = np.array([c.position for c in commands])
+        assert asked[:, 0].max() == pytest.approx(found[0].high, abs=1e-6)
+        assert asked[:, 1].max() == pytest.approx(found[1].high, abs=1e-6)
+        assert 'this tube can be bent: bend_x from ' in warnings(graph, 'console: commands')[-1]
+
+
+def test_the_compensator_cuts_what_a_console_asks_for_beyond_it():
+    overrides = {'compensator': {'mode': 'none'}, 'controller': {'active': False}}
+    with SimulatedGraph(overrides=overrides) as graph:
+        gear = graph.nodes['compensator'].rig.joints.gear
+        graph.enable()
+        graph.nodes['compensator'].findings = CalibrationFindings(reaches=(Reach(-0.2, 0.3),) * 2)
+        asked, drives = graph.listen(SLAVE_COMMAND), graph.listen(MOTOR_COMMAND, MOTORS)
+        graph.set('console', source='motion')
+        graph.advance(2.5)
+        assert max(a.position[0] for a in asked) > 0.8
+        assert max(d.position[0] for d in drives) == pytest.approx(0.3 * gear, abs=2e-3)
+        said = warnings(graph, 'compensator: output')[-1]
+        assert 'bend_y from -11 to 17 deg, more was asked for' in said
+        assert int(graph.reported('compensator: output')['cut to the reach']) > 1000
