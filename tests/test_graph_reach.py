@@ -20,26 +20,24 @@ def warnings(graph, name):
 
 
 def test_a_calibration_finds_the_reach_and_the_console_keeps_to_it(tmp_path):
-    overrides = tube_of_size(tmp_path, 90, 904)
+    """In a tube so tight that 60 deg are more than it allows."""
+    overrides = tube_of_size(tmp_path, 80, 1080)
     plant = load_plant(overrides['motor_driver']['plant_file'])
     overrides |= {'calibration': {'motion': 'brief', 'identify_plant': True}}
     with SimulatedGraph(overrides=overrides) as graph:
         graph.enable()
         values = graph.calibrate()
         found = [
-            Reach(*(float(values[f'reach.{joint}.{end}']) for end in ('low', 'high')))
-            for joint in JOINTS
+            [float(values[f'reach.{joint}.{end}']) for end in ('low', 'high')] for joint in JOINTS
         ]
-        for tube, joint in zip(found, plant.joints.values(), strict=True):
-            true = reach(joint)
-            assert np.degrees(tube.low) == pytest.approx(np.degrees(true.low), abs=2.0)
-            assert np.degrees(tube.high) == pytest.approx(np.degrees(true.high), abs=2.0)
+        true = [(tube.low, tube.high) for tube in map(reach, plant.joints.values())]
+        np.testing.assert_allclose(np.degrees(found), np.degrees(true), atol=5.0)
         commands = graph.listen(SLAVE_COMMAND)
         graph.set('console', source='motion')
         graph.advance(4.0)
-        asked = np.array([c.position for c in commands])
-        assert asked[:, 0].max() == pytest.approx(found[0].high, abs=1e-6)
-        assert asked[:, 1].max() == pytest.approx(found[1].high, abs=1e-6)
+        asked = np.max([c.position for c in commands], axis=0)
+        # The console brakes as the acceleration allows; the compensator cuts the way of braking.
+        np.testing.assert_allclose(asked, [high for _, high in found], atol=0.03)
         assert 'this tube can be bent: bend_x from ' in warnings(graph, 'console: commands')[-1]
 
 
