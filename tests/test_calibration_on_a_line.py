@@ -14,7 +14,7 @@ from endoscope_nodes.names import CALIBRATION_RESULT
 from endoscope_nodes.qos import RESULT
 
 # What a calibration says where this machine lets the graph or the line wait for too long.
-STALLED = ('can be bridged', 'silent', 'the slave became')
+STALLED = ('can be bridged', 'silent', 'the motion session has ended')
 
 
 @pytest.fixture
