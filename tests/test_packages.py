@@ -75,7 +75,7 @@ def test_the_top_level_is_what_it_is_meant_to_be() -> None:
         pytest.skip('not a git checkout')
     top = {line.split('/')[0] for line in listed.stdout.splitlines()}
     assert {name for name in top if not name.startswith('.')} == {
-        *('ros_ws', 'docker', 'tests', 'README.md', 'colcon.meta')
+        *('ros_ws', 'docker', 'bags', 'tests', 'README.md', 'colcon.meta')
     }
 
 
