@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from endoscope_bags import JointStateSeries, Recording
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
-from endoscope_core.rig import load_rig
+from endoscope_core.rig import shipped_rig
 
 SHAFT_TOPIC = 'motor/servo_jp'
 ANGLE_TOPIC = 'slave/servo_jp'
@@ -95,4 +95,4 @@ def _shaft_angles(series: JointStateSeries) -> NDArray[np.float64]:
     position = series.require('position')
     if series.topic.endswith(SHAFT_TOPIC):
         return position
-    return position * load_rig().joints.gear
+    return position * shipped_rig().joints.gear

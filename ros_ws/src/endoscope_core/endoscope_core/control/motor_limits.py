@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cache
 
-from endoscope_core.rig import Rig, load_rig
+from endoscope_core.rig import Rig, shipped_rig
 
 
 @dataclass(frozen=True)
@@ -54,4 +54,4 @@ class MotorLimits:
 @cache
 def shipped_limits() -> MotorLimits:
     """Those of the rig that is shipped."""
-    return MotorLimits.of(load_rig())
+    return MotorLimits.of(shipped_rig())

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from endoscope_core.metrics import NoLoopError, width_at_mid_height
 from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.physics.family import MOST_BENT, TubeFamily, shipped_family
-from endoscope_core.rig import load_rig
+from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
 
 JOINTS = ('bend_x', 'bend_y')
@@ -151,7 +151,7 @@ def calibration_command(
     """
     motion = motion or calibration_motion()
     angle, _ = motion.signal(np.arange(motion.samples) / CALIBRATION_RATE)
-    return np.repeat(load_rig().joints.gear * angle[:, None], len(plant.joints), axis=1)
+    return np.repeat(shipped_rig().joints.gear * angle[:, None], len(plant.joints), axis=1)
 
 
 def backlash_sizes(plant: PlantDescription) -> NDArray[np.float64]:

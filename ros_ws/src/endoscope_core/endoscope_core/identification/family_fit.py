@@ -16,11 +16,10 @@ from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.family import SIGNED, Readings, TubeFamily
 from endoscope_core.physics.simulator import simulate
+from endoscope_core.rig import shipped_rig
 
 Array = NDArray[np.float64]
 
-GEAR = 0.5
-"""Shaft angle for one radian of desired bending."""
 LUMPED = (0.0, 5.0, 0.0, 3.0)
 """A friction profile with all of it at the wire's ends: the lumped capstan plant."""
 
@@ -159,7 +158,7 @@ def read(family: TubeFamily, bend: float, desired: Array, tick: float) -> tuple[
         N.
     """
     plant = PlantDescription(joints={_JOINT: family.joint(bend)})
-    made = simulate(plant, (GEAR * desired)[:, None], tick)
+    made = simulate(plant, (shipped_rig().joints.gear * desired)[:, None], tick)
     tip, readings = made.bending_true[:, 0], family.readings
     angle = np.interp(made.time - readings.tracker_delay, made.time, tip - tip[0])
     late = made.time - readings.load_cell_delay

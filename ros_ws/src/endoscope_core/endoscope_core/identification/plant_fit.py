@@ -13,7 +13,7 @@ from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import JointParameters, PlantDescription, simulate
 from endoscope_core.physics.family import CENTRE, shipped_family
-from endoscope_core.rig import load_rig
+from endoscope_core.rig import shipped_rig
 
 Array = NDArray[np.float64]
 
@@ -113,7 +113,7 @@ def _fit_about(first: JointParameters, u: Array, wires: Array, angle: Array) -> 
     names = tuple(FITTED)
     spreads = np.array([FITTED[name] for name in names])
     shapes = np.array(list(SHAPED.values()))
-    gear = load_rig().joints.gear
+    gear = shipped_rig().joints.gear
     ticks = len(u) // _SAMPLES_A_TICK
     held = gear * u[: ticks * _SAMPLES_A_TICK].reshape(ticks, -1).mean(axis=1)
     scored = slice(None, None, _SCORED_EVERY)

@@ -123,7 +123,6 @@ def settle(
     history[COMMAND_HISTORY, :] = shaft
     _lay_out(sheath, p)
     x[FLOOR] = friction_floor(on, p, x)
-    history[ANGLE_HISTORY, :] = 0.0
     _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, -0.5 * tick, tick))
     table = sheath[SHAPES : SHAPES + 5]
     for wire in (WIRE_A, WIRE_B):

@@ -59,8 +59,8 @@ class Slots:
     ----------
     flags, parameters, states : int
         How many there are so far.
-    shaft_angles, joint_angles : list of int
-        States that begin at the shaft's and at the joint's angle.
+    shaft_angles : list of int
+        States that begin at the shaft's angle.
     """
 
     def __init__(self) -> None:
@@ -68,7 +68,6 @@ class Slots:
         self.parameters = FRICTION_PROFILE + PROFILE_TERMS
         self.states = 0
         self.shaft_angles: list[int] = []
-        self.joint_angles: list[int] = []
 
     def flag(self) -> int:
         """Index of the next effect's on/off flag."""
@@ -90,11 +89,6 @@ class Slots:
         self.shaft_angles.append(self.state_block())
         return self.shaft_angles[-1]
 
-    def joint_angle(self) -> int:
-        """Index of a state that begins at the joint's angle."""
-        self.joint_angles.append(self.state_block())
-        return self.joint_angles[-1]
-
 
 SLOTS = Slots()
 
@@ -111,11 +105,11 @@ EXTRA_LENGTH = SLOTS.state_block(2)
 """What effects have added to each wire's length, m."""
 REST_TENSION = SLOTS.state_block()
 """Mean tension of a wire as it was tightened, N."""
-JOINT = SLOTS.joint_angle()
+JOINT = SLOTS.state_block()
 """Bending angle of the joint, rad."""
 JOINT_STEP = SLOTS.state_block()
 """By how much it bent in the last tick, rad."""
-TIP = SLOTS.joint_angle()
+TIP = SLOTS.state_block()
 """Bending angle of the tip, rad."""
 JOINT_SLIDE = SLOTS.state_block(ELEMENTS)
 """Dahl states of the joint's friction."""

@@ -8,6 +8,7 @@ from endoscope_core.rig.facts import (
     RigFileError,
     Timeouts,
     load_rig,
+    shipped_rig,
 )
 
 __all__ = [
@@ -18,4 +19,5 @@ __all__ = [
     'RigFileError',
     'Timeouts',
     'load_rig',
+    'shipped_rig',
 ]

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -188,6 +188,12 @@ def load_rig(path: str | Path | None = None) -> Rig:
         raise
     except ValueError as error:
         raise RigFileError(f'rig file {path}: {error}') from error
+
+
+@cache
+def shipped_rig() -> Rig:
+    """The rig that comes with the project."""
+    return load_rig()
 
 
 def _content(path: Path) -> Mapping[str, Any]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.dataset import record_calibration
 from endoscope_core.physics import EffectSpec, PlantDescription, SensorModel, simulate
-from endoscope_core.rig import load_rig
+from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def other_motion(generator: Generator, plant: PlantDescription, motion: Calibrat
         reach[generator.integers(len(reach))] = 0.0
     else:
         reach *= 0.0
-    command = load_rig().joints.gear * motion.signal(pace * time)[0][:, None] * reach
+    command = shipped_rig().joints.gear * motion.signal(pace * time)[0][:, None] * reach
     wires = simulate(plant, command).tension.reshape(len(time), -1)
     return SensorModel(plant.sensors, int(generator.integers(2**31))).tension(wires)
 

@@ -1,8 +1,6 @@
 """Names of signals as the report writes them."""
 
-from functools import cache
-
-from endoscope_core.rig import load_rig
+from endoscope_core.rig import shipped_rig
 from endoscope_explain.recording.series import BENDING, MOTOR, WIRES
 
 QUANTITY_TOPICS = {
@@ -23,10 +21,9 @@ QUANTITY_UNITS = {
 }
 
 
-@cache
 def gear() -> float:
     """Angle of a motor's shaft for one radian of desired bending, of the rig as shipped."""
-    return load_rig().joints.gear
+    return shipped_rig().joints.gear
 
 
 def axis(joint: str) -> str:
