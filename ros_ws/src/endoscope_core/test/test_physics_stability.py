@@ -98,6 +98,22 @@ def test_everything_stays_finite_and_within_the_geometry(plant, chosen, command,
     assert np.abs(done.joint).max() <= 1.01 * inertia * bound + gap
 
 
+def test_friction_that_holds_everything_leaves_the_joint_to_its_own_moments():
+    # A capstan exponent of 41 in all: e^-41 at the joint is less than rounding leaves of a sum.
+    chosen = {
+        'friction_run_in': {'excess': 3.0, 'distance_m': 0.01, 'tail': 0.0},
+        'stribeck_friction': {'rise': 3.0, 'stribeck_speed': 0.001, 'tail': 0.0},
+        'friction_asymmetry': {'asymmetry': 0.3},
+        'load_independent_friction': {'force_n': 0.5},
+        'breathing': {
+            'moment_nm': 6e-4, 'frequency_hz': 0.25, 'phase_rad': 0.0, 'second_harmonic': 0.0
+        },
+    }  # fmt: skip
+    done = run(np.full(400, 0.5), chosen, 5e-3, capstan_exponent=2.0, pretension=0.0)
+    assert np.isfinite(done.states).all()
+    assert np.ptp(done.joint[-200:]) > 1e-3
+
+
 @given(plants(), commands())
 @settings(max_examples=100)
 def test_a_rig_that_rests_goes_nowhere(plant, command):

@@ -5,7 +5,6 @@ BENCHES: tuple[str, ...] = (
     'recorder',
     'explain',
     'simulate',
-    'compensation',
     'calibration_rate',
     'papers',
     'motor_bus',

@@ -29,7 +29,6 @@ from endoscope_core.identification.updated_table import (
 )
 from endoscope_core.signals import CALIBRATION_RATE
 
-PLANT_SAMPLES = 3500
 _SAMPLE_STEP = 10
 
 
@@ -132,10 +131,8 @@ def _plant_of_class(
     dataset: CalibrationDataset, class_deg: int, chosen: NDArray[np.intp]
 ) -> tuple[ClassIdentification, str]:
     """Geometric mean of the plants of a class's recordings, each fitted to its tensions."""
-    samples = min(PLANT_SAMPLES, len(dataset.desired_angle))
-    command = dataset.desired_angle[:samples]
     fits = [
-        fit_plant(command, dataset.tension[k, :samples, 2 * j : 2 * j + 2])
+        fit_plant(dataset.desired_angle, dataset.tension[k, :, 2 * j : 2 * j + 2])
         for k in chosen.tolist()
         for j in range(dataset.tension.shape[2] // 2)
     ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -12,7 +14,7 @@ from scipy.optimize import least_squares
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import JointParameters, PlantDescription, simulate
-from endoscope_core.physics.family import CENTRE, shipped_family
+from endoscope_core.physics.family import CENTRE, MOST_BENT, shipped_family
 from endoscope_core.rig import shipped_rig
 
 Array = NDArray[np.float64]
@@ -25,7 +27,8 @@ FITTED = {
     'joint_friction': 0.1,
     'joint_presliding': 0.15,
 }
-"""What is fitted, and the standard deviation of its logarithm from instrument to instrument."""
+"""What is fitted, and the standard deviation of its logarithm from instrument to instrument in
+tubes of one bend."""
 
 TENSION_SCALE = 0.05
 BENDING_SCALE = float(np.deg2rad(0.5))
@@ -33,7 +36,8 @@ EXPONENT_BOUNDS = (0.02, 4.5)
 SHAPED = {'joint_rest_angle': 0.1, 'pretension_profile': 0.15, 'friction_profile': 0.3}
 """What is fitted as it is: where the joint rests, how the wires were tightened, and where along the
 sheath friction is."""
-CALIBRATION_SAMPLES_NEEDED = 3500
+BENDS = (0.5 * MOST_BENT, MOST_BENT / math.sqrt(12.0))
+"""Mean and standard deviation of the bend of a tube, rad: any that the family has is as likely."""
 _STARTS = (0.25, 0.6, 1.0, 1.5, 2.1)
 _SAMPLES_A_TICK = 5
 _TICK = 5.0e-3
@@ -79,10 +83,11 @@ def fit_plant(
     The tensions at the motor hold the friction and, through it, the tip: how they rise and fall at
     a reversal shows the exponent and the wire's stiffness, where they stop rising the joint begins
     to move. All parameters enter through the simulation: bounded trust-region least
-    squares (Branch, Coleman and Li 1999) on their logarithms, with priors of the width that
-    `FITTED` says, from the best of five capstan exponents. Radii and servo are not fitted but the
-    rig's: that of the shipped family, or the nominal one where it explains the tensions better. It
-    is deterministic; the optimum is smooth and single once the exponent is near, which a genetic
+    squares (Branch, Coleman and Li 1999) on their logarithms, from the best of five capstan
+    exponents. What bending the tube changes goes along the lines of the shipped family, with the
+    bend as one more unknown; about them are priors of the width that `FITTED` says. Radii and servo
+    are not fitted but the family's, or nominal where the nominal rig explains the tensions better.
+    It is deterministic; the optimum is smooth and single once the exponent is near, which a genetic
     algorithm would find a hundred times slower.
 
     Parameters
@@ -94,7 +99,8 @@ def fit_plant(
     bending : array_like, shape (N,), optional
         Bending angle in rad; NaN where there is none.
     start : JointParameters, optional
-        Where the search begins and what the priors are about; both rigs if not given.
+        Where the search begins and what the priors are about; the family and the nominal rig if
+        not given.
 
     Raises
     ------
@@ -104,15 +110,20 @@ def fit_plant(
     """
     u, wires, angle = _checked(command, tension, bending)
     if start is not None:
-        return _fit_about(start, u, wires, angle)
-    rigs = (shipped_family().joint(CENTRE), JointParameters())
+        return _fit_about(_whatever_the_bend(start), u, wires, angle)
+    rigs = shipped_family().joint, _whatever_the_bend(JointParameters())
     return min((_fit_about(rig, u, wires, angle) for rig in rigs), key=lambda fit: fit.tension_rmse)
 
 
-def _fit_about(first: JointParameters, u: Array, wires: Array, angle: Array) -> PlantFit:
+def _whatever_the_bend(joint: JointParameters) -> Callable[[float], JointParameters]:
+    return lambda bend: joint
+
+
+def _fit_about(
+    in_tube: Callable[[float], JointParameters], u: Array, wires: Array, angle: Array
+) -> PlantFit:
     names = tuple(FITTED)
-    spreads = np.array([FITTED[name] for name in names])
-    shapes = np.array(list(SHAPED.values()))
+    first = in_tube(CENTRE)
     gear = shipped_rig().joints.gear
     ticks = len(u) // _SAMPLES_A_TICK
     held = gear * u[: ticks * _SAMPLES_A_TICK].reshape(ticks, -1).mean(axis=1)
@@ -121,14 +132,15 @@ def _fit_about(first: JointParameters, u: Array, wires: Array, angle: Array) -> 
     seen = np.isfinite(angle[rows])
 
     def physical(x: Array) -> PhysicalParameters:
+        middle = in_tube(min(MOST_BENT, max(0.0, float(x[-1]))))
         factors = np.exp(x[: len(names)]).tolist()
-        scaled = {n: getattr(first, n) * f for n, f in zip(names, factors, strict=True)}
-        tight = min(1.0, max(-1.0, first.pretension_profile + float(x[-2])))
+        scaled = {n: getattr(middle, n) * f for n, f in zip(names, factors, strict=True)}
+        tight = min(1.0, max(-1.0, middle.pretension_profile + float(x[-3])))
         joint = replace(
-            first,
-            joint_rest_angle=first.joint_rest_angle + float(x[-3]),
+            middle,
+            joint_rest_angle=middle.joint_rest_angle + float(x[-4]),
             pretension_profile=tight,
-            friction_profile=(float(x[-1]), *first.friction_profile[1:]),
+            friction_profile=(float(x[-2]), *middle.friction_profile[1:]),
             **scaled,
         )
         return PhysicalParameters(joint)
@@ -139,24 +151,26 @@ def _fit_about(first: JointParameters, u: Array, wires: Array, angle: Array) -> 
         wires_off = (made.tension[scored, 0] - wires[rows]).ravel()
         return wires_off, (made.bending_true[scored, 0] - angle[rows])[seen]
 
-    expected = np.zeros(len(names) + len(SHAPED))
-    expected[-1] = first.friction_profile[0] if first.friction_profile else 0.0
+    expected = np.zeros(len(names) + len(SHAPED) + 1)
+    expected[-2] = first.friction_profile[0] if first.friction_profile else 0.0
+    expected[-1] = BENDS[0]
+    deviations = np.concatenate([list(FITTED.values()), list(SHAPED.values()), BENDS[1:]])
 
     def residuals(x: Array) -> Array:
         wires_off, angle_off = misfits(x)
-        unlikely = (x - expected) / np.concatenate([spreads, shapes])
+        unlikely = (x - expected) / deviations
         return np.concatenate([wires_off / TENSION_SCALE, angle_off / BENDING_SCALE, unlikely])
 
-    tried = []
-    for exponent in _STARTS:
+    def begin_at(exponent: float) -> Array:
         x = expected.copy()
-        x[0] = np.log(exponent / max(first.capstan_exponent, 1e-3))
-        tried.append(x)
+        x[0] = math.log(exponent / max(in_tube(BENDS[0]).capstan_exponent, 1e-3))
+        return x
+
+    tried = [begin_at(exponent) for exponent in _STARTS]
     begin = min(tried, key=lambda x: float(np.sum(residuals(x)[: -len(x)] ** 2)))
-    reach = np.log(np.array(EXPONENT_BOUNDS) / max(first.capstan_exponent, 1e-3))
-    wide = expected[1:] + 3.0 * np.concatenate([spreads[1:], shapes])
-    narrow = 2.0 * expected[1:] - wide
-    low, high = np.append(reach[0], narrow), np.append(reach[1], wide)
+    low, high = expected - 3.0 * deviations, expected + 3.0 * deviations
+    low[0], high[0] = (begin_at(exponent)[0] for exponent in EXPONENT_BOUNDS)
+    low[-1], high[-1] = 0.0, MOST_BENT
     found = least_squares(
         residuals, begin, bounds=(low, high), diff_step=1e-3, xtol=1e-4, ftol=1e-4, max_nfev=15
     )
@@ -169,10 +183,11 @@ def _fit_about(first: JointParameters, u: Array, wires: Array, angle: Array) -> 
     )
 
 
-def plants_of_calibration(
-    command: ArrayLike, tension: ArrayLike, samples: int = CALIBRATION_SAMPLES_NEEDED
-) -> tuple[PhysicalParameters, ...]:
-    """Plants of all joints from the beginning of a calibration, the joints side by side.
+def plants_of_calibration(command: ArrayLike, tension: ArrayLike) -> tuple[PhysicalParameters, ...]:
+    """Plants of all joints from a calibration, the joints side by side.
+
+    Where friction lets the joint go to one side only a little, the way to the other shows where it
+    rests: a motion to one side and back tells a tight tube's reach worse than one to both.
 
     Parameters
     ----------
@@ -180,16 +195,14 @@ def plants_of_calibration(
         Joint-equivalent motor command of every joint at 1 kHz, rad.
     tension : array_like, shape (N, 2 J)
         Positive and negative wire of each joint in turn, N.
-    samples : int
-        How many of the samples to use: the way to one side and back shows all that there is.
 
     Raises
     ------
     PlantFitError
         If the recording shows no plant.
     """
-    u = np.asarray(command, dtype=float)[:samples]
-    wires = np.asarray(tension, dtype=float)[:samples]
+    u = np.asarray(command, dtype=float)
+    wires = np.asarray(tension, dtype=float)
     pairs = [wires[:, j : j + 2] for j in range(0, wires.shape[1], 2)]
     # The simulation lets go of the interpreter: two joints take two cores.
     with ThreadPoolExecutor(len(pairs)) as pool:

@@ -180,7 +180,7 @@ def bend(
     ----------
     x : array (states,)
         Changed in place.
-    table : array (5, CELLS + 1)
+    table : array (TABLE_ROWS, CELLS + 1)
     p, on : array (parameters,), array (flags,) of bool
     way : float
         By how much the pulley has wound up the positive wire in this tick, m.

@@ -50,7 +50,6 @@ from endoscope_core.physics.layout import (
     PULLEY_RADIUS,
     REST_TENSION,
     RISING_FACTOR,
-    SHAPES,
     SLIDING_SPEED,
     SLOTS,
     TICKS,
@@ -67,12 +66,15 @@ from endoscope_core.physics.servo import transition
 from endoscope_core.physics.sheath import (
     MOTOR_END,
     NODES,
+    TABLE_ROWS,
     lengthen,
     mean_tension,
     move,
     moved,
     node_tension,
     relax,
+    slide_on,
+    sliding_load,
     spread,
     tabulate,
 )
@@ -97,6 +99,8 @@ _STEPS_TO_START = 64
 _SETTLING_TICK = 1.0
 _TRIES = 40
 _SAME_FACTOR = 1e-12
+_TORQUE_PRECISION = 1e-11
+"""N m."""
 
 
 @compiled
@@ -124,7 +128,7 @@ def settle(
     _lay_out(sheath, p)
     x[FLOOR] = friction_floor(on, p, x)
     _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, -0.5 * tick, tick))
-    table = sheath[SHAPES : SHAPES + 5]
+    table = sheath[:TABLE_ROWS]
     for wire in (WIRE_A, WIRE_B):
         for i in range(CELLS + 1):
             start = p[PRETENSION] * math.exp(-p[PRETENSION_PROFILE] * sheath[EXPONENTS, i])
@@ -178,7 +182,7 @@ def _shape(x: Array, sheath: Array, p: Array, on: Flags, factor: float) -> None:
     """Work out the table of shapes for a factor on the capstan exponent."""
     falling, rising = direction_factors(on, p, x)
     x[FALLING_FACTOR], x[RISING_FACTOR] = factor * falling, factor * rising
-    table = sheath[SHAPES : SHAPES + 5]
+    table = sheath[:TABLE_ROWS]
     tabulate(table, sheath[PLACES], sheath[EXPONENTS], x[FALLING_FACTOR], x[RISING_FACTOR])
 
 
@@ -192,12 +196,18 @@ def _change_friction(
     before = x[FALLING_FACTOR] / falling
     if abs(factor - before) <= _SAME_FACTOR * before:
         return
-    table = sheath[SHAPES : SHAPES + 5]
-    for wire in (WIRE_A, WIRE_B):
-        spread(x, wire, table)
+    table = sheath[:TABLE_ROWS]
+    slips = factor < before
+    load_a = sliding_load(x, WIRE_A, table) if slips else 0.0
+    load_b = sliding_load(x, WIRE_B, table) if slips else 0.0
+    for wire, load in ((WIRE_A, load_a), (WIRE_B, load_b)):
+        if load == 0.0:
+            spread(x, wire, table)
     _shape(x, sheath, p, on, factor)
-    if factor < before:
-        for wire in (WIRE_A, WIRE_B):
+    for wire, load in ((WIRE_A, load_a), (WIRE_B, load_b)):
+        if load > 0.0:
+            slide_on(x, wire, table, load)
+        elif slips:
             relax(x, wire, table, sheath[WORK : WORK + 3])
 
 
@@ -247,33 +257,46 @@ def _torque(x: Array, table: Array, p: Array, on: Flags, step: float) -> float:
 
 
 @compiled
+def _unbearable(
+    x: Array, table: Array, p: Array, on: Flags, step: float, way: float, tick: float
+) -> float:
+    """Torque in N m by which the wires load the motor with more than it can bear."""
+    load = way * _torque(x, table, p, on, step)
+    return load - largest_torque(on, p, x, way * step / tick)
+
+
+@compiled
 def _yield(x: Array, table: Array, p: Array, on: Flags, step: float, tick: float) -> float:
     """Step of the motor in rad, cut where the wires load it with more than it can bear.
 
     The load grows with the step and the bearable falls with the speed of a motor that drives its
-    load: one step divides them.
+    load: one step divides them, which a bracketed secant finds (Dowell, Jarratt, BIT 11, 1971).
     """
-    load = _torque(x, table, p, on, step)
-    way = 1.0 if load > 0.0 else -1.0
-    if way * load <= largest_torque(on, p, x, way * step / tick):
+    way = 1.0 if _torque(x, table, p, on, step) > 0.0 else -1.0
+    far, far_excess = step, _unbearable(x, table, p, on, step, way, tick)
+    if far_excess <= 0.0:
         return step
-    too_far = step
     back = max(1e-4, abs(step))
-    far_enough = step
+    near = min(0.0, way * step) * way
+    near_excess = _unbearable(x, table, p, on, near, way, tick)
     for _ in range(_TRIES):
-        far_enough -= way * back
-        back *= 2.0
-        bearable = largest_torque(on, p, x, way * far_enough / tick)
-        if way * _torque(x, table, p, on, far_enough) <= bearable:
+        if near_excess <= 0.0:
             break
+        far, far_excess = near, near_excess
+        near -= way * back
+        back *= 2.0
+        near_excess = _unbearable(x, table, p, on, near, way, tick)
     for _ in range(_TRIES):
-        middle = 0.5 * (too_far + far_enough)
-        bearable = largest_torque(on, p, x, way * middle / tick)
-        if way * _torque(x, table, p, on, middle) > bearable:
-            too_far = middle
+        if abs(far_excess) <= _TORQUE_PRECISION or far_excess == near_excess:
+            break
+        found = far - far_excess * (far - near) / (far_excess - near_excess)
+        excess = _unbearable(x, table, p, on, found, way, tick)
+        if excess * far_excess > 0.0:
+            near_excess *= max(0.5, 1.0 - excess / far_excess)
         else:
-            far_enough = middle
-    return far_enough
+            near, near_excess = far, far_excess
+        far, far_excess = found, excess
+    return far
 
 
 @compiled
@@ -292,7 +315,7 @@ def advance_tick(
     tick : float
         That of `settle`, s.
     """
-    table = sheath[SHAPES : SHAPES + 5]
+    table = sheath[:TABLE_ROWS]
     time = (x[TICKS] + 0.5) * tick
     other = inputs[IN_OTHER_JOINT]
     history[COMMAND_HISTORY, int(x[TICKS]) % HISTORY] = inputs[IN_COMMAND]
@@ -332,7 +355,7 @@ def advance_tick(
 @compiled
 def tensions(x: Array, sheath: Array, end: int) -> tuple[float, float]:
     """Tensions in N of both wires at `MOTOR_END` or `JOINT_END`."""
-    table = sheath[SHAPES : SHAPES + 5]
+    table = sheath[:TABLE_ROWS]
     i = 0 if end == MOTOR_END else CELLS
     way = 0.5 if end == MOTOR_END else -0.5
     ta = node_tension(x, WIRE_A, table, i) - x[FLOOR] + way * x[FILM]

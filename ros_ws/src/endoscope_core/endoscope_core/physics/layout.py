@@ -5,7 +5,7 @@ modules are imported; numba then compiles the indices in as constants. An effect
 one test of a flag.
 """
 
-from endoscope_core.physics.sheath import wire_states
+from endoscope_core.physics.sheath import TABLE_ROWS, wire_states
 
 PROFILE_TERMS = 4
 """Most coefficients that a friction profile can have."""
@@ -132,10 +132,9 @@ WIRE_A = SLOTS.state_block(wire_states(CELLS))
 WIRE_B = SLOTS.state_block(wire_states(CELLS))
 
 # Rows of the arrays of a joint's sheath, (SHEATH_ROWS, CELLS + 1).
-SHAPES = 0
-"""First of the rows of the table of shapes."""
-PLACES, EXPONENTS, WORK = 5, 6, 7
-SHEATH_ROWS = 10
+# The table of shapes comes first.
+PLACES, EXPONENTS, WORK = range(TABLE_ROWS, TABLE_ROWS + 3)
+SHEATH_ROWS = TABLE_ROWS + 5
 
 HISTORY = 1024
 """Ticks of command and of angle that are kept for delays."""

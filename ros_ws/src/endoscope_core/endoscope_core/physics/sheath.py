@@ -28,8 +28,9 @@ slack at that end in N of stretch."""
 TOWARDS_MOTOR, TOWARDS_JOINT = 0, 1
 """Shapes of a sliding wire's tension."""
 
-# Rows of a table of shapes, array (5, nodes).
-FALLING, RISING, FALLING_SUM, RISING_SUM, WEIGHT = 0, 1, 2, 3, 4
+FALLING, RISING, FALLING_SUM, RISING_SUM, FALLING_REST, RISING_REST, WEIGHT = range(7)
+TABLE_ROWS = 7
+"""Rows of a table of shapes, array (TABLE_ROWS, nodes)."""
 
 
 def wire_states(cells: int) -> int:
@@ -43,8 +44,10 @@ def tabulate(table: Array, places: Array, exponents: Array, falling: float, risi
 
     Parameters
     ----------
-    table : array (5, N + 1)
-        Written: both shapes at the nodes, their running sums, and the nodes' weights.
+    table : array (TABLE_ROWS, N + 1)
+        Written: both shapes at the nodes, their weighted sums from the motor to each node and from
+        each node to the joint (a difference of the former would be lost in rounding where friction
+        is great), and the nodes' weights.
     places : array (N + 1,)
         The nodes' places along the wire, from 0 at the motor to 1 at the joint.
     exponents : array (N + 1,)
@@ -57,22 +60,29 @@ def tabulate(table: Array, places: Array, exponents: Array, falling: float, risi
     for i in range(nodes):
         weight = 0.5 * (places[min(i + 1, nodes - 1)] - places[max(i - 1, 0)])
         table[FALLING, i] = math.exp(-falling * exponents[i])
-        table[RISING, i] = math.exp(rising * exponents[i])
+        if rising == falling:
+            table[RISING, i] = 1.0 / table[FALLING, i]
+        else:
+            table[RISING, i] = math.exp(rising * exponents[i])
         fallen += weight * table[FALLING, i]
         risen += weight * table[RISING, i]
         table[FALLING_SUM, i] = fallen
         table[RISING_SUM, i] = risen
         table[WEIGHT, i] = weight
+    fallen, risen = 0.0, 0.0
+    for i in range(nodes - 1, -1, -1):
+        fallen += table[WEIGHT, i] * table[FALLING, i]
+        risen += table[WEIGHT, i] * table[RISING, i]
+        table[FALLING_REST, i] = fallen
+        table[RISING_REST, i] = risen
 
 
 @compiled
 def _weight_behind(table: Array, shape: int, end: int, count: int) -> float:
     """Sum of the weighted shape over the `count` nodes next to an end."""
-    sums = table[FALLING_SUM + shape]
     if end == MOTOR_END:
-        return sums[count - 1]
-    last = len(sums) - 1
-    return sums[last] if count > last else sums[last] - sums[last - count]
+        return table[FALLING_SUM + shape, count - 1]
+    return table[FALLING_REST + shape, table.shape[1] - count]
 
 
 @compiled
@@ -103,7 +113,7 @@ def moved(
         Not changed.
     wire : int
         Where the wire's states begin.
-    table : array (5, N + 1)
+    table : array (TABLE_ROWS, N + 1)
     end : int
         `MOTOR_END` or `JOINT_END`.
     force : float
@@ -247,6 +257,28 @@ def spread(x: Array, wire: int, table: Array) -> None:
 
 
 @compiled
+def sliding_load(x: Array, wire: int, table: Array) -> float:
+    """Mean tension in N of a wire that slides as a whole; 0 for any other."""
+    for end in range(2):
+        if int(x[wire + COUNT + end]) == table.shape[1]:
+            shape = int(x[wire + SHAPE + end])
+            return x[wire + AMPLITUDE + end] * table[FALLING_REST + shape, 0]
+    return 0.0
+
+
+@compiled
+def slide_on(x: Array, wire: int, table: Array, load: float) -> None:
+    """Go over to less steep shapes with a wire that slides as a whole and keeps its mean tension.
+
+    All of it slips: see `relax`.
+    """
+    for end in range(2):
+        if int(x[wire + COUNT + end]) == table.shape[1]:
+            shape = int(x[wire + SHAPE + end])
+            x[wire + AMPLITUDE + end] = load / table[FALLING_REST + shape, 0]
+
+
+@compiled
 def relax(x: Array, wire: int, table: Array, work: Array) -> None:
     """Let a spread wire slip where its tension is steeper than friction can now hold.
 
@@ -259,7 +291,7 @@ def relax(x: Array, wire: int, table: Array, work: Array) -> None:
     ----------
     x : array (states,)
     wire : int
-    table : array (5, N + 1)
+    table : array (TABLE_ROWS, N + 1)
         With the new shapes.
     work : array (3, N + 1)
         Overwritten.
@@ -285,7 +317,28 @@ def relax(x: Array, wire: int, table: Array, work: Array) -> None:
         i = 0
         for b in range(blocks):
             size = int(work[2, b])
+            amplitude = work[0, b] / work[1, b]
+            for j in range(i, i + size if size > 1 else i):
+                x[wire + NODES + j] = amplitude * table[shape, j]
             if size > 1:
-                for j in range(i, i + size):
-                    x[wire + NODES + j] = work[0, b] / work[1, b] * table[shape, j]
+                _keep_as_region(x, wire, nodes, shape, i, size, amplitude)
             i += size
+
+
+@compiled
+def _keep_as_region(
+    x: Array, wire: int, nodes: int, shape: int, first: int, size: int, amplitude: float
+) -> None:
+    """Take a stretch that has slipped for the region of an end; what it overlaps is none now."""
+    last = first + size
+    for end in range(2):
+        count = int(x[wire + COUNT + end])
+        begin = 0 if end == MOTOR_END else nodes - count
+        if first < begin + count and begin < last:
+            x[wire + COUNT + end] = 0.0
+    if first > 0 and last < nodes:
+        return
+    end = MOTOR_END if first == 0 else JOINT_END
+    x[wire + COUNT + end] = size
+    x[wire + SHAPE + end] = shape
+    x[wire + AMPLITUDE + end] = amplitude

@@ -33,6 +33,8 @@ class TrackingTrial:
         True bending angle.
     command : ndarray, shape (N, J)
         Joint-equivalent motor command.
+    tension : ndarray, shape (N, J, 2)
+        True tensions of the positive and the negative wire at the motor, N.
     rmse : float
         Of all joints in the signal's steady part.
     """
@@ -41,7 +43,13 @@ class TrackingTrial:
     desired: NDArray[np.float64]
     bending: NDArray[np.float64]
     command: NDArray[np.float64]
+    tension: NDArray[np.float64]
     rmse: float
+
+    def peak(self, begin: float, end: float) -> float:
+        """Largest error in rad of any joint from `begin` to `end` in s."""
+        inside = (self.time >= begin) & (self.time <= end)
+        return float(np.max(np.abs(self.bending[inside] - self.desired[inside, None])))
 
 
 def run_tracking_trial(
@@ -83,9 +91,10 @@ def run_tracking_trial(
     angles, velocities = signal(time)
     bending = np.empty((time.size, joints))
     command = np.empty((time.size, joints))
+    tension = np.empty((time.size, joints, 2))
     for k, now in enumerate(time.tolist()):
         sample = rig.sample
-        bending[k] = sample.bending_true
+        bending[k], tension[k] = sample.bending_true, sample.tension
         desired, velocity = motion.follow([angles[k]] * joints, [velocities[k]] * joints, TICK)
         measured = None
         if k % tracked_every == 0:
@@ -98,4 +107,4 @@ def run_tracking_trial(
     steady = time >= signal.steady[0]
     wanted = np.repeat(angles[steady, None], joints, axis=1)
     rmse = tracking_rmse(wanted, bending[steady])
-    return TrackingTrial(time, angles, bending, command, rmse)
+    return TrackingTrial(time, angles, bending, command, tension, rmse)

@@ -10,6 +10,7 @@ TABLES: tuple[str, ...] = (
     'nearest_class',
     'colon_shapes',
     'compensators',
+    'reach',
     'changing_tube',
     'calibration_time',
     'real_sizes',
