@@ -181,7 +181,7 @@ class AnyInterleaving(RuleBasedStateMachine):
 
     def start_driver(self):
         self.driver = ShaftMotion(COMMANDS, LIMITS)
-        self.turned = self.obeyed = self.heard_at = self.now
+        self.turned = self.obeyed = self.heard_at = self.came = self.now
         self.valid, self.heard = '', None
 
     def run(self, milliseconds):
@@ -227,12 +227,17 @@ class AnyInterleaving(RuleBasedStateMachine):
             return
         self.notice_what_ends_the_word()
         before, measured, now = self.driver.goal, tuple(self.shaft), self.now * MS
-        if self.driver.command(session, stamp, tuple(position), (), now, doubt) is None:
+        refusal = self.driver.command(session, stamp, tuple(position), (), now, doubt)
+        # A stream that paused may go on as fast as the bound, by its stamps.
+        period = max(1, stamp // MS - self.came)
+        if refusal in (None, Refusal.RATE):
+            self.came = max(self.came, stamp // MS)
+        if refusal is None:
             assert session, 'a command of no session was obeyed'
             assert session == self.valid, "a command was obeyed on nobody's word"
             assert not doubt
             self.obeyed = self.now
-            self.judge(before, measured, max(1, self.now - self.turned))
+            self.judge(before, measured, period)
 
     def notice_what_ends_the_word(self):
         if self.now - self.turned > 100 or self.now - self.heard_at > 200:
