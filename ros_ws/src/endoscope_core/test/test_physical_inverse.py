@@ -19,6 +19,7 @@ from endoscope_core.control import (
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.signals import non_periodic_signal, periodic_signal
+from endoscope_core.trials.never_seen_tube import within_reach
 from endoscope_core.trials.tracking_trial import run_tracking_trial
 
 LIMITS = shipped_limits()
@@ -29,12 +30,6 @@ PERIODIC, NON_PERIODIC = periodic_signal(3.2 * np.pi), non_periodic_signal(12.0)
 
 def plant(joint):
     return PlantDescription(joints={'bend_x': joint})
-
-
-def within_reach(signal, joint):
-    """The signal, scaled to 80 % of the reach where that is less."""
-    angle, _ = signal(np.arange(0.0, signal.duration, TICK))
-    return signal.scaled(min(1.0, 0.8 * reach(joint).high / np.max(np.abs(angle))))
 
 
 def commands(inverse, angle, velocity):
@@ -53,7 +48,7 @@ def simulated(joint, command):
 @pytest.mark.parametrize('exponent', [0.5, 0.9, 1.4])
 def test_a_plant_that_is_known_is_followed(exponent, signal):
     joint = replace(JOINT, capstan_exponent=exponent)
-    signal = within_reach(signal, joint)
+    signal = within_reach(signal, plant(joint))
     time = np.arange(0.0, signal.steady[1], TICK)
     angle, velocity = signal(time)
     steady = time >= signal.steady[0]
@@ -138,7 +133,7 @@ def test_modes_change_while_it_moves_without_a_jump():
 
 
 def test_the_whole_chain_follows_with_a_plant_that_is_ten_percent_off():
-    signal = within_reach(NON_PERIODIC, JOINT)
+    signal = within_reach(NON_PERIODIC, plant(JOINT))
     none = run_tracking_trial(plant(JOINT), signal, FeedforwardLaw(), False, 0).rmse
     left = []
     for exponent in (0.81, 0.9, 0.99):

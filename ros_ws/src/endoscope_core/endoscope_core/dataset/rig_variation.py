@@ -182,8 +182,8 @@ def configuration_of_size(
     try:
         if excess(0.0) > 0.0 or excess(MOST_BENT) < 0.0:
             return None
+        bend = float(brentq(excess, 0.0, MOST_BENT, xtol=1e-4, rtol=1e-4))
     except NoLoopError:
         return None
-    bend = float(brentq(excess, 0.0, MOST_BENT, xtol=1e-4, rtol=1e-4))
     plant = in_tube(instrument, bend, unevenness)
     return TubeConfiguration(plant, bend, unevenness, tuple(backlash_sizes(plant).tolist()))

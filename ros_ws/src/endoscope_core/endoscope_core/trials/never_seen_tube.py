@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.classifier.classification import Classifier, UnseenTensionError
+from endoscope_core.control import reach
 from endoscope_core.dataset import configuration_of_size, random_instrument, record_calibration
 from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS
 from endoscope_core.identification.law_choice import CalibrationFindings
@@ -17,6 +18,7 @@ from endoscope_core.physics import PlantDescription
 from endoscope_core.signals import Signal
 from endoscope_core.trials.tracking_trial import TrackingTrial
 
+SHARE_OF_REACH = 0.8
 SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG = 42.0, 98.0
 # Data sets draw from the seed alone; this keeps tubes judged on apart from tubes learnt from.
 _UNSEEN = 424_243
@@ -79,6 +81,13 @@ def calibrate(tube: NeverSeenTube, classifier: Classifier) -> CalibrationFinding
     except UnseenTensionError:
         return CalibrationFindings(plants=plants)
     return CalibrationFindings(verdict.class_deg, verdict.expected_size, plants)
+
+
+def within_reach(signal: Signal, plant: PlantDescription) -> Signal:
+    """A signal, scaled to 80 % of what every joint of a plant reaches where that is less."""
+    angle, _ = signal(np.arange(0.0, signal.duration, 0.01))
+    ends = [(-reached.low, reached.high) for reached in map(reach, plant.joints.values())]
+    return signal.scaled(min(1.0, SHARE_OF_REACH * np.min(ends) / float(np.max(np.abs(angle)))))
 
 
 def backlash_left(trial: TrackingTrial, signal: Signal) -> float:

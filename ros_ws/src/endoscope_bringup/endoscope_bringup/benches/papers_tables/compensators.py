@@ -8,7 +8,6 @@ TITLE = (
     'RMSE left on tubes never seen in fitting, % of the uncompensated; signals scaled to 80 % of '
     'the reach of the tube where that is less'
 )
-_SHARE_OF_REACH = 0.8
 _LARGEST_PEAK_DEG = 10.0
 _FEEDFORWARD = (
     ('bouc_wen', 'class', '24 to 27', 20.0),
@@ -36,12 +35,11 @@ def rows(settings: PapersBench) -> list[Row]:
         AdaptiveBacklashController,
         FeedforwardLaw,
         RecursiveHysteresisController,
-        reach,
     )
     from endoscope_core.errors import EndoscopeError
     from endoscope_core.identification.law_choice import LawChoice
     from endoscope_core.signals import non_periodic_signal, periodic_signal
-    from endoscope_core.trials.never_seen_tube import calibrate, never_seen_tube
+    from endoscope_core.trials.never_seen_tube import calibrate, never_seen_tube, within_reach
     from endoscope_core.trials.tracking_trial import run_tracking_trial
 
     classifier, choice = load_classifier(), LawChoice(2)
@@ -57,11 +55,8 @@ def rows(settings: PapersBench) -> list[Row]:
     for number in range(settings.tubes):
         tube = never_seen_tube(settings.seed, number)
         findings = calibrate(tube, classifier)
-        reaches = [reach(joint) for joint in tube.plant.joints.values()]
-        furthest = _SHARE_OF_REACH * min(min(-r.low, r.high) for r in reaches)
         for whole in (periodic_signal(), non_periodic_signal()):
-            angle, _ = whole(np.arange(0.0, whole.duration, 0.01))
-            signal = whole.scaled(min(1.0, furthest / float(np.max(np.abs(angle)))))
+            signal = within_reach(whole, tube.plant)
             none = run_tracking_trial(tube.plant, signal, FeedforwardLaw(), False, tube.noise).rmse
             for mode, by, feedback, paper, aim in schemes:
                 try:

@@ -1,40 +1,23 @@
 """Backlash sizes of a real rig from its tensions alone, each configuration left out in turn."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 
 from endoscope_bringup.benches.papers_tables.row import PapersBench, Row
 
 TITLE = 'Real recordings: backlash size from tension alone, leave one configuration out'
 
-_PERIOD = (0.5 * np.pi, 2.5 * np.pi)
-_TIME, _DESIRED, _ACTUAL, _POSITIVE, _NEGATIVE = 0, 1, 3, 4, 5
-
 
 def rows(settings: PapersBench) -> list[Row]:
     """One row, or none where the recordings are not at hand."""
-    from endoscope_core.metrics import width_at_mid_height
-    from endoscope_core.metrics.tension_loop import leave_one_out_errors, tension_loop_width
+    from endoscope_core.metrics.tension_loop import leave_one_out_errors
+    from endoscope_core.trials.real_recordings import real_recordings
 
-    shared = os.environ.get('ENDOSCOPE_SHARED')
-    folder = Path(shared or Path(__file__).parents[7] / 'shared') / 'data' / 'kaist'
-    paths = sorted(folder.glob('*.txt'))
-    if not paths:
-        settings.report(f'no recordings in {folder}; set ENDOSCOPE_SHARED')
+    recordings = real_recordings()
+    if not recordings:
+        settings.report('no recordings at hand; set ENDOSCOPE_SHARED')
         return []
-    sizes, widths = [], []
-    for path in paths:
-        table = np.loadtxt(path, delimiter=',')
-        # The rows repeat each reading of a slower clock.
-        table = table[np.diff(table[:, _TIME], prepend=-1.0) != 0.0]
-        first, last = np.searchsorted(table[:, _TIME], _PERIOD)
-        loop = table[first:last]
-        desired = loop[:, _DESIRED]
-        sizes.append(width_at_mid_height(desired, loop[:, _ACTUAL]))
-        widths.append(tension_loop_width(desired, loop[:, _POSITIVE], loop[:, _NEGATIVE]))
-    errors = leave_one_out_errors(widths, sizes)
+    sizes = [float(np.rad2deg(recording.backlash_size)) for recording in recordings]
+    errors = leave_one_out_errors([recording.tension_width for recording in recordings], sizes)
     note = 'errors of each: ' + ', '.join(f'{e:+.1f}' for e in errors)
     return [
         Row(
