@@ -73,15 +73,21 @@ def hold_on_ticks(times: Array, values: Array, ticks: int, tick: float = TICK) -
         raise ValueError('the stamps of the commands decrease')
     edges = tick * np.arange(ticks + 1)
     index = np.clip(np.searchsorted(times, edges, side='right') - 1, 0, None)
-    held = values[index]
+    result = values[index[:-1]]
     # Only ticks with a change inside need the integral; elsewhere the held value is exact.
-    later = np.clip(np.searchsorted(times, edges[1:], side='left') - 1, 0, None)
-    result = held[:-1].copy()
-    for n in np.flatnonzero(later > index[:-1]):
-        inside = np.arange(index[n] + 1, later[n] + 1)
-        corners = np.concatenate([[edges[n]], times[inside], [edges[n + 1]]])
-        pieces = values[np.concatenate([[index[n]], inside])]
-        result[n] = np.diff(corners) @ pieces / tick
+    changes = times[(times > 0.0) & (times < edges[-1])]
+    tick_of_change = np.searchsorted(edges, changes, side='right') - 1
+    inside = changes > edges[tick_of_change]
+    divided = np.unique(tick_of_change[inside])
+    corners = np.sort(np.concatenate([edges[divided], edges[divided + 1], changes[inside]]))
+    pieces = np.diff(corners)
+    tick_of_piece = np.searchsorted(edges, corners[:-1], side='right') - 1
+    # Between two divided ticks that are no neighbours lies what is none of either.
+    within = np.isin(tick_of_piece, divided) & (pieces > 0.0)
+    within &= corners[1:] <= edges[np.minimum(tick_of_piece + 1, ticks)]
+    held = values[np.clip(np.searchsorted(times, corners[:-1], side='right') - 1, 0, None)]
+    result[divided] = 0.0
+    np.add.at(result, tick_of_piece[within], (pieces[:, None] * held)[within] / tick)
     return result
 
 
