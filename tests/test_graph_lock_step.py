@@ -43,7 +43,7 @@ def test_two_runs_are_the_same_to_the_last_bit():
 
 def test_another_seed_gives_other_noise():
     def wires(seed):
-        with SimulatedGraph(overrides={'load_cells': {'seed': seed}}) as graph:
+        with SimulatedGraph(overrides={'motor_driver': {'seed': seed}}) as graph:
             samples = graph.listen('wires/measured_js', WIRES)
             graph.advance(0.05)
             return samples

@@ -122,8 +122,8 @@ def test_every_parameter_is_listed():
 def test_the_parameters_are_those_that_the_nodes_declare(nodes):
     rows = [line.split('`') for line in parameter_table.rows()]
     of_process = {
-        *('use_sim_time', 'tick_rate', 'rig_file', 'realtime_priority', 'cores'),
-        'start_type_description_service',
+        *('use_sim_time', 'tick_rate', 'rig_file', 'plant_file', 'seed', 'realtime_priority'),
+        *('cores', 'start_type_description_service'),
     }
     for name, node in nodes.items():
         declared = {p for p in node._parameters if not p.startswith('qos_overrides')} - of_process

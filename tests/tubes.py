@@ -7,8 +7,6 @@ import numpy as np
 from endoscope_core.dataset import configuration_of_size, random_instrument
 from endoscope_core.physics import save_plant
 
-NODES_WITH_A_PLANT = ('motor_driver', 'load_cells', 'em_tracker')
-
 
 def tube_of_size(folder, size_deg, seed):
     """Write a plant file; parameters by node that make the simulated slave that plant.
@@ -25,4 +23,5 @@ def tube_of_size(folder, size_deg, seed):
 def slave_of(plant, path):
     """Write a plant file; parameters by node that make the simulated slave that plant."""
     save_plant(plant, path)
-    return {node: {'plant_file': str(path)} for node in NODES_WITH_A_PLANT}
+    # The first node of a process reads it for all.
+    return {'motor_driver': {'plant_file': str(path)}}

@@ -28,6 +28,14 @@ def test_what_a_file_does_not_say_is_as_shipped(tmp_path):
         ('motors: {speed: fast}', "motors.speed is 'fast': give a number"),
         ('motors: 3', 'motors has to be a mapping, not 3'),
         ('joints: {drive: 9.0}', 'beyond motors.reach 1.6'),
+        (
+            'devices: {motors: dynamicsel}',
+            "motors is 'dynamicsel': give one of simulated, dynamixel",
+        ),
+        ('devices: {motor: simulated}', 'unknown key motor: did you mean motors'),
+        ('simulation: {seed: -1}', 'simulation.seed is -1: give a whole number from 0 on'),
+        ('simulation: {seed: 1.5}', 'simulation.seed is 1.5: give a whole number'),
+        ('simulation: {plant: 3}', 'simulation.plant is 3: give a text'),
         ('- 1', 'has to be a mapping'),
         ('motors: {speed: 1.0, speed: 2.0}', 'speed'),
     ],
@@ -36,6 +44,13 @@ def test_what_is_wrong_is_named(tmp_path, text, words):
     with pytest.raises(RigFileError, match=r'rig\.yaml') as refused:
         load_rig(written(tmp_path, text))
     assert words in str(refused.value)
+
+
+def test_a_plant_is_named_as_seen_from_the_rig_file(tmp_path):
+    own = load_rig(written(tmp_path, 'simulation: {plant: tubes/tight.yaml}'))
+    assert own.simulation.plant == str(tmp_path / 'tubes' / 'tight.yaml')
+    assert load_rig().simulation.plant == ''
+    assert load_rig().devices.motors == 'simulated'
 
 
 def test_a_file_that_is_not_there_is_said():

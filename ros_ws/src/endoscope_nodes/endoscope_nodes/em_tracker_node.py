@@ -16,6 +16,7 @@ from endoscope_core.kinematics import (
     tip_pose,
 )
 from endoscope_core.physics import SensorModel, recording_faults
+from endoscope_core.rig import TRACKER_DEVICES
 from endoscope_devices.em_tracker import (
     AuroraTracker,
     RegistrationWindow,
@@ -30,7 +31,6 @@ from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import JOINTS, SIMULATED_BENDING, SLAVE_MEASURED, TRACKER_POSE
 from endoscope_nodes.parameters import ParameterError, parameter
-from endoscope_nodes.plant_parameter import load_plant_parameter
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.sampling import SampleClock
@@ -40,7 +40,9 @@ from endoscope_nodes.sampling import SampleClock
 class EmTrackerParameters:
     """Parameters of the EM tracker."""
 
-    device: str = parameter('simulated', 'what is read', choices=('simulated', 'aurora'))
+    device: str = parameter(
+        '', 'what is read; empty for what the rig file says', choices=('', *TRACKER_DEVICES)
+    )
     port: str = parameter('', 'serial port of an aurora')
     tool: int = parameter(
         1, 'which of the sensors that are plugged in, in the order of their ports', low=1, high=32
@@ -62,10 +64,6 @@ class EmTrackerParameters:
     registration_file: str = parameter(
         '', 'where the pose of the straight instrument is kept; empty to forget it'
     )
-    plant_file: str = parameter(
-        '', 'plant.yaml with the noise and rate of the simulated tracker; empty for the nominal one'
-    )
-    seed: int = parameter(3, 'seed of the simulated sensor noise', low=0)
     section_length: float = parameter(
         0.02, 'length of the bending section', unit='m', low=0.001, high=0.5
     )
@@ -97,30 +95,31 @@ class EmTrackerNode(EndoscopeNode):
         self._pose.header.frame_id = p.base_frame
         self._poses = self.create_publisher(PoseStamped, TRACKER_POSE, SENSOR_OFFERED)
         self._measured = JointPublisher(self, SLAVE_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
-        if p.device == 'simulated':
-            plant = load_plant_parameter('em_tracker', p.plant_file)
-            self._sensors = SensorModel(plant.sensors, p.seed)
+        device = p.device or self.rig.devices.tracker
+        if device == 'simulated':
+            plant, self._seed = runtime.plant, runtime.seed_of(2)
+            self._sensors = SensorModel(plant.sensors, self._seed)
             self._faults = recording_faults(plant)
             self._first_ns: int | None = None
             self._sampling = SampleClock(plant.sensors.tracker_rate)
             JointSubscription(self, SIMULATED_BENDING, JOINTS, self._on_bending, LOCK_STEP)
         else:
-            self._tracker = self._connect(p)
+            self._tracker = self._connect(device, p)
             self.ticker.add(self._on_tick)
         self.create_service(Trigger, '~/register_straight', self._on_register)
-        self.diagnostics.add('tracker', self._report, p.device)
+        self.diagnostics.add('tracker', self._report, device)
 
     def _on_parameters(self, parameters: EmTrackerParameters) -> None:
         self._settings = parameters
 
-    def _connect(self, p: EmTrackerParameters) -> AuroraTracker:
+    def _connect(self, device: str, p: EmTrackerParameters) -> AuroraTracker:
         if self.ticker.simulated:
             raise ParameterError(
-                f"em_tracker: parameter 'device' is {p.device!r}, which needs real time; "
+                f'em_tracker: the device is {device!r}, which needs real time; '
                 "give 'simulated', or leave 'use_sim_time' out"
             )
         if not p.port:
-            raise ParameterError(f"em_tracker: parameter 'port' is empty: {p.device} needs it")
+            raise ParameterError(f"em_tracker: parameter 'port' is empty: {device} needs it")
         if p.registration_file and Path(p.registration_file).exists():
             try:
                 self._registration = load_registration(p.registration_file)
@@ -138,9 +137,7 @@ class EmTrackerNode(EndoscopeNode):
         if self._first_ns is None:
             self._first_ns = sample.stamp_ns
         since = (sample.stamp_ns - self._first_ns) * 1e-9
-        reading = self._faults.spoilt(
-            self._sensors.bending(sample.position), since, self._settings.seed
-        )
+        reading = self._faults.spoilt(self._sensors.bending(sample.position), since, self._seed)
         if np.hypot(*reading) >= np.pi:
             self._out_of_reach += 1
             return

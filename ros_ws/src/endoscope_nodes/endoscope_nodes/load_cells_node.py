@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from std_srvs.srv import Trigger
 
 from endoscope_core.physics import SensorModel
+from endoscope_core.rig import LOAD_CELL_DEVICES
 from endoscope_devices.load_cells import (
     CONNECTIONS,
     ModbusLoadCells,
@@ -27,7 +28,6 @@ from endoscope_nodes.names import (
     WIRES_MEASURED,
 )
 from endoscope_nodes.parameters import ParameterError, parameter
-from endoscope_nodes.plant_parameter import load_plant_parameter
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.sampling import SampleClock
@@ -37,17 +37,13 @@ from endoscope_nodes.sampling import SampleClock
 class LoadCellsParameters:
     """Parameters of the load cells."""
 
-    device: str = parameter('simulated', 'what is read', choices=('simulated', *CONNECTIONS))
+    device: str = parameter(
+        '', 'what is read; empty for what the rig file says', choices=('', *LOAD_CELL_DEVICES)
+    )
     port: str = parameter('', 'serial port of a modbus_rtu device, HOST:PORT of a modbus_tcp one')
     calibration_file: str = parameter(
         '', 'YAML file with registers, sensitivity, sign and zero of each cell of a real device'
     )
-    plant_file: str = parameter(
-        '',
-        'plant.yaml with the noise, resolution and rate of the simulated cells; empty for '
-        'the nominal ones',
-    )
-    seed: int = parameter(2, 'seed of the simulated sensor noise', low=0)
     connected: bool = parameter(
         True,
         'false makes the simulated cells fall silent, as an unplugged cable does',
@@ -71,37 +67,36 @@ class LoadCellsNode(EndoscopeNode):
         self._told = ''
         self._cells: ModbusLoadCells | None = None
         self._measured = JointPublisher(self, WIRES_MEASURED, WIRES, ('effort',), SENSOR_OFFERED)
-        if p.device == 'simulated':
-            sensors = load_plant_parameter('load_cells', p.plant_file).sensors
-            self._sensors = SensorModel(sensors, p.seed)
+        device = p.device or self.rig.devices.load_cells
+        if device == 'simulated':
+            sensors = runtime.plant.sensors
+            self._sensors = SensorModel(sensors, runtime.seed_of(1))
             self._sampling = SampleClock(sensors.load_cell_rate)
             JointSubscription(self, SIMULATED_WIRES, WIRES, self._on_wires, LOCK_STEP)
         else:
-            self._cells = self._connect(p)
+            self._cells = self._connect(device, p)
             JointSubscription(self, MOTOR_MEASURED, MOTORS, self._on_shafts, SENSOR_ASKED)
             self.ticker.add(self._on_tick)
         self.create_service(Trigger, '~/tare', self._on_tare)
-        self.diagnostics.add('cells', self._report, p.device)
+        self.diagnostics.add('cells', self._report, device)
 
     def _on_parameters(self, parameters: LoadCellsParameters) -> None:
         self._settings = parameters
 
-    def _connect(self, p: LoadCellsParameters) -> ModbusLoadCells:
+    def _connect(self, device: str, p: LoadCellsParameters) -> ModbusLoadCells:
         if self.ticker.simulated:
             raise ParameterError(
-                f"load_cells: parameter 'device' is {p.device!r}, which needs real time; "
+                f'load_cells: the device is {device!r}, which needs real time; '
                 "give 'simulated', or leave 'use_sim_time' out"
             )
         for name, value in (('port', p.port), ('calibration_file', p.calibration_file)):
             if not value:
-                raise ParameterError(
-                    f"load_cells: parameter '{name}' is empty: {p.device} needs it"
-                )
+                raise ParameterError(f"load_cells: parameter '{name}' is empty: {device} needs it")
         try:
             calibration = apply_saved_tare(
                 tare_path(p.calibration_file), load_calibration(p.calibration_file, WIRES)
             )
-            cells = CONNECTIONS[p.device](p.port, calibration)
+            cells = CONNECTIONS[device](p.port, calibration)
         except DeviceFileError as error:
             raise ParameterError(f"load_cells: parameter 'calibration_file': {error}") from error
         except DeviceError as error:

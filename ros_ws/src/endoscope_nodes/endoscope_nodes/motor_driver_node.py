@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from endoscope_core.rig import MOTOR_DEVICES
 from endoscope_core.safety import (
     CommandLimits,
     MotionLimits,
@@ -32,7 +33,6 @@ from endoscope_nodes.names import (
     WIRES,
 )
 from endoscope_nodes.parameters import ParameterError, parameter
-from endoscope_nodes.plant_parameter import load_plant_parameter
 from endoscope_nodes.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
@@ -43,11 +43,9 @@ from endoscope_nodes.watches import CommandReport, SessionWatch, rivals
 class MotorDriverParameters:
     """Parameters of the motor driver."""
 
-    device: str = parameter('simulated', 'what is driven', choices=('simulated', 'dynamixel'))
-    plant_file: str = parameter(
-        '', 'plant.yaml of the simulated slave; empty for the nominal plant'
+    device: str = parameter(
+        '', 'what is driven; empty for what the rig file says', choices=('', *MOTOR_DEVICES)
     )
-    seed: int = parameter(1, 'seed of the simulated sensor noise', low=0)
 
 
 class MotorDriverNode(EndoscopeNode):
@@ -63,7 +61,7 @@ class MotorDriverNode(EndoscopeNode):
 
     def __init__(self, runtime: Runtime) -> None:
         super().__init__('motor_driver', runtime)
-        p = self._settings = self.parameters(MotorDriverParameters)
+        device = self.parameters(MotorDriverParameters).device or self.rig.devices.motors
         bus = self.parameters(DynamixelParameters)
         facts, timeout_ns = self.rig.motors, self.rig.timeouts.command_ns
         # The allowance of the gate holds for the time of receipt, which jitters, and the shaper
@@ -71,7 +69,9 @@ class MotorDriverNode(EndoscopeNode):
         commands = CommandLimits(facts.reach, 1.25 * facts.speed, facts.entry_step, timeout_ns)
         limits = (facts.reach, facts.speed, facts.acceleration, facts.step)
         self.motion = ShaftMotion(commands, MotionLimits.either_way(len(MOTORS), *limits))
-        self._slave = self._simulated() if p.device == 'simulated' else None
+        self._slave = None
+        if device == 'simulated':
+            self._slave = SimulatedSlave(runtime.plant, MOTORS, runtime.seed_of(0))
         self._device: MotorDevice = self._slave or self._dynamixel(bus)
         try:
             self._device.open()
@@ -102,13 +102,8 @@ class MotorDriverNode(EndoscopeNode):
             on_malformed=lambda reason: self.motion.gate.refuse(Refusal.MALFORMED, reason),
         )
         self.diagnostics.add('commands', CommandReport(self.motion.gate, self._session.leave))
-        self.diagnostics.add('device', self._report_device, p.device)
+        self.diagnostics.add('device', self._report_device, device)
         self.ticker.add(self._on_tick)
-
-    def _simulated(self) -> SimulatedSlave:
-        p = self._settings
-        plant = load_plant_parameter('motor_driver', p.plant_file)
-        return SimulatedSlave(plant, MOTORS, p.seed)
 
     def _dynamixel(self, parameters: DynamixelParameters) -> MotorDevice:
         if self.ticker.simulated:

@@ -23,6 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import Rig, RigFileError, load_rig
 from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
 from endoscope_nodes.endoscope_node import EndoscopeNode
@@ -40,6 +41,7 @@ from endoscope_nodes.real_time import (
     start_in_the_background,
     threads_of_this_process,
 )
+from endoscope_nodes.simulated_plant import load_slave
 from endoscope_nodes.stop_signals import StopSignals
 from endoscope_nodes.ticker import Ticker
 from endoscope_nodes.watches import MeasuredPose
@@ -62,7 +64,13 @@ class BeatParameters:
         1000, 'beats of this process in real time; a divisor of 1000', unit='Hz', low=10, high=1000
     )
     rig_file: str = parameter(
-        '', 'rig.yaml with gear, limits and time-outs; what it does not say is as shipped'
+        '', 'rig.yaml with gear, limits, time-outs and devices; what it does not say is as shipped'
+    )
+    plant_file: str = parameter(
+        '', 'plant.yaml of the simulated slave and its sensors; empty for that of the rig file'
+    )
+    seed: int = parameter(
+        -1, 'seed of the simulated sensor noise; -1 for that of the rig file', low=-1
     )
 
 
@@ -132,6 +140,9 @@ class Runtime(ClosedOnExit):
         self._pose: MeasuredPose | None = None
         self._asked_pose: list[EndoscopeNode] = []
         self._rig = rig
+        self._plant: PlantDescription | None = None
+        self._plant_source = '', ''
+        self._seed = 0
         self._real_time = RealTimeParameters()
         self._overrides = overrides or {}
         self._exit_codes: list[int] = []
@@ -214,6 +225,13 @@ class Runtime(ClosedOnExit):
                 self._rig = load_rig(given.rig_file or None)
             except RigFileError as error:
                 raise ParameterError(f"{node.get_name()}: parameter 'rig_file': {error}") from error
+        simulation = self._rig.simulation
+        self._plant_source = (
+            (f"{node.get_name()}: parameter 'plant_file'", given.plant_file)
+            if given.plant_file
+            else ('simulation.plant of the rig file', simulation.plant)
+        )
+        self._seed = simulation.seed if given.seed < 0 else given.seed
         return 1000 // rate
 
     @property
@@ -222,6 +240,23 @@ class Runtime(ClosedOnExit):
         if self._rig is None:
             raise RuntimeError('no node has been added yet')
         return self._rig
+
+    @property
+    def plant(self) -> PlantDescription:
+        """The simulated slave, read when it is asked for first.
+
+        Raises
+        ------
+        ParameterError
+            See :func:`load_slave`.
+        """
+        if self._plant is None:
+            self._plant = load_slave(*self._plant_source)
+        return self._plant
+
+    def seed_of(self, device: int) -> int:
+        """Seed of the noise of a simulated device; each has its own number."""
+        return self._seed + device
 
     @property
     def ticker(self) -> Ticker:

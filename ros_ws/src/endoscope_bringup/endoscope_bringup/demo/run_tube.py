@@ -98,15 +98,12 @@ class _GraphSession:
         self, plant_file: Path, bag: Path, domain: int, seed: int, real_time: bool
     ) -> None:
         arguments = ['--ros-args', '-p', f'use_sim_time:={str(not real_time).lower()}']
-        slave = {'plant_file': str(plant_file), 'seed': seed}
         self._runtime = Runtime(
             arguments,
             context=Context(),
             domain_id=domain,
             overrides={
-                'motor_driver': slave,
-                'load_cells': slave,
-                'em_tracker': slave,
+                'motor_driver': {'plant_file': str(plant_file), 'seed': seed},
                 'recorder': {'bag': str(bag)},
             },
         )

@@ -1,22 +1,32 @@
-"""What stands on the table: gears, limits and time-outs, said once for every node."""
+"""What stands on the table: gears, limits, time-outs and devices, said once for every node."""
 
 from endoscope_core.rig.facts import (
+    LOAD_CELL_DEVICES,
+    MOTOR_DEVICES,
+    TRACKER_DEVICES,
+    DeviceFacts,
     HandleFacts,
     JointFacts,
     MotorFacts,
     Rig,
     RigFileError,
+    SimulationFacts,
     Timeouts,
     load_rig,
     shipped_rig,
 )
 
 __all__ = [
+    'LOAD_CELL_DEVICES',
+    'MOTOR_DEVICES',
+    'TRACKER_DEVICES',
+    'DeviceFacts',
     'HandleFacts',
     'JointFacts',
     'MotorFacts',
     'Rig',
     'RigFileError',
+    'SimulationFacts',
     'Timeouts',
     'load_rig',
     'shipped_rig',

@@ -1,8 +1,8 @@
-"""rig.yaml: gear, limits and time-outs of a rig, said once for every node."""
+"""rig.yaml: gear, limits, time-outs and devices of a rig, said once for every node."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -13,12 +13,48 @@ from endoscope_core.strict_yaml import YamlError, load_yaml
 SHIPPED = Path(__file__).with_name('rig.yaml')
 
 
+MOTOR_DEVICES = ('simulated', 'dynamixel')
+LOAD_CELL_DEVICES = ('simulated', 'modbus_rtu', 'modbus_tcp')
+TRACKER_DEVICES = ('simulated', 'aurora')
+
+
 class RigFileError(EndoscopeError, ValueError):
     """A rig file that cannot be used; the message names the file, the key and what to do."""
 
 
 def _fact(low: float, high: float) -> Any:
-    return field(metadata={'low': low, 'high': high})
+    """A number within bounds."""
+
+    def checked(value: Any) -> float:
+        wanted = f'give a number from {low:g} to {high:g}'
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError(wanted)
+        if not (math.isfinite(value) and low <= value <= high):
+            raise ValueError(wanted)
+        return float(value)
+
+    return field(metadata={'checked': checked})
+
+
+def _choice(*choices: str) -> Any:
+    def checked(value: Any) -> str:
+        if value not in choices:
+            raise ValueError(f'give one of {", ".join(choices)}')
+        return str(value)
+
+    return field(metadata={'checked': checked})
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError('give a text')
+    return value
+
+
+def _count(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ValueError('give a whole number from 0 on')
+    return value
 
 
 @dataclass(frozen=True)
@@ -136,6 +172,37 @@ class HandleFacts:
 
 
 @dataclass(frozen=True)
+class DeviceFacts:
+    """What stands on the table and what is simulated.
+
+    Attributes
+    ----------
+    motors, load_cells, tracker
+        One of `MOTOR_DEVICES`, `LOAD_CELL_DEVICES` and `TRACKER_DEVICES`.
+    """
+
+    motors: str = _choice(*MOTOR_DEVICES)
+    load_cells: str = _choice(*LOAD_CELL_DEVICES)
+    tracker: str = _choice(*TRACKER_DEVICES)
+
+
+@dataclass(frozen=True)
+class SimulationFacts:
+    """The simulated slave.
+
+    Attributes
+    ----------
+    plant
+        Path of its plant.yaml; empty for the nominal plant.
+    seed
+        Of the noise of its sensors.
+    """
+
+    plant: str = field(metadata={'checked': _text})
+    seed: int = field(metadata={'checked': _count})
+
+
+@dataclass(frozen=True)
 class Rig:
     """A rig; see the classes of its parts.
 
@@ -150,6 +217,8 @@ class Rig:
     timeouts: Timeouts
     tension: TensionFacts
     handle: HandleFacts
+    devices: DeviceFacts
+    simulation: SimulationFacts
 
     def __post_init__(self) -> None:
         shaft = self.joints.drive * self.joints.gear
@@ -177,15 +246,16 @@ def load_rig(path: str | Path | None = None) -> Rig:
     shipped = _content(SHIPPED)
     parts = {f.name: f.type for f in fields(Rig)}
     _check_keys(own, parts, f'rig file {path}')
+    made = {
+        name: _part(kind, shipped[name], own.get(name), f'rig file {path}: {name}')
+        for name, kind in parts.items()
+    }
+    if path is not None and made['simulation'].plant:
+        # Where a file is named, it is named as seen from the file that names it.
+        plant = Path(path).parent / made['simulation'].plant
+        made['simulation'] = replace(made['simulation'], plant=str(plant))
     try:
-        return Rig(
-            **{
-                name: _part(kind, shipped[name], own.get(name), f'rig file {path}: {name}')
-                for name, kind in parts.items()
-            }
-        )
-    except RigFileError:
-        raise
+        return Rig(**made)
     except ValueError as error:
         raise RigFileError(f'rig file {path}: {error}') from error
 
@@ -211,19 +281,15 @@ def _part(kind: Any, shipped: Mapping[str, Any], own: Any, where: str) -> Any:
         own = {}
     if not isinstance(own, Mapping):
         raise RigFileError(f'{where} has to be a mapping, not {own!r}')
-    known = {f.name: f.metadata for f in fields(kind)}
+    known = {f.name: f.metadata['checked'] for f in fields(kind)}
     _check_keys(own, known, where)
     values = {}
-    for name, bounds in known.items():
+    for name, checked in known.items():
         value = own.get(name, shipped[name])
-        low, high = bounds['low'], bounds['high']
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise RigFileError(f'{where}.{name} is {value!r}: give a number')
-        if not (math.isfinite(value) and low <= value <= high):
-            raise RigFileError(
-                f'{where}.{name} is {value!r}: give a number from {low:g} to {high:g}'
-            )
-        values[name] = float(value)
+        try:
+            values[name] = checked(value)
+        except ValueError as error:
+            raise RigFileError(f'{where}.{name} is {value!r}: {error}') from error
     return kind(**values)
 
 

@@ -1,4 +1,4 @@
-"""The plant that the nodes of a simulated slave share, named by a parameter."""
+"""The plant that the nodes of a simulated slave share."""
 
 from endoscope_core.physics import PlantDescription, PlantFileError, load_plant
 from endoscope_core.physics.effect import Stage
@@ -7,8 +7,15 @@ from endoscope_nodes.names import JOINTS
 from endoscope_nodes.parameters import ParameterError
 
 
-def load_plant_parameter(node_name: str, path: str) -> PlantDescription:
-    """Load the plant file of a parameter; an empty path is the nominal plant.
+def load_slave(source: str, path: str) -> PlantDescription:
+    """Load a plant file; an empty path is the nominal plant.
+
+    Parameters
+    ----------
+    source
+        Who names the file.
+    path
+        Of the plant.yaml.
 
     Raises
     ------
@@ -20,16 +27,16 @@ def load_plant_parameter(node_name: str, path: str) -> PlantDescription:
     try:
         plant = load_plant(path)
     except (PlantFileError, OSError) as error:
-        raise ParameterError(f"{node_name}: parameter 'plant_file': {error}") from error
+        raise ParameterError(f'{source}: {error}') from error
     if plant.joint_names() != JOINTS:
         raise ParameterError(
-            f"{node_name}: parameter 'plant_file': {path} describes {', '.join(plant.joints)}; "
+            f'{source}: {path} describes {", ".join(plant.joints)}; '
             f'the nodes need {", ".join(JOINTS)} in this order'
         )
     for spec in plant.effects:
         if describe(spec.id).stage is Stage.RECORDING:
             raise ParameterError(
-                f"{node_name}: parameter 'plant_file': {path} has the effect {spec.id}, which acts "
+                f'{source}: {path} has the effect {spec.id}, which acts '
                 'on recordings: leave it out here, and let `endoscope simulate` apply it'
             )
     return plant
