@@ -48,7 +48,6 @@ def test_feed_forward_and_feedback_reduce_the_error_of_60_sin_t(tmp_path, motion
     """
     overrides = tube_of_size(tmp_path, 65, 903)
     overrides |= {'compensator': {'mode': 'none'}, 'controller': {'active': False}}
-    overrides['calibration'] = {'identify_plant': True}
     overrides['console'] = {'command_file': str(motion_file)}
     with SimulatedGraph(overrides=overrides) as graph:
         streams = [graph.listen(t) for t in ('slave/servo_jp', 'slave/measured_js')]

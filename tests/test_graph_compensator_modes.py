@@ -15,7 +15,6 @@ pytestmark = pytest.mark.flaky(reruns=2)
 def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
     """The physical modes by the plant that the calibration identified, the others by size."""
     overrides = tube_of_size(tmp_path, 72, 11)
-    overrides['calibration'] = {'identify_plant': True}
     with SimulatedGraph(overrides=overrides) as graph:
         drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         graph.enable()

@@ -23,7 +23,7 @@ def test_a_calibration_finds_the_reach_and_the_console_keeps_to_it(tmp_path):
     """In a tube so tight that 60 deg are more than it allows."""
     overrides = tube_of_size(tmp_path, 80, 1080)
     plant = load_plant(overrides['motor_driver']['plant_file'])
-    overrides |= {'calibration': {'motion': 'brief', 'identify_plant': True}}
+    overrides |= {'calibration': {'motion': 'brief'}}
     with SimulatedGraph(overrides=overrides) as graph:
         graph.enable()
         values = graph.calibrate()

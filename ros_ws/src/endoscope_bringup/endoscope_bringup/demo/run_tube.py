@@ -104,6 +104,8 @@ class _GraphSession:
             domain_id=domain,
             overrides={
                 'motor_driver': {'plant_file': str(plant_file), 'seed': seed},
+                # The paper's signals are asked for in full, also where the tube ends them.
+                'calibration': {'identify_plant': False},
                 'recorder': {'bag': str(bag)},
             },
         )
