@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effect import Symptom
+from endoscope_core.physics.effects import CATALOGUE, showing
 from endoscope_explain.evaluate import residuals, simulate_joint
 from endoscope_explain.free_parameters import LEAD, FreeParameter
 from endoscope_explain.observation import JointObservation
@@ -14,7 +15,7 @@ from endoscope_explain.observation import JointObservation
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-CLOCK_SKEW = CATALOGUE['clock_skew']
+CLOCK_RATE = showing(Symptom.CLOCK_RATE)
 STEP = 5.0e-4
 """Difference step of a coordinate: a motor that stalls leaves a valley of the misfit so bent that
 one of 1 % ends a fit at its wall."""
@@ -74,7 +75,7 @@ class JointModel:
     def residuals(self, theta: Array) -> Array:
         """Residuals in noise units, all channels in a row."""
         parameters, lead = self.packed(theta)
-        skew = parameters[CLOCK_SKEW.first_parameter] if self.flags[CLOCK_SKEW.flag] else 0.0
+        skew = parameters[CLOCK_RATE.first_parameter] if self.flags[CLOCK_RATE.flag] else 0.0
         outputs = simulate_joint(self.observation, parameters, self.flags)
         return residuals(self.observation, outputs, lead, skew)
 

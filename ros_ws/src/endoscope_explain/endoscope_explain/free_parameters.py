@@ -54,8 +54,6 @@ FITTED_NOMINAL = (*SCALED_NOMINAL, *FORM_INDICES)
 BAND = 0.15
 """Relative tolerance by which a healthy rig differs from its description."""
 BAND_SPREAD = 0.09
-SCALED = {'friction_run_in': ('capstan_exponent', 1.8)}
-"""Nominal parameter that an effect scales by so much that its described value is ambiguous."""
 
 
 @dataclass(frozen=True)
@@ -171,9 +169,10 @@ def with_free_reference(
 
     Whether a described value holds before or after a run-in is a matter of definition.
     """
-    if effect_id not in SCALED:
+    rescales = CATALOGUE[effect_id].traits.rescales
+    if rescales is None:
         return free
-    name, reach = SCALED[effect_id]
+    name, reach = rescales
     return tuple(
         replace(item, low=item.low / reach, high=item.high * reach) if item.name == name else item
         for item in free

@@ -29,7 +29,7 @@ Begun = tuple[list[JointModel], list[Array]]
 Variant = tuple[str, tuple[float, ...]]
 """An effect, and what it acts on or which of its forms it has, which no shape of a tube changes."""
 
-LIKE_TIME = DEPENDS_ON_TIME | {'wire_creep'}
+LIKE_TIME = DEPENDS_ON_TIME | {e.id for e in CATALOGUE.values() if e.traits.resembles_time}
 """Effects that a motion made only once does not tell from a change with time: wires that go on
 stretching for seconds look like a sensor that drifts."""
 STARTS = 2

@@ -74,6 +74,15 @@ class Parameter:
                 raise ValueError(f'{self.name}: {value} is outside its bounds')
 
 
+class Symptom(StrEnum):
+    """What a recording itself shows of an effect, without any simulation."""
+
+    CLIPPED_TENSION = 'tension that stands at a limit'
+    MISSING_SAMPLES = 'samples that are missing'
+    CLOCK_RATE = 'stamps of a clock that runs fast or slow'
+    WRONG_SAMPLES = 'isolated angles that no joint can have'
+
+
 @dataclass(frozen=True)
 class Traits:
     """What a search for missing physics must know of an effect.
@@ -90,6 +99,13 @@ class Traits:
         Its misfit has many valleys: a fit needs many starts and wide difference steps.
     audited
         No simulation shows it: it is found in the recording itself.
+    symptom
+        By which the recording itself shows it; None for most.
+    resembles_time
+        What it does is not told from a change with time where a motion is made once.
+    rescales
+        Nominal parameter that it scales by so much that a described value is ambiguous, and by how
+        much; None for most.
     """
 
     depends_on_time: bool = False
@@ -97,6 +113,9 @@ class Traits:
     of_shape: bool = False
     rugged: bool = False
     audited: bool = False
+    symptom: Symptom | None = None
+    resembles_time: bool = False
+    rescales: tuple[str, float] | None = None
 
 
 @dataclass(frozen=True)

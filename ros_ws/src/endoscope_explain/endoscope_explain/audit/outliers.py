@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import norm, poisson
 
+from endoscope_core.physics.effect import Symptom
+from endoscope_core.physics.effects import showing
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.explanation import Estimate
 from endoscope_explain.recording.series import Array, Mask, Series
@@ -157,7 +159,7 @@ def outlier_finding(joints: Sequence[str], series: Series, wrong: Mask) -> Findi
     befallen = [name for j, name in enumerate(joints) if wrong[:, j].any()]
     signals = tuple(signal_name('bending', name) for name in befallen)
     return Finding(
-        'tracker_outliers',
+        showing(Symptom.WRONG_SAMPLES).id,
         Severity.FAULT,
         joints[worst],
         'sensing',

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from endoscope_core.physics.effect import Symptom
+from endoscope_core.physics.effects import showing
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.explanation import Estimate
 from endoscope_explain.recording.series import Array, Series
@@ -90,7 +92,7 @@ def skew_finding(topic: str, joint: str, skew: Estimate, duration: float) -> Fin
     """Describe the `clock_skew` of the device behind one topic."""
     way = 'fast' if skew.value > 0 else 'slow'
     return Finding(
-        'clock_skew',
+        showing(Symptom.CLOCK_RATE).id,
         Severity.FAULT,
         joint,
         'recording',

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from endoscope_core.physics.effect import Symptom
+from endoscope_core.physics.effects import showing
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.explanation import Estimate
 from endoscope_explain.recording.series import Array, Mask
@@ -60,7 +62,7 @@ def saturation_finding(
         else:
             spans.append((begin, end))
     return Finding(
-        'load_cell_saturation',
+        showing(Symptom.CLIPPED_TENSION).id,
         Severity.FAULT,
         joint,
         'sensing',

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from endoscope_core.physics.effect import Symptom
+from endoscope_core.physics.effects import showing
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.explanation import Estimate
 from endoscope_explain.recording.series import Array, Series
@@ -137,7 +139,7 @@ def gap_findings(
     counts = ', '.join(f'{t} ({missing[t]:.3f} s in {len(gaps_by_topic[t])})' for t in topics)
     return [
         Finding(
-            'recording_gap',
+            showing(Symptom.MISSING_SAMPLES).id,
             Severity.FAULT,
             joint,
             'recording',

@@ -8,7 +8,7 @@ import importlib
 import pkgutil
 
 from endoscope_core.errors import nearest
-from endoscope_core.physics.effect import Effect, UnknownEffectError, in_order_of_chain
+from endoscope_core.physics.effect import Effect, Symptom, UnknownEffectError, in_order_of_chain
 
 for _module in sorted(module.name for module in pkgutil.iter_modules(__path__)):
     importlib.import_module(f'{__name__}.{_module}')
@@ -28,3 +28,8 @@ def describe(effect_id: str) -> Effect:
     if effect_id not in CATALOGUE:
         raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, CATALOGUE)}')
     return CATALOGUE[effect_id]
+
+
+def showing(symptom: Symptom) -> Effect:
+    """The effect that a recording shows by a symptom."""
+    return next(effect for effect in CATALOGUE.values() if effect.traits.symptom is symptom)

@@ -5,7 +5,7 @@ It changes samples and not the rig: nothing of it is in the compiled physics.
 
 from collections.abc import Mapping
 
-from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Symptom, Traits
 from endoscope_core.physics.hooks import on_samples
 from endoscope_core.physics.samples import RecordingFaults
 
@@ -19,7 +19,7 @@ EFFECT = Effect(
     parameters=(
         Parameter('skew', '-', -0.05, 0.05, 1e-3, off=0.0, starts=(-5e-4, 5e-4), comparable=True),
     ),
-    traits=Traits(depends_on_time=True, of_device=True),
+    traits=Traits(depends_on_time=True, of_device=True, symptom=Symptom.CLOCK_RATE),
 )
 
 

@@ -1,7 +1,7 @@
 """`load_cell_saturation`: the load cell clips."""
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Symptom, Traits
 from endoscope_core.physics.hooks import LOAD_CELL, hook
 
 EFFECT = Effect(
@@ -17,6 +17,7 @@ EFFECT = Effect(
         ),
         Parameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
+    traits=Traits(symptom=Symptom.CLIPPED_TENSION),
 )
 LIMIT, WIRE = EFFECT.places
 

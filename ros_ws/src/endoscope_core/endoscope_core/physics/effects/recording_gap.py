@@ -5,7 +5,7 @@ It changes samples and not the rig: nothing of it is in the compiled physics.
 
 from collections.abc import Mapping
 
-from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Symptom, Traits
 from endoscope_core.physics.hooks import on_samples
 from endoscope_core.physics.samples import TOPICS, Gap, RecordingFaults
 
@@ -21,7 +21,7 @@ EFFECT = Effect(
         Parameter('duration_s', 's', 0.0, 600.0, 0.5, off=0.0),
         Parameter('topic', '-', 0.0, 2.0, 2.0, choices=(0.0, 1.0, 2.0)),
     ),
-    traits=Traits(audited=True),
+    traits=Traits(audited=True, symptom=Symptom.MISSING_SAMPLES),
 )
 
 

@@ -5,7 +5,7 @@ It changes samples and not the rig: nothing of it is in the compiled physics.
 
 from collections.abc import Mapping
 
-from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Symptom, Traits
 from endoscope_core.physics.hooks import on_samples
 from endoscope_core.physics.samples import Outliers, RecordingFaults
 
@@ -20,7 +20,7 @@ EFFECT = Effect(
         Parameter('rate', '-', 0.0, 0.5, 0.01, off=0.0),
         Parameter('size_rad', 'rad', 0.0, 3.0, 0.2, off=0.0),
     ),
-    traits=Traits(audited=True),
+    traits=Traits(audited=True, symptom=Symptom.WRONG_SAMPLES),
 )
 
 

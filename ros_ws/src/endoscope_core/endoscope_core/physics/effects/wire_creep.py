@@ -3,7 +3,7 @@
 import math
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import ADVANCE, LENGTH, hook
 from endoscope_core.physics.layout import REST_TENSION, SLOTS, WIRE_STIFFNESS
 
@@ -23,6 +23,7 @@ EFFECT = Effect(
         Parameter('slow_share', '-', 0.0, 1.0, 0.0, starts=(0.0, 0.3)),
         Parameter('slow_time_constant_s', 's', 1.0, 200.0, 8.0),
     ),
+    traits=Traits(resembles_time=True),
 )
 RATIO, TIME_CONSTANT, SLOW_SHARE, SLOW_TIME_CONSTANT = EFFECT.places
 FAST, SLOW = SLOTS.state_block(2), SLOTS.state_block(2)
