@@ -75,7 +75,7 @@ def _one(value: object) -> str:
 
 def _allowed(meta: dict) -> str:
     if meta['choices']:
-        return ', '.join(meta['choices'])
+        return ', '.join(filter(None, meta['choices']))
     if meta['low'] is None and meta['high'] is None:
         return ''
     low = '' if meta['low'] is None else f'{meta["low"]:.4g}'

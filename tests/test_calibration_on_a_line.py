@@ -45,8 +45,7 @@ def test_a_calibration_ends_with_the_class_of_the_tube(
     file = write_calibration(tmp_path, f'rate: {cell_rate}, latency: {LATENCY}')
     overrides = tube_of_size(tmp_path, size_deg, 900 + size_deg)
     overrides['load_cells'] = {'device': device, 'port': port, 'calibration_file': str(file)}
-    overrides['supervisor'] = {'stream_timeout': 5.0}
-    overrides['calibration'] = {'stream_timeout': 5.0, 'motion': 'brief'}
+    overrides['calibration'] = {'motion': 'brief'}
     graph = SensorGraph(
         tmp_path / 'bag',
         cells=cells,

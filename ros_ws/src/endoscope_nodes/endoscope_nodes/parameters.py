@@ -140,7 +140,7 @@ def _watch(
 def _constraints(field: dataclasses.Field) -> str:
     meta = field.metadata
     if meta['choices']:
-        return 'one of ' + ', '.join(meta['choices'])
+        return 'one of ' + ', '.join(filter(None, meta['choices']))
     if meta['low'] is None and meta['high'] is None:
         return ''
     low = '-inf' if meta['low'] is None else f'{meta["low"]:g}'

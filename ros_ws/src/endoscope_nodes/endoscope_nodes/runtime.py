@@ -229,7 +229,7 @@ class Runtime(ClosedOnExit):
         self._plant_source = (
             (f"{node.get_name()}: parameter 'plant_file'", given.plant_file)
             if given.plant_file
-            else ('simulation.plant of the rig file', simulation.plant)
+            else (f'rig file {given.rig_file}: simulation.plant', simulation.plant)
         )
         self._seed = simulation.seed if given.seed < 0 else given.seed
         return 1000 // rate

@@ -1,6 +1,5 @@
 """rig.yaml: gear, limits, time-outs and devices of a rig, said once for every node."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
@@ -29,7 +28,7 @@ def _fact(low: float, high: float) -> Any:
         wanted = f'give a number from {low:g} to {high:g}'
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ValueError(wanted)
-        if not (math.isfinite(value) and low <= value <= high):
+        if not low <= value <= high:
             raise ValueError(wanted)
         return float(value)
 
@@ -251,7 +250,6 @@ def load_rig(path: str | Path | None = None) -> Rig:
         for name, kind in parts.items()
     }
     if path is not None and made['simulation'].plant:
-        # Where a file is named, it is named as seen from the file that names it.
         plant = Path(path).parent / made['simulation'].plant
         made['simulation'] = replace(made['simulation'], plant=str(plant))
     try:
