@@ -272,8 +272,9 @@ def _yield(x: Array, table: Array, p: Array, on: Flags, step: float, tick: float
     The load grows with the step and the bearable falls with the speed of a motor that drives its
     load: one step divides them, which a bracketed secant finds (Dowell, Jarratt, BIT 11, 1971).
     """
-    way = 1.0 if _torque(x, table, p, on, step) > 0.0 else -1.0
-    far, far_excess = step, _unbearable(x, table, p, on, step, way, tick)
+    load = _torque(x, table, p, on, step)
+    way = 1.0 if load > 0.0 else -1.0
+    far, far_excess = step, abs(load) - largest_torque(on, p, x, way * step / tick)
     if far_excess <= 0.0:
         return step
     back = max(1e-4, abs(step))

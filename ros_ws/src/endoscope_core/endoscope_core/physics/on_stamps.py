@@ -82,9 +82,8 @@ def hold_on_ticks(times: Array, values: Array, ticks: int, tick: float = TICK) -
     corners = np.sort(np.concatenate([edges[divided], edges[divided + 1], changes[inside]]))
     pieces = np.diff(corners)
     tick_of_piece = np.searchsorted(edges, corners[:-1], side='right') - 1
-    # Between two divided ticks that are no neighbours lies what is none of either.
-    within = np.isin(tick_of_piece, divided) & (pieces > 0.0)
-    within &= corners[1:] <= edges[np.minimum(tick_of_piece + 1, ticks)]
+    # What lies between two divided ticks that are no neighbours begins in a tick that is not one.
+    within = np.isin(tick_of_piece, divided)
     held = values[np.clip(np.searchsorted(times, corners[:-1], side='right') - 1, 0, None)]
     result[divided] = 0.0
     np.add.at(result, tick_of_piece[within], (pieces[:, None] * held)[within] / tick)

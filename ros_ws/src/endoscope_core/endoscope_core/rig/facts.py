@@ -11,7 +11,6 @@ from endoscope_core.strict_yaml import YamlError, load_yaml
 
 SHIPPED = Path(__file__).with_name('rig.yaml')
 
-
 MOTOR_DEVICES = ('simulated', 'dynamixel')
 LOAD_CELL_DEVICES = ('simulated', 'modbus_rtu', 'modbus_tcp')
 TRACKER_DEVICES = ('simulated', 'aurora')
