@@ -317,28 +317,7 @@ def relax(x: Array, wire: int, table: Array, work: Array) -> None:
         i = 0
         for b in range(blocks):
             size = int(work[2, b])
-            amplitude = work[0, b] / work[1, b]
-            for j in range(i, i + size if size > 1 else i):
-                x[wire + NODES + j] = amplitude * table[shape, j]
             if size > 1:
-                _keep_as_region(x, wire, nodes, shape, i, size, amplitude)
+                for j in range(i, i + size):
+                    x[wire + NODES + j] = work[0, b] / work[1, b] * table[shape, j]
             i += size
-
-
-@compiled
-def _keep_as_region(
-    x: Array, wire: int, nodes: int, shape: int, first: int, size: int, amplitude: float
-) -> None:
-    """Take a stretch that has slipped for the region of an end; what it overlaps is none now."""
-    last = first + size
-    for end in range(2):
-        count = int(x[wire + COUNT + end])
-        begin = 0 if end == MOTOR_END else nodes - count
-        if first < begin + count and begin < last:
-            x[wire + COUNT + end] = 0.0
-    if first > 0 and last < nodes:
-        return
-    end = MOTOR_END if first == 0 else JOINT_END
-    x[wire + COUNT + end] = size
-    x[wire + SHAPE + end] = shape
-    x[wire + AMPLITUDE + end] = amplitude
