@@ -25,7 +25,6 @@ IMPORT_NAMES = {
     'pyserial': 'serial',
     'pyyaml': 'yaml',
     'scikit-learn': 'sklearn',
-    'scikit-surgerynditracker': 'sksurgerynditracker',
 }
 
 each_package = pytest.mark.parametrize('package', PACKAGES, ids=lambda path: path.name)
@@ -55,8 +54,9 @@ def _declared(package: Path) -> set[str]:
 
 
 def _locked_modules() -> set[str]:
-    project = tomllib.loads((WORKSPACE / 'pyproject.toml').read_text())['project']
-    names = [re.split(r'[^\w-]', line, maxsplit=1)[0] for line in project['dependencies']]
+    settings = tomllib.loads((WORKSPACE / 'pyproject.toml').read_text())
+    lines = settings['project']['dependencies'] + settings['dependency-groups']['train']
+    names = [re.split(r'[^\w-]', line, maxsplit=1)[0] for line in lines]
     return {IMPORT_NAMES.get(name, name) for name in names}
 
 

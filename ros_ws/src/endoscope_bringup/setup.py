@@ -3,7 +3,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 package_name = 'endoscope_bringup'
-shipped_suffixes = ('csv', 'css', 'j2', 'js', 'json', 'npz', 'pt', 'svg', 'yaml')
+shipped_suffixes = ('csv', 'css', 'j2', 'js', 'json', 'svg', 'yaml')
 share_folders = ('config', 'launch', 'layouts', 'urdf')
 
 

@@ -1,7 +1,7 @@
 from setuptools import find_packages, setup
 
 package_name = 'endoscope_explain'
-shipped_suffixes = ('csv', 'css', 'j2', 'js', 'json', 'npz', 'pt', 'svg', 'yaml')
+shipped_suffixes = ('csv', 'css', 'j2', 'js', 'json', 'svg', 'yaml')
 
 setup(
     name=package_name,

@@ -1,7 +1,7 @@
 from setuptools import find_packages, setup
 
 package_name = 'endoscope_nodes'
-shipped_suffixes = ('csv', 'css', 'j2', 'js', 'json', 'npz', 'pt', 'svg', 'xml', 'yaml')
+shipped_suffixes = ('csv', 'css', 'j2', 'js', 'json', 'svg', 'xml', 'yaml')
 
 setup(
     name=package_name,

@@ -1,6 +1,7 @@
 """`endoscope dataset`, `train` and `identify`, one after the other as a person uses them."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -65,7 +66,7 @@ def test_a_data_set_does_not_replace_what_is_there(data, capsys):
 
 
 def test_training_leaves_weights_that_tell_sizes(data, tmp_path):
-    out, plots = tmp_path / 'weights.pt', tmp_path / 'plots'
+    out, plots = tmp_path / 'weights.safetensors', tmp_path / 'plots'
     options = ['--folds', '2', '--plots', str(plots)]
     assert main(['train', '--data', str(data), '--out', str(out), *options]) == 0
     for name, words in (('confusion', 'true class'), ('intervals', 'within their interval')):
@@ -81,7 +82,8 @@ def test_training_leaves_weights_that_tell_sizes(data, tmp_path):
 
 
 def test_training_the_papers_network_leaves_weights_that_classify(data, tmp_path):
-    out = tmp_path / 'weights.pt'
+    pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
+    out = tmp_path / 'weights.safetensors'
     options = ['--model', 'cnn', '--folds', '2']
     assert main(['train', '--data', str(data), '--out', str(out), *options]) == 0
     described = json.loads(out.with_suffix('.json').read_text())
@@ -89,6 +91,26 @@ def test_training_the_papers_network_leaves_weights_that_classify(data, tmp_path
     assert np.sum(described['held_out']['confusion']) == 14
     result = TensionClassifier.load(out).classify(load_dataset(data).tension[0])
     assert sum(result.probabilities.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    'command',
+    [
+        ['train', '--model', 'cnn', '--data', 'DATA', '--out', 'weights.safetensors'],
+        ['bench', 'papers'],
+        ['bench', 'papers', '--only', 'classifiers'],
+    ],
+)
+def test_without_pytorch_one_line_says_how_to_get_it(command, data, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, 'torch', None)
+    monkeypatch.delitem(sys.modules, 'endoscope_core.classifier.training', raising=False)
+    assert main([str(data) if word == 'DATA' else word for word in command]) == 2
+    assert capsys.readouterr().err == (
+        'endoscope: training the networks of the first paper needs PyTorch: run '
+        '`make -C ros_ws train`, which says how large it is\n'
+    )
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_identifying_a_data_set_gives_a_set_for_each_class(data, tmp_path):
@@ -150,7 +172,7 @@ def test_a_bag_that_does_not_say_what_the_motors_did_is_refused(calibration, tmp
         ['identify', 'nowhere', '--model', 'bouc_wen'],
         ['identify', 'nowhere', '--model', 'unheard_of'],
         ['identify', 'nowhere'],
-        ['train', '--data', 'nowhere', '--out', 'x.pt'],
+        ['train', '--data', 'nowhere', '--out', 'x.safetensors'],
         ['dataset', '--out', 'x', '--per-class', '0'],
         ['dataset', '--out', 'x', '--motion', 'breif'],
     ],

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from endoscope_core.classifier.shipped import load_classifier
-from endoscope_core.classifier.training import use_one_thread
 from endoscope_core.dataset import CLASSES_DEG
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 from endoscope_core.trials.reading_rates import (
@@ -14,7 +13,6 @@ from endoscope_core.trials.reading_rates import (
 
 @pytest.fixture(scope='module', params=CALIBRATION_MOTIONS)
 def classifier(request):
-    use_one_thread()
     return load_classifier(motion=request.param)
 
 

@@ -3,7 +3,8 @@ import json
 
 import numpy as np
 import pytest
-import torch
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
 
 from endoscope_core.classifier.classification import ClassifierError, UnseenTensionError
 from endoscope_core.classifier.grouped_folds import grouped_folds
@@ -12,12 +13,12 @@ from endoscope_core.classifier.size_classifier import HeldOutCalibration, SizeCl
 from endoscope_core.classifier.size_model import SizeEstimate, fitted_size_model
 from endoscope_core.classifier.size_training import (
     calibration_of,
+    save_size_classifier,
     train_size_classifier,
     validated_size_classifier,
 )
 from endoscope_core.classifier.tension_features import log_courses, roughness
-from endoscope_core.classifier.training import use_one_thread
-from endoscope_core.classifier.weights_file import save_size_classifier, sealed
+from endoscope_core.classifier.weights_file import sealed
 from endoscope_core.dataset import (
     CLASSES_DEG,
     CalibrationDataset,
@@ -26,11 +27,6 @@ from endoscope_core.dataset import (
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 from endoscope_core.trials.never_seen_tube import never_seen_tube
 from endoscope_core.trials.unusual_recordings import UNUSUAL
-
-
-@pytest.fixture(scope='module', autouse=True)
-def one_thread():
-    use_one_thread()
 
 
 @pytest.fixture(scope='module', params=CALIBRATION_MOTIONS)
@@ -93,14 +89,15 @@ def test_the_tensions_of_standing_motors_are_refused(shipped):
 
 
 def test_sizes_beyond_the_classes_are_refused():
+    generator = np.random.default_rng(0)
     classifier = SizeClassifier(
-        fitted_size_model(torch.rand(6, 100, 4), torch.rand(6, 2), steps=1),
+        fitted_size_model(generator.random((6, 100, 4)), generator.random((6, 2)), steps=1),
         HeldOutCalibration(1.0, (9.0, 9.0, 9.0)),
         CLASSES_DEG,
         'brief',
     )
-    sizes = torch.tensor(np.deg2rad([20.0, 36.0, 70.0, 104.0, 120.0]))
-    estimate = SizeEstimate(sizes, torch.full((5,), 0.01), torch.zeros(5, 3))
+    sizes = np.deg2rad([20.0, 36.0, 70.0, 104.0, 120.0])
+    estimate = SizeEstimate(sizes, np.full(5, 0.01), np.zeros((5, 3)))
     refused = classifier.reasons_to_refuse(estimate)
     assert [bool(reasons) for reasons in refused] == [True, False, False, False, True]
     assert 'outside the 35 to 105 deg' in refused[0][0]
@@ -118,33 +115,78 @@ def test_a_recording_of_another_motion_or_with_gaps_is_refused(shipped):
 
 
 def test_courses_are_means_of_fifty_samples_of_each_joints_wires():
-    tension = torch.rand(3, 120, 4) * 5.0
+    tension = 5.0 * np.random.default_rng(0).random((3, 120, 4))
     courses = log_courses(tension)
     assert courses.shape == (3, 2, 4)
-    expected = torch.log(tension[2, 50:100, 3].mean() + 0.5)
-    assert courses[2, 1, 3] == pytest.approx(float(expected), abs=1e-5)
+    expected = np.log(np.mean(tension[2, 50:100, 3]) + 0.5)
+    assert courses[2, 1, 3] == pytest.approx(expected, rel=1e-12)
 
 
 def test_roughness_is_the_noise_and_not_the_motion():
     time = np.arange(9000) * 1e-3
     noise = np.random.default_rng(0).normal(0.0, 0.02, (1, 9000, 4))
-    tension = torch.from_numpy(5.0 + 4.0 * np.sin(2.0 * time)[None, :, None] + noise)
-    np.testing.assert_allclose(roughness(tension).numpy(), 0.02, rtol=0.05)
+    tension = 5.0 + 4.0 * np.sin(2.0 * time)[None, :, None] + noise
+    np.testing.assert_allclose(roughness(tension), 0.02, rtol=0.05)
 
 
 def test_intervals_hold_the_share_that_they_promise():
-    generator = torch.Generator().manual_seed(0)
-    true = torch.rand(4000, generator=generator, dtype=torch.float64)
-    deviation = 0.1 + torch.rand(4000, generator=generator, dtype=torch.float64)
-    error = 3.0 * deviation * torch.randn(4000, generator=generator, dtype=torch.float64)
-    strange = torch.randn(4000, 3, generator=generator, dtype=torch.float64)
+    generator = np.random.default_rng(0)
+    true, deviation = generator.random(4000), 0.1 + generator.random(4000)
+    error = 3.0 * deviation * generator.standard_normal(4000)
+    strange = generator.standard_normal((4000, 3))
     estimate = SizeEstimate(true + error, deviation, strange)
     half = SizeEstimate(*(x[:2000] for x in vars(estimate).values()))
     calibration = calibration_of(half, true[:2000])
     assert calibration.inflation == pytest.approx(3.0 * 1.645, rel=0.08)
-    covered = error[2000:].abs() <= calibration.inflation * deviation[2000:]
-    assert 0.87 < float(covered.double().mean()) < 0.93
+    covered = np.abs(error[2000:]) <= calibration.inflation * deviation[2000:]
+    assert 0.87 < np.mean(covered) < 0.93
     assert all(4.0 < ceiling < 6.0 for ceiling in calibration.ceilings)
+
+
+@pytest.fixture(scope='module')
+def process(easy):
+    """The fitted model, and scikit-learn's Gaussian process with its covariance."""
+    model = fitted_size_model(easy.tension, easy.joint_size, steps=20)
+    bump = ConstantKernel(model.height**2) * RBF(model.lengths)
+    line = ConstantKernel(model.linear**2) * DotProduct(0.0, 'fixed')
+    kernel = bump + line + WhiteKernel(model.noise**2)
+    jitter = 1e-9 * np.mean(np.diag(model.covariance(model.scores, model.scores)))
+    known = GaussianProcessRegressor(kernel, alpha=jitter, optimizer=None)
+    return model, known.fit(model.scores, model.target - np.mean(model.target))
+
+
+def test_the_likelihood_and_its_slope_are_those_of_scikit_learn(process):
+    model, known = process
+    value, slope = model.log_likelihood()
+    theirs, by_theta = known.log_marginal_likelihood(known.kernel_.theta, eval_gradient=True)
+    constant = 0.5 * len(model.target) * np.log(2.0 * np.pi)
+    assert value - constant == pytest.approx(theirs, rel=1e-6)
+    # Their hyperparameters are the logarithms of variances, ours of standard deviations.
+    height, *lengths, linear, noise = by_theta
+    expected = [*lengths, 2.0 * linear, 2.0 * height, 2.0 * noise]
+    # In ours the jitter grows with the covariance.
+    np.testing.assert_allclose(slope, expected, rtol=1e-3, atol=1e-3)
+
+
+def test_size_and_deviation_are_those_of_scikit_learn(process, easy):
+    model, known = process
+    unseen = easy.tension[::7] * 1.01
+    deviation = log_courses(unseen.astype(np.float64)) - model.centre
+    scores = (deviation @ model.basis.T / model.spread).reshape(-1, len(model.basis))
+    size, spread = known.predict(scores, return_std=True)
+    found = model.estimate(unseen)
+    size = np.mean(size.reshape(-1, 2) + np.mean(model.target), axis=1)
+    np.testing.assert_allclose(found.size, size, atol=1e-7)
+    np.testing.assert_allclose(found.deviation, spread.reshape(-1, 2).mean(axis=1), rtol=1e-5)
+
+
+def test_fitting_makes_what_is_known_likelier(easy):
+    values = [
+        fitted_size_model(easy.tension, easy.joint_size, steps).log_likelihood()[0]
+        for steps in (0, 10, 40)
+    ]
+    assert values == sorted(values)
+    assert values[2] > values[0] + 10.0
 
 
 def test_folds_keep_a_configuration_on_one_side(easy):
@@ -170,7 +212,7 @@ def test_validation_is_of_recordings_held_out_and_training_repeats(easy):
 
 def test_what_is_saved_gives_the_same_answer(easy, tmp_path):
     classifier, validation = validated_size_classifier(easy, 0, 3)
-    path = tmp_path / 'size.pt'
+    path = tmp_path / 'size.safetensors'
     save_size_classifier(path, classifier, easy, validation, 'endoscope train', 0)
     loaded = load_classifier(path, 'brief')
     first, second = (c.classify(easy.tension[10]) for c in (classifier, loaded))
@@ -184,7 +226,7 @@ def test_what_is_saved_gives_the_same_answer(easy, tmp_path):
 
 def test_weights_that_do_not_fit_are_one_clear_error(easy, tmp_path):
     classifier, validation = validated_size_classifier(easy, 0, 3)
-    path = tmp_path / 'size.pt'
+    path = tmp_path / 'size.safetensors'
     save_size_classifier(path, classifier, easy, validation, 'endoscope train', 0)
     described = json.loads(path.with_suffix('.json').read_text())
     del described['inflation']

@@ -5,10 +5,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
+from threadpoolctl import threadpool_limits
 
 from endoscope_core.calibration import (
     BendingRecord,
@@ -129,7 +129,8 @@ class CalibrationNode(EndoscopeNode):
         return self._run is not None
 
     def _load_classifier(self, weights: str) -> Classifier:
-        torch.set_num_threads(1)
+        # The threads of one judgement would stand in the way of the other nodes.
+        threadpool_limits(1, 'blas')
         try:
             classifier = load_classifier(weights or None, self._motion.name)
         except ClassifierError as error:

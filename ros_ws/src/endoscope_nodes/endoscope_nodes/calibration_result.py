@@ -15,7 +15,6 @@ from endoscope_nodes.diagnostics import ERROR, OK, status
 from endoscope_nodes.names import JOINTS
 
 if TYPE_CHECKING:
-    # Those who only read results need no torch.
     from endoscope_core.classifier.classification import ClassificationResult
 
 NAME = 'calibration: hysteresis class'

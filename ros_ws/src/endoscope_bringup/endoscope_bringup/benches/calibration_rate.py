@@ -1,8 +1,6 @@
 """`endoscope bench calibration_rate`: what a calibration loses where load cells are read slowly."""
 
 import argparse
-from importlib.resources import files
-from pathlib import Path
 
 from endoscope_bringup.seed_argument import seed
 
@@ -28,8 +26,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; return 0 if every rate calibrates, else 1."""
+    from endoscope_core.classifier.inference import TensionClassifier
     from endoscope_core.classifier.shipped import load_classifier
-    from endoscope_core.classifier.training import use_one_thread
     from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
     from endoscope_core.trials.reading_rates import (
         judged_at_rate,
@@ -41,7 +39,6 @@ def run(args: argparse.Namespace) -> int:
     if args.tubes < 1:
         print('endoscope bench calibration_rate: --tubes: give at least 1')
         return 2
-    use_one_thread()
     kept = True
     for name in CALIBRATION_MOTIONS:
         classifier = load_classifier(motion=name)
@@ -72,8 +69,7 @@ def run(args: argparse.Namespace) -> int:
                 print(f'{amount:5d} ms {_row(trials)}')
     print('\nthe 1D-CNN of the first paper, sinusoid')
     # It names a class for any tension.
-    path = files('endoscope_core.classifier') / 'weights' / 'tension_cnn.pt'
-    network = load_classifier(Path(str(path)))
+    network = TensionClassifier.load_default()
     tubes = tubes_of_all_classes(args.seed, args.tubes, calibration_motion())
     for rate in RATES:
         trials = [

@@ -46,6 +46,9 @@ def run(args: argparse.Namespace) -> int:
     except ValueError as error:
         print(f'endoscope bench papers: {error}', file=sys.stderr)
         return 2
+    if 'classifiers' in args.only and args.plot is None:
+        # Says now rather than after the other tables what it needs.
+        importlib.import_module('endoscope_core.classifier.training')
     if args.plot is not None:
         from endoscope_bringup.benches.papers_plot import tracking_plot
         from endoscope_core.atomic_output import write_text

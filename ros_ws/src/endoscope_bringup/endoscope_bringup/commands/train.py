@@ -26,14 +26,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         type=Path,
         required=True,
         metavar='FILE',
-        help='weights to write, by custom with suffix .pt',
+        help='weights to write, by custom with suffix .safetensors',
     )
     parser.add_argument(
         '--model',
         choices=('size', 'cnn'),
         default='size',
         help='size: regresses the backlash size with an interval, and refuses what it does not '
-        "know; cnn: the first paper's 1D-CNN, for the sinusoid only (size)",
+        "know; cnn: the first paper's 1D-CNN, for the sinusoid only, which needs PyTorch: "
+        '`make -C ros_ws train` installs it (size)',
     )
     parser.add_argument('--seed', type=seed, default=0, help='of weights, batches and folds (0)')
     parser.add_argument(
@@ -51,7 +52,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     """Validate, train and write; return 0."""
     from endoscope_core.atomic_output import require_free_directory
-    from endoscope_core.classifier.training import use_one_thread
     from endoscope_core.classifier.weights_file import weights_path
     from endoscope_core.dataset import load_dataset
 
@@ -59,7 +59,6 @@ def run(args: argparse.Namespace) -> int:
     if args.plots is not None:
         require_free_directory(args.plots)
     dataset = load_dataset(args.data)
-    use_one_thread()
     made = dataset.manifest
     command = (
         f'endoscope dataset --seed {made["seed"]} --per-class {made["per_class"]} '
@@ -77,9 +76,14 @@ def run(args: argparse.Namespace) -> int:
 def _train_cnn(
     args: argparse.Namespace, dataset: 'CalibrationDataset', out: Path, command: str
 ) -> str:
-    from endoscope_core.classifier.training import cross_validate, train_network
-    from endoscope_core.classifier.weights_file import save_network
+    from endoscope_core.classifier.training import (
+        cross_validate,
+        save_network,
+        train_network,
+        use_one_thread,
+    )
 
+    use_one_thread()
     validation = cross_validate(dataset, args.seed, args.folds, _print_line)
     network = train_network(dataset.tension, dataset.class_deg, args.seed)
     save_network(out, network, dataset, validation, command, args.seed)
@@ -95,8 +99,10 @@ def _train_size(
 ) -> str:
     import math
 
-    from endoscope_core.classifier.size_training import validated_size_classifier
-    from endoscope_core.classifier.weights_file import save_size_classifier
+    from endoscope_core.classifier.size_training import (
+        save_size_classifier,
+        validated_size_classifier,
+    )
 
     classifier, validation = validated_size_classifier(dataset, args.seed, args.folds, _print_line)
     save_size_classifier(out, classifier, dataset, validation, command, args.seed)

@@ -1,26 +1,25 @@
-"""Spoiled classifier weights: archives, tensors that claim to be others, programs in pickles."""
+"""Spoiled classifier weights: damaged files, arrays that claim to be others, pickled programs."""
 
-import io
 import json
 import os
 import pickle
 import shutil
-import zipfile
+import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
+import safetensors.numpy
 from numpy.random import Generator
 
 from endoscope_bringup.hostile_files.spoiling import boundary, spoiled_bytes, spoiled_yaml
-from endoscope_core.classifier.classification import ClassifierError, UnseenTensionError
+from endoscope_core.classifier.classification import WIRES, ClassifierError, UnseenTensionError
 from endoscope_core.classifier.inference import DEFAULT_WEIGHTS
 from endoscope_core.classifier.shipped import load_classifier, shipped_weights
-from endoscope_core.classifier.standardised_tension import WIRES
-from endoscope_core.classifier.training import use_one_thread
 from endoscope_core.classifier.weights_file import sealed
 from endoscope_core.signals import SINUSOID, calibration_motion
+
+_HEAD = 8
 
 
 class _Program:
@@ -39,11 +38,10 @@ class WeightsCase:
     name = 'weights'
 
     def __init__(self, folder: Path) -> None:
-        use_one_thread()
-        self._path, self._mark = folder / 'weights.pt', folder / 'ran'
+        self._path, self._mark = folder / 'weights.safetensors', folder / 'ran'
         size = shipped_weights(SINUSOID)
         self._sound = [size, size.with_name(DEFAULT_WEIGHTS)]
-        self._states = [torch.load(path, weights_only=True) for path in self._sound]
+        self._states = [safetensors.numpy.load_file(path) for path in self._sound]
         samples = calibration_motion(SINUSOID).samples
         wave = 1.0 + np.sin(np.arange(samples)[:, None] * 1e-3 + np.arange(WIRES))
         self._tension = 5.0 * wave
@@ -58,41 +56,24 @@ class WeightsCase:
         self._which = int(rng.integers(2))
         sound = self._sound[self._which]
         data, described = sound.read_bytes(), sound.with_suffix('.json').read_bytes()
-        way = rng.integers(6)
+        way = rng.integers(7)
         self._told = way < 3
         if way < 2:
             data = spoiled_bytes(data, rng)
         elif way == 2:
             described = spoiled_yaml(described.decode(), rng)
         elif way == 3:
-            data = _saved(_other_state(dict(self._states[self._which]), rng))
+            data = safetensors.numpy.save(_other_state(dict(self._states[self._which]), rng))
         elif way == 4:
-            data = self._with_program(data, rng)
+            data = _other_header(data, rng)
+        elif way == 5:
+            data = pickle.dumps(_Program(self._mark), protocol=int(rng.integers(5)))
         else:
             described = json.dumps(_other_number(json.loads(described), rng)).encode()
         if way > 2:
             described = _sealed(described, data)
         self._path.write_bytes(data)
         self._path.with_suffix('.json').write_bytes(described)
-
-    def _with_program(self, data: bytes, rng: Generator) -> bytes:
-        program = _Program(self._mark)
-        way = rng.integers(4)
-        if way == 0:
-            return pickle.dumps(program, protocol=int(rng.integers(5)))
-        if way == 1:
-            return _saved({'centre': program})
-        out = io.BytesIO()
-        packing = zipfile.ZIP_DEFLATED if way == 2 else zipfile.ZIP_STORED
-        with zipfile.ZipFile(io.BytesIO(data)) as sound, zipfile.ZipFile(out, 'w', packing) as new:
-            for name in sound.namelist():
-                content = sound.read(name)
-                if name.endswith('data.pkl') and rng.random() < 0.7:
-                    content = pickle.dumps(program, protocol=2)
-                elif rng.random() < 0.1:
-                    content = bytes(1 << int(rng.integers(10, 25)))
-                new.writestr(name, content)
-        return out.getvalue()
 
     def read(self) -> bool:
         """Load it; nothing in it may have run, and what was only damaged answers as before."""
@@ -117,38 +98,57 @@ def _sealed(described: bytes, data: bytes) -> bytes:
     return json.dumps(sealed(json.loads(described), data)).encode()
 
 
-def _saved(state: dict[str, Any]) -> bytes:
-    out = io.BytesIO()
-    torch.save(state, out)
-    return out.getvalue()
+def _other_header(data: bytes, rng: Generator) -> bytes:
+    """Another shape, type or place for some array, or a header that is none."""
+    length = struct.unpack('<Q', data[:_HEAD])[0]
+    header, numbers = json.loads(data[_HEAD : _HEAD + length]), data[_HEAD + length :]
+    way = rng.integers(6)
+    if way == 0:
+        return struct.pack('<Q', int(2 ** rng.uniform(0.0, 63.9))) + data[_HEAD:]
+    if way == 1:
+        text = spoiled_bytes(data[_HEAD : _HEAD + length], rng)
+    else:
+        entry = header[str(rng.choice(list(header)))]
+        huge = int(2 ** rng.uniform(0.0, 70.0))
+        if way == 2:
+            entry['shape'] = [[huge, huge], [-1], [0], 'x', [[1]], None][rng.integers(6)]
+        elif way == 3:
+            entry['dtype'] = ['F16', 'BF16', 'F8_E4M3', 'I64', 'BOOL', 'C64', 1][rng.integers(7)]
+        elif way == 4:
+            entry['data_offsets'] = [[0, huge], [huge, 0], [-1, 8], []][rng.integers(4)]
+        else:
+            header[str(boundary(rng))] = dict(entry)
+        text = json.dumps(header).encode()
+    return struct.pack('<Q', len(text)) + text + numbers
 
 
 def _other_state(state: dict[str, Any], rng: Generator) -> dict[str, Any]:
     for _ in range(rng.integers(1, 4)):
         name = str(rng.choice(list(state)))
-        tensor = state[name]
-        way = rng.integers(8)
+        array = state[name]
+        way = rng.integers(7)
         if way == 0:
             state.pop(name)
         elif way == 1:
             value = float(rng.choice((np.nan, np.inf, 0.0, -1.0)))
-            state[name] = torch.full_like(tensor, value, dtype=torch.float64)
+            state[name] = np.full(array.shape, value)
         elif way == 2:
-            state[name] = tensor.new_ones(()).expand(1 << int(rng.integers(1, 40)))
+            state[name] = np.ones(1 << int(rng.integers(1, 22)), array.dtype)
             break
         elif way == 3:
-            state[name] = tensor.to((torch.float16, torch.int64, torch.bool)[rng.integers(3)])
+            with np.errstate(over='ignore', invalid='ignore'):
+                state[name] = array.astype((np.float16, np.int64, np.bool_)[rng.integers(3)])
         elif way == 4:
-            state[name] = tensor.flatten()[: int(rng.integers(tensor.numel() + 1))].clone()
+            state[name] = array.ravel()[: int(rng.integers(array.size + 1))].copy()
         elif way == 5:
-            state[name] = torch.as_tensor(rng.normal(size=tuple(tensor.shape))).to(tensor.dtype)
-        elif way == 6:
-            state[name] = tensor * float(10.0 ** rng.uniform(-300.0, 300.0))
+            drawn = rng.normal(size=array.shape)
+            state[name] = np.asarray(drawn, array.dtype)
         else:
-            state[str(boundary(rng))] = [tensor]
+            with np.errstate(over='ignore'):
+                scaled = array * 10.0 ** rng.uniform(-300.0, 300.0)
+                state[name] = np.asarray(scaled, array.dtype)
         if not state:
             break
-        state = {key: value for key, value in state.items() if isinstance(value, torch.Tensor)}
     return state
 
 

@@ -4,7 +4,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from endoscope_core.classifier.standardised_tension import WIRES
+from endoscope_core.classifier.classification import WIRES
 from endoscope_core.signals import CALIBRATION_SAMPLES
 
 PIXELS = 60

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from endoscope_core.classifier.classification import (
+    WIRES,
     Classifier,
     ClassifierError,
     UnseenTensionError,
@@ -17,12 +16,11 @@ from endoscope_core.classifier.classification import (
 from endoscope_core.classifier.inference import TensionClassifier
 from endoscope_core.classifier.size_classifier import HeldOutCalibration, SizeClassifier
 from endoscope_core.classifier.size_model import STRANGENESS, BacklashSizeModel
-from endoscope_core.classifier.standardised_tension import WIRES
 from endoscope_core.classifier.weights_file import (
     CNN,
     SIZE,
     classes_of,
-    filled,
+    fitting,
     read_weights,
     unusable,
 )
@@ -35,7 +33,8 @@ come with this package know 420."""
 
 def shipped_weights(motion: str) -> Path:
     """The size classifier that comes with this package for a calibration motion."""
-    return Path(str(files('endoscope_core.classifier') / 'weights' / f'backlash_size_{motion}.pt'))
+    name = f'backlash_size_{motion}.safetensors'
+    return Path(str(files('endoscope_core.classifier') / 'weights' / name))
 
 
 def load_classifier(weights: str | Path | None = None, motion: str = SINUSOID) -> Classifier:
@@ -72,7 +71,7 @@ def load_classifier(weights: str | Path | None = None, motion: str = SINUSOID) -
 
 
 def _size_classifier(
-    path: Path, description: dict[str, Any], state: dict[str, Tensor]
+    path: Path, description: dict[str, Any], state: dict[str, np.ndarray]
 ) -> SizeClassifier:
     try:
         ceilings = tuple(float(x) for x in description['ceilings'])
@@ -84,12 +83,12 @@ def _size_classifier(
         if known > MOST_KNOWN:
             raise ValueError(f'it knows {known} courses, more than {MOST_KNOWN}')
         for name in ('spread', 'lengths', 'height', 'noise', 'rest', 'quiet'):
-            if not (state[name] > 0.0).all():
+            if not np.all(state[name] > 0.0):
                 raise ValueError(f'{name} is not positive')
-        with torch.device('meta'):
-            model = BacklashSizeModel(known, len(state['centre']), components)
+        shapes = BacklashSizeModel.shapes(known, len(state['centre']), components)
+        model = BacklashSizeModel(**fitting(state, shapes, np.float64))
+        model.require_fitted()
         classes = classes_of(description)
-        filled(model, state).require_fitted()
         return SizeClassifier(model, calibration, classes, str(description['motion']))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise unusable(path, error) from error
@@ -102,7 +101,7 @@ def _try(path: Path, classifier: Classifier) -> None:
         result = classifier.classify(np.full((samples, WIRES), 1.0))
     except UnseenTensionError:
         return
-    except RuntimeError as error:
+    except np.linalg.LinAlgError as error:
         raise unusable(path, error) from error
     if not all(map(math.isfinite, (*result.probabilities.values(), result.expected_size))):
         raise ClassifierError(f'{path} holds no classifier weights: its answers are not finite')

@@ -2,14 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
-import torch
-from numpy.typing import ArrayLike
-from torch import Tensor
+from numpy.typing import ArrayLike, NDArray
 
 from endoscope_core.classifier.classification import (
     LEVEL,
+    WIRES,
     CellReadings,
     ClassificationResult,
     UnseenTensionError,
@@ -17,10 +17,10 @@ from endoscope_core.classifier.classification import (
     result_of,
 )
 from endoscope_core.classifier.size_model import STRANGENESS, BacklashSizeModel, SizeEstimate
-from endoscope_core.classifier.standardised_tension import WIRES
 from endoscope_core.signals import calibration_motion
 
 HALF_CLASS = math.radians(5.0)
+_NORMAL = NormalDist()
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class SizeClassifier:
         classes_deg: tuple[int, ...],
         motion: str,
     ) -> None:
-        self.model = model.eval()
+        self.model = model
         self.calibration = calibration
         self.classes_deg = classes_deg
         self.motion = motion
@@ -89,8 +89,7 @@ class SizeClassifier:
             If the shape is another or a value is not finite.
         """
         array = checked_tension(tension, (self._samples, WIRES))
-        with torch.no_grad():
-            estimate = self.model(torch.from_numpy(array[self._settled :]).unsqueeze(0), cells)
+        estimate = self.model.estimate(array[None, self._settled :], cells)
         reasons = self.reasons_to_refuse(estimate)[0]
         if reasons:
             raise UnseenTensionError(f'none of the classes: {reasons[0]}')
@@ -98,8 +97,7 @@ class SizeClassifier:
 
     def reasons_to_refuse(self, estimate: SizeEstimate) -> list[list[str]]:
         """Why each of R recordings is none of the classes; an empty list where it may be one."""
-        ceilings = torch.tensor(self.calibration.ceilings)
-        strange = (estimate.strangeness > ceilings).tolist()
+        strange = estimate.strangeness > np.array(self.calibration.ceilings)
         reasons = [
             [text for text, too_much in zip(STRANGENESS, row, strict=True) if too_much]
             for row in strange
@@ -116,31 +114,33 @@ class SizeClassifier:
 
     def results(self, estimate: SizeEstimate) -> list[ClassificationResult]:
         """Result for each of R recordings, whether it is to be refused or not."""
-        spread = self._spread(estimate)
-        borders = torch.tensor(np.deg2rad(self.classes_deg[1:])) - HALF_CLASS
-        below = torch.special.ndtr((borders - estimate.size[:, None]) / spread[:, None])
-        edges = torch.nn.functional.pad(below, (1, 0), value=0.0)
-        weights = torch.diff(torch.nn.functional.pad(edges, (0, 1), value=1.0), dim=1).tolist()
-        sizes = estimate.size.tolist()
-        return [
-            _with_size(result_of(self.classes_deg, row), size, interval)
-            for row, size, interval in zip(weights, sizes, self._intervals(estimate), strict=True)
-        ]
+        borders = np.deg2rad(self.classes_deg[1:]) - HALF_CLASS
+        found = []
+        for size, spread, interval in zip(
+            estimate.size.tolist(), self._spread(estimate), self._intervals(estimate), strict=True
+        ):
+            below = [_NORMAL.cdf((border - size) / spread) for border in borders.tolist()]
+            weights = np.diff([0.0, *below, 1.0]).tolist()
+            found.append(_with_size(result_of(self.classes_deg, weights), size, interval))
+        return found
 
     @property
     def _range(self) -> tuple[float, float]:
         ends = np.deg2rad([self.classes_deg[0], self.classes_deg[-1]])
         return float(ends[0] - HALF_CLASS), float(ends[1] + HALF_CLASS)
 
-    def _spread(self, estimate: SizeEstimate) -> Tensor:
+    def _spread(self, estimate: SizeEstimate) -> list[float]:
         """Standard deviation in rad of a normal distribution as wide as the intervals."""
-        normal = torch.special.ndtri(torch.tensor(0.5 + 0.5 * LEVEL, dtype=torch.float64))
-        return estimate.deviation * self.calibration.inflation / normal
+        normal = _NORMAL.inv_cdf(0.5 + 0.5 * LEVEL)
+        return (self._half_width(estimate) / normal).tolist()
 
     def _intervals(self, estimate: SizeEstimate) -> list[tuple[float, float]]:
-        half = estimate.deviation * self.calibration.inflation
-        ends = torch.stack([estimate.size - half, estimate.size + half], dim=1).tolist()
-        return [(low, high) for low, high in ends]
+        half = self._half_width(estimate)
+        low, high = estimate.size - half, estimate.size + half
+        return list(zip(low.tolist(), high.tolist(), strict=True))
+
+    def _half_width(self, estimate: SizeEstimate) -> NDArray[np.float64]:
+        return estimate.deviation * self.calibration.inflation
 
 
 def _with_size(

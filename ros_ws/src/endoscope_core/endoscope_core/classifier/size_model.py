@@ -1,9 +1,11 @@
 """Backlash size of a tube, with its uncertainty, regressed from wire tensions."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
-import torch
-from torch import Tensor, nn
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from endoscope_core.classifier.classification import CellReadings
 from endoscope_core.classifier.tension_features import (
@@ -13,9 +15,14 @@ from endoscope_core.classifier.tension_features import (
     variance_of_fewer_readings,
 )
 
+Array = NDArray[np.float64]
+Number = float | Array
+"""Read from a file it is an array of shape ()."""
+
 COMPONENTS = 16
 STEPS = 120
 _RATE = 0.08
+_MOMENTA = (0.9, 0.999)
 _JITTER = 1e-9
 _LEAST = 1e-6
 _ROUNDING = 1e-6
@@ -27,17 +34,17 @@ class SizeEstimate:
 
     Parameters
     ----------
-    size, deviation : Tensor, shape (R,)
+    size, deviation : ndarray, shape (R,)
         Backlash size in rad, mean of the joints, and the standard deviation of its error as the
         model takes it, before calibration on recordings held out.
-    strangeness : Tensor, shape (R, 3)
+    strangeness : ndarray, shape (R, 3)
         Natural logarithms of how far the tensions are from those that the model knows, the worst
         joint or wire of each recording; see `STRANGENESS`.
     """
 
-    size: Tensor
-    deviation: Tensor
-    strangeness: Tensor
+    size: Array
+    deviation: Array
+    strangeness: Array
 
 
 STRANGENESS = (
@@ -48,7 +55,8 @@ STRANGENESS = (
 """What each number of `SizeEstimate.strangeness` says when it is too large."""
 
 
-class BacklashSizeModel(nn.Module):
+@dataclass(frozen=True, eq=False)
+class BacklashSizeModel:
     """Gaussian process on principal components of the tension courses of one joint.
 
     Friction acts on tension as a factor (Euler-Eytelwein), so that the courses are read as
@@ -63,86 +71,51 @@ class BacklashSizeModel(nn.Module):
 
     Parameters
     ----------
-    known : int
-        Number M of courses that it is fitted to.
-    course : int
-        Length C of a joint's course.
-    components : int
-        Number K of principal components.
+    centre : ndarray, shape (C,)
+        Mean course.
+    basis : ndarray, shape (K, C)
+        Principal components.
+    spread : ndarray, shape (K,)
+        Standard deviation of the courses along each.
+    scores : ndarray, shape (M, K)
+        The M courses that it is fitted to, in components, whitened.
+    target : ndarray, shape (M,)
+        Their backlash sizes in rad.
+    lengths : ndarray, shape (K,)
+        Of the squared-exponential covariance.
+    linear, height, noise : float
+        Standard deviations of the size in rad: for a unit of a component, of the
+        squared-exponential part, and of what tensions do not tell.
+    rest : float
+        Rms of what the components leave out of a known course.
+    quiet : float
+        Noise of a load cell in N rms.
     """
 
-    centre: Tensor
-    basis: Tensor
-    spread: Tensor
-    scores: Tensor
-    target: Tensor
-    lengths: Tensor
-    linear: Tensor
-    height: Tensor
-    noise: Tensor
-    rest: Tensor
-    quiet: Tensor
+    centre: Array
+    basis: Array
+    spread: Array
+    scores: Array
+    target: Array
+    lengths: Array
+    linear: Number
+    height: Number
+    noise: Number
+    rest: Number
+    quiet: Number
 
-    def __init__(self, known: int, course: int, components: int = COMPONENTS) -> None:
-        super().__init__()
-        shapes: dict[str, tuple[int, ...]] = {
+    @staticmethod
+    def shapes(known: int, course: int, components: int) -> dict[str, tuple[int, ...]]:
+        """Shape of each of its arrays, for M known courses of length C in K components."""
+        return {
             'centre': (course,),
             'basis': (components, course),
             'spread': (components,),
             'scores': (known, components),
             'target': (known,),
             'lengths': (components,),
-            'linear': (),
-            'height': (),
-            'noise': (),
-            'rest': (),
-            'quiet': (),
+            **dict.fromkeys(('linear', 'height', 'noise', 'rest', 'quiet'), ()),
         }
-        for name, shape in shapes.items():
-            self.register_buffer(name, torch.ones(shape, dtype=torch.float64))
-        self._conditioned: tuple[Tensor, Tensor, Tensor] | None = None
-
-    def fit(self, tension: Tensor, joint_size: Tensor, steps: int = STEPS) -> None:
-        """Take over what R recordings (R, N, 2 J) of known sizes (R, J) in rad teach.
-
-        Parameters
-        ----------
-        tension, joint_size : Tensor
-        steps : int
-            Of the search for the greatest likelihood, by Adam.
-        """
-        course = log_courses(tension.double()).flatten(0, 1)
-        self.target = joint_size.double().flatten()
-        self.centre = course.mean(dim=0)
-        _, strengths, directions = torch.linalg.svd(course - self.centre, full_matrices=False)
-        components = len(self.spread)
-        self.basis = directions[:components].contiguous()
-        self.spread = strengths[:components] / len(course) ** 0.5
-        self.scores, rest = self._components(course)
-        self.rest = rest.square().mean().sqrt()
-        self.quiet = roughness(tension.double()).log().mean().exp()
-        self._conditioned = None
-        self._maximise_likelihood(steps)
-
-    def _maximise_likelihood(self, steps: int) -> None:
-        target = self.target - self.target.mean()
-        unit = target.std()
-        logarithms = torch.cat(
-            [
-                torch.full((len(self.spread),), 1.5, dtype=torch.float64),
-                torch.log(torch.tensor([0.5, 1.0, 0.02], dtype=torch.float64) * unit),
-            ]
-        ).requires_grad_()
-        search = torch.optim.Adam([logarithms], lr=_RATE)
-        for _ in range(steps):
-            search.zero_grad()
-            self._take(logarithms)
-            factor, weights = self._solve(target)
-            loss = 0.5 * target @ weights + factor.diagonal().log().sum()
-            loss.backward()
-            search.step()
-        with torch.no_grad():
-            self._take(logarithms)
 
     def require_fitted(self) -> None:
         """Refuse numbers that no fit gives.
@@ -155,96 +128,173 @@ class BacklashSizeModel(nn.Module):
         ValueError
             They are not, or a known size is no angle of a tube.
         """
-        unit = torch.eye(len(self.basis), dtype=self.basis.dtype)
-        squares = self.scores.square().mean(dim=0)
-        if not torch.allclose(self.basis @ self.basis.T, unit, atol=_ROUNDING):
+        if not np.allclose(self.basis @ self.basis.T, np.eye(len(self.basis)), atol=_ROUNDING):
             raise ValueError('the components are not orthonormal')
-        if not torch.allclose(squares, torch.ones_like(squares), atol=_ROUNDING):
+        if not np.allclose(np.mean(np.square(self.scores), axis=0), 1.0, atol=_ROUNDING):
             raise ValueError('the scores are not whitened')
-        if not bool(((self.target >= 0.0) & (self.target <= 2.0 * torch.pi)).all()):
+        if not np.all((self.target >= 0.0) & (self.target <= 2.0 * np.pi)):
             raise ValueError('the known sizes are no angles')
 
-    def _take(self, logarithms: Tensor) -> None:
-        values = logarithms.exp()
-        self.lengths = values[:-3]
-        self.linear, self.height, self.noise = values[-3:]
-
-    def _covariance(self, a: Tensor, b: Tensor) -> Tensor:
-        """Covariance (A, B) in rad^2 of the sizes at whitened components (A, K) and (B, K)."""
-        x, y = a / self.lengths, b / self.lengths
-        square = x.square().sum(dim=1)[:, None] + y.square().sum(dim=1) - 2.0 * (x @ y.T)
-        bump = (-0.5 * square.clamp(min=0.0)).exp()
-        return self.height**2 * bump + self.linear**2 * (a @ b.T)
-
-    def _solve(self, target: Tensor) -> tuple[Tensor, Tensor]:
-        """Cholesky factor of the known sizes' covariance, and its solution for a target."""
-        known = self._covariance(self.scores, self.scores)
-        floor = self.noise**2 + _JITTER * known.diagonal().mean()
-        factor = torch.linalg.cholesky(known + floor * torch.eye(len(known), dtype=known.dtype))
-        return factor, torch.cholesky_solve(target[:, None], factor)[:, 0]
-
-    def _components(self, course: Tensor) -> tuple[Tensor, Tensor]:
-        """Whitened components of courses, and the rms of what they leave out."""
-        deviation = course - self.centre
-        raw = deviation @ self.basis.T
-        rest = (deviation - raw @ self.basis).square().mean(dim=-1).sqrt()
-        return raw / self.spread, rest
-
-    def forward(self, tension: Tensor, cells: CellReadings | None = None) -> SizeEstimate:
+    def estimate(self, tension: ArrayLike, cells: CellReadings | None = None) -> SizeEstimate:
         """Sizes of recordings (R, N, 2 J) in N at 1 kHz.
 
         Where the cells were read less often, their noise is that of the readings, and what fewer
         readings add to the noise of the courses is no strangeness of the tube.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If the model's numbers make no covariance.
         """
-        if self._conditioned is None:
-            middle = self.target.mean()
-            self._conditioned = (middle, *self._solve(self.target - middle))
-        middle, factor, weights = self._conditioned
-        tension = tension.double()
+        factor, weights = self._conditioned
+        tension = np.asarray(tension, dtype=np.float64)
         course = log_courses(tension)
-        scores, rest = self._components(course)
-        flat = scores.flatten(0, 1)
-        known = self._covariance(flat, self.scores)
-        told = torch.linalg.solve_triangular(factor, known.T, upper=False).square().sum(dim=0)
-        alone = self.height**2 + self.linear**2 * flat.square().sum(dim=1)
-        size = (known @ weights + middle).unflatten(0, scores.shape[:2])
-        deviation = (alone - told).clamp(min=0.0).add(self.noise**2).sqrt()
+        scores, rest = components(course, self.centre, self.basis, self.spread)
+        flat = scores.reshape(-1, scores.shape[-1])
+        known = self.covariance(flat, self.scores)
+        told = np.sum(np.square(solve_triangular(factor, known.T, lower=True)), axis=0)
+        alone = self.height**2 + self.linear**2 * np.sum(np.square(flat), axis=1)
+        size = (known @ weights + np.mean(self.target)).reshape(scores.shape[:2])
+        deviation = np.sqrt(np.maximum(alone - told, 0.0) + self.noise**2)
         # The joints of a rig are alike, and so are the model's errors on them: they do not average.
-        deviation = deviation.unflatten(0, scores.shape[:2]).mean(dim=1)
+        deviation = deviation.reshape(scores.shape[:2]).mean(axis=1)
         return SizeEstimate(
-            size.mean(dim=1), deviation, self._strangeness(tension, course, scores, rest, cells)
+            size.mean(axis=1), deviation, self._strangeness(tension, course, scores, rest, cells)
         )
+
+    def covariance(self, a: Array, b: Array) -> Array:
+        """Covariance (A, B) in rad^2 of the sizes at whitened components (A, K) and (B, K)."""
+        return self.height**2 * self._bump(a, b) + self.linear**2 * (a @ b.T)
+
+    def log_likelihood(self) -> tuple[float, Array]:
+        """Of the known sizes, less a constant; and its gradient.
+
+        Returns
+        -------
+        value : float
+        gradient : ndarray, shape (K + 3,)
+            By the logarithms of `lengths`, `linear`, `height` and `noise` (section 5.4.1).
+        """
+        factor, weights = self._conditioned
+        target = self.target - np.mean(self.target)
+        value = -0.5 * target @ weights - np.sum(np.log(np.diag(factor)))
+        inverse = cho_solve((factor, True), np.eye(len(factor)))
+        slope = 0.5 * (np.outer(weights, weights) - inverse)
+        noise = 2.0 * self.noise**2 * np.trace(slope)
+        slope[np.diag_indices_from(slope)] += _JITTER * np.mean(np.diag(slope))
+        bent = self.height**2 * slope * self._bump(self.scores, self.scores)
+        squares = np.sum(bent, axis=1) @ np.square(self.scores)
+        products = np.sum(self.scores * (bent @ self.scores), axis=0)
+        lengths = 2.0 * (squares - products) / self.lengths**2
+        linear = 2.0 * self.linear**2 * np.sum(self.scores * (slope @ self.scores))
+        return float(value), np.array([*lengths, linear, 2.0 * np.sum(bent), noise])
+
+    @cached_property
+    def _conditioned(self) -> tuple[Array, Array]:
+        """Cholesky factor of the known sizes' covariance, and its solution for these sizes."""
+        known = self.covariance(self.scores, self.scores)
+        known[np.diag_indices_from(known)] += self.noise**2 + _JITTER * np.mean(np.diag(known))
+        factor = cholesky(known, lower=True)
+        return factor, cho_solve((factor, True), self.target - np.mean(self.target))
+
+    def _bump(self, a: Array, b: Array) -> Array:
+        x, y = a / self.lengths, b / self.lengths
+        ends = np.sum(np.square(x), axis=1)[:, None] + np.sum(np.square(y), axis=1)
+        return np.exp(-0.5 * np.maximum(ends - 2.0 * (x @ y.T), 0.0))
 
     def _strangeness(
         self,
-        tension: Tensor,
-        course: Tensor,
-        scores: Tensor,
-        rest: Tensor,
+        tension: Array,
+        course: Array,
+        scores: Array,
+        rest: Array,
         cells: CellReadings | None,
-    ) -> Tensor:
+    ) -> Array:
         rms, interval = roughness(tension), PERIOD
         if cells is not None:
-            rms = torch.tensor(cells.noise, dtype=rms.dtype).reshape(1, *rms.shape[1:])
-            interval = cells.interval
+            rms, interval = np.reshape(cells.noise, (1, *rms.shape[1:])), cells.interval
         added = variance_of_fewer_readings(course, rms, interval)
-        of_basis = self.basis.square()
-        unknown = rest.square() - (added * (1.0 - of_basis.sum(dim=0))).mean(dim=-1)
-        far = scores.square().mean(dim=-1) - (added @ of_basis.T / self.spread**2).mean(dim=-1)
-        noise = (rms / self.quiet).clamp(min=_LEAST).log().abs().amax(dim=(1, 2))
-        return torch.stack(
+        of_basis = np.square(self.basis)
+        unknown = rest**2 - np.mean(added * (1.0 - of_basis.sum(axis=0)), axis=-1)
+        far = np.mean(scores**2, axis=-1) - np.mean(added @ of_basis.T / self.spread**2, axis=-1)
+        noise = np.abs(np.log(np.maximum(rms / self.quiet, _LEAST))).max(axis=(1, 2))
+        return np.stack(
             [
-                (unknown / self.rest**2).clamp(min=_LEAST).sqrt().log().amax(dim=1),
-                far.clamp(min=_LEAST).sqrt().log().amax(dim=1),
-                noise.expand(len(tension)),
+                _log_root(unknown / self.rest**2).max(axis=1),
+                _log_root(far).max(axis=1),
+                np.broadcast_to(noise, len(tension)),
             ],
-            dim=1,
+            axis=1,
         )
 
 
-def fitted_size_model(tension: Tensor, joint_size: Tensor, steps: int = STEPS) -> BacklashSizeModel:
-    """A model fitted to recordings (R, N, 2 J) in N of known sizes (R, J) in rad."""
-    known, course = log_courses(tension.double()).flatten(0, 1).shape
-    model = BacklashSizeModel(known, course, min(COMPONENTS, known - 1))
-    model.fit(tension, joint_size, steps)
-    return model.eval()
+def fitted_size_model(
+    tension: ArrayLike, joint_size: ArrayLike, steps: int = STEPS
+) -> BacklashSizeModel:
+    """A model fitted to recordings of known sizes.
+
+    Parameters
+    ----------
+    tension : ndarray, shape (R, N, 2 J)
+        N at 1 kHz.
+    joint_size : ndarray, shape (R, J)
+        rad.
+    steps : int
+        Of the search for the greatest likelihood.
+    """
+    tension = np.asarray(tension, dtype=np.float64)
+    courses = log_courses(tension)
+    course = courses.reshape(-1, courses.shape[-1])
+    target = np.ravel(joint_size).astype(np.float64)
+    centre = course.mean(axis=0)
+    _, strengths, directions = np.linalg.svd(course - centre, full_matrices=False)
+    kept = min(COMPONENTS, len(course) - 1, course.shape[1])
+    basis, spread = directions[:kept].copy(), strengths[:kept] / np.sqrt(len(course))
+    scores, rest = components(course, centre, basis, spread)
+    unit = np.std(target, ddof=1)
+    first = BacklashSizeModel(
+        centre=centre,
+        basis=basis,
+        spread=spread,
+        scores=scores,
+        target=target,
+        lengths=np.full(kept, np.exp(1.5)),
+        linear=0.5 * unit,
+        height=unit,
+        noise=0.02 * unit,
+        rest=np.sqrt(np.mean(np.square(rest))),
+        quiet=np.exp(np.mean(np.log(roughness(tension)))),
+    )
+    return _likeliest(first, steps)
+
+
+def _likeliest(model: BacklashSizeModel, steps: int) -> BacklashSizeModel:
+    """Search for the greatest likelihood by Adam (Kingma, Ba, ICLR 2015, algorithm 1).
+
+    It ends after so many steps rather than where the likelihood is greatest: lengths of components
+    that say nothing of the size would go to infinity.
+    """
+    logarithms = np.log([*model.lengths, model.linear, model.height, model.noise])
+    mean, square = np.zeros_like(logarithms), np.zeros_like(logarithms)
+    slow, slower = _MOMENTA
+    for step in range(1, steps + 1):
+        _, uphill = model.log_likelihood()
+        mean = slow * mean + (1.0 - slow) * uphill
+        square = slower * square + (1.0 - slower) * uphill**2
+        root = np.sqrt(square / (1.0 - slower**step)) + 1e-8
+        logarithms = logarithms + _RATE * mean / (1.0 - slow**step) / root
+        *lengths, linear, height, noise = np.exp(logarithms)
+        model = replace(model, lengths=np.array(lengths), linear=linear, height=height, noise=noise)
+    return model
+
+
+def components(course: Array, centre: Array, basis: Array, spread: Array) -> tuple[Array, Array]:
+    """Whitened components of courses, and the rms of what they leave out."""
+    deviation = course - centre
+    raw = deviation @ basis.T
+    rest = np.sqrt(np.mean(np.square(deviation - raw @ basis), axis=-1))
+    return raw / spread, rest
+
+
+def _log_root(square: Array) -> Array:
+    return 0.5 * np.log(np.maximum(square, _LEAST))

@@ -1,21 +1,25 @@
 """Fits the size model and measures, on tubes held out from it, how far it is to be trusted."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from threadpoolctl import threadpool_limits
 
 from endoscope_core.classifier.classification import LEVEL, ClassificationResult
 from endoscope_core.classifier.grouped_folds import CrossValidation, Rows, grouped_folds
 from endoscope_core.classifier.size_classifier import HeldOutCalibration, SizeClassifier
 from endoscope_core.classifier.size_model import SizeEstimate, fitted_size_model
-from endoscope_core.classifier.training import Progress
+from endoscope_core.classifier.weights_file import SIZE, save_weights
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 from endoscope_core.signals import calibration_motion
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
 
 TAIL_DEVIATIONS = 5.0
 LEAST_MARGIN = math.log(1.5)
@@ -43,8 +47,8 @@ class SizeValidation:
     rmse: tuple[float, ...]
     coverage: tuple[float, ...]
     refused: int
-    error: NDArray[np.float64]
-    half_width: NDArray[np.float64]
+    error: Array
+    half_width: Array
 
     def share_within(self, level: float) -> float:
         """Share of errors inside the intervals that are to hold a share `level` of them."""
@@ -68,7 +72,7 @@ def validated_size_classifier(
 ) -> tuple[SizeClassifier, SizeValidation]:
     """Classifier of `train_size_classifier`, and what its folds say of it."""
     classifier, split, held_out = _train(dataset, seed, folds)
-    true = torch.from_numpy(dataset.backlash_size)
+    true = dataset.backlash_size
     named = np.zeros_like(dataset.class_deg)
     error, half_width = np.zeros(len(true)), np.zeros(len(true))
     rmse, coverage, refused = [], [], 0
@@ -81,8 +85,8 @@ def validated_size_classifier(
         results = judge.results(estimate)
         named[test] = [result.class_deg for result in results]
         refused += sum(bool(reasons) for reasons in judge.reasons_to_refuse(estimate))
-        error[test] = (estimate.size - true[test]).numpy()
-        half_width[test] = judge.calibration.inflation * estimate.deviation.numpy()
+        error[test] = estimate.size - true[test]
+        half_width[test] = judge.calibration.inflation * estimate.deviation
         rmse.append(float(np.sqrt(np.mean(error[test] ** 2))))
         coverage.append(share_covered(results, dataset.backlash_size[test]))
         if progress is not None:
@@ -96,12 +100,36 @@ def validated_size_classifier(
     return classifier, validation
 
 
-def share_covered(results: list[ClassificationResult], size: NDArray[np.float64]) -> float:
+def save_size_classifier(
+    path: str | Path,
+    classifier: SizeClassifier,
+    dataset: CalibrationDataset,
+    validation: SizeValidation,
+    command: str,
+    seed: int,
+) -> None:
+    """Write a size classifier and how it was made; parameters as of `save_weights`."""
+    own = {
+        'intervals_hold': LEVEL,
+        'inflation': classifier.calibration.inflation,
+        'ceilings': list(classifier.calibration.ceilings),
+        'held_out': {
+            'size_rmse': list(validation.rmse),
+            'interval_coverage': list(validation.coverage),
+            'refused': validation.refused,
+        },
+    }
+    model = classifier.model
+    state = {each.name: np.asarray(getattr(model, each.name)) for each in fields(model)}
+    save_weights(path, state, SIZE, own, dataset, validation.classes, command, seed)
+
+
+def share_covered(results: list[ClassificationResult], size: Array) -> float:
     """Share of true sizes (R,) in rad that lie in the intervals of the results."""
     return float(np.mean([r.holds(x) for r, x in zip(results, size.tolist(), strict=True)]))
 
 
-def calibration_of(held_out: SizeEstimate, true: Tensor) -> HeldOutCalibration:
+def calibration_of(held_out: SizeEstimate, true: Array) -> HeldOutCalibration:
     """Calibration on estimates of R recordings held out, whose true sizes (R,) in rad are known.
 
     Intervals: split conformal prediction with errors in units of the model's own deviation
@@ -109,12 +137,12 @@ def calibration_of(held_out: SizeEstimate, true: Tensor) -> HeldOutCalibration:
     distances are close to normal; tensions are refused from five standard deviations over the mean
     on, and never below one and a half times the mean distance.
     """
-    scores = ((held_out.size - true).abs() / held_out.deviation).sort().values
+    scores = np.sort(np.abs(held_out.size - true) / held_out.deviation)
     rank = min(len(scores), math.ceil((len(scores) + 1) * LEVEL))
     strange = held_out.strangeness
-    margin = (TAIL_DEVIATIONS * strange.std(dim=0)).clamp(min=LEAST_MARGIN)
+    margin = np.maximum(TAIL_DEVIATIONS * strange.std(axis=0, ddof=1), LEAST_MARGIN)
     return HeldOutCalibration(
-        float(scores[rank - 1]), tuple((strange.mean(dim=0) + margin).tolist())
+        float(scores[rank - 1]), tuple((strange.mean(axis=0) + margin).tolist())
     )
 
 
@@ -122,20 +150,20 @@ def _train(
     dataset: CalibrationDataset, seed: int, folds: int
 ) -> tuple[SizeClassifier, list[tuple[Rows, Rows]], SizeEstimate]:
     settled = calibration_motion(dataset.motion).settled
-    tension = torch.from_numpy(dataset.tension[:, settled:])
-    size = torch.from_numpy(dataset.joint_size)
+    tension, size = dataset.tension[:, settled:], dataset.joint_size
     split = grouped_folds(dataset, seed, folds)
-    parts = []
-    for train, test in split:
-        model = fitted_size_model(tension[train], size[train])
-        with torch.no_grad():
-            parts.append(model(tension[test]))
-    order = torch.from_numpy(np.argsort(np.concatenate([test for _, test in split])))
+    # One thread forms its sums in the same order everywhere.
+    with threadpool_limits(1, 'blas'):
+        model = fitted_size_model(tension, size)
+        parts = [
+            fitted_size_model(tension[train], size[train]).estimate(tension[test])
+            for train, test in split
+        ]
+    order = np.argsort(np.concatenate([test for _, test in split]))
     held_out = SizeEstimate(
-        *(torch.cat([getattr(part, name) for part in parts])[order] for name in _FIELDS)
+        *(np.concatenate([getattr(part, name) for part in parts])[order] for name in _FIELDS)
     )
-    calibration = calibration_of(held_out, torch.from_numpy(dataset.backlash_size))
-    model = fitted_size_model(tension, size)
+    calibration = calibration_of(held_out, dataset.backlash_size)
     return SizeClassifier(model, calibration, CLASSES_DEG, dataset.motion), split, held_out
 
 
@@ -143,5 +171,4 @@ _FIELDS = ('size', 'deviation', 'strangeness')
 
 
 def _rows(estimate: SizeEstimate, rows: Rows) -> SizeEstimate:
-    chosen = torch.from_numpy(rows)
-    return SizeEstimate(*(getattr(estimate, name)[chosen] for name in _FIELDS))
+    return SizeEstimate(*(getattr(estimate, name)[rows] for name in _FIELDS))

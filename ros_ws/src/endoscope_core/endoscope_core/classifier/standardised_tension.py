@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor, nn
 
-WIRES = 4
+from endoscope_core.classifier.classification import WIRES
 
 
 class StandardisedTension(nn.Module):

@@ -1,47 +1,54 @@
-"""The 1D-CNN of Table 2 of the first paper."""
+"""The 1D-CNN of Table 2 of the first paper, as PyTorch trains it."""
 
-from collections.abc import Sequence
+from itertools import pairwise
 
+import numpy as np
 from torch import Tensor, nn
 
-from endoscope_core.classifier.standardised_tension import WIRES, StandardisedTension
-from endoscope_core.signals import CALIBRATION_SAMPLES
-
-KERNEL = 3
-STRIDE = 3
-CHANNELS = (16, 16, 32, 32, 64, 64, 64, 64)
+from endoscope_core.classifier.classification import WIRES
+from endoscope_core.classifier.inference import CHANNELS, STRIDE
+from endoscope_core.classifier.standardised_tension import StandardisedTension
 
 
 class TensionCnn(StandardisedTension):
     """Eight convolutions with batch normalisation and ReLU, then a dense layer.
 
     Eight strides of three reduce 9000 samples to exactly one, so that the dense layer sees one
-    feature vector of the whole recording. The paper does not give the numbers of channels; these
-    make 49 thousand weights. Softmax belongs to the loss in training and to the caller otherwise.
+    feature vector of the whole recording. Softmax belongs to the loss in training and to the
+    caller otherwise.
 
     Parameters
     ----------
     classes : int
         Number of classes.
-    channels : sequence of int
-        Output channels of the eight convolutions.
     """
 
-    def __init__(self, classes: int, channels: Sequence[int] = CHANNELS) -> None:
+    def __init__(self, classes: int) -> None:
         super().__init__()
         layers: list[nn.Module] = []
-        width = WIRES
-        for wider in channels:
-            layers += [nn.Conv1d(width, wider, KERNEL, STRIDE), nn.BatchNorm1d(wider), nn.ReLU()]
-            width = wider
+        for width, wider in pairwise((WIRES, *CHANNELS)):
+            layers += [nn.Conv1d(width, wider, STRIDE, STRIDE), nn.BatchNorm1d(wider), nn.ReLU()]
         self.features = nn.Sequential(*layers)
-        length = CALIBRATION_SAMPLES
-        for _ in channels:
-            length //= STRIDE
-        self.dense = nn.Linear(width * length, classes)
+        self.dense = nn.Linear(CHANNELS[-1], classes)
 
     def forward(self, tension: Tensor) -> Tensor:
         """Logits (R, classes) of tensions (R, 4, 9000) in N."""
         features = self.features(self.unitless(tension))
         logits: Tensor = self.dense(features.flatten(1))
         return logits
+
+    def weights(self) -> dict[str, np.ndarray]:
+        """Weights as `TensionClassifier` takes them: each normalisation within its convolution."""
+        state = {name: value.double().numpy() for name, value in self.state_dict().items()}
+        found = {'offset': state['offset'][:, 0], 'scale': state['scale'][:, 0]}
+        for k in range(len(CHANNELS)):
+            own, norm = f'features.{3 * k}.', f'features.{3 * k + 1}.'
+            spread = np.sqrt(state[norm + 'running_var'] + self.features[3 * k + 1].eps)
+            gain = state[norm + 'weight'] / spread
+            # Rows in the order of samples, then channels.
+            rows = state[own + 'weight'].transpose(2, 1, 0).reshape(-1, len(gain))
+            found[f'filter.{k}'] = rows * gain
+            shift = state[own + 'bias'] - state[norm + 'running_mean']
+            found[f'bias.{k}'] = shift * gain + state[norm + 'bias']
+        found |= {'dense': state['dense.weight'].T, 'bias': state['dense.bias']}
+        return {name: np.ascontiguousarray(x, dtype=np.float32) for name, x in found.items()}

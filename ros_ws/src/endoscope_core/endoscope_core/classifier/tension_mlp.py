@@ -3,7 +3,8 @@
 from torch import Tensor, nn
 from torch.nn import functional
 
-from endoscope_core.classifier.standardised_tension import WIRES, StandardisedTension
+from endoscope_core.classifier.classification import WIRES
+from endoscope_core.classifier.standardised_tension import StandardisedTension
 from endoscope_core.signals import CALIBRATION_SAMPLES
 
 DECIMATION = 10

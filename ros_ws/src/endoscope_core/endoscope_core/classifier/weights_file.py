@@ -1,32 +1,28 @@
-"""Classifier weights on disk: a PyTorch file, and beside it the account of how they were made."""
+"""Classifier weights on disk: a safetensors file, and beside it how they were made."""
 
 import json
-import struct
+from collections.abc import Mapping
 from hashlib import sha256
-from io import BytesIO
 from pathlib import Path
 from typing import Any
-from zipfile import ZIP_STORED, BadZipFile, ZipFile
 
-import torch
-from torch import Tensor, nn
+import numpy as np
+import safetensors.numpy
+from numpy.typing import DTypeLike
+from safetensors import SafetensorError
 
 from endoscope_core.atomic_output import write_bytes, write_text
-from endoscope_core.classifier.classification import LEVEL, ClassifierError
+from endoscope_core.classifier.classification import ClassifierError
 from endoscope_core.classifier.grouped_folds import CrossValidation
-from endoscope_core.classifier.size_classifier import SizeClassifier
-from endoscope_core.classifier.size_training import SizeValidation
-from endoscope_core.classifier.tension_cnn import CHANNELS, TensionCnn
-from endoscope_core.classifier.training import Network, TrainingSettings
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 from endoscope_core.errors import EndoscopeError
 
-SCHEMA = 3
+SCHEMA = 4
 CNN = 'cnn'
 SIZE = 'size'
 SEAL = 'sha256'
 LARGEST_WEIGHTS, LARGEST_DESCRIPTION = 16 << 20, 1 << 20
-"""In bytes. The largest that come with this package have 224 kB and 1.5 kB."""
+"""In bytes. The largest that come with this package have 222 kB and 1.5 kB."""
 
 
 class WeightsFileError(EndoscopeError, ValueError):
@@ -43,27 +39,33 @@ def weights_path(path: str | Path) -> Path:
     """
     path = Path(path)
     if path.suffix == '.json' or path.is_dir():
-        raise WeightsFileError(f'{path} cannot hold weights: name a file with suffix .pt')
+        raise WeightsFileError(f'{path} cannot hold weights: name a file with suffix .safetensors')
     return path
 
 
-def save_network(
+def save_weights(
     path: str | Path,
-    network: Network,
+    state: Mapping[str, np.ndarray],
+    kind: str,
+    own: Mapping[str, Any],
     dataset: CalibrationDataset,
     validation: CrossValidation,
     command: str,
     seed: int,
 ) -> None:
-    """Write ``path`` (state dict) and the JSON file of the same name beside it.
+    """Write ``path`` and the JSON file of the same name beside it.
 
     Parameters
     ----------
     path : path
-        Of the weights; suffix .pt by custom.
-    network : Network
-        Trained on all of `dataset`; a 1D-CNN, the others are only compared with it.
+        Of the weights; suffix .safetensors by custom.
+    state : mapping of str to ndarray
+    kind : str
+        `CNN` or `SIZE`.
+    own : mapping
+        What a description of that kind has to say besides; in `held_out`, of the validation.
     dataset : CalibrationDataset
+        That the classifier was trained on, all of it.
     validation : CrossValidation
         On the same data set.
     command : str
@@ -74,43 +76,38 @@ def save_network(
     Raises
     ------
     WeightsFileError
-        If the network is another, or `path` cannot hold weights.
+        If `path` cannot hold weights.
     """
-    if not isinstance(network, TensionCnn):
-        raise WeightsFileError(f'{path}: weights of a {type(network).__name__} are not kept')
-    own = {'channels': list(CHANNELS), 'training': vars(TrainingSettings())}
-    held_out = _held_out(validation)
-    _save(path, network.state_dict(), CNN, own, dataset, held_out, command, seed)
-
-
-def save_size_classifier(
-    path: str | Path,
-    classifier: SizeClassifier,
-    dataset: CalibrationDataset,
-    validation: SizeValidation,
-    command: str,
-    seed: int,
-) -> None:
-    """Write a size classifier as `save_network` writes a network."""
-    calibration = classifier.calibration
-    own = {
-        'intervals_hold': LEVEL,
-        'inflation': calibration.inflation,
-        'ceilings': list(calibration.ceilings),
+    path = weights_path(path)
+    held_out = {
+        'grouped_by': 'tube configuration',
+        'accuracy': list(validation.accuracy),
+        'mean_accuracy': validation.mean_accuracy,
+        'confusion': validation.confusion.tolist(),
     }
-    held_out = _held_out(validation.classes) | {
-        'size_rmse': list(validation.rmse),
-        'interval_coverage': list(validation.coverage),
-        'refused': validation.refused,
+    description = {
+        'schema': SCHEMA,
+        'kind': kind,
+        'motion': dataset.motion,
+        'classes_deg': list(CLASSES_DEG),
+        **own,
+        'command': command,
+        'seed': seed,
+        'dataset': {
+            'manifest_sha256': dataset.manifest_hash,
+            'seed': dataset.manifest['seed'],
+            'per_class': dataset.manifest['per_class'],
+        },
+        'held_out': held_out | own.get('held_out', {}),
     }
-    state = classifier.model.state_dict()
-    _save(path, state, SIZE, own, dataset, held_out, command, seed)
+    state = {name: np.asarray(array, order='C') for name, array in state.items()}
+    data = safetensors.numpy.save(state)
+    write_bytes(path, data)
+    write_text(path.with_suffix('.json'), json.dumps(sealed(description, data), indent=1) + '\n')
 
 
-def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Description and state dict of a weights file.
-
-    Nothing in the file is run: PyTorch's unpickler for weights makes tensors and nothing else.
+def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Description and arrays of a weights file.
 
     Raises
     ------
@@ -133,7 +130,7 @@ def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
         raise unusable(sidecar, error) from error
     if not isinstance(description, dict) or description.get('schema') != SCHEMA:
         raise ClassifierError(
-            f'{sidecar} holds no classifier weights of schema {SCHEMA}: make them anew with '
+            f'{sidecar} holds no classifier weights of schema {SCHEMA}: train again with '
             '`endoscope train`'
         )
     if description.get(SEAL) != sealed(description, data)[SEAL]:
@@ -141,17 +138,15 @@ def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
             f'{path} holds no classifier weights: it and {sidecar.name} are not what was written '
             'together, one of them was damaged or exchanged'
         )
-    _check_archive(path, data)
     try:
-        state = torch.load(BytesIO(data), map_location='cpu', weights_only=True)
-    except Exception as error:
+        state = safetensors.numpy.load(data)
+    except (SafetensorError, ValueError, KeyError) as error:
         raise ClassifierError(
-            f'{path} holds no classifier weights: it is no PyTorch file of tensors only'
+            f'{path} holds no classifier weights: it is no safetensors file of numbers ({error})'
         ) from error
-    try:
-        _check_state(state)
-    except ValueError as error:
-        raise unusable(path, error) from error
+    for name, array in state.items():
+        if not np.all(np.isfinite(array)):
+            raise unusable(path, ValueError(f'{name} holds values that are not finite'))
     return description, state
 
 
@@ -162,51 +157,26 @@ def sealed(description: dict[str, Any], data: bytes) -> dict[str, Any]:
     return {**rest, SEAL: digest}
 
 
-def _check_archive(path: Path, data: bytes) -> None:
-    try:
-        with ZipFile(BytesIO(data)) as archive:
-            packed = any(entry.compress_type != ZIP_STORED for entry in archive.infolist())
-    except (BadZipFile, OSError, ValueError, RuntimeError, EOFError, struct.error) as error:
-        raise ClassifierError(
-            f'{path} holds no classifier weights: it is no PyTorch file ({error})'
-        ) from error
-    if packed:
-        raise ClassifierError(f'{path} holds no classifier weights: PyTorch does not compress them')
-
-
-def _check_state(state: Any) -> None:
-    if not isinstance(state, dict) or not state:
-        raise ValueError('no state dict')
-    for name, tensor in state.items():
-        if not isinstance(tensor, Tensor) or tensor.layout != torch.strided:
-            raise ValueError(f'{name} is no dense tensor')
-        # A view can claim terabytes of one number.
-        if tensor.device.type != 'cpu' or not tensor.is_contiguous():
-            raise ValueError(f'{name} has no memory of its own')
-        if not torch.isfinite(tensor).all():
-            raise ValueError(f'{name} holds values that are not finite')
-
-
-def filled[Kind: nn.Module](network: Kind, state: dict[str, Tensor]) -> Kind:
-    """The network, made on PyTorch's device `meta` (without memory), with the tensors in it.
+def fitting(
+    state: dict[str, np.ndarray], shapes: Mapping[str, tuple[int, ...]], dtype: DTypeLike
+) -> dict[str, np.ndarray]:
+    """The arrays, whose names, shapes and type must be those that are due.
 
     Raises
     ------
     ValueError
-        If names, shapes or types of the tensors are not those of the network.
+        If they are not.
     """
-    wanted = network.state_dict()
-    for name in wanted.keys() | state.keys():
-        if name not in state or name not in wanted:
-            raise ValueError(f'{name} is {"missing" if name in wanted else "unknown"}')
-        found, due = state[name], wanted[name]
-        if found.shape != due.shape or found.dtype != due.dtype:
+    for name in shapes.keys() | state.keys():
+        if name not in state or name not in shapes:
+            raise ValueError(f'{name} is {"missing" if name in shapes else "unknown"}')
+        found, due = state[name], shapes[name]
+        if found.shape != due or found.dtype != dtype:
             raise ValueError(
-                f'{name} is {found.dtype} {list(found.shape)} where {due.dtype} '
-                f'{list(due.shape)} is due'
+                f'{name} is {found.dtype} {list(found.shape)} where {np.dtype(dtype)} {list(due)} '
+                'is due'
             )
-    network.load_state_dict(state, assign=True)
-    return network
+    return state
 
 
 def classes_of(description: dict[str, Any]) -> tuple[int, ...]:
@@ -231,47 +201,3 @@ def classes_of(description: dict[str, Any]) -> tuple[int, ...]:
 def unusable(path: str | Path, error: Exception) -> ClassifierError:
     """The error to raise where what was read does not fit together."""
     return ClassifierError(f'{path} holds no classifier weights: {error}')
-
-
-def _held_out(validation: CrossValidation) -> dict[str, Any]:
-    return {
-        'grouped_by': 'tube configuration',
-        'accuracy': list(validation.accuracy),
-        'mean_accuracy': validation.mean_accuracy,
-        'confusion': validation.confusion.tolist(),
-    }
-
-
-def _save(
-    path: str | Path,
-    state: dict[str, Tensor],
-    kind: str,
-    own: dict[str, Any],
-    dataset: CalibrationDataset,
-    held_out: dict[str, Any],
-    command: str,
-    seed: int,
-) -> None:
-    path = weights_path(path)
-    buffer = BytesIO()
-    torch.save(state, buffer)
-    write_bytes(path, buffer.getvalue())
-    description = {
-        'schema': SCHEMA,
-        'kind': kind,
-        'motion': dataset.motion,
-        'classes_deg': list(CLASSES_DEG),
-        **own,
-        'command': command,
-        'seed': seed,
-        'dataset': {
-            'manifest_sha256': dataset.manifest_hash,
-            'seed': dataset.manifest['seed'],
-            'per_class': dataset.manifest['per_class'],
-        },
-        'held_out': held_out,
-    }
-    write_text(
-        path.with_suffix('.json'),
-        json.dumps(sealed(description, buffer.getvalue()), indent=1) + '\n',
-    )

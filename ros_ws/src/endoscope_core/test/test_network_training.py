@@ -1,0 +1,135 @@
+"""Training of the networks of the first paper, where PyTorch is installed."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from endoscope_core.classifier.grouped_folds import CrossValidation
+from endoscope_core.classifier.inference import TensionClassifier
+from endoscope_core.classifier.weights_file import WeightsFileError
+from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
+
+torch = pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
+
+from endoscope_core.classifier.recurrence_plot_cnn import (  # noqa: E402
+    PIXELS,
+    RecurrencePlotCnn,
+    recurrence_plots,
+)
+from endoscope_core.classifier.tension_cnn import TensionCnn  # noqa: E402
+from endoscope_core.classifier.training import (  # noqa: E402
+    NETWORKS,
+    TrainingSettings,
+    cross_validate,
+    predict,
+    save_network,
+    train_network,
+    use_one_thread,
+)
+
+SHORT = TrainingSettings(batch_size=14, epochs=60, learning_rate=3e-3, decay=0.97)
+
+
+@pytest.fixture(scope='module', autouse=True)
+def one_thread():
+    use_one_thread()
+
+
+@pytest.fixture(scope='module')
+def easy():
+    """Two configurations of each class whose tensions differ plainly."""
+    generator = np.random.default_rng(0)
+    classes = np.repeat(CLASSES_DEG, 4)
+    time = np.arange(9000) * 1e-3
+    wave = np.sin(time)[:, None] * np.array([1.0, -1.0, 1.0, -1.0])
+    noise = generator.normal(0.0, 0.02, (classes.size, 9000, 4))
+    tension = (5.0 + 0.05 * classes[:, None, None] * wave + noise).astype(np.float32)
+    return CalibrationDataset(
+        tension=tension,
+        desired_angle=np.sin(time),
+        desired_velocity=np.cos(time),
+        actual_angle=np.zeros((classes.size, 9000, 2), np.float32),
+        class_deg=classes,
+        joint_size=np.deg2rad(np.stack([classes, classes], axis=1)),
+        configuration=np.arange(classes.size) // 2,
+        manifest={'seed': 0, 'per_class': 4, 'motion': 'sinusoid'},
+    )
+
+
+def test_table_2_reduces_a_recording_to_one_feature_vector():
+    network = TensionCnn(7).eval()
+    convolutions = [m for m in network.modules() if isinstance(m, torch.nn.Conv1d)]
+    assert [(c.kernel_size, c.stride) for c in convolutions] == [((3,), (3,))] * 8
+    assert network.features(torch.zeros(1, 4, 9000)).shape == (1, 64, 1)
+    names = [type(m).__name__ for m in network.features]
+    assert names == ['Conv1d', 'BatchNorm1d', 'ReLU'] * 8
+    assert isinstance(network.dense, torch.nn.Linear)
+
+
+@pytest.mark.parametrize('kind', ['mlp', 'recurrence_plot_cnn'])
+def test_the_networks_compared_with_learn_too(easy, kind):
+    settings = TrainingSettings(batch_size=14, epochs=50, learning_rate=1e-3, decay=0.98)
+    network = train_network(easy.tension, easy.class_deg, 1, settings, kind)
+    likeliest = np.array(CLASSES_DEG)[np.argmax(predict(network, easy.tension), axis=1)]
+    assert np.mean(np.abs(likeliest - easy.class_deg)) < 6.0
+    assert type(network) is NETWORKS[kind]
+
+
+def test_a_recurrence_plot_is_the_distance_of_every_two_states():
+    tension = torch.from_numpy(np.linspace(2.0, 8.0, 9000)).float().expand(1, 4, 9000)
+    plots = recurrence_plots(tension)
+    states = tension[0, 0].reshape(PIXELS, -1).mean(dim=1)
+    assert plots.shape == (1, 4, PIXELS, PIXELS)
+    assert plots[0, 2, 7, 30] == pytest.approx(float(states[30] - states[7]), abs=1e-5)
+    assert torch.equal(plots, plots.transpose(2, 3))
+
+
+def test_training_learns_and_repeats_with_its_seed(easy):
+    first = train_network(easy.tension, easy.class_deg, 1, SHORT)
+    again = train_network(easy.tension, easy.class_deg, 1, SHORT)
+    for one, other in zip(first.parameters(), again.parameters(), strict=True):
+        assert torch.equal(one, other)
+    likeliest = np.array(CLASSES_DEG)[np.argmax(predict(first, easy.tension), axis=1)]
+    assert np.mean(np.abs(likeliest - easy.class_deg)) < 6.0
+
+
+def test_folds_never_split_a_configuration(easy, monkeypatch):
+    from endoscope_core.classifier import training
+
+    trained_with = []
+
+    def remember(tension, class_deg, seed, settings, kind):
+        trained_with.append(tension)
+        return TensionCnn(len(CLASSES_DEG)).eval()
+
+    monkeypatch.setattr(training, 'train_network', remember)
+    result = cross_validate(easy, seed=0, folds=2)
+    assert result.confusion.sum() == len(easy.class_deg)
+    for tension in trained_with:
+        rows = [k for k, t in enumerate(easy.tension) if any(np.array_equal(t, x) for x in tension)]
+        inside = set(easy.configuration[rows].tolist())
+        assert all(np.sum(easy.configuration[rows] == c) == 2 for c in inside)
+
+
+def test_saved_weights_give_the_same_answer(easy, tmp_path):
+    network = train_network(easy.tension, easy.class_deg, 1, dataclasses.replace(SHORT, epochs=2))
+    validation = cross_validate(easy, 1, 2, settings=dataclasses.replace(SHORT, epochs=1))
+    path = tmp_path / 'weights.safetensors'
+    save_network(path, network, easy, validation, 'endoscope train', 1)
+    described = json.loads(path.with_suffix('.json').read_text())
+    assert described['dataset']['manifest_sha256'] == easy.manifest_hash
+    assert described['held_out']['mean_accuracy'] == validation.mean_accuracy
+    result = TensionClassifier.load(path).classify(easy.tension[0])
+    expected = predict(network, easy.tension[:1])[0]
+    np.testing.assert_allclose(list(result.probabilities.values()), expected, atol=1e-6)
+
+
+def test_weights_do_not_go_where_their_description_goes(easy, tmp_path):
+    nothing = CrossValidation((1.0,), np.eye(7, dtype=np.int64))
+    with pytest.raises(WeightsFileError, match='RecurrencePlotCnn are not kept'):
+        save_network(tmp_path / 'x.safetensors', RecurrencePlotCnn(7), easy, nothing, '', 0)
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(WeightsFileError, match=r'suffix \.safetensors'):
+        save_network(tmp_path / 'x.json', TensionCnn(7), easy, nothing, '', 0)
