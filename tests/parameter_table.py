@@ -6,7 +6,7 @@
 import dataclasses
 import importlib
 
-from endoscope_nodes.recorded_topics import INTERFACE_TOPICS
+from endoscope_nodes.topics import RECORDED
 
 DECLARED = {
     'motor_driver': (
@@ -58,7 +58,7 @@ def _row(node: str, field: dataclasses.Field) -> str:
 
 
 def _default(value: object) -> str:
-    if value == tuple(INTERFACE_TOPICS):
+    if value == RECORDED:
         return 'all of the interface'
     items = value if isinstance(value, tuple) else (value,)
     text = ', '.join(_one(item) for item in items)

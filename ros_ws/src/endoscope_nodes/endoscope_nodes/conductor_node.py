@@ -16,6 +16,7 @@ from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
+    CLOCK,
     CORRECTION,
     MOTOR_COMMAND,
     MOTOR_MEASURED,
@@ -102,7 +103,7 @@ class ConductorNode(EndoscopeNode):
         self._future: Future | None = None
         self.ticks = 0
         self.failure: BarrierTimeout | None = None
-        self._clock_out = self.create_publisher(ClockMessage, '/clock', LOCK_STEP)
+        self._clock_out = self.create_publisher(ClockMessage, CLOCK, LOCK_STEP)
         for topic in FOLLOWED:
             self.create_subscription(JointState, topic, self._answer_to(topic), LOCK_STEP, raw=True)
         steady = Clock(clock_type=ClockType.STEADY_TIME)

@@ -16,6 +16,7 @@ from rclpy.node import Node
 
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.discovery import stay_on_this_machine
+from endoscope_nodes.names import DIAGNOSTICS
 from endoscope_nodes.program import NODES
 from endoscope_nodes.qos import EVENT
 
@@ -47,7 +48,7 @@ def is_heard(node: str, namespace: str, longest_s: float) -> bool:
     def listen(message: DiagnosticArray) -> None:
         heard.extend(status.name.partition(':')[0] for status in message.status)
 
-    listener.create_subscription(DiagnosticArray, '/diagnostics', listen, EVENT)
+    listener.create_subscription(DiagnosticArray, DIAGNOSTICS, listen, EVENT)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(listener)
     deadline = time.monotonic() + longest_s

@@ -13,14 +13,13 @@ from endoscope_bags.cdr_encoding import encode_clock
 from endoscope_bags.errors import BagError
 from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.names import MOTOR_COMMAND, MOTOR_MEASURED
+from endoscope_nodes.names import CLOCK, DIAGNOSTICS, MOTOR_COMMAND, MOTOR_MEASURED
 from endoscope_nodes.parameters import ParameterError, parameter
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.recorded_topics import message_class
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_NS
 
-_CLOCK = '/clock'
 # A reader that asks for what is not offered never connects.
 _LONGEST_WAIT_NS = 5_000_000_000
 _LINGER_S = 0.5
@@ -70,9 +69,7 @@ class ReplayNode(EndoscopeNode):
             raise ParameterError(f'replay: {p.bag}: nothing to publish in the chosen topics')
         self._start_ns = self._next.log_ns // TICK_NS * TICK_NS
         self._clock_ns = self._start_ns - TICK_NS
-        self._clock_out = (
-            self.create_publisher(ClockMessage, _CLOCK, LOCK_STEP) if p.clock else None
-        )
+        self._clock_out = self.create_publisher(ClockMessage, CLOCK, LOCK_STEP) if p.clock else None
         self._delay_ns = round(p.delay * 1e9)
         self._begin_ns = time.monotonic_ns() + self._delay_ns
         self._wait_until_ns = self._begin_ns + _LONGEST_WAIT_NS
@@ -99,7 +96,7 @@ class ReplayNode(EndoscopeNode):
         return [
             topic
             for topic in chosen
-            if topic.message_count and not (self._parameters_.clock and topic.name == _CLOCK)
+            if topic.message_count and not (self._parameters_.clock and topic.name == CLOCK)
         ]
 
     def _publisher(self, topic: Topic) -> Publisher:
@@ -154,11 +151,11 @@ class ReplayNode(EndoscopeNode):
 
     def _live_nodes(self) -> str:
         """Name a node that the replay would talk over; empty if there is none."""
-        watched = {*self._outputs, *([_CLOCK] if self._clock_out is not None else [])}
+        watched = {*self._outputs, *([CLOCK] if self._clock_out is not None else [])}
         for topic in self._outputs:
             if topic.endswith('/' + MOTOR_COMMAND):
                 watched.add(topic.removesuffix(MOTOR_COMMAND) + MOTOR_MEASURED)
-        watched.discard('/diagnostics')
+        watched.discard(DIAGNOSTICS)
         for topic in sorted(watched):
             for info in self.get_publishers_info_by_topic(topic):
                 if info.node_name != self.get_name():
