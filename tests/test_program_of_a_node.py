@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from private_domain import private_domain
 
+from endoscope_core.atomic_output import atomic_directory
 from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.parameters import described
 from endoscope_nodes.program import NODES
@@ -90,10 +91,54 @@ def test_a_recording_is_finished_once_however_often_it_is_asked_for(tmp_path, fi
         time.sleep(0.002)
     errors = process.stderr.read()
     assert process.returncode == 0, errors
-    [line] = errors.splitlines()
-    assert '0 lost' in line
+    assert [line for line in errors.splitlines() if ' lost' in line] == errors.splitlines()[-1:]
+    assert '0 lost' in errors
     assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
     assert (tmp_path / 'bag' / 'bag_0.mcap').read_bytes().endswith(MCAP_MAGIC)
+
+
+def test_a_recording_is_called_what_it_will_be_called(tmp_path):
+    with atomic_directory(tmp_path / 'demo') as partial:
+        process = start('recorder', '--ros-args', '-p', f'bag:={partial / "bag"}')
+        wait_for_line(process, f'recording to {tmp_path / "demo" / "bag"}\n')
+        process.terminate()
+        _, errors = process.communicate(timeout=PATIENCE_S)
+    assert '.partial' not in errors
+    assert f'{tmp_path / "demo" / "bag"}: 0 messages, 0 lost' in errors
+
+
+def test_the_graph_says_what_it_was_given_when_it_is_ready_and_what_to_do(tmp_path):
+    parameters = tmp_path / 'rig.yaml'
+    parameters.write_text('/**/console: {ros__parameters: {source: none, scale: 0.5}}\n')
+    process = start(
+        'graph',
+        *('--ros-args', '--params-file', str(parameters), '-p', 'tick_rate:=200'),
+        *('-p', 'autostart:=false', '-r', '__ns:=/left'),
+    )
+    told = []
+    for line in process.stderr:
+        told.append(line.partition('] [')[2].partition('] [')[2].strip())
+        if '[WARN]' not in line and 'ready in' in line:
+            break
+    process.terminate()
+    process.communicate(timeout=PATIENCE_S)
+    assert [line for line in told if ' with ' in line] == [
+        'left.motor_driver]: with tick_rate:=200',
+        'left.console]: with scale:=0.5',
+        'left.recorder]: with autostart:=false',
+    ]
+    assert told[-1] == (
+        'graph]: ready in /left at 200 Hz: motors simulated; load cells simulated; '
+        'tracker simulated; slave DISABLED; next: endoscope operate enable; '
+        'not recording: endoscope operate record start'
+    )
+
+
+def test_a_node_alone_says_what_it_waits_for():
+    process = start('supervisor')
+    wait_for_line(process, 'not ready yet: motor/measured_js has not been received')
+    process.terminate()
+    process.communicate(timeout=PATIENCE_S)
 
 
 def test_a_program_started_by_nohup_outlives_the_terminal(tmp_path):

@@ -6,6 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 import torch
 from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -29,6 +30,7 @@ from endoscope_core.safety import StateCommand, TensionGuard
 from endoscope_core.signals import SINUSOID, calibration_motion
 from endoscope_nodes.calibration_result import (
     aborted_result,
+    numbers_of,
     refused_result,
     successful_result,
 )
@@ -37,6 +39,7 @@ from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
+    CALIBRATION_NUMBERS,
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
     JOINTS,
@@ -59,10 +62,11 @@ _Judgement = tuple[ClassificationResult, tuple[PhysicalParameters, ...]]
 class CalibrationNode(EndoscopeNode):
     """Serves ``calibration/run`` and the ``home`` command; publishes ``calibration/result``.
 
-    The service answers at once, with the reason if it refuses; the result follows on its topic.
-    Whatever makes the recording worthless or motion doubtful aborts: the commands stop, the slave
-    holds or goes back to the console by a ramp, and the result says why. Tensions unlike any known
-    are refused: the result names no class, and nothing is compensated.
+    The service answers at once, with the reason if it refuses; the result follows on its topic, and
+    as numbers for programs that plot. Whatever makes the recording worthless or motion doubtful
+    aborts: the commands stop, the slave holds or goes back to the console by a ramp, and the result
+    says why. Tensions unlike any known are refused: the result names no class, and nothing is
+    compensated.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -87,6 +91,7 @@ class CalibrationNode(EndoscopeNode):
             self, CALIBRATION_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
         )
         self._results = self.create_publisher(DiagnosticArray, CALIBRATION_RESULT, RESULT)
+        self._numbers = self.create_publisher(JointState, CALIBRATION_NUMBERS, RESULT)
         self._session = SessionWatch(self, None, self._on_leave)
         self._pose = runtime.pose_of(self)
         self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
@@ -131,7 +136,7 @@ class CalibrationNode(EndoscopeNode):
         if self._run is not None:
             return f'busy: {self._run.step}'
         if not self._session.name:
-            return 'no motion session is open: the slave has to be ENABLED'
+            return 'no motion session is open: endoscope operate enable opens one'
         trouble, shafts = self._trouble(), self._pose.shafts()
         if trouble or shafts is None:
             return trouble
@@ -260,6 +265,7 @@ class CalibrationNode(EndoscopeNode):
     def _publish(self, result: DiagnosticArray) -> None:
         result.header.frame_id = self._commands.session
         self._results.publish(result)
+        self._numbers.publish(numbers_of(result))
 
     def _abort(self, reason: str) -> None:
         run, self._run = self._run, None

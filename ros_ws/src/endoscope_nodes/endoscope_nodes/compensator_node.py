@@ -374,7 +374,10 @@ class CompensatorNode(EndoscopeNode):
         if self._trouble:
             return f'no feed-forward: {self._trouble}'
         if self.findings is None:
-            return f'no feed-forward: {self._settings.mode} waits for {CALIBRATION_RESULT}'
+            return (
+                f'no feed-forward: {self._settings.mode} waits for a calibration; '
+                'endoscope operate calibrate'
+            )
         return f'{self._settings.mode} by {self._settings.selected_by}: {_in_words(self.findings)}'
 
     def _report(self) -> Report:

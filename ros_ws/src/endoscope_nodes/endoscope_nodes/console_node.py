@@ -1,5 +1,6 @@
 """The operator's side: plays a motion, or follows the handle while the clutch is held."""
 
+import operator
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -36,7 +37,7 @@ from endoscope_nodes.names import (
     MASTER_MEASURED,
     SLAVE_COMMAND,
 )
-from endoscope_nodes.node_parameters import ConsoleParameters
+from endoscope_nodes.node_parameters import FOLLOW_THE_HANDLE, ConsoleParameters
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
@@ -47,6 +48,9 @@ from endoscope_nodes.watches import (
     StreamWatch,
     rivals,
 )
+
+# A hand that rests on a handle moves it by less than half a degree.
+_MOTION_RAD = 0.01
 
 
 class ConsoleNode(EndoscopeNode):
@@ -70,6 +74,9 @@ class ConsoleNode(EndoscopeNode):
         self._sent_ns: int | None = None
         self._clutch_said = False
         self._refused_before = 0
+        self._handle_from: tuple[float, ...] = ()
+        self._handle_moves = False
+        self._told_of_handle = False
         self._reaches: tuple[Reach, ...] = ()
         self._beyond_reach = self._beyond_before = 0
         facts = self.rig.joints
@@ -132,6 +139,7 @@ class ConsoleNode(EndoscopeNode):
         self._settings = parameters
         self._rest()
         self._next = 0
+        self._handle_moves = self._told_of_handle = False
         self._played = self._load(parameters)
         self._own_topics()
 
@@ -156,7 +164,35 @@ class ConsoleNode(EndoscopeNode):
         if crowd:
             self._session.leave(crowd)
             return
-        self._handle.take(sample.stamp_ns, sample.position, self.ticker.monotonic_ns())
+        refused = self._handle.take(sample.stamp_ns, sample.position, self.ticker.monotonic_ns())
+        if refused is None and self._settings.source != FOLLOW_THE_HANDLE:
+            self._notice_motion(sample.position)
+
+    def _notice_motion(self, position: tuple[float, ...]) -> None:
+        """Notice that somebody moves a handle that nothing follows."""
+        if len(self._handle_from) != len(position):
+            self._handle_from = position
+        moved = max(map(abs, map(operator.sub, position, self._handle_from)), default=0.0)
+        if moved > _MOTION_RAD:
+            self._handle_from, self._handle_moves = position, True
+
+    def _unheeded(self) -> str:
+        """Say that a handle is not followed, if somebody moves it or holds its clutch."""
+        moves, self._handle_moves = self._handle_moves, False
+        # A program that commands the slave itself holds the clutch with reason.
+        held = (
+            self._clutch.held
+            and self._handle.alive(self.ticker.monotonic_ns())
+            and not self.count_publishers(SLAVE_COMMAND)
+        )
+        source = self._settings.source
+        if source == FOLLOW_THE_HANDLE or not (moves or held):
+            return ''
+        return (
+            f'the handle {"moves" if moves else "has its clutch held"} and nothing follows it: '
+            f"the console's source is {source}; endoscope operate set console.source "
+            f'{FOLLOW_THE_HANDLE}'
+        )
 
     def _on_result(self, message: DiagnosticArray) -> None:
         """Keep to what this session's own calibration found out about the tube's reach."""
@@ -298,6 +334,12 @@ class ConsoleNode(EndoscopeNode):
         if fresh:
             said = f'{fresh} messages of {MASTER_MEASURED} refused, last: {handle.last_reason}'
             return WARN, said, values
+        unheeded = self._unheeded()
+        if unheeded and not self._told_of_handle:
+            self._told_of_handle = True
+            self.get_logger().warning(unheeded)
+        if unheeded:
+            return WARN, unheeded, values
         beyond = self._beyond_reach - self._beyond_before
         self._beyond_before = self._beyond_reach
         if beyond:
@@ -306,7 +348,7 @@ class ConsoleNode(EndoscopeNode):
             values['progress [s]'] = min(self._next, len(self._played)) * TICK_S
             values['length [s]'] = len(self._played) * TICK_S
             return OK, 'finished' if self.finished else 'playing', values
-        if source == 'master' and not handle.alive(self.ticker.monotonic_ns()):
+        if source == FOLLOW_THE_HANDLE and not handle.alive(self.ticker.monotonic_ns()):
             return WARN, f'{MASTER_MEASURED} is silent', values
         return OK, source, values
 

@@ -26,7 +26,13 @@ from endoscope_devices.strict_yaml import DeviceFileError
 from endoscope_nodes.diagnostics import ERROR, OK, STALE, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
-from endoscope_nodes.names import JOINTS, SIMULATED_BENDING, SLAVE_MEASURED, TRACKER_POSE
+from endoscope_nodes.names import (
+    JOINTS,
+    REGISTER_STRAIGHT,
+    SIMULATED_BENDING,
+    SLAVE_MEASURED,
+    TRACKER_POSE,
+)
 from endoscope_nodes.node_parameters import EmTrackerParameters
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_OFFERED
@@ -54,7 +60,7 @@ class EmTrackerNode(EndoscopeNode):
         self._pose.header.frame_id = p.base_frame
         self._poses = self.create_publisher(PoseStamped, TRACKER_POSE, SENSOR_OFFERED)
         self._measured = JointPublisher(self, SLAVE_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
-        device = p.device or self.rig.devices.tracker
+        device = self._device_name = p.device or self.rig.devices.tracker
         if device == 'simulated':
             plant, self._seed = runtime.plant, runtime.seed_of(2)
             self._sensors = SensorModel(plant.sensors, self._seed)
@@ -70,6 +76,11 @@ class EmTrackerNode(EndoscopeNode):
 
     def _on_parameters(self, parameters: EmTrackerParameters) -> None:
         self._settings = parameters
+
+    @property
+    def announcement(self) -> str:
+        """Name the device."""
+        return f'tracker {self._device_name}'
 
     def _connect(self, device: str, p: EmTrackerParameters) -> AuroraTracker:
         if self.ticker.simulated:
@@ -174,7 +185,7 @@ class EmTrackerNode(EndoscopeNode):
             if trouble:
                 return ERROR, trouble, values
             if self._registration is None:
-                return WARN, 'hold the instrument straight and call ~/register_straight', values
+                return WARN, f'hold the instrument straight and call {REGISTER_STRAIGHT}', values
         age = self.ticker.monotonic_ns() - self._last_ns
         if self._measured.count == 0 or age > 500_000_000:
             return STALE, 'no poses', values

@@ -47,7 +47,7 @@ class LoadCellsNode(EndoscopeNode):
         self._told = ''
         self._cells: ModbusLoadCells | None = None
         self._measured = JointPublisher(self, WIRES_MEASURED, WIRES, ('effort',), SENSOR_OFFERED)
-        device = p.device or self.rig.devices.load_cells
+        device = self._device_name = p.device or self.rig.devices.load_cells
         if device == 'simulated':
             sensors = runtime.plant.sensors
             self._sensors = SensorModel(sensors, runtime.seed_of(1))
@@ -62,6 +62,11 @@ class LoadCellsNode(EndoscopeNode):
 
     def _on_parameters(self, parameters: LoadCellsParameters) -> None:
         self._settings = parameters
+
+    @property
+    def announcement(self) -> str:
+        """Name the device."""
+        return f'load cells {self._device_name}'
 
     def _connect(self, device: str, p: LoadCellsParameters) -> ModbusLoadCells:
         if self.ticker.simulated:

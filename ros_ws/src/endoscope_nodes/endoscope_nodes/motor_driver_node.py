@@ -52,6 +52,7 @@ class MotorDriverNode(EndoscopeNode):
     def __init__(self, runtime: Runtime) -> None:
         super().__init__('motor_driver', runtime)
         device = self.parameters(MotorDriverParameters).device or self.rig.devices.motors
+        self._device_name = device
         bus = self.parameters(DynamixelParameters)
         facts, timeout_ns = self.rig.motors, self.rig.timeouts.command_ns
         # The allowance of the gate holds for the time of receipt, which jitters, and the shaper
@@ -94,6 +95,11 @@ class MotorDriverNode(EndoscopeNode):
         self.diagnostics.add('commands', CommandReport(self.motion.gate, self._session.leave))
         self.diagnostics.add('device', self._report_device, device)
         self.ticker.add(self._on_tick)
+
+    @property
+    def announcement(self) -> str:
+        """Name the device."""
+        return f'motors {self._device_name}'
 
     def _dynamixel(self, parameters: DynamixelParameters) -> MotorDevice:
         if self.ticker.simulated:

@@ -275,6 +275,9 @@ class ControllerParameters:
     )
 
 
+FOLLOW_THE_HANDLE = 'master'
+
+
 @dataclass(frozen=True)
 class ConsoleParameters:
     """Parameters of the console."""
@@ -282,7 +285,7 @@ class ConsoleParameters:
     source: str = parameter(
         'none',
         'where commands come from; setting it starts a motion or file anew',
-        choices=('none', 'motion', 'file', 'master'),
+        choices=('none', 'motion', 'file', FOLLOW_THE_HANDLE),
         dynamic=True,
     )
     motion: str = parameter(

@@ -16,6 +16,7 @@ from endoscope_bags.recording_session import (
     SessionReport,
     simulated_receipt_ns,
 )
+from endoscope_core.atomic_output import with_final_names
 from endoscope_nodes.diagnostics import ERROR, OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
@@ -89,6 +90,11 @@ class RecorderNode(EndoscopeNode):
             except BagError as error:
                 raise ParameterError(f"recorder: parameter 'bag': {error}") from error
 
+    @property
+    def announcement(self) -> str:
+        """Say how to begin a recording, where none is being made."""
+        return '' if self._session else 'not recording: endoscope operate record start'
+
     def _on_parameters(self, new: RecorderParameters) -> None:
         self._bag = new.bag
 
@@ -101,13 +107,14 @@ class RecorderNode(EndoscopeNode):
             One is being made already, its place is taken, or the disk is full.
         """
         if self._session is not None:
-            raise BagError(f'already recording to {self._session.path}; stop that first')
+            there = with_final_names(str(self._session.path))
+            raise BagError(f'already recording to {there}; stop that first')
         path = Path(self._bag or time.strftime('bags/recording-%Y%m%d-%H%M%S'))
         self._session = RecordingSession(path)
         self._said_loss = 0
         self._untyped = list(self._topics)
         self._subscribe_untyped()
-        self.get_logger().info(f'recording to {path}')
+        self.get_logger().info(f'recording to {with_final_names(str(path))}')
         return path
 
     def stop(self) -> SessionReport:
@@ -144,7 +151,7 @@ class RecorderNode(EndoscopeNode):
 
     def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            response.message = str(self.start())
+            response.message = with_final_names(str(self.start()))
             response.success = True
         except BagError as error:
             response.message = str(error)
@@ -261,7 +268,7 @@ class RecorderNode(EndoscopeNode):
             return OK, 'not recording', {}
         report = self._session.report()
         values: dict[str, object] = {
-            'bag': report.path,
+            'bag': with_final_names(str(report.path)),
             'messages': report.message_count,
             'lost': report.lost_count,
         }

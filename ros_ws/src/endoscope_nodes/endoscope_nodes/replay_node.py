@@ -62,6 +62,11 @@ class ReplayNode(EndoscopeNode):
         self.diagnostics.add('replay', self._report)
         self.ticker.every(TICK_NS * 1e-9, self._go_on)
 
+    @property
+    def announcement(self) -> str:
+        """Name the bag."""
+        return f'{self._parameters_.bag}, {self._parameters_.speed:g} times its pace'
+
     def _open(self, bag: str) -> Recording:
         try:
             return open_bag(bag)

@@ -24,13 +24,14 @@ from rclpy.task import Future
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import Rig, RigFileError, load_rig
+from endoscope_nodes.announcement import Announcement
 from endoscope_nodes.declared_parameters import check_overrides, declare_parameters
 from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.matching import all_matched
 from endoscope_nodes.node_parameters import BeatParameters, RealTimeParameters
 from endoscope_nodes.parameter_sections import check_sections
-from endoscope_nodes.parameters import ParameterError
+from endoscope_nodes.parameters import ParameterError, changed
 from endoscope_nodes.real_time import (
     enter_real_time,
     start_in_the_background,
@@ -73,6 +74,11 @@ class Runtime(ClosedOnExit):
     ------
     ParameterError
         The ROS arguments cannot be read.
+
+    Attributes
+    ----------
+    process_parameters
+        Values of the parameters of the whole process that are not the defaults.
 
     Examples
     --------
@@ -119,6 +125,7 @@ class Runtime(ClosedOnExit):
         self._plant: PlantDescription | None = None
         self._plant_source = '', ''
         self._seed = 0
+        self.process_parameters: dict[str, object] = {}
         self._real_time = RealTimeParameters()
         self._overrides = overrides or {}
         self._exit_codes: list[int] = []
@@ -191,6 +198,7 @@ class Runtime(ClosedOnExit):
     def _stride_and_rig(self, node: EndoscopeNode) -> int:
         self._real_time = declare_parameters(node, RealTimeParameters)
         given = declare_parameters(node, BeatParameters)
+        self.process_parameters = changed(given) | changed(self._real_time)
         rate = given.tick_rate
         if 1000 % rate:
             raise ParameterError(
@@ -371,6 +379,7 @@ def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -
         with StopSignals(runtime.stop), runtime:
             compose(runtime)
             runtime.prepare()
+            Announcement(runtime)
             runtime.spin()
     except (
         ParameterError,

@@ -61,6 +61,19 @@ class SupervisorNode(EndoscopeNode):
         self.ticker.every(HEARTBEAT_S, self._beat)
         self._check()
 
+    @property
+    def announcement(self) -> str:
+        """Say in which state the slave is, and what to do about it."""
+        state = self.machine.state
+        if state is OperatingState.DISABLED:
+            return f'slave {state}; next: endoscope operate enable'
+        return f'slave {state}{f" ({self.machine.cause})" if self.machine.cause else ""}'
+
+    @property
+    def waiting(self) -> str:
+        """Name what forbids motion."""
+        return '; '.join(self.machine.present_causes.values())
+
     def _beat(self) -> None:
         self._check()
         self._publish()

@@ -68,6 +68,11 @@ class Ticker:
         if simulated:
             node.create_subscription(ClockMessage, CLOCK, self._on_clock, SENSOR_ASKED, raw=True)
 
+    @property
+    def rate(self) -> int:
+        """Beats a second in real time."""
+        return 1000 // self._stride
+
     def now_ns(self) -> int:
         """Time for stamps in nanoseconds; 0 while simulated time has not begun."""
         return self._sim_ns if self.simulated else time.monotonic_ns() + self._offset_ns

@@ -238,6 +238,16 @@ TOPICS = (
         one_sender=True,
     ),
     Topic(
+        names.CALIBRATION_NUMBERS,
+        _JOINT_STATE,
+        'once a calibration, latched',
+        f'the figures of `{names.CALIBRATION_RESULT}` as numbers, for programs that plot: `name` '
+        'is the key, `position` the value in SI; `class` in rad, `success` 1 or 0',
+        offered=RESULT,
+        asked=RESULT,
+        said_by=('calibration',),
+    ),
+    Topic(
         names.CORRECTION,
         _JOINT_STATE,
         '1 kHz while commands come',
