@@ -5,19 +5,39 @@ import math
 
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
 from simulated_graph import SimulatedGraph
 from tubes import slave_of, tube_of_size
 
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.rig import load_rig
+from endoscope_nodes.names import CALIBRATION_NUMBERS
+from endoscope_nodes.qos import RESULT
+
+
+def assert_same_figures(numbers, values):
+    """One message of numbers that are those of the result."""
+    [message] = numbers
+    told = dict(zip(message.name, message.position, strict=True))
+    assert told['success'] == 1.0
+    assert math.degrees(told['class']) == pytest.approx(float(values['class_deg']))
+    alike = {'probability', 'backlash_size', 'duration', 'reach.bend_x.low', 'reach.bend_y.high'}
+    alike |= {'regressed_size', 'regressed_size_low', 'regressed_size_high'}
+    alike |= {key for key in values if key.startswith('probability_')}
+    for key in (*alike, 'bend_x.capstan_exponent'):
+        assert told[key] == float(values[key]), key
 
 
 @pytest.mark.parametrize(('size_deg', 'seed'), [(50, 901), (80, 902)])
 def test_finds_the_class_of_a_known_tube(tmp_path, size_deg, seed):
     with SimulatedGraph(overrides=tube_of_size(tmp_path, size_deg, seed)) as graph:
+        numbers = []
+        graph.probe.create_subscription(JointState, CALIBRATION_NUMBERS, numbers.append, RESULT)
+        graph.connect()
         graph.enable()
         values = graph.calibrate()
+        assert_same_figures(numbers, values)
         assert float(values['class_deg']) == size_deg
         probabilities = [float(v) for k, v in values.items() if k.startswith('probability_')]
         assert len(probabilities) == 7

@@ -5,6 +5,7 @@ In simulated time, so that every instant is the same in every run.
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from simulated_graph import SimulatedGraph
 from std_msgs.msg import Header, String
 
 from endoscope_core.rig import load_rig
-from endoscope_nodes.diagnostics import ERROR, OK, status
+from endoscope_nodes.diagnostics import ERROR, OK, WARN, status
 from endoscope_nodes.names import (
     CALIBRATION_RESULT,
     CORRECTION,
@@ -620,6 +621,38 @@ def test_unusable_handle_messages_are_counted_and_said():
         assert any('elbow' in message or 'not finite' in message for message in told)
         values = graph.reported('console: commands')
         assert values['handle refused: not finite'] == values['handle refused: malformed'] == '1'
+
+
+@pytest.mark.parametrize('source', ['none', 'motion'])
+def test_a_handle_that_nothing_follows_is_said_with_what_to_do(source):
+    with run(overrides={'console': {'source': source}}) as graph:
+        console, said = graph.nodes['console'], []
+        console.get_logger = lambda: SimpleNamespace(warning=said.append)
+        handle = Handle(graph)
+        handle.move(1.1, clutch=False)
+        assert not said
+        handle.move(3.0, (0.05, 0.0), clutch=False)
+        advice = 'endoscope operate set console.source master'
+        told = graph.diagnostics['console: commands'][-1]
+        assert told.level == WARN
+        assert told.message == (
+            f"the handle moves and nothing follows it: the console's source is {source}; {advice}"
+        )
+        assert said == [told.message]
+        graph.set('console', source='master')
+        handle.move(2.1, (0.05, 0.0), clutch=False)
+        assert advice not in graph.diagnostics['console: commands'][-1].message
+        assert len(said) == 1
+
+
+def test_a_clutch_that_holds_nothing_is_said_unless_a_program_commands_the_slave():
+    with run() as graph:
+        handle = Handle(graph)
+        handle.move(1.1)
+        assert 'has its clutch held' in graph.diagnostics['console: commands'][-1].message
+        graph.speak(JointState, SLAVE_COMMAND, COMMAND)
+        handle.move(1.1)
+        assert graph.diagnostics['console: commands'][-1].level == OK
 
 
 def test_a_handle_that_falls_silent_stands_and_is_taken_up_where_the_slave_is():

@@ -10,6 +10,9 @@ from pathlib import Path
 import pytest
 from private_domain import private_domain
 
+from endoscope_core.atomic_output import atomic_directory
+from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
+from endoscope_nodes.parameters import described
 from endoscope_nodes.program import NODES
 
 PATIENCE_S = 120.0
@@ -88,10 +91,54 @@ def test_a_recording_is_finished_once_however_often_it_is_asked_for(tmp_path, fi
         time.sleep(0.002)
     errors = process.stderr.read()
     assert process.returncode == 0, errors
-    [line] = errors.splitlines()
-    assert '0 lost' in line
+    assert [line for line in errors.splitlines() if ' lost' in line] == errors.splitlines()[-1:]
+    assert '0 lost' in errors
     assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
     assert (tmp_path / 'bag' / 'bag_0.mcap').read_bytes().endswith(MCAP_MAGIC)
+
+
+def test_a_recording_is_called_what_it_will_be_called(tmp_path):
+    with atomic_directory(tmp_path / 'demo') as partial:
+        process = start('recorder', '--ros-args', '-p', f'bag:={partial / "bag"}')
+        wait_for_line(process, f'recording to {tmp_path / "demo" / "bag"}\n')
+        process.terminate()
+        _, errors = process.communicate(timeout=PATIENCE_S)
+    assert '.partial' not in errors
+    assert f'{tmp_path / "demo" / "bag"}: 0 messages, 0 lost' in errors
+
+
+def test_the_graph_says_what_it_was_given_when_it_is_ready_and_what_to_do(tmp_path):
+    parameters = tmp_path / 'rig.yaml'
+    parameters.write_text('/**/console: {ros__parameters: {source: none, scale: 0.5}}\n')
+    process = start(
+        'graph',
+        *('--ros-args', '--params-file', str(parameters), '-p', 'tick_rate:=200'),
+        *('-p', 'autostart:=false', '-r', '__ns:=/left'),
+    )
+    told = []
+    for line in process.stderr:
+        told.append(line.partition('] [')[2].partition('] [')[2].strip())
+        if '[WARN]' not in line and 'ready in' in line:
+            break
+    process.terminate()
+    process.communicate(timeout=PATIENCE_S)
+    assert [line for line in told if ' with ' in line] == [
+        'left.motor_driver]: with tick_rate:=200',
+        'left.console]: with scale:=0.5',
+        'left.recorder]: with autostart:=false',
+    ]
+    assert told[-1] == (
+        'graph]: ready in /left at 200 Hz: motors simulated; load cells simulated; '
+        'tracker simulated; slave DISABLED; next: endoscope operate enable; '
+        'not recording: endoscope operate record start'
+    )
+
+
+def test_a_node_alone_says_what_it_waits_for():
+    process = start('supervisor')
+    wait_for_line(process, 'not ready yet: motor/measured_js has not been received')
+    process.terminate()
+    process.communicate(timeout=PATIENCE_S)
 
 
 def test_a_program_started_by_nohup_outlives_the_terminal(tmp_path):
@@ -104,12 +151,47 @@ def test_a_program_started_by_nohup_outlives_the_terminal(tmp_path):
     assert process.returncode == 0, errors
 
 
-@pytest.mark.parametrize('name', ['motor_driver', 'graph'])
-@pytest.mark.parametrize('word', ['-h', '--help'])
-def test_who_asks_for_help_gets_it_and_starts_nothing(name, word):
-    code, out, errors = ended(name, word)
+@pytest.mark.parametrize(
+    ('name', 'args'),
+    [
+        *((name, ['--help']) for name in ('graph', *NODES)),
+        ('graph', ['-h']),
+        ('graph', ['--ros-args', '--help']),
+        ('console', ['--ros-args', '-p', 'source:=motion', '-h']),
+        ('graph', ['--ros-args', '-r', '__ns:=/left', '--', '--help']),
+    ],
+)
+def test_who_asks_for_help_gets_it_and_starts_nothing(name, args):
+    code, out, errors = ended(name, *args)
     assert (code, errors) == (0, '')
     assert out.startswith(f'usage: {name} ')
+
+
+@pytest.mark.parametrize('name', ['graph', *NODES])
+def test_help_tells_every_parameter(name):
+    _, out, _ = ended(name, '--help')
+    told = ' '.join(out.split())
+    for node in NODES if name == 'graph' else [name]:
+        if (name, node) == ('graph', 'replay'):
+            continue
+        for kind in (*OF_NODE[node], *OF_PROCESS):
+            for parameter in described(kind):
+                mark = '* ' if parameter.dynamic else ''
+                assert f'{mark}-p {parameter.name}:={parameter.default} ' in told
+                assert parameter.description in told
+                assert f'{parameter.allowed} {parameter.unit}'.strip() in told
+
+
+def test_help_loads_neither_ros_nor_anything_that_computes():
+    code = (
+        'import sys\n'
+        'from endoscope_nodes.program import graph\n'
+        "graph(['--help'])\n"
+        "heavy = {'rclpy', 'rcl_interfaces', 'numpy', 'numba', 'scipy', 'torch', 'yaml'}\n"
+        'sys.exit(str(heavy & set(sys.modules)) if heavy & set(sys.modules) else 0)\n'
+    )
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, '')
 
 
 @pytest.mark.parametrize(

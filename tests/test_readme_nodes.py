@@ -12,7 +12,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
-from endoscope_nodes.recorded_topics import type_name
 from endoscope_nodes.runtime import Runtime
 
 # In real time, on a machine that may stall for longer than a device may be silent.
@@ -100,7 +99,8 @@ def test_every_topic_is_listed_with_its_type_and_qos(nodes):
             if publisher.topic_name in OF_EVERY_NODE:
                 continue
             kind, _, offered = TOPICS[_short(publisher.topic_name)][:3]
-            assert kind.strip(' `') == type_name(publisher.msg_type).replace('/msg/', '/'), name
+            said = publisher.msg_type
+            assert kind.strip(' `') == f'{said.__module__.partition(".")[0]}/{said.__name__}', name
             assert offered.strip() == _qos(publisher.qos_profile), publisher.topic_name
         for subscription in node.subscriptions:
             if subscription.topic_name in OF_EVERY_NODE:

@@ -10,6 +10,7 @@ from endoscope_bags.errors import BagWriteError
 from endoscope_bags.information import LOST_PREFIX
 from endoscope_bags.qos_profile import QosProfile
 from endoscope_bags.sequence_gaps import SequenceGaps
+from endoscope_core.atomic_output import with_final_names
 
 _STALE_CHUNK_NS = round(1.25e9 * CHUNK_SECONDS)
 
@@ -78,7 +79,8 @@ class SessionReport:
         return not self.lost_count and not self.full and self.finished
 
     def __str__(self) -> str:
-        text = f'{self.path}: {self.message_count} messages, {self.lost_count} lost'
+        where = with_final_names(str(self.path))
+        text = f'{where}: {self.message_count} messages, {self.lost_count} lost'
         losses = [f'{topic} {count}' for topic, count in self.lost.items() if count]
         text += f' ({", ".join(losses)})' if losses else ''
         text += f'; {self.full}' if self.full else ''

@@ -1,6 +1,7 @@
 """Output files and folders that appear whole or not at all."""
 
 import os
+import re
 import secrets
 import shutil
 import tempfile
@@ -9,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from endoscope_core.errors import EndoscopeError
+
+_PARTIAL = re.compile(r'(?<![\w.-])\.partial-[0-9a-f]{8}-')
 
 
 class OutputPlaceError(EndoscopeError, OSError):
@@ -82,6 +85,17 @@ def atomic_directory(path: str | Path) -> Iterator[Path]:
         partial.replace(target)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def with_final_names(text: str) -> str:
+    """Return a text in which outputs have the names that a person will find when they are done.
+
+    Parameters
+    ----------
+    text
+        A path, or a line that names outputs which are still under their temporary names.
+    """
+    return _PARTIAL.sub('', text)
 
 
 def require_free_directory(path: str | Path) -> None:

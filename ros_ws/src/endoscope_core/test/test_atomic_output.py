@@ -10,9 +10,22 @@ from endoscope_core.atomic_output import (
     atomic_directory,
     atomic_file,
     require_free_directory,
+    with_final_names,
     write_bytes,
     write_text,
 )
+
+
+def test_what_is_written_has_the_name_that_a_person_will_find(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with atomic_directory(tmp_path / 'demo') as partial:
+        told = with_final_names(f'recording to {partial / "bag"}')
+        assert told == f'recording to {tmp_path / "demo" / "bag"}'
+    with atomic_file('report.json') as partial:
+        assert with_final_names(f'bag:={partial}') == 'bag:=report.json'
+        partial.touch()
 
 
 def test_file_takes_its_name_only_when_the_block_ends(tmp_path: Path) -> None:

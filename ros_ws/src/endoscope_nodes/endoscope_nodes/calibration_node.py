@@ -2,10 +2,10 @@
 
 import contextlib
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from threadpoolctl import threadpool_limits
@@ -27,9 +27,10 @@ from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.control import PhysicalParameters
 from endoscope_core.identification.plant_fit import PlantFitError, plants_of_calibration
 from endoscope_core.safety import StateCommand, TensionGuard
-from endoscope_core.signals import CALIBRATION_MOTIONS, SINUSOID, calibration_motion
+from endoscope_core.signals import SINUSOID, calibration_motion
 from endoscope_nodes.calibration_result import (
     aborted_result,
+    numbers_of,
     refused_result,
     successful_result,
 )
@@ -38,6 +39,7 @@ from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
+    CALIBRATION_NUMBERS,
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
     JOINTS,
@@ -47,7 +49,8 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import CalibrationParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_NS
@@ -56,39 +59,14 @@ from endoscope_nodes.watches import SessionWatch, StreamWatch
 _Judgement = tuple[ClassificationResult, tuple[PhysicalParameters, ...]]
 
 
-@dataclass(frozen=True)
-class CalibrationParameters:
-    """Parameters of the calibration."""
-
-    weights: str = parameter(
-        '',
-        'classifier weights as `endoscope train` writes them; empty for those that come with '
-        'the project',
-    )
-    motion: str = parameter(
-        SINUSOID,
-        "motion by which the tube is judged: the first paper's sinusoid of 9 s, or one of 3 s",
-        choices=CALIBRATION_MOTIONS,
-    )
-    identify_plant: bool = parameter(
-        True,
-        'whether to identify the plant of each joint from the tensions too: it tells how far the '
-        'tube lets the tip be bent, which console and compensator keep to, and the physical modes '
-        'of the compensator can be selected by it; half a second of computing',
-    )
-    return_speed: float = parameter(
-        1.0, 'largest speed on the way to zero', unit='rad/s', low=0.01, high=10.0
-    )
-    rest: float = parameter(0.5, 'rest at zero before the motion', unit='s', low=0.0, high=60.0)
-
-
 class CalibrationNode(EndoscopeNode):
     """Serves ``calibration/run`` and the ``home`` command; publishes ``calibration/result``.
 
-    The service answers at once, with the reason if it refuses; the result follows on its topic.
-    Whatever makes the recording worthless or motion doubtful aborts: the commands stop, the slave
-    holds or goes back to the console by a ramp, and the result says why. Tensions unlike any known
-    are refused: the result names no class, and nothing is compensated.
+    The service answers at once, with the reason if it refuses; the result follows on its topic, and
+    as numbers for programs that plot. Whatever makes the recording worthless or motion doubtful
+    aborts: the commands stop, the slave holds or goes back to the console by a ramp, and the result
+    says why. Tensions unlike any known are refused: the result names no class, and nothing is
+    compensated.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -113,6 +91,7 @@ class CalibrationNode(EndoscopeNode):
             self, CALIBRATION_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
         )
         self._results = self.create_publisher(DiagnosticArray, CALIBRATION_RESULT, RESULT)
+        self._numbers = self.create_publisher(JointState, CALIBRATION_NUMBERS, RESULT)
         self._session = SessionWatch(self, None, self._on_leave)
         self._pose = runtime.pose_of(self)
         self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
@@ -158,7 +137,7 @@ class CalibrationNode(EndoscopeNode):
         if self._run is not None:
             return f'busy: {self._run.step}'
         if not self._session.name:
-            return 'no motion session is open: the slave has to be ENABLED'
+            return 'no motion session is open: endoscope operate enable opens one'
         trouble, shafts = self._trouble(), self._pose.shafts()
         if trouble or shafts is None:
             return trouble
@@ -287,6 +266,7 @@ class CalibrationNode(EndoscopeNode):
     def _publish(self, result: DiagnosticArray) -> None:
         result.header.frame_id = self._commands.session
         self._results.publish(result)
+        self._numbers.publish(numbers_of(result))
 
     def _abort(self, reason: str) -> None:
         run, self._run = self._run, None

@@ -1,12 +1,15 @@
-"""The message ``calibration/result``: how it is written, and how it is read."""
+"""The message ``calibration/result``, how it is written and read, and its figures as numbers."""
 
+import contextlib
 import json
 import math
+from array import array
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
+from sensor_msgs.msg import JointState
 
 from endoscope_core.control import PhysicalParameters, Reach, reach
 from endoscope_core.control.physical_parameters import PROFILE
@@ -87,6 +90,34 @@ def refused_result(stamp_ns: int, reason: str, duration: float) -> DiagnosticArr
         'duration': duration,
     }
     return _array(stamp_ns, ERROR, reason, values)
+
+
+def numbers_of(result: DiagnosticArray) -> JointState:
+    """Return the figures of a result as numbers, which programs that plot can show.
+
+    Parameters
+    ----------
+    result
+        Of a success, an abort or a refusal.
+
+    Returns
+    -------
+    JointState
+        `name` is a figure's key, `position` its value in SI: ``class`` in rad, the others as in the
+        result; ``success`` is 1 or 0. What is no number, and what is there in degrees once more,
+        is left out.
+    """
+    [status] = result.status
+    numbers = {'success': float(status.level == OK)}
+    for item in status.values:
+        with contextlib.suppress(ValueError):
+            if item.key == 'class_deg':
+                numbers['class'] = math.radians(float(item.value))
+            elif item.key != 'backlash_size_deg':
+                numbers[item.key] = float(item.value)
+    return JointState(
+        header=result.header, name=list(numbers), position=array('d', numbers.values())
+    )
 
 
 def is_of_no_class(message: DiagnosticArray) -> bool:

@@ -1,7 +1,7 @@
 """The operator's side: plays a motion, or follows the handle while the clutch is held."""
 
+import operator
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -18,7 +18,6 @@ from endoscope_core.control import (
 )
 from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.safety.motion_session import STALL_NS
-from endoscope_core.signals import MOTIONS
 from endoscope_core.signals.command_file import CommandFileError
 from endoscope_nodes.calibration_result import findings_of, is_of_no_class
 from endoscope_nodes.console_motion import (
@@ -38,7 +37,8 @@ from endoscope_nodes.names import (
     MASTER_MEASURED,
     SLAVE_COMMAND,
 )
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import FOLLOW_THE_HANDLE, ConsoleParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
@@ -49,36 +49,8 @@ from endoscope_nodes.watches import (
     rivals,
 )
 
-
-@dataclass(frozen=True)
-class ConsoleParameters:
-    """Parameters of the console."""
-
-    source: str = parameter(
-        'none',
-        'where commands come from; setting it starts a motion or file anew',
-        choices=('none', 'motion', 'file', 'master'),
-        dynamic=True,
-    )
-    motion: str = parameter(
-        'periodic', 'motion that is played', choices=tuple(MOTIONS), dynamic=True
-    )
-    joints: tuple[str, ...] = parameter(
-        JOINTS, 'joints that the motion moves', choices=JOINTS, dynamic=True
-    )
-    command_file: str = parameter(
-        '', 'CSV file that is played, columns time [s], bend_x and bend_y [rad]', dynamic=True
-    )
-    scale: float = parameter(
-        1.0, 'slave motion for one radian of handle motion', low=0.01, high=10.0, dynamic=True
-    )
-    approach_speed: float = parameter(
-        1.0,
-        'largest speed on the way to the first angle of a motion',
-        unit='rad/s',
-        low=0.01,
-        high=10.0,
-    )
+# A hand that rests on a handle moves it by less than half a degree.
+_MOTION_RAD = 0.01
 
 
 class ConsoleNode(EndoscopeNode):
@@ -102,6 +74,9 @@ class ConsoleNode(EndoscopeNode):
         self._sent_ns: int | None = None
         self._clutch_said = False
         self._refused_before = 0
+        self._handle_from: tuple[float, ...] = ()
+        self._handle_moves = False
+        self._told_of_handle = False
         self._reaches: tuple[Reach, ...] = ()
         self._beyond_reach = self._beyond_before = 0
         facts = self.rig.joints
@@ -164,6 +139,7 @@ class ConsoleNode(EndoscopeNode):
         self._settings = parameters
         self._rest()
         self._next = 0
+        self._handle_moves = self._told_of_handle = False
         self._played = self._load(parameters)
         self._own_topics()
 
@@ -188,7 +164,35 @@ class ConsoleNode(EndoscopeNode):
         if crowd:
             self._session.leave(crowd)
             return
-        self._handle.take(sample.stamp_ns, sample.position, self.ticker.monotonic_ns())
+        refused = self._handle.take(sample.stamp_ns, sample.position, self.ticker.monotonic_ns())
+        if refused is None and self._settings.source != FOLLOW_THE_HANDLE:
+            self._notice_motion(sample.position)
+
+    def _notice_motion(self, position: tuple[float, ...]) -> None:
+        """Notice that somebody moves a handle that nothing follows."""
+        if len(self._handle_from) != len(position):
+            self._handle_from = position
+        moved = max(map(abs, map(operator.sub, position, self._handle_from)), default=0.0)
+        if moved > _MOTION_RAD:
+            self._handle_from, self._handle_moves = position, True
+
+    def _unheeded(self) -> str:
+        """Say that a handle is not followed, if somebody moves it or holds its clutch."""
+        moves, self._handle_moves = self._handle_moves, False
+        # A program that commands the slave itself holds the clutch with reason.
+        held = (
+            self._clutch.held
+            and self._handle.alive(self.ticker.monotonic_ns())
+            and not self.count_publishers(SLAVE_COMMAND)
+        )
+        source = self._settings.source
+        if source == FOLLOW_THE_HANDLE or not (moves or held):
+            return ''
+        return (
+            f'the handle {"moves" if moves else "has its clutch held"} and nothing follows it: '
+            f"the console's source is {source}; endoscope operate set console.source "
+            f'{FOLLOW_THE_HANDLE}'
+        )
 
     def _on_result(self, message: DiagnosticArray) -> None:
         """Keep to what this session's own calibration found out about the tube's reach."""
@@ -330,6 +334,12 @@ class ConsoleNode(EndoscopeNode):
         if fresh:
             said = f'{fresh} messages of {MASTER_MEASURED} refused, last: {handle.last_reason}'
             return WARN, said, values
+        unheeded = self._unheeded()
+        if unheeded and not self._told_of_handle:
+            self._told_of_handle = True
+            self.get_logger().warning(unheeded)
+        if unheeded:
+            return WARN, unheeded, values
         beyond = self._beyond_reach - self._beyond_before
         self._beyond_before = self._beyond_reach
         if beyond:
@@ -338,7 +348,7 @@ class ConsoleNode(EndoscopeNode):
             values['progress [s]'] = min(self._next, len(self._played)) * TICK_S
             values['length [s]'] = len(self._played) * TICK_S
             return OK, 'finished' if self.finished else 'playing', values
-        if source == 'master' and not handle.alive(self.ticker.monotonic_ns()):
+        if source == FOLLOW_THE_HANDLE and not handle.alive(self.ticker.monotonic_ns()):
             return WARN, f'{MASTER_MEASURED} is silent', values
         return OK, source, values
 

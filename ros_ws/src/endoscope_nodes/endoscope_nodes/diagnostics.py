@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.time import Time
 
+from endoscope_nodes.names import DIAGNOSTICS
 from endoscope_nodes.qos import EVENT
 from endoscope_nodes.ticker import Ticker
 
@@ -53,7 +54,7 @@ class Diagnostics:
         self._node = node
         self._ticker = ticker
         self._reports: list[tuple[str, str, Callable[[], Report]]] = []
-        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', EVENT)
+        self._publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS, EVENT)
         ticker.every(1.0, self.publish)
 
     def add(self, subcomponent: str, report: Callable[[], Report], hardware_id: str = '') -> None:

@@ -7,8 +7,9 @@ from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.node import Node
 from rclpy.time import Time
 
+from endoscope_nodes.declared_parameters import declare_parameters
 from endoscope_nodes.diagnostics import Diagnostics
-from endoscope_nodes.parameters import declare_parameters
+from endoscope_nodes.parameters import changed
 
 if TYPE_CHECKING:
     from endoscope_nodes.runtime import Runtime
@@ -34,6 +35,8 @@ class EndoscopeNode(Node):
         Reports published on ``/diagnostics``.
     exit_code
         What the process should say when it ends; 0 unless the node sets it.
+    given
+        Values of its parameters that are not the defaults, as they were when it was built.
     """
 
     def __init__(self, name: str, runtime: 'Runtime') -> None:
@@ -44,6 +47,7 @@ class EndoscopeNode(Node):
             parameter_overrides=runtime.overrides_of(name),
         )
         self.exit_code = 0
+        self.given: dict[str, object] = {}
         self.ticker = runtime.ticker_of(self)
         self.rig = runtime.rig
         self.diagnostics = Diagnostics(self, self.ticker)
@@ -55,7 +59,19 @@ class EndoscopeNode(Node):
         check: Callable[[P], object] | None = None,
     ) -> P:
         """Declare the parameters of the dataclass ``kind``; see :func:`declare_parameters`."""
-        return declare_parameters(self, kind, on_change, check)
+        values = declare_parameters(self, kind, on_change, check)
+        self.given |= changed(values)
+        return values
+
+    @property
+    def announcement(self) -> str:
+        """What it is, in the line that tells that the process can be operated; may be empty."""
+        return ''
+
+    @property
+    def waiting(self) -> str:
+        """What it waits for before it can be operated; empty for nothing."""
+        return ''
 
     def get_clock(self) -> Clock:
         """Return the node's clock, which in simulated time shows that of the ticker."""

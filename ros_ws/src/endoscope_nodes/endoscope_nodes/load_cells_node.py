@@ -1,11 +1,8 @@
 """Reads the tension of the wires."""
 
-from dataclasses import dataclass
-
 from std_srvs.srv import Trigger
 
 from endoscope_core.physics import SensorModel
-from endoscope_core.rig import LOAD_CELL_DEVICES
 from endoscope_devices.load_cells import (
     CONNECTIONS,
     ModbusLoadCells,
@@ -27,28 +24,11 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import LoadCellsParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.sampling import SampleClock
-
-
-@dataclass(frozen=True)
-class LoadCellsParameters:
-    """Parameters of the load cells."""
-
-    device: str = parameter(
-        '', 'what is read; empty for what the rig file says', choices=('', *LOAD_CELL_DEVICES)
-    )
-    port: str = parameter('', 'serial port of a modbus_rtu device, HOST:PORT of a modbus_tcp one')
-    calibration_file: str = parameter(
-        '', 'YAML file with registers, sensitivity, sign and zero of each cell of a real device'
-    )
-    connected: bool = parameter(
-        True,
-        'false makes the simulated cells fall silent, as an unplugged cable does',
-        dynamic=True,
-    )
 
 
 class LoadCellsNode(EndoscopeNode):
@@ -67,7 +47,7 @@ class LoadCellsNode(EndoscopeNode):
         self._told = ''
         self._cells: ModbusLoadCells | None = None
         self._measured = JointPublisher(self, WIRES_MEASURED, WIRES, ('effort',), SENSOR_OFFERED)
-        device = p.device or self.rig.devices.load_cells
+        device = self._device_name = p.device or self.rig.devices.load_cells
         if device == 'simulated':
             sensors = runtime.plant.sensors
             self._sensors = SensorModel(sensors, runtime.seed_of(1))
@@ -82,6 +62,11 @@ class LoadCellsNode(EndoscopeNode):
 
     def _on_parameters(self, parameters: LoadCellsParameters) -> None:
         self._settings = parameters
+
+    @property
+    def announcement(self) -> str:
+        """Name the device."""
+        return f'load cells {self._device_name}'
 
     def _connect(self, device: str, p: LoadCellsParameters) -> ModbusLoadCells:
         if self.ticker.simulated:

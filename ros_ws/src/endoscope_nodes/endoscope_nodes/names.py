@@ -1,4 +1,4 @@
-"""Names of joints, motors, wires and topics, as other people's programs rely on them."""
+"""Names of joints, motors, wires, topics and services, as other people's programs rely on them."""
 
 JOINTS = ('bend_x', 'bend_y')
 MOTORS = ('motor_x', 'motor_y')
@@ -10,12 +10,11 @@ SLAVE_COMMAND = 'slave/servo_jp'
 SLAVE_MEASURED = 'slave/measured_js'
 CALIBRATION_COMMAND = 'calibration/servo_jp'
 CALIBRATION_RESULT = 'calibration/result'
-CALIBRATION_RUN = 'calibration/run'
+CALIBRATION_NUMBERS = 'calibration/numbers'
 CORRECTION = 'controller/correction_js'
 COMPENSATOR_STATE = 'compensator/state'
 MOTOR_COMMAND = 'motor/servo_jp'
 MOTOR_MEASURED = 'motor/measured_js'
-MOTOR_REBOOT = 'motor/reboot'
 WIRES_MEASURED = 'wires/measured_js'
 TRACKER_POSE = 'tracker/measured_cp'
 OPERATING_STATE = 'slave/operating_state'
@@ -23,20 +22,12 @@ MOTION_SESSION = 'slave/motion_session'
 STATE_COMMAND = 'slave/state_command'
 SIMULATED_WIRES = 'simulation/wires'
 SIMULATED_BENDING = 'simulation/bending'
+DIAGNOSTICS = '/diagnostics'
+CLOCK = '/clock'
 
-# Each has one sender while the slave is enabled: whoever else speaks there is a fault.
-SOLE_SENDER = (
-    MASTER_MEASURED,
-    MASTER_CLUTCH,
-    SLAVE_COMMAND,
-    SLAVE_MEASURED,
-    CALIBRATION_COMMAND,
-    CALIBRATION_RESULT,
-    CORRECTION,
-    COMPENSATOR_STATE,
-    MOTOR_COMMAND,
-    MOTOR_MEASURED,
-    WIRES_MEASURED,
-    OPERATING_STATE,
-    MOTION_SESSION,
-)
+CALIBRATION_RUN = 'calibration/run'
+RECORDER_START = 'recorder/start'
+RECORDER_STOP = 'recorder/stop'
+LOAD_CELLS_TARE = 'load_cells/tare'
+REGISTER_STRAIGHT = 'em_tracker/register_straight'
+MOTOR_REBOOT = 'motor/reboot'

@@ -1,36 +1,15 @@
-"""Which topics the recorder takes, what they carry, and with which QoS it asks for them."""
+"""How a topic is taken for a recording: its class, the QoS that is asked for, what was offered."""
 
 import importlib
 from collections.abc import Sequence
 
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
-from sensor_msgs.msg import JointState, Joy
-from std_msgs.msg import Header, String
 
 from endoscope_bags.errors import UnknownTypeError
 from endoscope_bags.qos_profile import QosProfile
-from endoscope_nodes.qos import EVENT, RECORDER_ASKED, RESULT
-
-INTERFACE_TOPICS: dict[str, tuple[type, QoSProfile]] = {
-    'master/measured_js': (JointState, RECORDER_ASKED),
-    'master/clutch': (Joy, EVENT),
-    'slave/servo_jp': (JointState, RECORDER_ASKED),
-    'slave/measured_js': (JointState, RECORDER_ASKED),
-    'motor/servo_jp': (JointState, RECORDER_ASKED),
-    'motor/measured_js': (JointState, RECORDER_ASKED),
-    'wires/measured_js': (JointState, RECORDER_ASKED),
-    'tracker/measured_cp': (PoseStamped, RECORDER_ASKED),
-    'calibration/result': (DiagnosticArray, RESULT),
-    'compensator/state': (DiagnosticArray, RESULT),
-    'slave/operating_state': (String, RESULT),
-    'slave/motion_session': (Header, EVENT),
-    'slave/state_command': (String, EVENT),
-    '/diagnostics': (DiagnosticArray, EVENT),
-}
-"""The public topics, each with its type and with what is asked for while nobody offers it yet."""
+from endoscope_nodes import topics
+from endoscope_nodes.qos import profile
 
 
 def message_class(type_name: str) -> type:
@@ -49,40 +28,21 @@ def message_class(type_name: str) -> type:
     return kind
 
 
-def type_name(kind: type) -> str:
-    """Return for example ``'std_msgs/msg/String'`` for the class of a message."""
-    return f'{kind.__module__.partition(".")[0]}/msg/{kind.__name__}'
-
-
-def suitable_qos(asked: QoSProfile, publishers: Sequence[TopicEndpointInfo]) -> QoSProfile:
+def suitable_qos(latched: bool, publishers: Sequence[TopicEndpointInfo]) -> QoSProfile:
     """Return the QoS that hears every publisher, and latched messages where all are latched.
 
     Parameters
     ----------
-    asked
-        What to ask for where the publishers do not decide.
+    latched
+        Whether to ask for latched messages while nobody publishes yet.
     publishers
         Those known at the moment.
     """
-    if not publishers:
-        return QoSProfile(
-            depth=RECORDER_ASKED.depth,
-            history=HistoryPolicy.KEEP_LAST,
-            reliability=asked.reliability,
-            durability=asked.durability,
-        )
-    reliable = asked.reliability == ReliabilityPolicy.RELIABLE and all(
-        p.qos_profile.reliability == ReliabilityPolicy.RELIABLE for p in publishers
-    )
-    latched = all(p.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in publishers)
-    return QoSProfile(
-        depth=RECORDER_ASKED.depth,
-        history=HistoryPolicy.KEEP_LAST,
-        reliability=ReliabilityPolicy.RELIABLE
-        if reliable or latched
-        else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )
+    offered = [p.qos_profile for p in publishers]
+    if offered:
+        latched = all(q.durability == DurabilityPolicy.TRANSIENT_LOCAL for q in offered)
+    reliable = latched or all(q.reliability == ReliabilityPolicy.RELIABLE for q in offered)
+    return profile(topics.Qos(topics.RECORDER_ASKED.depth, reliable, latched))
 
 
 def offered_profiles(publishers: Sequence[TopicEndpointInfo]) -> tuple[QosProfile, ...]:

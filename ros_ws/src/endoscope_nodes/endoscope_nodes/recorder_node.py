@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rclpy.clock import Clock, ClockType
-from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from endoscope_bags.errors import BagError, UnknownTypeError
@@ -17,46 +16,27 @@ from endoscope_bags.recording_session import (
     SessionReport,
     simulated_receipt_ns,
 )
+from endoscope_core.atomic_output import with_final_names
 from endoscope_nodes.diagnostics import ERROR, OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.parameters import ParameterError, parameter
-from endoscope_nodes.qos import RECORDER_ASKED
+from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
+from endoscope_nodes.node_parameters import RecorderParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.raw_subscription import RawSubscription
-from endoscope_nodes.recorded_topics import (
-    INTERFACE_TOPICS,
-    message_class,
-    offered_profiles,
-    suitable_qos,
-    type_name,
-)
+from endoscope_nodes.recorded_topics import message_class, offered_profiles, suitable_qos
 from endoscope_nodes.runtime import Runtime, run_nodes
+from endoscope_nodes.topics import BY_NAME
 
 _STAMP = struct.Struct('<iI')
 _SECOND = 1_000_000_000
 _LOOK_PERIOD_S = 0.1
 
 
-@dataclass(frozen=True)
-class RecorderParameters:
-    """Parameters of the recorder."""
-
-    bag: str = parameter(
-        '', 'folder or .mcap file to write; empty for bags/recording-DATE-TIME', dynamic=True
-    )
-    topics: tuple[str, ...] = parameter(
-        tuple(INTERFACE_TOPICS), 'topics to record, relative ones in the namespace of the node'
-    )
-    autostart: bool = parameter(True, 'record from the start instead of on recorder/start')
-    drain_period: float = parameter(
-        0.002, 'how often the queues are emptied', unit='s', low=0.0005, high=0.1
-    )
-
-
 @dataclass
 class _Source:
     name: str
     kind: type
-    asked: QoSProfile
+    latched: bool
     has_stamp: bool
     subscription: RawSubscription
     number: int
@@ -93,8 +73,8 @@ class RecorderNode(EndoscopeNode):
         self._last_tick_ns = 0
         self._said_loss = 0
         self.last_report: SessionReport | None = None
-        self.create_service(Trigger, 'recorder/start', self._on_start)
-        self.create_service(Trigger, 'recorder/stop', self._on_stop)
+        self.create_service(Trigger, RECORDER_START, self._on_start)
+        self.create_service(Trigger, RECORDER_STOP, self._on_stop)
         if self.ticker.simulated:
             self.ticker.add(self._on_tick)
         else:
@@ -110,6 +90,11 @@ class RecorderNode(EndoscopeNode):
             except BagError as error:
                 raise ParameterError(f"recorder: parameter 'bag': {error}") from error
 
+    @property
+    def announcement(self) -> str:
+        """Say how to begin a recording, where none is being made."""
+        return '' if self._session else 'not recording: endoscope operate record start'
+
     def _on_parameters(self, new: RecorderParameters) -> None:
         self._bag = new.bag
 
@@ -122,13 +107,14 @@ class RecorderNode(EndoscopeNode):
             One is being made already, its place is taken, or the disk is full.
         """
         if self._session is not None:
-            raise BagError(f'already recording to {self._session.path}; stop that first')
+            there = with_final_names(str(self._session.path))
+            raise BagError(f'already recording to {there}; stop that first')
         path = Path(self._bag or time.strftime('bags/recording-%Y%m%d-%H%M%S'))
         self._session = RecordingSession(path)
         self._said_loss = 0
         self._untyped = list(self._topics)
         self._subscribe_untyped()
-        self.get_logger().info(f'recording to {path}')
+        self.get_logger().info(f'recording to {with_final_names(str(path))}')
         return path
 
     def stop(self) -> SessionReport:
@@ -165,7 +151,7 @@ class RecorderNode(EndoscopeNode):
 
     def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            response.message = str(self.start())
+            response.message = with_final_names(str(self.start()))
             response.success = True
         except BagError as error:
             response.message = str(error)
@@ -190,27 +176,27 @@ class RecorderNode(EndoscopeNode):
 
     def _subscribe(self, topic: str) -> None:
         namespace = self.get_namespace().rstrip('/') + '/'
-        known = INTERFACE_TOPICS.get(topic) or INTERFACE_TOPICS.get(topic.removeprefix(namespace))
+        known = BY_NAME.get(topic) or BY_NAME.get(topic.removeprefix(namespace))
         if known is not None:
-            self._add_source(topic, *known)
+            self._add_source(topic, known.type, known.asked.latched)
             return
         types = dict(self.get_topic_names_and_types()).get(self.resolve_topic_name(topic), [])
         if types:
-            self._add_source(topic, message_class(types[0]), RECORDER_ASKED)
+            self._add_source(topic, types[0], latched=False)
         else:
             self._untyped.append(topic)
 
-    def _add_source(self, topic: str, kind: type, asked: QoSProfile) -> None:
+    def _add_source(self, topic: str, type_name: str, latched: bool) -> None:
         assert self._session is not None
         full = self.resolve_topic_name(topic)
-        name = type_name(kind)
-        has_stamp = begins_with_header(message_type(name).definition)
-        qos = suitable_qos(asked, self.get_publishers_info_by_topic(full))
+        kind = message_class(type_name)
+        has_stamp = begins_with_header(message_type(type_name).definition)
+        qos = suitable_qos(latched, self.get_publishers_info_by_topic(full))
         subscription = RawSubscription(self, kind, topic, qos)
-        source = _Source(full, kind, asked, has_stamp, subscription, 0)
+        source = _Source(full, kind, latched, has_stamp, subscription, 0)
         source.number = self._session.add_topic(
             full,
-            name,
+            type_name,
             lambda: offered_profiles(self.get_publishers_info_by_topic(full)),
             source.count_publishers,
         )
@@ -236,7 +222,7 @@ class RecorderNode(EndoscopeNode):
 
     def _adapt(self, source: _Source) -> None:
         publishers = self.get_publishers_info_by_topic(source.name)
-        qos = suitable_qos(source.asked, publishers)
+        qos = suitable_qos(source.latched, publishers)
         if publishers and (qos.durability, qos.reliability) != (
             source.subscription.qos.durability,
             source.subscription.qos.reliability,
@@ -282,7 +268,7 @@ class RecorderNode(EndoscopeNode):
             return OK, 'not recording', {}
         report = self._session.report()
         values: dict[str, object] = {
-            'bag': report.path,
+            'bag': with_final_names(str(report.path)),
             'messages': report.message_count,
             'lost': report.lost_count,
         }

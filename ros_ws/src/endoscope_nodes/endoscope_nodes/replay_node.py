@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -13,33 +12,17 @@ from endoscope_bags.cdr_encoding import encode_clock
 from endoscope_bags.errors import BagError
 from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.names import MOTOR_COMMAND, MOTOR_MEASURED
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.names import CLOCK, DIAGNOSTICS, MOTOR_COMMAND, MOTOR_MEASURED
+from endoscope_nodes.node_parameters import ReplayParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.recorded_topics import message_class
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_NS
 
-_CLOCK = '/clock'
 # A reader that asks for what is not offered never connects.
 _LONGEST_WAIT_NS = 5_000_000_000
 _LINGER_S = 0.5
-
-
-@dataclass(frozen=True)
-class ReplayParameters:
-    """Parameters of the replay."""
-
-    bag: str = parameter('', 'rosbag2 folder or .mcap file to replay')
-    speed: float = parameter(1.0, 'recorded seconds in a real one', low=0.01, high=100.0)
-    topics: tuple[str, ...] = parameter(('',), 'full names to publish; an empty one for all')
-    clock: bool = parameter(True, 'publish the time of the recording on /clock')
-    delay: float = parameter(
-        1.0, 'time from finding all readers to the first message', unit='s', low=0.0
-    )
-    beside_live_nodes: bool = parameter(
-        False, 'replay even where other nodes publish the same topics'
-    )
 
 
 class ReplayNode(EndoscopeNode):
@@ -70,9 +53,7 @@ class ReplayNode(EndoscopeNode):
             raise ParameterError(f'replay: {p.bag}: nothing to publish in the chosen topics')
         self._start_ns = self._next.log_ns // TICK_NS * TICK_NS
         self._clock_ns = self._start_ns - TICK_NS
-        self._clock_out = (
-            self.create_publisher(ClockMessage, _CLOCK, LOCK_STEP) if p.clock else None
-        )
+        self._clock_out = self.create_publisher(ClockMessage, CLOCK, LOCK_STEP) if p.clock else None
         self._delay_ns = round(p.delay * 1e9)
         self._begin_ns = time.monotonic_ns() + self._delay_ns
         self._wait_until_ns = self._begin_ns + _LONGEST_WAIT_NS
@@ -80,6 +61,11 @@ class ReplayNode(EndoscopeNode):
         self.published = 0
         self.diagnostics.add('replay', self._report)
         self.ticker.every(TICK_NS * 1e-9, self._go_on)
+
+    @property
+    def announcement(self) -> str:
+        """Name the bag."""
+        return f'{self._parameters_.bag}, {self._parameters_.speed:g} times its pace'
 
     def _open(self, bag: str) -> Recording:
         try:
@@ -99,7 +85,7 @@ class ReplayNode(EndoscopeNode):
         return [
             topic
             for topic in chosen
-            if topic.message_count and not (self._parameters_.clock and topic.name == _CLOCK)
+            if topic.message_count and not (self._parameters_.clock and topic.name == CLOCK)
         ]
 
     def _publisher(self, topic: Topic) -> Publisher:
@@ -154,11 +140,11 @@ class ReplayNode(EndoscopeNode):
 
     def _live_nodes(self) -> str:
         """Name a node that the replay would talk over; empty if there is none."""
-        watched = {*self._outputs, *([_CLOCK] if self._clock_out is not None else [])}
+        watched = {*self._outputs, *([CLOCK] if self._clock_out is not None else [])}
         for topic in self._outputs:
             if topic.endswith('/' + MOTOR_COMMAND):
                 watched.add(topic.removesuffix(MOTOR_COMMAND) + MOTOR_MEASURED)
-        watched.discard('/diagnostics')
+        watched.discard(DIAGNOSTICS)
         for topic in sorted(watched):
             for info in self.get_publishers_info_by_topic(topic):
                 if info.node_name != self.get_name():

@@ -13,17 +13,18 @@ from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointSample, JointSubscription
 from endoscope_nodes.names import (
+    DIAGNOSTICS,
     MOTION_SESSION,
     MOTOR_COMMAND,
     MOTOR_MEASURED,
     OPERATING_STATE,
-    SOLE_SENDER,
     STATE_COMMAND,
     WIRES,
     WIRES_MEASURED,
 )
 from endoscope_nodes.qos import EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
+from endoscope_nodes.topics import TOPICS
 from endoscope_nodes.watches import SESSION_REPORT, StreamWatch, senders_in_words
 
 # Subcomponents whose errors forbid motion; their nodes tell them at once.
@@ -45,7 +46,7 @@ class SupervisorNode(EndoscopeNode):
         self._guard = TensionGuard(WIRES, self.rig.tension.ceiling)
         self._last_refusal = ''
         self._own = f'{self.get_namespace().rstrip("/")}/'
-        self._watched = [self.resolve_topic_name(topic) for topic in SOLE_SENDER]
+        self._watched = [self.resolve_topic_name(t.name) for t in TOPICS if t.one_sender]
         self._states = self.create_publisher(String, OPERATING_STATE, RESULT)
         self._sessions = self.create_publisher(Header, MOTION_SESSION, EVENT)
         self._motor = StreamWatch(self.ticker, MOTOR_MEASURED)
@@ -55,10 +56,23 @@ class SupervisorNode(EndoscopeNode):
         )
         JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
         self.create_subscription(String, STATE_COMMAND, self._on_command, EVENT)
-        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, EVENT)
+        self.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, EVENT)
         self.diagnostics.add('operating state', self._report)
         self.ticker.every(HEARTBEAT_S, self._beat)
         self._check()
+
+    @property
+    def announcement(self) -> str:
+        """Say in which state the slave is, and what to do about it."""
+        state = self.machine.state
+        if state is OperatingState.DISABLED:
+            return f'slave {state}; next: endoscope operate enable'
+        return f'slave {state}{f" ({self.machine.cause})" if self.machine.cause else ""}'
+
+    @property
+    def waiting(self) -> str:
+        """Name what forbids motion."""
+        return '; '.join(self.machine.present_causes.values())
 
     def _beat(self) -> None:
         self._check()

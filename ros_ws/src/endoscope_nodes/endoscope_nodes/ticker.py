@@ -9,7 +9,8 @@ from rclpy.node import Node
 from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from endoscope_nodes.qos import CLOCK_ASKED
+from endoscope_nodes.names import CLOCK
+from endoscope_nodes.qos import SENSOR_ASKED
 
 TICK_NS = 1_000_000
 TICK_S = TICK_NS * 1e-9
@@ -65,7 +66,12 @@ class Ticker:
         # system clock must not look like a step of the motion.
         self._offset_ns = time.time_ns() - time.monotonic_ns()
         if simulated:
-            node.create_subscription(ClockMessage, '/clock', self._on_clock, CLOCK_ASKED, raw=True)
+            node.create_subscription(ClockMessage, CLOCK, self._on_clock, SENSOR_ASKED, raw=True)
+
+    @property
+    def rate(self) -> int:
+        """Beats a second in real time."""
+        return 1000 // self._stride
 
     def now_ns(self) -> int:
         """Time for stamps in nanoseconds; 0 while simulated time has not begun."""

@@ -1,0 +1,67 @@
+"""What a process says of itself: the parameters that it was given, and when it can be operated."""
+
+from typing import TYPE_CHECKING
+
+from rclpy.clock import Clock, ClockType
+from rclpy.logging import get_logger
+
+from endoscope_core.atomic_output import with_final_names
+from endoscope_nodes.parameters import as_typed
+
+if TYPE_CHECKING:
+    from endoscope_nodes.runtime import Runtime
+
+_LOOK_S = 0.2
+_PATIENCE_LOOKS = 25
+
+
+class Announcement:
+    """Says once that the nodes of a process can be operated, and what to do next.
+
+    That is when they have found each other and none of them waits for anything.  Where that takes
+    longer than 5 s, it says what is waited for.
+
+    Parameters
+    ----------
+    runtime
+        With all its nodes.
+    """
+
+    def __init__(self, runtime: 'Runtime') -> None:
+        self._runtime = runtime
+        self._looks = 0
+        self._logger = (
+            runtime.nodes[0].get_logger() if len(runtime.nodes) == 1 else get_logger('graph')
+        )
+        for node in runtime.nodes:
+            given = runtime.process_parameters if node is runtime.nodes[0] else {}
+            told = [f'{name}:={as_typed(value)}' for name, value in (given | node.given).items()]
+            if told:
+                node.get_logger().info(with_final_names(f'with {", ".join(told)}'))
+        self._timer = runtime.nodes[0].create_timer(
+            _LOOK_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+
+    def _look(self) -> None:
+        waiting = self._waiting()
+        if not waiting:
+            self._timer.cancel()
+            self._logger.info(self._ready())
+            return
+        self._looks += 1
+        if self._looks == _PATIENCE_LOOKS:
+            self._logger.warning(f'not ready yet: {waiting}')
+
+    def _waiting(self) -> str:
+        waiting = [node.waiting for node in self._runtime.nodes if node.waiting]
+        if not self._runtime.ticker.now_ns():
+            waiting.append('simulated time has not begun')
+        if not waiting and not self._runtime.connected():
+            return 'the nodes have not found each other'
+        return '; '.join(waiting)
+
+    def _ready(self) -> str:
+        nodes, ticker = self._runtime.nodes, self._runtime.ticker
+        pace = 'in simulated time' if ticker.simulated else f'at {ticker.rate} Hz'
+        said = '; '.join(filter(None, (node.announcement for node in nodes)))
+        return f'ready in {nodes[0].get_namespace()} {pace}' + (f': {said}' if said else '')

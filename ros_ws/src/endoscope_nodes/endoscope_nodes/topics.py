@@ -1,0 +1,390 @@
+"""The interface: every topic and service of the graph, said once.
+
+Nodes, recorder, help and reference pages take from here; nothing here needs ROS.
+
+Sensors are offered reliable with a deep queue, so that a recorder can ask for everything, and
+asked for best effort, so that a slow reader never holds a writer up.  Queues are deep because a
+desktop kernel stalls for 5 to 15 ms now and then, which is 15 samples at 1 kHz.  A command is only
+worth something while it is the newest: depth 1, and its reader checks its age.
+"""
+
+from dataclasses import dataclass
+
+from endoscope_nodes import names
+
+
+@dataclass(frozen=True)
+class Qos:
+    """Quality of service, as far as the interface uses it.
+
+    Attributes
+    ----------
+    depth
+        Messages that the queue keeps, the newest ones.
+    reliable
+        Whether what is lost is sent again; best effort otherwise.
+    latched
+        Whether a reader that comes late is given the last message (transient local).
+    """
+
+    depth: int
+    reliable: bool = True
+    latched: bool = False
+
+    def __str__(self) -> str:
+        words = ['reliable' if self.reliable else 'best effort']
+        if self.latched:
+            words.append('transient local')
+        return ', '.join((*words, str(self.depth)))
+
+
+SENSOR_OFFERED = Qos(100)
+SENSOR_ASKED = Qos(50, reliable=False)
+RECORDER_ASKED = Qos(2000)
+COMMAND = Qos(1)
+RESULT = Qos(1, latched=True)
+EVENT = Qos(10)
+LOCK_STEP = Qos(100)
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of the interface.
+
+    Attributes
+    ----------
+    name
+        Relative to the namespace of the graph, ``/endoscope`` by default, or absolute.
+    type
+        For example ``'sensor_msgs/msg/JointState'``.
+    rate
+        In words, with its unit.
+    content
+        What it says, each figure with its unit.
+    offered
+        QoS of the sender; None where it is not a node of this project.
+    asked
+        QoS of the readers.
+    said_by, heard_by
+        Nodes; the recorder hears whatever is `recorded`, and the conductor waits for the streams.
+    recorded
+        Whether the recorder takes it unless it is told otherwise.
+    one_sender
+        Whether whoever else speaks here while the slave is enabled is a fault.
+    """
+
+    name: str
+    type: str
+    rate: str
+    content: str
+    offered: Qos | None
+    asked: Qos
+    said_by: tuple[str, ...] = ()
+    heard_by: tuple[str, ...] = ()
+    recorded: bool = True
+    one_sender: bool = False
+
+
+@dataclass(frozen=True)
+class Service:
+    """A service of the graph; all are `std_srvs/srv/Trigger`: success, and a message in words.
+
+    Attributes
+    ----------
+    name
+        Relative to the namespace of the graph.
+    served_by
+        Node.
+    purpose
+        What it does and when it is refused.
+    device
+        Device without which it is not there; empty for none.
+    """
+
+    name: str
+    served_by: str
+    purpose: str
+    device: str = ''
+
+
+TRIGGER = 'std_srvs/srv/Trigger'
+
+_JOINT_STATE = 'sensor_msgs/msg/JointState'
+_DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
+_STREAM = '1 kHz'
+_LATCHED_STATE = 'on change, latched'
+
+TOPICS = (
+    Topic(
+        names.MASTER_MEASURED,
+        _JOINT_STATE,
+        "1 kHz or the handle's own",
+        '`position` of the handle in rad, `bend_x` and `bend_y`',
+        offered=None,
+        asked=SENSOR_ASKED,
+        heard_by=('console',),
+        one_sender=True,
+    ),
+    Topic(
+        names.MASTER_CLUTCH,
+        'sensor_msgs/msg/Joy',
+        'on change and 10 Hz',
+        "`buttons[0]` = 1: follow the handle; the console's own while it plays a motion",
+        offered=EVENT,
+        asked=EVENT,
+        said_by=('console',),
+        heard_by=('console', 'compensator'),
+        one_sender=True,
+    ),
+    Topic(
+        names.SLAVE_COMMAND,
+        _JOINT_STATE,
+        _STREAM,
+        'desired bending: `position` in rad and `velocity` in rad/s of `bend_x` and `bend_y`, '
+        "`header.frame_id` the motion session; the console's unless its source is `none`",
+        offered=COMMAND,
+        asked=COMMAND,
+        said_by=('console',),
+        heard_by=('compensator', 'controller'),
+        one_sender=True,
+    ),
+    Topic(
+        names.SLAVE_MEASURED,
+        _JOINT_STATE,
+        '40 Hz',
+        'bending by the EM tracker: `position` in rad of `bend_x` and `bend_y`',
+        offered=SENSOR_OFFERED,
+        asked=SENSOR_ASKED,
+        said_by=('em_tracker',),
+        heard_by=('console', 'compensator', 'controller', 'calibration'),
+        one_sender=True,
+    ),
+    Topic(
+        names.MOTOR_COMMAND,
+        _JOINT_STATE,
+        _STREAM,
+        'command to the shafts after compensation: `position` in rad of `motor_x` and `motor_y`, '
+        '`header.frame_id` the motion session',
+        offered=COMMAND,
+        asked=COMMAND,
+        said_by=('compensator',),
+        heard_by=('motor_driver',),
+        one_sender=True,
+    ),
+    Topic(
+        names.MOTOR_MEASURED,
+        _JOINT_STATE,
+        '1 kHz simulated, as the bus carries on hardware',
+        '`position` in rad, `velocity` in rad/s and `effort` in N m of the shafts `motor_x` and '
+        '`motor_y`',
+        offered=SENSOR_OFFERED,
+        asked=SENSOR_ASKED,
+        said_by=('motor_driver',),
+        heard_by=(
+            *('console', 'compensator', 'controller', 'calibration', 'supervisor'),
+            'load_cells',
+        ),
+        one_sender=True,
+    ),
+    Topic(
+        names.WIRES_MEASURED,
+        _JOINT_STATE,
+        '1 kHz simulated, as the transmitter is read on hardware',
+        '`effort`: tension in N of `wire_x_pos`, `wire_x_neg`, `wire_y_pos` and `wire_y_neg`',
+        offered=SENSOR_OFFERED,
+        asked=SENSOR_ASKED,
+        said_by=('load_cells',),
+        heard_by=('calibration', 'supervisor'),
+        one_sender=True,
+    ),
+    Topic(
+        names.TRACKER_POSE,
+        'geometry_msgs/msg/PoseStamped',
+        '40 Hz',
+        "pose of the tip in the frame of the instrument's base: m, and a quaternion",
+        offered=SENSOR_OFFERED,
+        asked=SENSOR_ASKED,
+        said_by=('em_tracker',),
+    ),
+    Topic(
+        names.CALIBRATION_COMMAND,
+        _JOINT_STATE,
+        '1 kHz while it calibrates or goes home',
+        '`position` in rad and `velocity` in rad/s of the shafts, divided by the gear; goes before '
+        'the console and passes uncompensated',
+        offered=COMMAND,
+        asked=COMMAND,
+        said_by=('calibration',),
+        heard_by=('console', 'compensator', 'controller'),
+        recorded=False,
+        one_sender=True,
+    ),
+    Topic(
+        names.CALIBRATION_RESULT,
+        _DIAGNOSTICS,
+        'once a calibration, latched',
+        'status `calibration: hysteresis class`: `class_deg`, `probability`, `probability_40_deg` '
+        'to `probability_100_deg`, `backlash_size` in rad, `backlash_size_deg`, '
+        '`backlash_size_from`, `regressed_size` from tensions alone in rad and its 90 % interval '
+        '`regressed_size_low` to `regressed_size_high`, `duration` in s, and unless '
+        '`identify_plant` is false the plant of each joint as `bend_x.capstan_exponent` and so on, '
+        'and how far the tube lets it bend as `reach.bend_x.low` and `reach.bend_x.high` in rad. '
+        'After an abort the level is ERROR, with `reason` and `step`; for tensions unlike any '
+        'known tube it is ERROR, with `reason` and `class_deg` `none`, and nothing is compensated',
+        offered=RESULT,
+        asked=RESULT,
+        said_by=('calibration',),
+        heard_by=('console', 'compensator', 'controller'),
+        one_sender=True,
+    ),
+    Topic(
+        names.CALIBRATION_NUMBERS,
+        _JOINT_STATE,
+        'once a calibration, latched',
+        f'the figures of `{names.CALIBRATION_RESULT}` as numbers, for programs that plot: `name` '
+        'is the key, `position` the value in SI; `class` in rad, `success` 1 or 0',
+        offered=RESULT,
+        asked=RESULT,
+        said_by=('calibration',),
+    ),
+    Topic(
+        names.CORRECTION,
+        _JOINT_STATE,
+        '1 kHz while commands come',
+        'correction by feedback: `position` in rad of `bend_x` and `bend_y`, added to the command '
+        'of the shafts divided by the gear',
+        offered=COMMAND,
+        asked=COMMAND,
+        said_by=('controller',),
+        heard_by=('compensator',),
+        recorded=False,
+        one_sender=True,
+    ),
+    Topic(
+        names.COMPENSATOR_STATE,
+        _DIAGNOSTICS,
+        _LATCHED_STATE,
+        'status `compensator: model`: `mode` in force, `wanted_mode`, `selected_by`, `class_deg`, '
+        "`lead` in s, `gear`, and the mode's parameters of each joint as `bend_x.…`",
+        offered=RESULT,
+        asked=RESULT,
+        said_by=('compensator',),
+        one_sender=True,
+    ),
+    Topic(
+        names.OPERATING_STATE,
+        'std_msgs/msg/String',
+        'on change and 20 Hz, latched',
+        '`DISABLED`, `ENABLED`, `PAUSED` or `FAULT`',
+        offered=RESULT,
+        asked=RESULT,
+        said_by=('supervisor',),
+        heard_by=('motor_driver',),
+        one_sender=True,
+    ),
+    Topic(
+        names.MOTION_SESSION,
+        'std_msgs/msg/Header',
+        'on change and 20 Hz',
+        '`frame_id` names the motion session that the last `enable` opened; empty for none',
+        offered=EVENT,
+        asked=EVENT,
+        said_by=('supervisor',),
+        heard_by=('console', 'compensator', 'controller', 'calibration', 'motor_driver'),
+        one_sender=True,
+    ),
+    Topic(
+        names.STATE_COMMAND,
+        'std_msgs/msg/String',
+        'when somebody asks',
+        '`enable`, `disable`, `pause`, `resume` or `home`',
+        offered=None,
+        asked=EVENT,
+        heard_by=('supervisor', 'calibration'),
+    ),
+    Topic(
+        names.SIMULATED_WIRES,
+        _JOINT_STATE,
+        _STREAM,
+        'what the simulated slave shows its simulated load cells, without noise: `effort` in N',
+        offered=LOCK_STEP,
+        asked=LOCK_STEP,
+        said_by=('motor_driver',),
+        heard_by=('load_cells',),
+        recorded=False,
+    ),
+    Topic(
+        names.SIMULATED_BENDING,
+        _JOINT_STATE,
+        _STREAM,
+        'what the simulated slave shows its simulated tracker, without noise: `position` in rad',
+        offered=LOCK_STEP,
+        asked=LOCK_STEP,
+        said_by=('motor_driver',),
+        heard_by=('em_tracker',),
+        recorded=False,
+    ),
+    Topic(
+        names.DIAGNOSTICS,
+        _DIAGNOSTICS,
+        '1 Hz, and at once when a node is in trouble',
+        'health of every node, as `/endoscope/NODE: subcomponent`',
+        offered=EVENT,
+        asked=EVENT,
+        said_by=('every node',),
+        heard_by=('supervisor',),
+    ),
+    Topic(
+        names.CLOCK,
+        'rosgraph_msgs/msg/Clock',
+        'every simulated millisecond, in simulated time only',
+        'the simulated time',
+        offered=LOCK_STEP,
+        asked=SENSOR_ASKED,
+        said_by=('conductor', 'replay'),
+        heard_by=('every node',),
+        recorded=False,
+    ),
+)
+"""Every topic of the graph."""
+
+SERVICES = (
+    Service(
+        names.CALIBRATION_RUN,
+        'calibration',
+        f'begins a calibration, which needs an enabled slave; {names.CALIBRATION_RESULT} says how '
+        'it went',
+    ),
+    Service(
+        names.RECORDER_START,
+        'recorder',
+        'begins a recording, and says where; refused while one is being made',
+    ),
+    Service(
+        names.RECORDER_STOP,
+        'recorder',
+        'ends the recording, and says how many messages it has and how many were lost',
+    ),
+    Service(
+        names.LOAD_CELLS_TARE,
+        'load_cells',
+        'takes the tension of the last second for zero; refused while shafts turn, noise or drift '
+        'is too large or the wires are loaded, and by simulated cells',
+    ),
+    Service(
+        names.REGISTER_STRAIGHT,
+        'em_tracker',
+        'takes the mean pose of the last second for that of the straight instrument; refused while '
+        'it moves, and by the simulated tracker',
+    ),
+    Service(
+        names.MOTOR_REBOOT,
+        'motor_driver',
+        'restarts servos that have shut down, without torque; refused while the slave is enabled',
+        device='dynamixel',
+    ),
+)
+"""Every service of the graph, beside those that ROS gives every node."""
+
+BY_NAME = {topic.name: topic for topic in TOPICS}
+RECORDED = tuple(topic.name for topic in TOPICS if topic.recorded)
