@@ -4,26 +4,9 @@
 """
 
 import dataclasses
-import importlib
 
+from endoscope_nodes.node_parameters import OF_NODE
 from endoscope_nodes.topics import RECORDED
-
-DECLARED = {
-    'motor_driver': (
-        ('motor_driver_node', 'MotorDriverParameters'),
-        ('dynamixel_parameters', 'DynamixelParameters'),
-    ),
-    'load_cells': (('load_cells_node', 'LoadCellsParameters'),),
-    'em_tracker': (('em_tracker_node', 'EmTrackerParameters'),),
-    'compensator': (('compensator_parameters', 'CompensatorParameters'),),
-    'controller': (('controller_node', 'ControllerParameters'),),
-    'calibration': (('calibration_node', 'CalibrationParameters'),),
-    'console': (('console_node', 'ConsoleParameters'),),
-    'recorder': (('recorder_node', 'RecorderParameters'),),
-    'replay': (('replay_node', 'ReplayParameters'),),
-    'conductor': (('conductor_node', 'ConductorParameters'),),
-}
-"""Modules and dataclasses that hold the parameters of each node."""
 
 HEADING = (
     '| node | parameter | default | allowed | unit | while running | what it does |',
@@ -35,11 +18,9 @@ def rows() -> list[str]:
     """Return a line of Markdown for each parameter."""
     return [
         _row(node, field)
-        for node, kinds in DECLARED.items()
-        for module, kind in kinds
-        for field in dataclasses.fields(
-            getattr(importlib.import_module(f'endoscope_nodes.{module}'), kind)
-        )
+        for node, kinds in OF_NODE.items()
+        for kind in kinds
+        for field in dataclasses.fields(kind)
     ]
 
 

@@ -1,4 +1,4 @@
-"""The table of topics and services is what the nodes do, to the QoS."""
+"""The tables of topics, services and parameters are what the nodes do, to the QoS."""
 
 from contextlib import ExitStack
 
@@ -7,6 +7,8 @@ from private_domain import private_domain
 from rclpy.context import Context
 
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
+from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
+from endoscope_nodes.parameters import described
 from endoscope_nodes.qos import profile
 from endoscope_nodes.recorded_topics import message_class
 from endoscope_nodes.runtime import Runtime
@@ -89,6 +91,15 @@ def test_every_service_has_its_node(nodes):
             and not service.service_name.endswith('get_type_description')
         }
         assert served == {s.name for s in SERVICES if s.served_by == name and not s.device}, name
+
+
+def test_every_node_declares_the_parameters_that_are_listed(nodes):
+    of_process = {name for kind in OF_PROCESS for name in kind.__dataclass_fields__}
+    of_ros = {'use_sim_time', 'start_type_description_service'}
+    for name, node in nodes.items():
+        declared = {p for p in node._parameters if not p.startswith('qos_overrides')}
+        listed = {parameter.name for kind in OF_NODE[name] for parameter in described(kind)}
+        assert declared - of_process - of_ros == listed, name
 
 
 def test_every_node_is_named_as_it_is(nodes):

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from private_domain import private_domain
 
+from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
+from endoscope_nodes.parameters import described
 from endoscope_nodes.program import NODES
 
 PATIENCE_S = 120.0
@@ -104,12 +106,47 @@ def test_a_program_started_by_nohup_outlives_the_terminal(tmp_path):
     assert process.returncode == 0, errors
 
 
-@pytest.mark.parametrize('name', ['motor_driver', 'graph'])
-@pytest.mark.parametrize('word', ['-h', '--help'])
-def test_who_asks_for_help_gets_it_and_starts_nothing(name, word):
-    code, out, errors = ended(name, word)
+@pytest.mark.parametrize(
+    ('name', 'args'),
+    [
+        *((name, ['--help']) for name in ('graph', *NODES)),
+        ('graph', ['-h']),
+        ('graph', ['--ros-args', '--help']),
+        ('console', ['--ros-args', '-p', 'source:=motion', '-h']),
+        ('graph', ['--ros-args', '-r', '__ns:=/left', '--', '--help']),
+    ],
+)
+def test_who_asks_for_help_gets_it_and_starts_nothing(name, args):
+    code, out, errors = ended(name, *args)
     assert (code, errors) == (0, '')
     assert out.startswith(f'usage: {name} ')
+
+
+@pytest.mark.parametrize('name', ['graph', *NODES])
+def test_help_tells_every_parameter(name):
+    _, out, _ = ended(name, '--help')
+    told = ' '.join(out.split())
+    for node in NODES if name == 'graph' else [name]:
+        if (name, node) == ('graph', 'replay'):
+            continue
+        for kind in (*OF_NODE[node], *OF_PROCESS):
+            for parameter in described(kind):
+                mark = '* ' if parameter.dynamic else ''
+                assert f'{mark}-p {parameter.name}:={parameter.default} ' in told
+                assert parameter.description in told
+                assert f'{parameter.allowed} {parameter.unit}'.strip() in told
+
+
+def test_help_loads_neither_ros_nor_anything_that_computes():
+    code = (
+        'import sys\n'
+        'from endoscope_nodes.program import graph\n'
+        "graph(['--help'])\n"
+        "heavy = {'rclpy', 'rcl_interfaces', 'numpy', 'numba', 'scipy', 'torch', 'yaml'}\n"
+        'sys.exit(str(heavy & set(sys.modules)) if heavy & set(sys.modules) else 0)\n'
+    )
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, '')
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 import contextlib
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -27,7 +26,7 @@ from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.control import PhysicalParameters
 from endoscope_core.identification.plant_fit import PlantFitError, plants_of_calibration
 from endoscope_core.safety import StateCommand, TensionGuard
-from endoscope_core.signals import CALIBRATION_MOTIONS, SINUSOID, calibration_motion
+from endoscope_core.signals import SINUSOID, calibration_motion
 from endoscope_nodes.calibration_result import (
     aborted_result,
     refused_result,
@@ -47,39 +46,14 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import CalibrationParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_NS
 from endoscope_nodes.watches import SessionWatch, StreamWatch
 
 _Judgement = tuple[ClassificationResult, tuple[PhysicalParameters, ...]]
-
-
-@dataclass(frozen=True)
-class CalibrationParameters:
-    """Parameters of the calibration."""
-
-    weights: str = parameter(
-        '',
-        'classifier weights as `endoscope train` writes them; empty for those that come with '
-        'the project',
-    )
-    motion: str = parameter(
-        SINUSOID,
-        "motion by which the tube is judged: the first paper's sinusoid of 9 s, or one of 3 s",
-        choices=CALIBRATION_MOTIONS,
-    )
-    identify_plant: bool = parameter(
-        True,
-        'whether to identify the plant of each joint from the tensions too: it tells how far the '
-        'tube lets the tip be bent, which console and compensator keep to, and the physical modes '
-        'of the compensator can be selected by it; half a second of computing',
-    )
-    return_speed: float = parameter(
-        1.0, 'largest speed on the way to zero', unit='rad/s', low=0.01, high=10.0
-    )
-    rest: float = parameter(0.5, 'rest at zero before the motion', unit='s', low=0.0, high=60.0)
 
 
 class CalibrationNode(EndoscopeNode):

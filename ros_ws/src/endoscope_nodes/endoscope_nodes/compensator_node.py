@@ -6,9 +6,8 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
 
+from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_CLASS, MODES
 from endoscope_core.control import (
-    ADAPTIVE_PHYSICAL,
-    MODES,
     DesiredMotion,
     Feedforward,
     FeedforwardLaw,
@@ -18,10 +17,9 @@ from endoscope_core.control import (
     reach_in_words,
 )
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.identification.law_choice import BY_CLASS, CalibrationFindings, LawChoice
+from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 from endoscope_core.safety import CommandGate, CommandLimits, MotionLimits, MotionShaper, Refusal
 from endoscope_nodes.calibration_result import findings_of, is_of_no_class
-from endoscope_nodes.compensator_parameters import CompensatorParameters
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report, status
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
@@ -35,6 +33,7 @@ from endoscope_nodes.names import (
     MOTORS,
     SLAVE_COMMAND,
 )
+from endoscope_nodes.node_parameters import CompensatorParameters
 from endoscope_nodes.qos import COMMAND, RESULT
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S

@@ -3,7 +3,6 @@
 import struct
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from rclpy.clock import Clock, ClockType
 from rclpy.task import Future
@@ -15,69 +14,20 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.names import (
-    CALIBRATION_COMMAND,
     CLOCK,
-    CORRECTION,
-    MOTOR_COMMAND,
-    MOTOR_MEASURED,
-    SLAVE_COMMAND,
     SLAVE_MEASURED,
-    WIRES_MEASURED,
 )
-from endoscope_nodes.parameters import parameter
+from endoscope_nodes.node_parameters import FOLLOWED, ConductorParameters
 from endoscope_nodes.qos import LOCK_STEP
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.sampling import SampleClock
 from endoscope_nodes.ticker import TICK_NS
 
-FOLLOWED = (
-    SLAVE_COMMAND,
-    CALIBRATION_COMMAND,
-    CORRECTION,
-    MOTOR_COMMAND,
-    SLAVE_MEASURED,
-    MOTOR_MEASURED,
-    WIRES_MEASURED,
-)
 _STAMP = struct.Struct('<iI')
 
 
 class BarrierTimeout(EndoscopeError, TimeoutError):
     """A topic did not answer a tick; the message names it."""
-
-
-@dataclass(frozen=True)
-class ConductorParameters:
-    """Parameters of the conductor."""
-
-    wait_for: tuple[str, ...] = parameter(
-        (MOTOR_MEASURED, WIRES_MEASURED),
-        'topics without whose answer time never goes on',
-        choices=FOLLOWED,
-    )
-    start: float = parameter(1.0, 'simulated time of the first tick', unit='s', low=0.001)
-    duration: float = parameter(
-        0.0, 'how long to run when started as a process of its own; 0 for ever', unit='s', low=0.0
-    )
-    speed: float = parameter(
-        0.0, 'simulated seconds in a real one; 0 for as fast as possible', low=0.0, high=100.0
-    )
-    tracker_rate: float = parameter(
-        40.0,
-        'rate of slave/measured_js, to know in which ticks to expect it',
-        unit='Hz',
-        low=0.1,
-        high=1000.0,
-    )
-    timeout: float = parameter(
-        10.0, 'real time after which a missing answer is an error', unit='s', low=0.1
-    )
-    grace: float = parameter(
-        0.05,
-        'real time after which a stream that is not waited for is taken as ended',
-        unit='s',
-        low=0.001,
-    )
 
 
 class ConductorNode(EndoscopeNode):

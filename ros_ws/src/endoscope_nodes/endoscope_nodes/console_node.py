@@ -1,7 +1,6 @@
 """The operator's side: plays a motion, or follows the handle while the clutch is held."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -18,7 +17,6 @@ from endoscope_core.control import (
 )
 from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.safety.motion_session import STALL_NS
-from endoscope_core.signals import MOTIONS
 from endoscope_core.signals.command_file import CommandFileError
 from endoscope_nodes.calibration_result import findings_of, is_of_no_class
 from endoscope_nodes.console_motion import (
@@ -38,7 +36,8 @@ from endoscope_nodes.names import (
     MASTER_MEASURED,
     SLAVE_COMMAND,
 )
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import ConsoleParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
@@ -48,37 +47,6 @@ from endoscope_nodes.watches import (
     StreamWatch,
     rivals,
 )
-
-
-@dataclass(frozen=True)
-class ConsoleParameters:
-    """Parameters of the console."""
-
-    source: str = parameter(
-        'none',
-        'where commands come from; setting it starts a motion or file anew',
-        choices=('none', 'motion', 'file', 'master'),
-        dynamic=True,
-    )
-    motion: str = parameter(
-        'periodic', 'motion that is played', choices=tuple(MOTIONS), dynamic=True
-    )
-    joints: tuple[str, ...] = parameter(
-        JOINTS, 'joints that the motion moves', choices=JOINTS, dynamic=True
-    )
-    command_file: str = parameter(
-        '', 'CSV file that is played, columns time [s], bend_x and bend_y [rad]', dynamic=True
-    )
-    scale: float = parameter(
-        1.0, 'slave motion for one radian of handle motion', low=0.01, high=10.0, dynamic=True
-    )
-    approach_speed: float = parameter(
-        1.0,
-        'largest speed on the way to the first angle of a motion',
-        unit='rad/s',
-        low=0.01,
-        high=10.0,
-    )
 
 
 class ConsoleNode(EndoscopeNode):

@@ -1,11 +1,10 @@
 """Feedback from the tracker: what the feed-forward leaves over, learnt while it moves."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
+from endoscope_core.choices import ADAPTIVE, RECURSIVE_LEAST_SQUARES
 from endoscope_core.control import (
     AdaptiveBacklashController,
     DesiredMotion,
@@ -25,7 +24,7 @@ from endoscope_nodes.names import (
     SLAVE_COMMAND,
     SLAVE_MEASURED,
 )
-from endoscope_nodes.parameters import parameter
+from endoscope_nodes.node_parameters import ControllerParameters
 from endoscope_nodes.qos import COMMAND, RESULT
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
@@ -33,37 +32,11 @@ from endoscope_nodes.watches import CommandReport, SessionWatch, StreamWatch, ri
 
 Controller = AdaptiveBacklashController | RecursiveHysteresisController
 LAWS: dict[str, type[Controller]] = {
-    'adaptive': AdaptiveBacklashController,
-    'recursive_least_squares': RecursiveHysteresisController,
+    ADAPTIVE: AdaptiveBacklashController,
+    RECURSIVE_LEAST_SQUARES: RecursiveHysteresisController,
 }
 
 _NOTHING = np.zeros(len(JOINTS))
-
-
-@dataclass(frozen=True)
-class ControllerParameters:
-    """Parameters of the controller."""
-
-    active: bool = parameter(
-        True, 'whether to learn and correct while the tracker is fresh', dynamic=True
-    )
-    law: str = parameter(
-        'adaptive',
-        "how to learn: the second paper's adaptive law, or recursive least squares; a change "
-        'takes place once the correction has faded out',
-        choices=tuple(LAWS),
-        dynamic=True,
-    )
-    tracker_timeout: float = parameter(
-        0.15,
-        'silence of the tracker after which the correction fades out',
-        unit='s',
-        low=0.03,
-        high=5.0,
-    )
-    fade_time: float = parameter(
-        1.0, 'time from no correction to the whole and back', unit='s', low=0.05, high=30.0
-    )
 
 
 class ControllerNode(EndoscopeNode):

@@ -1,7 +1,5 @@
 """Reads the pose of the instrument's tip, and from it the bending angles."""
 
-import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +14,6 @@ from endoscope_core.kinematics import (
     tip_pose,
 )
 from endoscope_core.physics import SensorModel, recording_faults
-from endoscope_core.rig import TRACKER_DEVICES
 from endoscope_devices.em_tracker import (
     AuroraTracker,
     RegistrationWindow,
@@ -30,49 +27,11 @@ from endoscope_nodes.diagnostics import ERROR, OK, STALE, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import JOINTS, SIMULATED_BENDING, SLAVE_MEASURED, TRACKER_POSE
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import EmTrackerParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.sampling import SampleClock
-
-
-@dataclass(frozen=True)
-class EmTrackerParameters:
-    """Parameters of the EM tracker."""
-
-    device: str = parameter(
-        '', 'what is read; empty for what the rig file says', choices=('', *TRACKER_DEVICES)
-    )
-    port: str = parameter('', 'serial port of an aurora')
-    tool: int = parameter(
-        1, 'which of the sensors that are plugged in, in the order of their ports', low=1, high=32
-    )
-    latency: float = parameter(
-        0.0,
-        'time from measuring to having a frame, taken off its stamp',
-        unit='s',
-        low=0.0,
-        high=0.5,
-    )
-    sensor_roll: float = parameter(
-        0.0,
-        "angle about the instrument's axis from its x axis to the sensor's, as it is mounted",
-        unit='rad',
-        low=-math.pi,
-        high=math.pi,
-    )
-    registration_file: str = parameter(
-        '', 'where the pose of the straight instrument is kept; empty to forget it'
-    )
-    section_length: float = parameter(
-        0.02, 'length of the bending section', unit='m', low=0.001, high=0.5
-    )
-    base_frame: str = parameter('endoscope_base', 'frame of the poses')
-    in_volume: bool = parameter(
-        True,
-        'false makes the simulated tracker lose its sensor, which then is silent',
-        dynamic=True,
-    )
 
 
 class EmTrackerNode(EndoscopeNode):

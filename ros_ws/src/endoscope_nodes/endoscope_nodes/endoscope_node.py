@@ -7,8 +7,8 @@ from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.node import Node
 from rclpy.time import Time
 
+from endoscope_nodes.declared_parameters import declare_parameters
 from endoscope_nodes.diagnostics import Diagnostics
-from endoscope_nodes.parameters import declare_parameters
 
 if TYPE_CHECKING:
     from endoscope_nodes.runtime import Runtime

@@ -8,17 +8,8 @@ import sys
 import time
 from collections.abc import Sequence
 
-import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.discovery import stay_on_this_machine
-from endoscope_nodes.names import DIAGNOSTICS
 from endoscope_nodes.program import NODES
-from endoscope_nodes.qos import EVENT
 
 _LONGEST_S = 5.0
 
@@ -33,6 +24,17 @@ def is_heard(node: str, namespace: str, longest_s: float) -> bool:
     longest_s
         For how long to listen, in s; a node speaks once a second.
     """
+    # Only now: whoever asks for help need not wait for ROS.
+    import rclpy
+    from diagnostic_msgs.msg import DiagnosticArray
+    from rclpy.context import Context
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.node import Node
+
+    from endoscope_nodes.discovery import stay_on_this_machine
+    from endoscope_nodes.names import DIAGNOSTICS
+    from endoscope_nodes.qos import EVENT
+
     stay_on_this_machine()
     names = {node, f'/{namespace.strip("/")}/{node}'}
     context = Context()

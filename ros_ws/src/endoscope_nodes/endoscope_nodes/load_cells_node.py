@@ -1,11 +1,8 @@
 """Reads the tension of the wires."""
 
-from dataclasses import dataclass
-
 from std_srvs.srv import Trigger
 
 from endoscope_core.physics import SensorModel
-from endoscope_core.rig import LOAD_CELL_DEVICES
 from endoscope_devices.load_cells import (
     CONNECTIONS,
     ModbusLoadCells,
@@ -27,28 +24,11 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import LoadCellsParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.sampling import SampleClock
-
-
-@dataclass(frozen=True)
-class LoadCellsParameters:
-    """Parameters of the load cells."""
-
-    device: str = parameter(
-        '', 'what is read; empty for what the rig file says', choices=('', *LOAD_CELL_DEVICES)
-    )
-    port: str = parameter('', 'serial port of a modbus_rtu device, HOST:PORT of a modbus_tcp one')
-    calibration_file: str = parameter(
-        '', 'YAML file with registers, sensitivity, sign and zero of each cell of a real device'
-    )
-    connected: bool = parameter(
-        True,
-        'false makes the simulated cells fall silent, as an unplugged cable does',
-        dynamic=True,
-    )
 
 
 class LoadCellsNode(EndoscopeNode):

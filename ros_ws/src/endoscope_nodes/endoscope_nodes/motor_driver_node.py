@@ -1,12 +1,10 @@
 """Drives the motor shafts: the simulated slave or a bus of servos, the same node for both."""
 
 from collections import deque
-from dataclasses import dataclass
 
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from endoscope_core.rig import MOTOR_DEVICES
 from endoscope_core.safety import (
     CommandLimits,
     MotionLimits,
@@ -18,7 +16,7 @@ from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
 from endoscope_devices.motor_device import DeviceError, MotorDevice
 from endoscope_devices.simulated_slave import SimulatedSlave
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report
-from endoscope_nodes.dynamixel_parameters import DynamixelParameters, build_motors
+from endoscope_nodes.dynamixel_bus import build_motors
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
@@ -32,20 +30,12 @@ from endoscope_nodes.names import (
     SIMULATED_WIRES,
     WIRES,
 )
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import DynamixelParameters, MotorDriverParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
 from endoscope_nodes.watches import CommandReport, SessionWatch, rivals
-
-
-@dataclass(frozen=True)
-class MotorDriverParameters:
-    """Parameters of the motor driver."""
-
-    device: str = parameter(
-        '', 'what is driven; empty for what the rig file says', choices=('', *MOTOR_DEVICES)
-    )
 
 
 class MotorDriverNode(EndoscopeNode):

@@ -1,19 +1,14 @@
-"""Node parameters as frozen dataclasses, each value checked before a node starts to act.
+"""Parameters of nodes as fields of frozen dataclasses: what each may be, and whether a value is.
 
-rclpy accepts a NaN, a value out of range without a descriptor, and a misspelt override without a
-word.  Here each of them is one error that names the parameter and what would be right.
+Nothing here needs ROS; :mod:`endoscope_nodes.declared_parameters` declares them on a node.
 """
 
 import dataclasses
 import difflib
 import math
 import typing
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
-
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 
 class ParameterError(ValueError):
@@ -37,7 +32,7 @@ def parameter(
     default
         Value where nothing else is given: bool, int, float, str, or a tuple of float or str.
     description, unit
-        What it does, shown by ``ros2 param describe``.
+        What it does, as help and reference show it.
     low, high
         Inclusive limits of a number (of each number of a tuple).
     choices
@@ -58,97 +53,92 @@ def parameter(
     )
 
 
-def declare_parameters[P](
-    node: Node,
-    kind: type[P],
-    on_change: Callable[[P], None] | None = None,
-    check: Callable[[P], object] | None = None,
-) -> P:
-    """Declare every field of the dataclass ``kind`` on ``node`` and return its checked values.
+@dataclasses.dataclass(frozen=True)
+class Described:
+    """A parameter in words.
+
+    Attributes
+    ----------
+    name, description, unit
+        Of the parameter.
+    default
+        As it is written on a command line, for example ``[1, 2]``; ``''`` for an empty text.
+    allowed
+        For example ``from 0 to 3`` or ``one of none, motion``; empty where anything goes.
+    dynamic
+        Whether it may change while the node runs.
+    """
+
+    name: str
+    default: str
+    allowed: str
+    unit: str
+    dynamic: bool
+    description: str
+
+
+def described(kind: type) -> tuple[Described, ...]:
+    """Describe every parameter of a dataclass."""
+    return tuple(
+        Described(
+            f.name,
+            as_typed(f.default),
+            constraints(f),
+            f.metadata['unit'],
+            f.metadata['dynamic'],
+            f.metadata['description'],
+        )
+        for f in dataclasses.fields(kind)
+    )
+
+
+def as_typed(value: object) -> str:
+    """Return a value as it is written on a command line."""
+    if isinstance(value, tuple):
+        return f'[{", ".join(as_typed(item) for item in value)}]'
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        text = f'{value:.6g}'
+        return text if set(text) & set('.en') else f'{text}.0'
+    return str(value) or "''"
+
+
+def changed(values: Any) -> dict[str, object]:
+    """Return the values of a dataclass of parameters that are not the defaults, by name."""
+    return {
+        f.name: value
+        for f in dataclasses.fields(values)
+        if (value := getattr(values, f.name)) != f.default
+    }
+
+
+def constraints(field: dataclasses.Field) -> str:
+    """Say what a parameter may be; empty where anything goes."""
+    meta = field.metadata
+    if meta['choices']:
+        return 'one of ' + ', '.join(filter(None, meta['choices']))
+    low, high = (None if meta[end] is None else f'{meta[end]:g}' for end in ('low', 'high'))
+    if low is None:
+        return '' if high is None else f'at most {high}'
+    return f'at least {low}' if high is None else f'from {low} to {high}'
+
+
+def checked(node: str, field: dataclasses.Field, hint: Any, value: Any) -> Any:
+    """Return a value as the type of its parameter.
 
     Parameters
     ----------
-    on_change
-        Called with the new values after a dynamic parameter was set.
-    check
-        Called with the new values before they are taken; raises `ParameterError` to refuse them.
+    node
+        Whose parameter it is, for errors.
+    field, hint
+        Of the dataclass.
 
     Raises
     ------
     ParameterError
-        A value is NaN or infinite, of the wrong type, out of range, or not one of the choices.
+        It is of another type, not finite or out of bounds.
     """
-    fields = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
-    hints = typing.get_type_hints(kind)
-    values = {}
-    for name, field in fields.items():
-        default = list(field.default) if isinstance(field.default, tuple) else field.default
-        text = field.metadata['description']
-        if field.metadata['unit']:
-            text += f' [{field.metadata["unit"]}]'
-        descriptor = ParameterDescriptor(
-            description=text,
-            read_only=not field.metadata['dynamic'],
-            dynamic_typing=True,
-            additional_constraints=_constraints(field),
-        )
-        given = node.declare_parameter(name, default, descriptor).value
-        values[name] = _checked(node.get_name(), field, hints[name], given)
-    current = kind(**values)
-    if any(f.metadata['dynamic'] for f in fields.values()):
-        _watch(node, fields, hints, current, on_change, check)
-    return current
-
-
-def _watch(
-    node: Node,
-    fields: dict[str, dataclasses.Field],
-    hints: dict[str, Any],
-    current: Any,
-    on_change: Callable[[Any], None] | None,
-    check_all: Callable[[Any], object] | None,
-) -> None:
-    state = [current]
-
-    def changed(parameters: list[Parameter]) -> dict[str, Any]:
-        return {
-            p.name: _checked(node.get_name(), fields[p.name], hints[p.name], p.value)
-            for p in parameters
-            if p.name in fields
-        }
-
-    def check(parameters: list[Parameter]) -> SetParametersResult:
-        try:
-            new = changed(parameters)
-            if new and check_all is not None:
-                check_all(dataclasses.replace(state[0], **new))
-        except ParameterError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
-
-    def apply(parameters: list[Parameter]) -> None:
-        new = changed(parameters)
-        if new:
-            state[0] = dataclasses.replace(state[0], **new)
-            if on_change is not None:
-                on_change(state[0])
-
-    node.add_on_set_parameters_callback(check)
-    node.add_post_set_parameters_callback(apply)
-
-
-def _constraints(field: dataclasses.Field) -> str:
-    meta = field.metadata
-    if meta['choices']:
-        return 'one of ' + ', '.join(filter(None, meta['choices']))
-    if meta['low'] is None and meta['high'] is None:
-        return ''
-    low = '-inf' if meta['low'] is None else f'{meta["low"]:g}'
-    high = 'inf' if meta['high'] is None else f'{meta["high"]:g}'
-    return f'from {low} to {high}'
-
-
-def _checked(node: str, field: dataclasses.Field, hint: Any, value: Any) -> Any:
     where = f"{node}: parameter '{field.name}'"
     item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
     if item is not None:
@@ -159,7 +149,7 @@ def _checked(node: str, field: dataclasses.Field, hint: Any, value: Any) -> Any:
 
 
 def _checked_one(where: str, field: dataclasses.Field, kind: Any, value: Any) -> Any:
-    constraint = _constraints(field)
+    constraint = constraints(field)
     wanted = {
         bool: 'true or false',
         int: 'a whole number',
@@ -187,32 +177,3 @@ def _checked_one(where: str, field: dataclasses.Field, kind: Any, value: Any) ->
 def _nearest(value: str, field: dataclasses.Field) -> str:
     near = difflib.get_close_matches(value, field.metadata['choices'], 1, 0.5)
     return f' (did you mean {near[0]}?)' if near else ''
-
-
-def check_overrides(nodes: list[Node]) -> None:
-    """Refuse parameter overrides that no node declared.
-
-    An override given to every node of a composition alike (without a node's name) need only be
-    known to one of them.
-
-    Raises
-    ------
-    ParameterError
-        Names the override and the nearest valid parameter.
-    """
-    declared = {node: set(node._parameters) for node in nodes}
-    given = {node: set(node._parameter_overrides) for node in nodes}
-    for node in nodes:
-        for name in sorted(given[node]):
-            if name in declared[node] or name.startswith('qos_overrides.'):
-                continue
-            known_elsewhere = any(name in declared[other] for other in nodes)
-            if known_elsewhere and all(name in given[other] for other in nodes):
-                continue
-            near = difflib.get_close_matches(name, sorted(declared[node]), 1, 0.4)
-            hint = (
-                f"; did you mean '{near[0]}'?"
-                if near
-                else ('; it has ' + ', '.join(sorted(declared[node])))
-            )
-            raise ParameterError(f"{node.get_name()}: unknown parameter '{name}'{hint}")

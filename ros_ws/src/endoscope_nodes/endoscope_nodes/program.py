@@ -9,18 +9,7 @@ from endoscope_nodes.stop_signals import end_when_asked
 
 _ROS_ARGS = '--ros-args'
 _END_OF_ROS_ARGS = '--'
-_HELP = """\
-usage: {name} [--ros-args [-p PARAMETER:=VALUE ...] [--params-file FILE ...]
-       {blank} [-r __ns:=/NAMESPACE] [-r OLD:=NEW ...] [--log-level LEVEL]]
-
-{purpose}
-
-Parameters are listed in README.md; `ros2 param describe` tells those of a node that runs. What is
-unknown, misspelt or out of range is refused.
-
-SIGINT, SIGTERM and SIGHUP stop it. Exit status: 0, or 1 where a recording is incomplete or a replay
-was refused, 2 for arguments or parameters that it does not start with, 128 + the signal's number
-where it was stopped before it had started."""
+_HELP = ('-h', '--help')
 
 
 @dataclass(frozen=True)
@@ -34,12 +23,20 @@ class Program:
     module
         Module of the package whose ``main()`` runs it.
     purpose
-        One line for the help.
+        What it does, a sentence or two.
+    composed
+        Nodes that it runs; empty for the one of its name.
     """
 
     name: str
     module: str
     purpose: str
+    composed: tuple[str, ...] = ()
+
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """Nodes that it runs."""
+        return self.composed or (self.name,)
 
     def __call__(self, argv: Sequence[str] | None = None) -> int:
         """Run it.
@@ -55,10 +52,14 @@ class Program:
             Exit status; see the help.
         """
         end_when_asked(self.name)
-        words = words_for_nobody(sys.argv[1:] if argv is None else argv)
-        if words and words[0] in ('-h', '--help'):
-            print(_HELP.format(name=self.name, blank=' ' * len(self.name), purpose=self.purpose))
+        argv = sys.argv[1:] if argv is None else argv
+        # Wherever it stands: nobody who asks for help wants to see motors start.
+        if set(_HELP) & set(argv):
+            from endoscope_nodes.node_help import help_of
+
+            print(help_of(self.name, self.purpose, self.nodes))
             return 0
+        words = words_for_nobody(argv)
         if words:
             print(
                 f"{self.name}: unknown argument '{words[0]}'; parameters go behind {_ROS_ARGS} "
@@ -88,24 +89,78 @@ def words_for_nobody(argv: Sequence[str]) -> list[str]:
     return words
 
 
-console = Program('console', 'console_node', 'Turns the motion of the handle into commands.')
-motor_driver = Program('motor_driver', 'motor_driver_node', 'Drives the motors of the slave.')
-load_cells = Program('load_cells', 'load_cells_node', 'Measures the tensions of the wires.')
-em_tracker = Program('em_tracker', 'em_tracker_node', 'Measures where the tip is.')
-calibration = Program('calibration', 'calibration_node', 'Calibrates the model of hysteresis.')
-compensator = Program('compensator', 'compensator_node', 'Compensates hysteresis.')
-controller = Program('controller', 'controller_node', 'Corrects the tip by what is measured.')
-supervisor = Program('supervisor', 'supervisor_node', 'Decides whether the slave may move.')
-recorder = Program('recorder', 'recorder_node', 'Records topics into a bag.')
-replay = Program('replay', 'replay_node', "Publishes a bag's topics again.")
-conductor = Program('conductor', 'conductor_node', 'Makes simulated time for all nodes.')
-graph = Program('graph', 'graph', 'Runs all nodes in one process.')
-
-NODES = tuple(
-    program.name
-    for program in (
-        *(console, motor_driver, load_cells, em_tracker, calibration, compensator),
-        *(controller, supervisor, recorder, replay, conductor),
-    )
+console = Program(
+    'console',
+    'console_node',
+    'Turns the motion of the handle into commands while the clutch is held, or plays a motion or '
+    'a file.',
 )
+motor_driver = Program(
+    'motor_driver',
+    'motor_driver_node',
+    'Drives the motors of the slave as far as it is safe, simulated or on a bus of servos, and '
+    'publishes what the shafts do.',
+)
+load_cells = Program(
+    'load_cells',
+    'load_cells_node',
+    'Measures the tensions of the wires, simulated or behind a Modbus transmitter.',
+)
+em_tracker = Program(
+    'em_tracker',
+    'em_tracker_node',
+    'Measures the pose of the tip and from it the bending, simulated or by an electromagnetic '
+    'tracker.',
+)
+supervisor = Program(
+    'supervisor',
+    'supervisor_node',
+    'Decides whether the slave may move: opens motion sessions, and ends them where anything '
+    'vital fails.',
+)
+compensator = Program(
+    'compensator',
+    'compensator_node',
+    'Turns desired bending into commands for the motors that make up for the hysteresis.',
+)
+controller = Program(
+    'controller',
+    'controller_node',
+    'Learns from the tracker what the compensation leaves over, and corrects it.',
+)
+calibration = Program(
+    'calibration',
+    'calibration_node',
+    'Moves the slave as a calibration asks, finds the hysteresis class of its tube from the '
+    'tensions, and takes the slave home.',
+)
+recorder = Program(
+    'recorder',
+    'recorder_node',
+    'Records every message of the interface into a bag, counted, with what was lost.',
+)
+replay = Program(
+    'replay',
+    'replay_node',
+    'Publishes the topics of a bag again, at their pace or another, and ends.',
+)
+conductor = Program(
+    'conductor',
+    'conductor_node',
+    'Makes simulated time, a millisecond at a time, as fast as the graph can follow.',
+)
+
+_COMPOSED = (
+    *(motor_driver, load_cells, em_tracker, supervisor),
+    *(compensator, controller, calibration, console, recorder),
+)
+NODES = tuple(program.name for program in (*_COMPOSED, replay, conductor))
 """Names of all nodes that the package has."""
+
+graph = Program(
+    'graph',
+    'graph',
+    'Runs all nodes in one process; with -p use_sim_time:=true the conductor too, in simulated '
+    'time.',
+    tuple(program.name for program in (*_COMPOSED, conductor)),
+)

@@ -8,31 +8,16 @@ SCHED_RESET_ON_FORK; mlockall(2).
 import ctypes
 import os
 import resource
-from dataclasses import dataclass
 from pathlib import Path
 
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import RealTimeParameters
+from endoscope_nodes.parameters import ParameterError
 
 _HOW = 'see ros_ws/doc/running.md'
 _TASKS = Path('/proc/self/task')
 # linux/capability.h and sys/mman.h.
 _CAP_IPC_LOCK = 14
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
-
-
-@dataclass(frozen=True)
-class RealTimeParameters:
-    """Parameters of the first node of a process, for all of it."""
-
-    realtime_priority: int = parameter(
-        0,
-        'SCHED_FIFO priority of this process, which is locked into memory; 0 for none',
-        low=0,
-        high=99,
-    )
-    cores: tuple[int, ...] = parameter(
-        (), 'processor cores for this process, for example [2, 3]; by default all', low=0
-    )
 
 
 def threads_of_this_process() -> frozenset[int]:

@@ -19,31 +19,16 @@ from endoscope_bags.recording_session import (
 from endoscope_nodes.diagnostics import ERROR, OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import RecorderParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.raw_subscription import RawSubscription
 from endoscope_nodes.recorded_topics import message_class, offered_profiles, suitable_qos
 from endoscope_nodes.runtime import Runtime, run_nodes
-from endoscope_nodes.topics import BY_NAME, RECORDED
+from endoscope_nodes.topics import BY_NAME
 
 _STAMP = struct.Struct('<iI')
 _SECOND = 1_000_000_000
 _LOOK_PERIOD_S = 0.1
-
-
-@dataclass(frozen=True)
-class RecorderParameters:
-    """Parameters of the recorder."""
-
-    bag: str = parameter(
-        '', 'folder or .mcap file to write; empty for bags/recording-DATE-TIME', dynamic=True
-    )
-    topics: tuple[str, ...] = parameter(
-        RECORDED, 'topics to record, relative ones in the namespace of the node'
-    )
-    autostart: bool = parameter(True, 'record from the start instead of on recorder/start')
-    drain_period: float = parameter(
-        0.002, 'how often the queues are emptied', unit='s', low=0.0005, high=0.1
-    )
 
 
 @dataclass

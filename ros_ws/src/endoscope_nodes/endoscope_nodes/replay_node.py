@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -14,7 +13,8 @@ from endoscope_bags.errors import BagError
 from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.names import CLOCK, DIAGNOSTICS, MOTOR_COMMAND, MOTOR_MEASURED
-from endoscope_nodes.parameters import ParameterError, parameter
+from endoscope_nodes.node_parameters import ReplayParameters
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.recorded_topics import message_class
 from endoscope_nodes.runtime import Runtime, run_nodes
@@ -23,22 +23,6 @@ from endoscope_nodes.ticker import TICK_NS
 # A reader that asks for what is not offered never connects.
 _LONGEST_WAIT_NS = 5_000_000_000
 _LINGER_S = 0.5
-
-
-@dataclass(frozen=True)
-class ReplayParameters:
-    """Parameters of the replay."""
-
-    bag: str = parameter('', 'rosbag2 folder or .mcap file to replay')
-    speed: float = parameter(1.0, 'recorded seconds in a real one', low=0.01, high=100.0)
-    topics: tuple[str, ...] = parameter(('',), 'full names to publish; an empty one for all')
-    clock: bool = parameter(True, 'publish the time of the recording on /clock')
-    delay: float = parameter(
-        1.0, 'time from finding all readers to the first message', unit='s', low=0.0
-    )
-    beside_live_nodes: bool = parameter(
-        False, 'replay even where other nodes publish the same topics'
-    )
 
 
 class ReplayNode(EndoscopeNode):

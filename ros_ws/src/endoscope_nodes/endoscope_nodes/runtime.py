@@ -3,7 +3,6 @@
 import gc
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 import rclpy
@@ -25,18 +24,14 @@ from rclpy.task import Future
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import Rig, RigFileError, load_rig
+from endoscope_nodes.declared_parameters import check_overrides, declare_parameters
 from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.matching import all_matched
+from endoscope_nodes.node_parameters import BeatParameters, RealTimeParameters
 from endoscope_nodes.parameter_sections import check_sections
-from endoscope_nodes.parameters import (
-    ParameterError,
-    check_overrides,
-    declare_parameters,
-    parameter,
-)
+from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.real_time import (
-    RealTimeParameters,
     enter_real_time,
     start_in_the_background,
     threads_of_this_process,
@@ -54,25 +49,6 @@ SWITCH_INTERVAL_S = 5e-5
 _CARRY_ON_S = 0.1
 # A collection of the second generation takes most of a tick: ten times rarer than by default.
 GC_THRESHOLDS = (7000, 10, 10)
-
-
-@dataclass(frozen=True)
-class BeatParameters:
-    """Parameters of the first node of a process, for all of them."""
-
-    tick_rate: int = parameter(
-        1000, 'beats of this process in real time; a divisor of 1000', unit='Hz', low=10, high=1000
-    )
-    rig_file: str = parameter(
-        '', 'rig.yaml with gear, limits, time-outs and devices; what it does not say is as shipped'
-    )
-    plant_file: str = parameter(
-        '', 'plant.yaml of the simulated slave and its sensors; empty for that of the rig file'
-    )
-    seed: int = parameter(
-        -1, 'seed of the simulated sensor noise; -1 for that of the rig file', low=-1
-    )
-
 
 N = TypeVar('N', bound=EndoscopeNode)
 

@@ -1,17 +1,11 @@
 """From a hand to a command: what is desired, feed-forward and feedback."""
 
+from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES, PHYSICAL
 from endoscope_core.control.adaptive_backlash import AdaptiveBacklashController
 from endoscope_core.control.adaptive_backlash_law import AdaptiveBacklashSettings
 from endoscope_core.control.adaptive_physical_inverse import AdaptivePhysicalInverse
 from endoscope_core.control.desired_motion import DesiredMotion
-from endoscope_core.control.feedforward import (
-    ADAPTIVE_PHYSICAL,
-    MODES,
-    PHYSICAL,
-    Feedforward,
-    FeedforwardLaw,
-    FeedforwardSettings,
-)
+from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
 from endoscope_core.control.motor_limits import MotorLimits, shipped_limits
 from endoscope_core.control.physical_inverse import PhysicalInverse

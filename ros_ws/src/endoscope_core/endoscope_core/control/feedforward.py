@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES, PHYSICAL
 from endoscope_core.control.adaptive_physical_inverse import AdaptivePhysicalInverse
 from endoscope_core.control.joint_inverse import HysteresisInverse, JointInverse, Passing
 from endoscope_core.control.motor_limits import MotorLimits, shipped_limits
@@ -19,10 +20,6 @@ from endoscope_core.hysteresis.inverse import MODELS, HysteresisParameters
 
 Vector = Sequence[float] | NDArray[np.float64]
 LawParameters = HysteresisParameters | PhysicalParameters
-
-PHYSICAL = 'physical'
-ADAPTIVE_PHYSICAL = 'adaptive_physical'
-MODES = ('none', *MODELS, PHYSICAL, ADAPTIVE_PHYSICAL)
 
 
 def parameters_of(mode: str) -> type[LawParameters]:

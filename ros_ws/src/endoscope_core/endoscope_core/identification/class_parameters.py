@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.choices import PHYSICAL
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.dataset import CalibrationDataset
 from endoscope_core.errors import EndoscopeError
@@ -16,7 +17,6 @@ from endoscope_core.identification.feedforward_fit import FeedforwardFit, fit_fe
 from endoscope_core.identification.hysteresis_fit import ModelFit, Recording, fit_model
 from endoscope_core.identification.parameter_blend import (
     KINDS,
-    PHYSICAL,
     LawParameters,
     blend_joints,
 )

@@ -6,19 +6,22 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from endoscope_core.control import ADAPTIVE_PHYSICAL, FeedforwardLaw, PhysicalParameters, Reach
+from endoscope_core.choices import (
+    ADAPTIVE_PHYSICAL,
+    BY_CLASS,
+    BY_PLANT,
+    BY_SIZE,
+    PHYSICAL,
+    SELECTIONS,
+)
+from endoscope_core.control import FeedforwardLaw, PhysicalParameters, Reach
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.class_parameters import (
     load_class_parameters,
     parameters_for_class,
 )
-from endoscope_core.identification.parameter_blend import PHYSICAL, LawParameters
+from endoscope_core.identification.parameter_blend import LawParameters
 from endoscope_core.identification.updated_table import UpdatedTable
-
-BY_CLASS = 'class'
-BY_SIZE = 'size'
-BY_PLANT = 'plant'
-SELECTIONS = (BY_CLASS, BY_SIZE, BY_PLANT)
 
 
 class LawChoiceError(EndoscopeError, ValueError):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from itertools import zip_longest
 
-from endoscope_core.control.feedforward import PHYSICAL, LawParameters
+from endoscope_core.choices import PHYSICAL
+from endoscope_core.control.feedforward import LawParameters
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.hysteresis import (
     AsymmetricBoucWenParameters,

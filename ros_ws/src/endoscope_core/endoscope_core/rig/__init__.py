@@ -1,9 +1,7 @@
 """What stands on the table: gears, limits, time-outs and devices, said once for every node."""
 
+from endoscope_core.choices import LOAD_CELL_DEVICES, MOTOR_DEVICES, TRACKER_DEVICES
 from endoscope_core.rig.facts import (
-    LOAD_CELL_DEVICES,
-    MOTOR_DEVICES,
-    TRACKER_DEVICES,
     DeviceFacts,
     HandleFacts,
     JointFacts,

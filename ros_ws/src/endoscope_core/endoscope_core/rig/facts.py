@@ -6,14 +6,11 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+from endoscope_core.choices import LOAD_CELL_DEVICES, MOTOR_DEVICES, TRACKER_DEVICES
 from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_core.strict_yaml import YamlError, load_yaml
 
 SHIPPED = Path(__file__).with_name('rig.yaml')
-
-MOTOR_DEVICES = ('simulated', 'dynamixel')
-LOAD_CELL_DEVICES = ('simulated', 'modbus_rtu', 'modbus_tcp')
-TRACKER_DEVICES = ('simulated', 'aurora')
 
 
 class RigFileError(EndoscopeError, ValueError):

@@ -1,10 +1,8 @@
 """Motions as functions of time: calibration, the papers' signals, commissioning."""
 
+from endoscope_core.choices import BRIEF, CALIBRATION_MOTIONS, SINUSOID
 from endoscope_core.signals.brief_calibration import brief_calibration
 from endoscope_core.signals.calibration_motion import (
-    BRIEF,
-    CALIBRATION_MOTIONS,
-    SINUSOID,
     CalibrationMotion,
     UnknownCalibrationError,
     calibration_motion,

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from endoscope_core.choices import BRIEF, SINUSOID
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.signals.brief_calibration import BRIEF_RECORD_DURATION, brief_calibration
 from endoscope_core.signals.calibration_sinusoid import (
@@ -15,9 +16,6 @@ from endoscope_core.signals.calibration_sinusoid import (
     calibration_sinusoid,
 )
 from endoscope_core.signals.signal import Signal
-
-SINUSOID = 'sinusoid'
-BRIEF = 'brief'
 
 
 class UnknownCalibrationError(EndoscopeError, ValueError):
@@ -51,7 +49,6 @@ _MOTIONS: dict[str, tuple[Callable[[], Signal], float]] = {
     SINUSOID: (calibration_sinusoid, CALIBRATION_RECORD_DURATION),
     BRIEF: (brief_calibration, BRIEF_RECORD_DURATION),
 }
-CALIBRATION_MOTIONS = tuple(_MOTIONS)
 
 
 def calibration_motion(name: str = SINUSOID) -> CalibrationMotion:

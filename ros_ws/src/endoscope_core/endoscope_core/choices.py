@@ -1,0 +1,34 @@
+"""What an operator chooses by name: compensation, feedback, motions and devices.
+
+The names alone, so that whoever only lists them loads nothing of what they do.
+"""
+
+HYSTERESIS_MODELS = ('bouc_wen', 'asymmetric_bouc_wen', 'dahl', 'play', 'prandtl_ishlinskii')
+PHYSICAL = 'physical'
+ADAPTIVE_PHYSICAL = 'adaptive_physical'
+MODES = ('none', *HYSTERESIS_MODELS, PHYSICAL, ADAPTIVE_PHYSICAL)
+"""Modes of feed-forward compensation."""
+
+BY_CLASS = 'class'
+BY_SIZE = 'size'
+BY_PLANT = 'plant'
+SELECTIONS = (BY_CLASS, BY_SIZE, BY_PLANT)
+"""What of a calibration selects the parameters of a mode."""
+
+ADAPTIVE = 'adaptive'
+RECURSIVE_LEAST_SQUARES = 'recursive_least_squares'
+FEEDBACK_LAWS = (ADAPTIVE, RECURSIVE_LEAST_SQUARES)
+"""Laws by which feedback learns."""
+
+SINUSOID = 'sinusoid'
+BRIEF = 'brief'
+CALIBRATION_MOTIONS = (SINUSOID, BRIEF)
+"""Motions by which a tube is judged."""
+
+PLAYED_MOTIONS = ('calibration', 'periodic', 'non_periodic', 'commissioning')
+"""Motions that the console plays."""
+
+SIMULATED = 'simulated'
+MOTOR_DEVICES = (SIMULATED, 'dynamixel')
+LOAD_CELL_DEVICES = (SIMULATED, 'modbus_rtu', 'modbus_tcp')
+TRACKER_DEVICES = (SIMULATED, 'aurora')
