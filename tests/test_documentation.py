@@ -8,7 +8,6 @@ from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
 
-import parameter_table
 import pytest
 import yaml
 from doc_pages import LANGUAGES, NOT_RUN, PAGES, ROOT, WORKSPACE, blocks, prose, run_page
@@ -17,6 +16,8 @@ from endoscope_bringup.commands import COMMANDS
 from endoscope_core.physics import JointParameters, SensorParameters
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_nodes import program
+from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
+from endoscope_nodes.parameters import described
 from endoscope_nodes.topics import SERVICES, TOPICS
 
 NOT_YET = {'operate', 'teleop', 'topics', 'train', 'endoscope.svg'}  # TODO-MERGE: delete
@@ -140,4 +141,5 @@ def _missing(site: Path, page: str, names: Iterable[str]) -> list[str]:
 
 
 def _what_parameters_do() -> list[str]:
-    return [row.split('|')[-2].strip().replace('`', '') for row in parameter_table.rows()]
+    kinds = [kind for kinds in (OF_PROCESS, *OF_NODE.values()) for kind in kinds]
+    return [one.description.replace('`', '') for kind in kinds for one in described(kind)]

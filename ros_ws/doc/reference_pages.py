@@ -2,7 +2,6 @@
 
 import argparse
 import dataclasses
-import importlib
 import math
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -18,28 +17,9 @@ from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.plant_file import REACH, plant_to_mapping
 from endoscope_nodes import program
+from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
+from endoscope_nodes.parameters import Described, as_typed, described
 from endoscope_nodes.topics import RECORDED, SERVICES, TOPICS, TRIGGER, Qos, Topic
-
-
-def _of(module: str, *kinds: str) -> list[type]:
-    return [getattr(importlib.import_module(f'endoscope_nodes.{module}'), kind) for kind in kinds]
-
-
-PARAMETERS = {
-    'console': _of('console_node', 'ConsoleParameters'),
-    'motor_driver': [
-        *_of('motor_driver_node', 'MotorDriverParameters'),
-        *_of('dynamixel_parameters', 'DynamixelParameters'),
-    ],
-    'load_cells': _of('load_cells_node', 'LoadCellsParameters'),
-    'em_tracker': _of('em_tracker_node', 'EmTrackerParameters'),
-    'calibration': _of('calibration_node', 'CalibrationParameters'),
-    'compensator': _of('compensator_parameters', 'CompensatorParameters'),
-    'controller': _of('controller_node', 'ControllerParameters'),
-    'recorder': _of('recorder_node', 'RecorderParameters'),
-    'replay': _of('replay_node', 'ReplayParameters'),
-    'conductor': _of('conductor_node', 'ConductorParameters'),
-}
 
 
 class _Generated(Directive):
@@ -176,28 +156,28 @@ def _qos(qos: Qos | None) -> str:
 
 
 class Parameters(_Generated):
-    """The parameters of each node, from the dataclasses that they are declared by."""
+    """The parameters of each node, and of a process."""
 
     def lines(self) -> Iterator[str]:
-        """Yield a section for each node."""
-        for node, kinds in PARAMETERS.items():
-            yield from ('', f'## {node}')
-            yield from _table(
-                ('parameter', 'default', 'allowed', 'unit', 'live', 'what it does'),
-                [_parameter(field) for kind in kinds for field in dataclasses.fields(kind)],
-            )
+        """Yield a section for each node that has any."""
+        for title, kinds in (('Of every process', OF_PROCESS), *OF_NODE.items()):
+            if kinds:
+                yield from ('', f'## {title}')
+                yield from _table(
+                    ('parameter', 'default', 'allowed', 'unit', 'live', 'what it does'),
+                    [_parameter(one) for kind in kinds for one in described(kind)],
+                )
 
 
-def _parameter(field: dataclasses.Field) -> tuple[str, ...]:
-    meta = field.metadata
-    default = 'all that are recorded' if field.default == RECORDED else _value(field.default)
+def _parameter(one: Described) -> tuple[str, ...]:
+    every = one.default == as_typed(RECORDED)
     return (
-        f'`{field.name}`',
-        default,
-        _names(filter(None, meta['choices'])) or _range(meta['low'], meta['high']),
-        meta['unit'],
-        'yes' if meta['dynamic'] else '',
-        meta['description'],
+        f'`{one.name}`',
+        'all that are recorded' if every else f'`{one.default}`',
+        one.allowed,
+        one.unit,
+        'yes' if one.dynamic else '',
+        one.description,
     )
 
 
@@ -222,15 +202,14 @@ class PlantKeys(_Generated):
         """Yield a table for joints and one for sensors."""
         for title, kind in (('joints', JointParameters), ('sensors', SensorParameters)):
             yield from ('', f'## {title}')
-            yield from _table(
-                ('key', 'nominal', 'allowed', 'unit'),
-                [
-                    (f'`{f.name}`', _value(f.default), _range(*REACH[f.name][:2]), REACH[f.name][2])
-                    for f in dataclasses.fields(kind)
-                ],
-            )
-            described = f'endoscope_core.physics.{kind.__name__}'
-            yield f'What each means: {{class}}`~{described}`.'
+            yield from _table(('key', 'nominal', 'allowed', 'unit'), _keys(kind))
+            yield f'What each means: {{class}}`~endoscope_core.physics.{kind.__name__}`.'
+
+
+def _keys(kind: type) -> Iterator[tuple[str, ...]]:
+    for key in dataclasses.fields(kind):
+        low, high, unit = REACH[key.name]
+        yield f'`{key.name}`', f'`{as_typed(key.default)}`', _range(low, high), unit
 
 
 class Effects(_Generated):
@@ -281,28 +260,12 @@ class Modules(Directive):
         return parsed.children
 
 
-def _range(low: float | None, high: float | None) -> str:
-    if low is None and high is None:
-        return ''
-    if low is None:
-        return f'to {_number(high)}'
-    return f'from {_number(low)}' if high is None else f'{_number(low)} to {_number(high)}'
+def _range(low: float, high: float) -> str:
+    return f'{_number(low)} to {_number(high)}'
 
 
-def _number(value: float | None) -> str:
-    return '' if value is None else f'{value:.6g}'
-
-
-def _value(value: object) -> str:
-    items = value if isinstance(value, tuple) else (value,)
-    text = ', '.join(_one(item) for item in items)
-    return f'`{text}`' if text else ''
-
-
-def _one(value: object) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return _number(value) if isinstance(value, float) else str(value)
+def _number(value: float) -> str:
+    return f'{value:.6g}'
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
