@@ -7,9 +7,11 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import parameter_table
 import pytest
 import yaml
+
+from endoscope_nodes.node_parameters import OF_NODE
+from endoscope_nodes.parameters import described
 
 ROOT = Path(__file__).parents[1]
 COMPOSE_FILE = ROOT / 'docker' / 'compose.yaml'
@@ -89,14 +91,14 @@ def test_compose_accepts_the_file() -> None:
 
 def test_hardware_changes_how_nodes_are_started_and_only_by_parameters_that_they_have() -> None:
     services = yaml.safe_load(COMPOSE_FILE.read_text())['services']
-    declared = {tuple(row.split('`')[1:4:2]) for row in parameter_table.rows()}
     for name, service in yaml.safe_load(HARDWARE_FILE.read_text())['services'].items():
         assert name in services
         node, *arguments = service['command'].split()
         assert node == name
         given = re.findall(r'-p (\w+):=', ' '.join(arguments))
         assert 'device' in given
-        assert {(name, parameter) for parameter in given} <= declared
+        declared = {one.name for kind in OF_NODE[name] for one in described(kind)}
+        assert set(given) <= declared
 
 
 def test_compose_accepts_the_hardware() -> None:

@@ -10,6 +10,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).parents[1]
 WORKSPACE = ROOT / 'ros_ws'
@@ -126,6 +127,41 @@ def test_everything_in_the_package_is_installed(package: Path, tmp_path: Path) -
         if path.is_file() and not NOT_SOURCE & set(path.parts)
     }
     assert built == sources, 'a folder without __init__.py, or a suffix that setup.py does not ship'
+
+
+@each_package
+def test_the_licence_is_installed(package: Path, tmp_path: Path) -> None:
+    subprocess.run(
+        [sys.executable, 'setup.py', '-q', 'egg_info', '--egg-base', str(tmp_path)]
+        + ['install_data', '--install-dir', str(tmp_path)],
+        cwd=package,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    installed = tmp_path / 'share' / package.name / 'LICENSE'
+    assert installed.read_text() == (WORKSPACE / 'LICENSE').read_text()
+
+
+def test_one_version_is_named_everywhere() -> None:
+    project = tomllib.loads((WORKSPACE / 'pyproject.toml').read_text())['project']
+    citation = yaml.safe_load((WORKSPACE / 'CITATION.cff').read_text())
+    manifests = [ElementTree.parse(package / 'package.xml') for package in PACKAGES]
+    assert {str(manifest.findtext('version')) for manifest in manifests} == {project['version']}
+    assert citation['version'] == project['version']
+    changes = re.findall(r'^## (\d\S+)', (WORKSPACE / 'CHANGELOG.md').read_text(), flags=re.M)
+    assert changes[0] == project['version']
+
+
+def test_the_citation_has_what_cff_asks_for() -> None:
+    citation = yaml.safe_load((WORKSPACE / 'CITATION.cff').read_text())
+    assert citation['cff-version'] == '1.2.0'
+    for cited in (citation, *citation['references']):
+        assert cited['title']
+        assert cited['authors']
+        assert all('name' in person or 'family-names' in person for person in cited['authors'])
+    assert len(citation['references']) == 2
+    assert {reference['type'] for reference in citation['references']} == {'article'}
 
 
 @each_package

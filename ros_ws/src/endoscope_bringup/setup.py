@@ -20,12 +20,12 @@ def shared_files() -> list[tuple[str, list[str]]]:
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version='0.2.0',
     packages=find_packages(exclude=['test']),
     package_data={'': ['py.typed', *('**/*.' + suffix for suffix in shipped_suffixes)]},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
-        ('share/' + package_name, ['package.xml']),
+        ('share/' + package_name, ['package.xml', 'LICENSE']),
         *shared_files(),
     ],
     install_requires=['setuptools'],

@@ -1,0 +1,145 @@
+"""What README and pages say is so: links, commands, files and everything that can be run."""
+
+import html
+import re
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+import yaml
+from doc_pages import LANGUAGES, NOT_RUN, PAGES, ROOT, WORKSPACE, blocks, prose, run_page
+
+from endoscope_bringup.commands import COMMANDS
+from endoscope_core.physics import JointParameters, SensorParameters
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_nodes import program
+from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
+from endoscope_nodes.parameters import described
+from endoscope_nodes.topics import SERVICES, TOPICS
+
+NOT_YET = {'operate', 'teleop', 'topics', 'train', 'endoscope.svg'}  # TODO-MERGE: delete
+TUTORIAL = WORKSPACE / 'doc/tutorial.md'
+
+each_page = pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+
+
+def _slug(heading: str) -> str:
+    """Return the anchor that GitHub and MyST give a heading."""
+    return re.sub(r'[^\w\- ]', '', heading.strip().lower()).replace(' ', '-')
+
+
+def test_readme_can_be_read_in_one_go() -> None:
+    assert len((ROOT / 'README.md').read_text().splitlines()) <= 200
+
+
+@each_page
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r'\]\((?!https?:)([^)]+)\)', prose(page)):
+        path, _, anchor = target.partition('#')
+        file = page.parent / path if path else page
+        if file.name in NOT_YET and not file.exists():
+            continue
+        assert file.exists(), target
+        if anchor:
+            headings = re.findall(r'^#+ (.+)$', prose(file), flags=re.M)
+            assert anchor in map(_slug, headings), target
+
+
+@each_page
+def test_blocks_say_what_they_are(page: Path) -> None:
+    for block in blocks(page):
+        where = f'line {block.line}'
+        assert block.language in LANGUAGES, where
+        if block.language == 'console':
+            assert set(block.words) <= {*NOT_RUN, 'background'}, where
+            assert block.commands(), f'{where}: no line begins with "$ "'
+            if 'ros2 ' in block.text and block.is_run:
+                pytest.fail(f'{where}: a command of a sourced ROS 2 is not marked')
+        if block.language == 'yaml':
+            assert isinstance(yaml.safe_load(block.text), dict), where
+    indented = re.findall(r'\n\n( {4}.*)', prose(page))
+    assert indented == [], 'put it into a fence, which says what it is'
+
+
+@each_page
+def test_commands_and_targets_are_there(page: Path) -> None:
+    text = page.read_text(encoding='utf-8')
+    named = set(re.findall(r'(?:`|\$ )endoscope ([a-z]+)', text))
+    assert named <= {name.rstrip('_') for name in COMMANDS} | NOT_YET
+    makefile = (WORKSPACE / 'Makefile').read_text()
+    targets = set(re.findall(r'^([a-z-]+):', makefile, flags=re.M))
+    assert set(re.findall(r'make -C ros_ws ([a-z-]+)', text)) <= targets | NOT_YET
+
+
+def test_readme_names_every_command() -> None:
+    named = re.findall(r'`endoscope ([a-z]+)', (ROOT / 'README.md').read_text())
+    assert {name.rstrip('_') for name in COMMANDS} <= set(named)
+
+
+@pytest.mark.parametrize(
+    'page',
+    [
+        page
+        for page in PAGES
+        if page != TUTORIAL
+        and any(b.language in ('console', 'python') and b.is_run for b in blocks(page))
+    ],
+    ids=lambda page: str(page.relative_to(ROOT)),
+)
+def test_what_a_page_shows_runs(page: Path, tmp_path: Path) -> None:
+    run_page(page, tmp_path)
+
+
+@pytest.fixture(scope='module')
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site as `make -C ros_ws doc` builds it; a warning fails the build."""
+    out = tmp_path_factory.mktemp('site')
+    recipe = re.search(r'-m (sphinx .*) doc build/doc/html', (WORKSPACE / 'Makefile').read_text())
+    assert recipe
+    built = subprocess.run(
+        [sys.executable, '-m', *recipe[1].split(), '-d', out / 'trees', 'doc', out / 'html'],
+        cwd=WORKSPACE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    assert built.returncode == 0, built.stdout
+    return out / 'html'
+
+
+def test_the_site_needs_no_network(site: Path) -> None:
+    for page in site.rglob('*.html'):
+        text = page.read_text(encoding='utf-8')
+        assert re.findall(r'<(?:script|img|iframe)[^>]* src="https?://[^"]*"', text) == [], page
+        assert re.findall(r'<link rel="stylesheet"[^>]* href="https?://[^"]*"', text) == [], page
+
+
+def test_reference_pages_have_everything(site: Path) -> None:
+    commands = [f'endoscope {name.rstrip("_")}' for name in COMMANDS]
+    keys = [f.name for kind in (JointParameters, SensorParameters) for f in fields(kind)]
+    assert _missing(site, 'commands', commands) == []
+    assert _missing(site, 'nodes', program.NODES) == []
+    assert _missing(site, 'topics', [entry.name for entry in (*TOPICS, *SERVICES)]) == []
+    assert _missing(site, 'topics', [topic.content.replace('`', '') for topic in TOPICS]) == []
+    assert _missing(site, 'parameters', _what_parameters_do()) == []
+    assert _missing(site, 'effects', CATALOGUE) == []
+    assert _missing(site, 'plant_file', keys) == []
+    assert _missing(site, 'api_core', ('load_plant', 'simulate', 'PhysicalInverse')) == []
+    assert _missing(site, 'api_bags', ('open_bag', 'BagWriter')) == []
+    assert _missing(site, 'api_devices', ('AuroraTracker', 'load_calibration')) == []
+
+
+def _missing(site: Path, page: str, names: Iterable[str]) -> list[str]:
+    """Return the names that a reference page does not show."""
+    text = (site / 'reference' / f'{page}.html').read_text(encoding='utf-8')
+    shown = ' '.join(html.unescape(re.sub(r'<[^>]+>', '', text)).split())
+    return [name for name in names if name not in shown]
+
+
+def _what_parameters_do() -> list[str]:
+    kinds = [kind for kinds in (OF_PROCESS, *OF_NODE.values()) for kind in kinds]
+    return [one.description.replace('`', '') for kind in kinds for one in described(kind)]
