@@ -99,6 +99,8 @@ class GraphClient(ClosedOnExit):
         In the namespace of the graph, by which to listen and ask.
     serve
         Lets the node be served for so many seconds; what is waited for is looked at in between.
+    clock
+        Time in s by which patience is measured.
 
     Attributes
     ----------
@@ -114,9 +116,15 @@ class GraphClient(ClosedOnExit):
         Last result of a calibration, and the model in force; None before the first.
     """
 
-    def __init__(self, node: Node, serve: Callable[[float], object]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        serve: Callable[[float], object],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self.node = node
-        self._serve = serve
+        self.serve = serve
+        self._clock = clock
         self.state = self.session = ''
         self.state_ns = self.open_ns = 0
         self.health: dict[str, Health] = {}
@@ -210,15 +218,14 @@ class GraphClient(ClosedOnExit):
 
     def wait_until(self, condition: Callable[[], bool], patience_s: float = PATIENCE_S) -> bool:
         """Listen until something has come true, or for so long; whether it has."""
-        waited = 0.0
+        end = self._clock() + patience_s
         while True:
             self.hear()
             if condition():
                 return True
-            if waited > patience_s:
+            if self._clock() > end:
                 return False
-            self._serve(POLL_S)
-            waited += POLL_S
+            self.serve(POLL_S)
 
     def wait_for(
         self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
@@ -279,15 +286,14 @@ class GraphClient(ClosedOnExit):
     def _ask(self, command: str, done: Callable[[], bool], what: str, patience_s: float) -> None:
         """Give a command, again where it brought no answer, until it is done."""
         asked_ns = time.time_ns()
-        waited = 0.0
-        while waited <= patience_s:
+        end = self._clock() + patience_s
+        while self._clock() <= end:
             self.order(command)
             if self.wait_until(lambda: done() or bool(self._refused(asked_ns)), _REPEATED_AFTER_S):
                 refused = self._refused(asked_ns)
                 if refused:
                     raise GraphRefusedError(refused)
                 return
-            waited += _REPEATED_AFTER_S
         raise GraphRefusedError(f'waited {patience_s:g} s in vain for {what}')
 
     def _refused(self, asked_ns: int) -> str:

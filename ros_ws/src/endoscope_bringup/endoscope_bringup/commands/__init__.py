@@ -11,6 +11,8 @@ COMMANDS: tuple[str, ...] = (
     'explain',
     'invert',
     'convert',
+    'operate',
+    'topics',
     'record',
     'replay',
     'bag',

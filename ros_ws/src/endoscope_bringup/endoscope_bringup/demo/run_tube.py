@@ -113,7 +113,7 @@ class _GraphSession:
             self._runtime.add(factory)
         self._recorder = self._runtime.add(RecorderNode)
         self._node = self._runtime.add(lambda runtime: EndoscopeNode('operator', runtime))
-        self._client = GraphClient(self._node, self._advance)
+        self._client = GraphClient(self._node, self._advance, self._now)
         self._last_calibration_ns = 0
         self._client.listen(JointState, CALIBRATION_COMMAND, self._note_calibration)
         self._conductor = None if real_time else self._runtime.add(ConductorNode)
