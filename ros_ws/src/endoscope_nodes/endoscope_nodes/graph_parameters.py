@@ -15,6 +15,7 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.task import Future
 
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.graph_client import PATIENCE_S, GraphClient, GraphRefusedError, NoGraphError
@@ -155,6 +156,12 @@ def read_parameter(
     )
 
 
+def request_parameters(client: GraphClient, node: str, values: Mapping[str, Any]) -> Future:
+    """Ask a node to take new values of some parameters, and wait for nothing."""
+    kind, service = SetParametersAtomically, f'{node}/set_parameters_atomically'
+    return client.client(kind, service).call_async(_request(values))
+
+
 def set_parameters(
     client: GraphClient, node: str, values: Mapping[str, Any], patience_s: float = PATIENCE_S
 ) -> None:
@@ -167,16 +174,18 @@ def set_parameters(
     NoGraphError
         The node does not answer.
     """
-    request = SetParametersAtomically.Request(
+    kind, service = SetParametersAtomically, f'{node}/set_parameters_atomically'
+    result = client.call(kind, service, _request(values), patience_s).result
+    if not result.successful:
+        raise GraphRefusedError(result.reason or f'{node} refused it and says no reason')
+
+
+def _request(values: Mapping[str, Any]) -> SetParametersAtomically.Request:
+    return SetParametersAtomically.Request(
         parameters=[
             Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
         ]
     )
-    result = client.call(
-        SetParametersAtomically, f'{node}/set_parameters_atomically', request, patience_s
-    ).result
-    if not result.successful:
-        raise GraphRefusedError(result.reason or f'{node} refused it and says no reason')
 
 
 def _plain(value: Any) -> Any:

@@ -13,6 +13,7 @@ COMMANDS: tuple[str, ...] = (
     'convert',
     'operate',
     'topics',
+    'teleop',
     'record',
     'replay',
     'bag',

@@ -73,6 +73,11 @@ def _calibrate(client: GraphClient, patience_s: float) -> Reply:
     progress = _Progress()
     try:
         result = client.calibrate(progress, patience_s)
+    except GraphRefusedError as error:
+        # An aborted calibration tells what it saw: the session ended. The supervisor knows why.
+        if client.state == 'FAULT' and client.wait_until(lambda: bool(client.why), patience_s):
+            raise GraphRefusedError(f'{error} ({client.state}: {client.why})') from error
+        raise
     finally:
         progress.end()
     return Reply(calibration_in_words(result), {'result': result.values})

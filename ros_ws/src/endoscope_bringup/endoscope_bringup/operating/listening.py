@@ -16,6 +16,7 @@ from endoscope_nodes.recorded_topics import message_class, suitable_qos
 from endoscope_nodes.topics import BY_NAME, TOPICS, Topic
 
 _HEADINGS = ('topic', 'type', 'senders', 'readers', '')
+_ROS_OWN = ('/parameter_events', '/rosout')
 _FOUND_S = 1.0
 _PROMPT_S = 0.01
 
@@ -79,7 +80,7 @@ def _missing(topic: Topic | None, senders: list[str], silent: list[str]) -> str:
         return f'{" and ".join(silent)} does not send it now'
     if topic.said_by:
         return f'no sender: {" or ".join(topic.said_by)} does not run'
-    return 'no sender'
+    return 'no sender outside the graph'
 
 
 def _in_words(row: dict[str, Any]) -> tuple[str, ...]:
@@ -148,7 +149,7 @@ def _messages(
 def _hint(client: GraphClient, name: str) -> str:
     own = f'{client.node.get_namespace().rstrip("/")}/'
     there = [n.removeprefix(own) for n, _ in client.node.get_topic_names_and_types()]
-    there = [n for n in there if _senders(client, n)]
+    there = [n for n in there if n not in _ROS_OWN and _senders(client, n)]
     if not there:
         return ': start a graph with `graph`'
     return '' if name in BY_NAME else f'; {nearest(name, there)}'
