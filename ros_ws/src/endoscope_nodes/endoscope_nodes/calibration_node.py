@@ -42,8 +42,10 @@ from endoscope_nodes.names import (
     CALIBRATION_NUMBERS,
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
+    HOME_REACHED,
     JOINTS,
     MOTOR_MEASURED,
+    PROCEDURE_WAITING,
     SLAVE_MEASURED,
     STATE_COMMAND,
     WIRES,
@@ -86,6 +88,7 @@ class CalibrationNode(EndoscopeNode):
         self._aborts = 0
         self._refused = 0
         self._last = ''
+        self._last_ns = 0
         self._guard = TensionGuard(WIRES, self.rig.tension.calibration_ceiling)
         self._commands = JointPublisher(
             self, CALIBRATION_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
@@ -131,6 +134,12 @@ class CalibrationNode(EndoscopeNode):
             trouble = self._start(homing=True)
             if trouble:
                 self.get_logger().warning(f'home: {trouble}')
+                self._tell(f'home: {trouble}')
+
+    def _tell(self, last: str) -> None:
+        """Say at once what has come of a procedure: whoever asked for it waits for that."""
+        self._last, self._last_ns = last, self.ticker.now_ns()
+        self.diagnostics.publish()
 
     def _start(self, homing: bool) -> str:
         """Begin, or say why not."""
@@ -155,6 +164,7 @@ class CalibrationNode(EndoscopeNode):
         self._began_ns = self.ticker.now_ns()
         self._bending = BendingRecord(len(JOINTS))
         self._judging = None
+        self.diagnostics.publish()
         return ''
 
     def _trouble(self) -> str:
@@ -226,7 +236,7 @@ class CalibrationNode(EndoscopeNode):
     def _finish(self, run: CalibrationRun) -> None:
         if self._homing:
             self._run = None
-            self._last = 'home reached'
+            self._tell(HOME_REACHED)
             return
         if self._judging is None:
             if run.record is None or not run.record.complete:
@@ -252,13 +262,13 @@ class CalibrationNode(EndoscopeNode):
         )
         self._run = None
         self._runs += 1
-        self._last = f'class {verdict.class_deg} deg'
+        self._tell(f'class {verdict.class_deg} deg')
         self.get_logger().info(f'{self._last}, probability {verdict.probability:.3f}')
 
     def _refuse(self, reason: str) -> None:
         self._run = None
         self._refused += 1
-        self._last = reason
+        self._tell(reason)
         self.get_logger().error(f'{reason}; the motion is not compensated')
         now = self.ticker.now_ns()
         self._publish(refused_result(now, reason, (now - self._began_ns) * 1e-9))
@@ -273,7 +283,7 @@ class CalibrationNode(EndoscopeNode):
         if run is None:
             return
         self._aborts += 1
-        self._last = f'aborted while {run.step}: {reason}'
+        self._tell(f'aborted while {run.step}: {reason}')
         self.get_logger().error(self._last)
         if not self._homing:
             now = self.ticker.now_ns()
@@ -285,10 +295,11 @@ class CalibrationNode(EndoscopeNode):
             'aborted': self._aborts,
             'refused': self._refused,
             'last': self._last,
+            'since last [s]': (self.ticker.now_ns() - self._last_ns) * 1e-9,
             'peak tension [N]': self._guard.peak,
         }
         if self._run is None:
-            return OK, 'waiting', values
+            return OK, PROCEDURE_WAITING, values
         values['progress'] = self._run.progress
         return OK, str(self._run.step), values
 

@@ -31,3 +31,7 @@ RECORDER_STOP = 'recorder/stop'
 LOAD_CELLS_TARE = 'load_cells/tare'
 REGISTER_STRAIGHT = 'em_tracker/register_straight'
 MOTOR_REBOOT = 'motor/reboot'
+
+# What `calibration: procedure` says on /diagnostics where nothing is being done, and of a way home.
+PROCEDURE_WAITING = 'waiting'
+HOME_REACHED = 'home reached'

@@ -45,6 +45,7 @@ class SupervisorNode(EndoscopeNode):
         self.machine = OperatingStateMachine()
         self._guard = TensionGuard(WIRES, self.rig.tension.ceiling)
         self._last_refusal = ''
+        self._refused_ns = 0
         self._own = f'{self.get_namespace().rstrip("/")}/'
         self._watched = [self.resolve_topic_name(t.name) for t in TOPICS if t.one_sender]
         self._states = self.create_publisher(String, OPERATING_STATE, RESULT)
@@ -88,11 +89,13 @@ class SupervisorNode(EndoscopeNode):
         )
 
     def _on_command(self, message: String) -> None:
-        before = self.machine.state
-        answer = self.machine.command(message.data, self.ticker.now_ns())
+        before, now = self.machine.state, self.ticker.now_ns()
+        answer = self.machine.command(message.data, now)
         if not answer.accepted:
-            self._last_refusal = answer.reason
+            self._last_refusal, self._refused_ns = answer.reason, now
             self.get_logger().warning(answer.reason)
+            # Whoever asked waits for the reason.
+            self.diagnostics.publish()
         elif self.machine.state != before:
             self._last_refusal = ''
             self.get_logger().info(f'{before} -> {self.machine.state} {self.machine.session}')
@@ -136,6 +139,7 @@ class SupervisorNode(EndoscopeNode):
             'cause': machine.cause,
             'present causes': '; '.join(machine.present_causes.values()),
             'last refusal': self._last_refusal,
+            'since last refusal [s]': (self.ticker.now_ns() - self._refused_ns) * 1e-9,
             'peak tension [N]': self._guard.peak,
         }
         if machine.state is OperatingState.FAULT:

@@ -98,7 +98,7 @@ def run_processes_bench(rate: int, seconds: float) -> ProcessesFigure:
         began = time.monotonic()
         operator.serve(seconds)
         after, elapsed = _counts(operator), time.monotonic() - began
-        state = operator.state
+        state = operator.graph.state
         cpu = sum(map(cpu_seconds, processes.pids)) - cpu
     done = after - before
     due = done['ticks'] + done['missed ticks']
@@ -124,22 +124,24 @@ def _hops(done: Counter[str]) -> str:
 def _enable(operator: Operator) -> None:
     """Wait until every node is heard and the slave follows commands."""
     deadline = time.monotonic() + _PATIENCE_S
-    while operator.state != OperatingState.ENABLED or len(operator.heard_ns) < len(NODES):
+    while operator.graph.state != OperatingState.ENABLED or len(operator.graph.heard_ns) < len(
+        NODES
+    ):
         if time.monotonic() > deadline:
-            silent = sorted(set(NODES) - set(operator.heard_ns))
-            raise RuntimeError(f'{operator.state or "no state"}; silent: {", ".join(silent)}')
-        operator.order('enable')
+            silent = sorted(set(NODES) - set(operator.graph.heard_ns))
+            raise RuntimeError(f'{operator.graph.state or "no state"}; silent: {", ".join(silent)}')
+        operator.graph.order('enable')
         operator.serve(1.0)
 
 
 def _counts(operator: Operator) -> Counter[str]:
     """Ticks of the motor driver, and of each node what it sent, obeyed and refused."""
     operator.serve(1.1)
-    device = operator.values['motor_driver: device']
+    device = operator.graph.health['motor_driver: device'].values
     found = Counter({key: int(device[key]) for key in ('ticks', 'missed ticks')})
-    found['sent'] = int(operator.values['console: commands']['published'])
+    found['sent'] = int(operator.graph.health['console: commands'].values['published'])
     for node in _OBEYING:
-        for key, value in operator.values[f'{node}: commands'].items():
+        for key, value in operator.graph.health[f'{node}: commands'].values.items():
             if key.startswith(('accepted', 'refused')):
                 found[f'{node} {key}'] = int(value)
     return found

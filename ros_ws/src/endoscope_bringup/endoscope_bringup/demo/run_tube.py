@@ -1,5 +1,6 @@
 """Runs the whole procedure for one shape of the tube and records it."""
 
+import struct
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,13 +9,8 @@ from typing import Any
 
 from rclpy.context import Context
 from rclpy.task import Future
+from sensor_msgs.msg import JointState
 
-from endoscope_bringup.demo.director_node import (
-    DirectorNode,
-    GraphRefusedError,
-    check_parameters_taken,
-    values_of,
-)
 from endoscope_bringup.demo.procedure import (
     MOTIONS,
     CalibrationFacts,
@@ -26,8 +22,11 @@ from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.family import shipped_family
 from endoscope_core.signals import calibration_sinusoid, motion_by_name
 from endoscope_nodes.conductor_node import ConductorNode
+from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
-from endoscope_nodes.names import JOINTS
+from endoscope_nodes.graph_client import GraphClient, GraphRefusedError
+from endoscope_nodes.graph_parameters import set_parameters
+from endoscope_nodes.names import CALIBRATION_COMMAND, JOINTS
 from endoscope_nodes.recorder_node import RecorderNode
 from endoscope_nodes.runtime import FOREVER_S, Runtime
 
@@ -36,6 +35,7 @@ Progress = Callable[[str], None]
 POLL_S = 0.05
 PATIENCE_S = 20.0
 SETTLING_S = 1.0
+_STAMP = struct.Struct('<iI')
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,10 @@ class _GraphSession:
         for factory in (*SLAVE_NODES, *CONTROL_NODES):
             self._runtime.add(factory)
         self._recorder = self._runtime.add(RecorderNode)
-        self._director = self._runtime.add(DirectorNode)
+        self._node = self._runtime.add(lambda runtime: EndoscopeNode('operator', runtime))
+        self._client = GraphClient(self._node, self._advance, self._now)
+        self._last_calibration_ns = 0
+        self._client.listen(JointState, CALIBRATION_COMMAND, self._note_calibration)
         self._conductor = None if real_time else self._runtime.add(ConductorNode)
         self._runtime.prepare()
 
@@ -120,7 +123,14 @@ class _GraphSession:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._runtime.close()
+        try:
+            self._client.close()
+        finally:
+            self._runtime.close()
+
+    def _note_calibration(self, data: bytes, received_ns: int) -> None:
+        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+        self._last_calibration_ns = seconds * 1_000_000_000 + nanoseconds
 
     def _advance(self, seconds: float) -> None:
         if self._conductor is None:
@@ -130,49 +140,26 @@ class _GraphSession:
         self._runtime.spin_until(done, FOREVER_S)
         done.result()
 
-    def _wait_until(self, condition: Callable[[], bool], what: str) -> None:
-        waited = 0.0
-        while not condition():
-            if waited > PATIENCE_S:
-                raise GraphRefusedError(f'waited {PATIENCE_S:g} s in vain for {what}')
-            self._advance(POLL_S)
-            waited += POLL_S
-
-    def _answer_of(self, future: Future, what: str) -> Any:
-        self._wait_until(future.done, what)
-        return future.result()
-
     def _set(self, node: str, **values: Any) -> None:
-        answer = self._answer_of(
-            self._director.request_parameters(node, **values), f'the parameters of {node}'
-        )
-        check_parameters_taken(node, answer)
+        set_parameters(self._client, node, values)
 
     def start(self) -> None:
         """Wait for discovery, then enable the slave."""
         limit = time.monotonic() + PATIENCE_S
-        while not (self._director.ready() and self._runtime.connected()):
+        while not (self._client.is_connected() and self._runtime.connected()):
             if time.monotonic() > limit:
                 raise GraphRefusedError('the nodes did not find each other: is multicast allowed?')
             self._runtime.spin_until(Future(), POLL_S)
         self._advance(0.5)
-        self._director.command_state('enable')
-        self._wait_until(lambda: self._director.operating_state == 'ENABLED', 'ENABLED')
+        self._client.ask('enable')
 
     def calibrate(self, tube: Tube, progress: Progress) -> CalibrationFacts:
         """Run the calibration and wait for its result."""
         progress(f'{tube.name}: calibrating')
-        answer = self._answer_of(self._director.request_calibration(), 'calibration/run')
-        if not answer.success:
-            raise GraphRefusedError(f'calibration/run: {answer.message}')
-        self._wait_until(
-            lambda: self._director.calibration_result is not None, 'calibration/result'
-        )
-        assert self._director.calibration_result is not None
-        values = values_of(self._director.calibration_result)
+        values = self._client.calibrate().values
         facts = CalibrationFacts(
             tube.name,
-            self._director.last_calibration_ns * 1e-9 - calibration_sinusoid().duration,
+            self._last_calibration_ns * 1e-9 - calibration_sinusoid().duration,
             float(values['class_deg']),
             {
                 round(float(key.removeprefix('probability_').removesuffix('_deg'))): float(value)
@@ -202,10 +189,9 @@ class _GraphSession:
         return Segment(tube.name, motion, mode, start, end)
 
     def _now(self) -> float:
-        return self._director.ticker.now_ns() * 1e-9
+        return self._node.ticker.now_ns() * 1e-9
 
     def stop(self) -> dict[str, int]:
         """Disable the slave, end the recording, and say what it missed by topic."""
-        self._director.command_state('disable')
-        self._wait_until(lambda: self._director.operating_state == 'DISABLED', 'DISABLED')
+        self._client.ask('disable')
         return dict(self._recorder.stop().lost)

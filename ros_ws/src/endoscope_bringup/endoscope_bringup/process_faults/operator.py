@@ -7,38 +7,27 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, Joy
-from std_msgs.msg import Header, String
 
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_nodes.discovery import stay_on_this_machine
+from endoscope_nodes.graph_client import GraphClient
 from endoscope_nodes.joint_stream import JointPublisher, JointReader, JointSample
 from endoscope_nodes.names import (
     JOINTS,
     MASTER_CLUTCH,
     MASTER_MEASURED,
-    MOTION_SESSION,
     MOTOR_COMMAND,
     MOTOR_MEASURED,
     MOTORS,
-    OPERATING_STATE,
     SLAVE_COMMAND,
     SLAVE_MEASURED,
-    STATE_COMMAND,
 )
-from endoscope_nodes.qos import COMMAND, EVENT, SENSOR_OFFERED
-from endoscope_nodes.raw_subscription import RawSubscription
+from endoscope_nodes.qos import COMMAND, EVENT, SENSOR_OFFERED, profile
+from endoscope_nodes.topics import Qos
 
-_DEEP = QoSProfile(
-    depth=5000,
-    history=HistoryPolicy.KEEP_LAST,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-)
+_DEEP = profile(Qos(5000))
 _TURN_NS = 4_000_000
 _CLUTCH_TURNS = 25
 # The hand swings at up to 1 rad/s, a shaft at half of that, and steers back to the middle.
@@ -69,14 +58,8 @@ class Operator(ClosedOnExit):
         Whether each command is followed by an old one, sent anew.
     late_ns
         How far stamps are behind.
-    states
-        Operating states with the time of receipt in ns.
-    session
-        Motion session as last heard.
-    open_ns
-        When the supervisor was last heard to say that a session is open.
-    values, heard_ns
-        What was said last on `/diagnostics`, by status, and when each node was heard there.
+    graph
+        What the graph says, and by which it is asked.
     """
 
     def __init__(self, domain: int) -> None:
@@ -87,11 +70,6 @@ class Operator(ClosedOnExit):
         self.sent: deque[tuple[str, int, tuple[float, ...]]] = deque(maxlen=5000)
         self.replays = False
         self.late_ns = 0
-        self.states: list[tuple[int, str]] = []
-        self.session = ''
-        self.open_ns = 0
-        self.values: dict[str, dict[str, str]] = {}
-        self.heard_ns: dict[str, int] = {}
         self._bending: JointSample | None = None
         self._turn = 0
         self._due_ns = 0
@@ -105,55 +83,17 @@ class Operator(ClosedOnExit):
         stay_on_this_machine()
         rclpy.init(args=[], context=self._context, domain_id=domain)
         self.node = rclpy.create_node('operator', context=self._context, namespace='endoscope')
-        self._orders = self.node.create_publisher(String, STATE_COMMAND, EVENT)
+        self.graph = GraphClient(self.node, self.serve)
         shafts, goals, joints = JointReader(MOTORS), JointReader(MOTORS), JointReader(JOINTS)
-        self._heard: list[tuple[RawSubscription, Callable[[bytes, int], object]]] = [
-            (self._listen(kind, topic), take)
-            for kind, topic, take in (
-                (JointState, MOTOR_MEASURED, lambda d, _: self.shafts.append(shafts.read(d))),
-                (JointState, MOTOR_COMMAND, lambda d, _: self.goals.append(goals.read(d))),
-                (JointState, SLAVE_MEASURED, lambda d, _: self._note_bending(joints.read(d))),
-                (String, OPERATING_STATE, self._note_state),
-                (Header, MOTION_SESSION, self._note_session),
-                (DiagnosticArray, '/diagnostics', self._note_health),
-            )
-        ]
-
-    def _listen(self, kind: type, topic: str) -> RawSubscription:
-        return RawSubscription(self.node, kind, topic, _DEEP)
+        for topic, take in (
+            (MOTOR_MEASURED, lambda d, _: self.shafts.append(shafts.read(d))),
+            (MOTOR_COMMAND, lambda d, _: self.goals.append(goals.read(d))),
+            (SLAVE_MEASURED, lambda d, _: self._note_bending(joints.read(d))),
+        ):
+            self.graph.listen(JointState, topic, take, qos=_DEEP)
 
     def _note_bending(self, sample: JointSample) -> None:
         self._bending = sample
-
-    def _note_state(self, data: bytes, received_ns: int) -> None:
-        self.states.append((received_ns, deserialize_message(data, String).data))
-
-    def _note_session(self, data: bytes, received_ns: int) -> None:
-        self.session = deserialize_message(data, Header).frame_id
-        if self.session:
-            self.open_ns = received_ns
-
-    def _note_health(self, data: bytes, received_ns: int) -> None:
-        for status in deserialize_message(data, DiagnosticArray).status:
-            name = status.name.removeprefix('/endoscope/')
-            self.values[name] = {v.key: v.value for v in status.values}
-            self.values[name]['message'] = status.message
-            self.heard_ns[name.partition(':')[0]] = received_ns
-
-    @property
-    def state(self) -> str:
-        """Operating state as last heard."""
-        return self.states[-1][1] if self.states else ''
-
-    @property
-    def cause(self) -> str:
-        """What the supervisor says is the matter."""
-        said = self.values.get('supervisor: operating state', {})
-        return said.get('cause') or said.get('present causes') or said.get('last refusal', '')
-
-    def order(self, text: str) -> None:
-        """Give a state command."""
-        self._orders.publish(String(data=text))
 
     def use(self, source: str) -> None:
         """Be the sender of what the source needs, and of nothing else."""
@@ -192,7 +132,7 @@ class Operator(ClosedOnExit):
                 # Stamps are a turn apart, however late this process was run.
                 self._send(self._due_ns + self._to_stamp_ns)
                 self._due_ns += _TURN_NS
-            self._hear()
+            self.graph.hear()
             if until():
                 return True
             if now >= end:
@@ -210,14 +150,14 @@ class Operator(ClosedOnExit):
         bent = self._bending.position if self._bending else (0.0,) * len(JOINTS)
         speed = tuple(swing - STEERING * x for x in bent)
         stamp = stamp_ns - self.late_ns
-        if self.source == 'outside' and self.session != self._entered:
+        if self.source == 'outside' and self.graph.session != self._entered:
             # Whoever enters a session starts from the measured pose.
-            self._entered, self._hand = self.session, bent
+            self._entered, self._hand = self.graph.session, bent
         self._hand = tuple(a + v * _TURN_NS * 1e-9 for a, v in zip(self._hand, speed, strict=True))
         if self.source == 'master':
             self._handle.publish(stamp, *self._hand)
-        elif self.session:
-            self.sent.append((self.session, stamp, (*self._hand, *speed)))
+        elif self.graph.session:
+            self.sent.append((self.graph.session, stamp, (*self._hand, *speed)))
             for session, stamped, values in (self.sent[-1], *self._old()):
                 self._handle.session = session
                 self._handle.publish(stamped, *values)
@@ -225,14 +165,8 @@ class Operator(ClosedOnExit):
     def _old(self) -> list[tuple[str, int, tuple[float, ...]]]:
         return [self.sent[self._turn * 7919 % len(self.sent)]] if self.replays else []
 
-    def _hear(self) -> None:
-        for subscription, take in self._heard:
-            for data, info in subscription.take():
-                take(data, info['received_timestamp'])
-
     def close(self) -> None:
         """Leave the graph."""
-        for subscription, _ in self._heard:
-            subscription.close()
+        self.graph.close()
         self.node.destroy_node()
         self._context.shutdown()

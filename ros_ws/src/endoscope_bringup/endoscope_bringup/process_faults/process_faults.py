@@ -118,7 +118,7 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
         rig.end('recorder')
     before: list[str] = []
     while not _moves(rig, fault.source):
-        before.append(operator.cause)
+        before.append(operator.graph.why)
         if len(before) > _MOST_TRIES:
             raise RuntimeError(f'the motion ends before anything breaks: {before[-1]}')
     lost, bag = _lost(rig), rig.bag
@@ -131,7 +131,7 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
         since_ns = time.time_ns()
     rig.revive()
     operator.serve(_AFTERMATH_S)
-    state, cause, open_ns = operator.state, operator.cause, operator.open_ns
+    state, cause, open_ns = operator.graph.state, operator.graph.why, operator.graph.open_ns
     enable_ns = time.time_ns()
     enabled_s = rig.enable_and_move()
     operator.serve(0.3)
@@ -165,7 +165,7 @@ def _moves(rig: ProcessRig, source: str) -> bool:
     operator.shafts.clear()
     operator.goals.clear()
     operator.serve(rig.random.uniform(0.3, 1.5))
-    moves = operator.state == 'ENABLED'
+    moves = operator.graph.state == 'ENABLED'
     if not moves:
         # The cause is told within a second.
         operator.serve(1.1)
@@ -173,8 +173,8 @@ def _moves(rig: ProcessRig, source: str) -> bool:
 
 
 def _lost(rig: ProcessRig) -> int:
-    said = rig.operator.values.get('recorder: recording', {})
-    return int(said.get('lost', 0))
+    said = rig.operator.graph.health.get('recorder: recording')
+    return int(said.values.get('lost', 0)) if said else 0
 
 
 def _complete_to(bag: Path, fault_ns: int) -> float:
@@ -231,13 +231,13 @@ def _command(names: tuple[str, ...], rig: ProcessRig) -> JointState:
     near = [x + rig.random.uniform(-0.1, 0.1) for x in at]
     position = rig.random.choice((near, [1.0, -1.0], [1e9, 0.0], [math.nan, 0.0]))
     message = JointState(name=list(names), position=position)
-    message.header.frame_id = rig.operator.session
+    message.header.frame_id = rig.operator.graph.session
     return message
 
 
 def _result(rig: ProcessRig) -> DiagnosticArray:
     message = DiagnosticArray()
-    message.header.frame_id = rig.operator.session
+    message.header.frame_id = rig.operator.graph.session
     message.status = [status('calibration: hysteresis class', OK, '', {'class_deg': 100})]
     return message
 
@@ -247,7 +247,7 @@ def _clutch(rig: ProcessRig) -> Joy:
 
 
 def _speak_while_disabled(rig: ProcessRig) -> None:
-    rig.operator.order('disable')
+    rig.operator.graph.order('disable')
     rig.operator.serve(0.3)
     state = _speak(String, OPERATING_STATE, lambda _: String(data='ENABLED'), RESULT)
     state.inject(rig)

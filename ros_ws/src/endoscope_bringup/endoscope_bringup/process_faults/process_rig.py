@@ -67,11 +67,11 @@ class ProcessRig(ClosedOnExit):
             if name not in self.processes.running:
                 self.start(name)
         if not self.operator.serve(PATIENCE_S, self._all_heard):
-            silent = sorted(set(NODES) - set(self.operator.heard_ns))
+            silent = sorted(set(NODES) - set(self.operator.graph.heard_ns))
             raise RuntimeError(f'not heard of: {", ".join(silent)}')
 
     def _all_heard(self) -> bool:
-        return set(self.operator.heard_ns) >= set(NODES)
+        return set(self.operator.graph.heard_ns) >= set(NODES)
 
     def start(self, name: str) -> None:
         """Start a process."""
@@ -107,7 +107,7 @@ class ProcessRig(ClosedOnExit):
 
     def _forget(self, name: str) -> None:
         for node in NODES if name == GRAPH else (name,):
-            self.operator.heard_ns.pop(node, None)
+            self.operator.graph.heard_ns.pop(node, None)
 
     def enable_and_move(self) -> float | None:
         """Enable until the shafts move; seconds that it took, None if they do not."""
@@ -121,10 +121,10 @@ class ProcessRig(ClosedOnExit):
             now = time.monotonic()
             if now >= again:
                 again = now + 0.1
-                operator.order('enable')
+                operator.graph.order('enable')
             at = operator.shafts[-1].position if operator.shafts else rest
             moved = max(abs(a - b) for a, b in zip(at, rest, strict=True)) > _MOVED_RAD
-            return operator.state == 'ENABLED' and moved
+            return operator.graph.state == 'ENABLED' and moved
 
         return time.monotonic() - began if operator.serve(PATIENCE_S, moving) else None
 

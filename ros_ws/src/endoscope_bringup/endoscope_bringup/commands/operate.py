@@ -1,0 +1,104 @@
+"""`endoscope operate`: asks a running graph for something and prints its answer."""
+
+import argparse
+
+MOVING = ('enable', 'resume', 'home', 'calibrate')
+DONE, REFUSED = 0, 1
+
+_ACTIONS = {
+    'status': 'state and why, session, health of every node, model, last calibration, recorder, '
+    'console',
+    'enable': 'let the slave move: opens a motion session; waits for ENABLED',
+    'disable': 'end the session and let go of the motors, in any state; waits for DISABLED',
+    'home': 'move the motors back to zero; waits until they are there',
+    'pause': 'end the session and hold the slave where it is; waits for PAUSED',
+    'resume': 'go on after a pause; waits for ENABLED',
+    'calibrate': 'find the hysteresis class of the tube by a motion of some 10 s; waits for the '
+    'result',
+    'set': 'give a node a new value of a parameter',
+    'get': "print a parameter's value",
+    'record': 'begin or end a recording',
+}
+_INTERRUPTED = (
+    'Ctrl-C, SIGTERM or a terminal that is closed pauses the graph: the slave holds where it is, '
+    'and nothing goes on unattended; `resume` lets it move again. Only a kill -9 of this command '
+    'leaves the motion to the graph, which ends it by itself.'
+)
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `operate`."""
+    parser = subparsers.add_parser(
+        'operate',
+        help='enable, calibrate, set parameters, record: ask a running graph, print its answer',
+        description='Asks a running graph for something and prints its answer in a line. Exits 0 '
+        'when it is done, 1 when the graph refuses it or it is not reached in time, 2 for wrong '
+        'usage, 130 when interrupted.',
+    )
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument('--json', action='store_true', help='print one JSON object instead')
+    common.add_argument(
+        '--namespace', default='endoscope', help='of the graph (default: %(default)s)'
+    )
+    common.add_argument(
+        '--timeout',
+        type=positive,
+        default=10.0,
+        metavar='S',
+        help='how long to wait for an answer (default: %(default)g)',
+    )
+    actions = parser.add_subparsers(dest='action', metavar='ACTION', required=True)
+    for name, words in _ACTIONS.items():
+        more = f' {_INTERRUPTED}' if name in MOVING else ''
+        action = actions.add_parser(
+            name, parents=[common], help=words, description=f'{words[0].upper()}{words[1:]}.{more}'
+        )
+        if name in ('set', 'get'):
+            action.add_argument(
+                'parameter', metavar='NODE.PARAMETER', help='for example compensator.mode'
+            )
+        if name == 'set':
+            action.add_argument(
+                'value', metavar='VALUE', help='of its type: true, 0.5, physical, [bend_x, bend_y]'
+            )
+        if name == 'record':
+            action.add_argument('what', choices=('start', 'stop'))
+
+
+def positive(text: str) -> float:
+    """Read a time in s for argparse: more than none, an hour at most."""
+    value = float(text)
+    if not 0.0 < value <= 3600.0:
+        raise ValueError(text)
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Ask; return 1 if it was refused or not reached in time."""
+    import json
+    import sys
+
+    from endoscope_bringup.operating.actions import act
+    from endoscope_bringup.operating.interruption import paused_when_interrupted
+    from endoscope_core.errors import printable
+    from endoscope_nodes.graph_client import GraphRefusedError, joined_graph
+
+    name = ' '.join(filter(None, (args.action, getattr(args, 'what', ''))))
+    try:
+        with (
+            joined_graph('operate', args.namespace) as client,
+            paused_when_interrupted(client, args.action in MOVING),
+        ):
+            reply = act(client, args)
+    except GraphRefusedError as error:
+        if args.json:
+            print(json.dumps({'action': name, 'done': False, 'answer': str(error)}))
+        else:
+            print(f'{name}: {error}', file=sys.stderr)
+        return REFUSED
+    if args.json:
+        print(json.dumps({'action': name, 'done': True, 'answer': reply.lines[0]} | reply.values))
+    else:
+        for line in reply.lines:
+            print(printable(line))
+    return DONE

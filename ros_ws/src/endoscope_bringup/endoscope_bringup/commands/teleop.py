@@ -1,0 +1,86 @@
+"""`endoscope teleop`: moves the slave by the keyboard of a terminal, as long as a key is held."""
+
+import argparse
+
+from endoscope_bringup.commands.operate import positive
+
+_KEYS = """\
+keys:
+  arrows, or W A S D   bend while held: left and right bend_x, down and up bend_y
+  [ ]                  slower, faster
+  - =                  smaller, larger scale: slave motion for one radian of the handle; only
+                       while nothing is held
+  E                    enable, or resume after a pause: a session is opened, nothing moves yet
+  P                    pause: the session ends, the slave holds where it is
+  H                    home while held: the motors go back to zero; let go before they are
+                       there and the graph is paused
+  Q, Ctrl-C            quit
+  space, any other     stop
+
+A held key is the dead-man. Most terminals tell only a key's repeats: then the slave moves from the
+first repeat, which comes after the keyboard's own delay of 0.25 to 0.66 s, and stops 0.15 s after
+the last one; a keyboard that repeats before 0.18 or after 0.7 s moves nothing. A terminal that
+speaks the keyboard protocol of kitty (kitty, foot, WezTerm, Ghostty, Alacritty, ...) tells press
+and release: then the slave moves from one to the other, two keys move both joints, and silence
+still stops it, 0.15 s after a repeat and 0.7 s after a press. After a stop that was no release the
+key has to be let go of and pressed anew.
+
+The slave follows while the graph is ENABLED and `console.source` is `master`, which is set with
+your consent and set back at the end. Whatever ends this program, the clutch is released first: Q,
+Ctrl-C, Ctrl-Z, SIGTERM, a closed terminal; after a kill -9 the graph stops by itself, since the
+handle is silent.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `teleop`."""
+    parser = subparsers.add_parser(
+        'teleop',
+        help='move the slave by the keyboard of a terminal; a held key is the dead-man',
+        description='Moves the slave of a running graph by the keyboard, as long as a key is held.',
+        epilog=_KEYS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        '--take', action='store_true', help='set console.source to master without asking'
+    )
+    parser.add_argument(
+        '--speed',
+        type=positive,
+        default=17.0,
+        metavar='DEG_S',
+        help='of the handle at the start, 3 to 57 deg/s (default: %(default)g)',
+    )
+    parser.add_argument(
+        '--scale',
+        type=positive,
+        help="slave motion for one radian of the handle; default the console's own",
+    )
+    parser.add_argument(
+        '--namespace', default='endoscope', help='of the graph (default: %(default)s)'
+    )
+    parser.add_argument(
+        '--timeout',
+        type=positive,
+        default=10.0,
+        metavar='S',
+        help='how long to wait for an answer of the graph (default: %(default)g)',
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Teleoperate until Q; return 1 if the graph refuses it."""
+    import sys
+
+    from endoscope_bringup.operating.terminal import check_terminal
+
+    check_terminal()
+    from endoscope_bringup.operating.teleoperation import teleoperate
+    from endoscope_nodes.graph_client import GraphRefusedError, joined_graph
+
+    try:
+        with joined_graph('teleop', args.namespace) as client:
+            return teleoperate(client, args)
+    except GraphRefusedError as error:
+        print(f'teleop: {error}', file=sys.stderr)
+        return 1

@@ -1,0 +1,58 @@
+"""`endoscope topics`: which topics there are, how often they speak, and what they say."""
+
+import argparse
+
+from endoscope_bringup.commands.operate import positive
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `topics`."""
+    parser = subparsers.add_parser(
+        'topics',
+        help="the graph's topics on the wire: who speaks and listens, how often, what they say",
+        description='Without options lists the topics of the interface with their senders and '
+        'readers, and says what is missing. Exits 0, or 1 where nobody sends what was asked for.',
+    )
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument(
+        '--hz', metavar='NAME', help='measure how often a topic speaks, by the times of receipt'
+    )
+    what.add_argument('--echo', metavar='NAME', help='print what a topic says')
+    parser.add_argument('--once', action='store_true', help='with --echo: only one message')
+    parser.add_argument('--count', type=int, metavar='N', help='end after N messages')
+    parser.add_argument('--seconds', type=positive, metavar='S', help='end after S seconds')
+    parser.add_argument('--json', action='store_true', help='JSON; one object a line with --echo')
+    parser.add_argument(
+        '--namespace',
+        default='endoscope',
+        help='of the graph and of names that begin with no / (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--timeout',
+        type=positive,
+        default=10.0,
+        metavar='S',
+        help='how long to wait for a sender (default: %(default)g)',
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """List, measure or print; return 1 where nobody sends."""
+    import sys
+
+    from endoscope_bringup.operating.listening import echo, listing, rate
+    from endoscope_nodes.graph_client import GraphRefusedError, joined_graph
+
+    count = 1 if args.once else args.count
+    try:
+        with joined_graph('topics', args.namespace) as client:
+            if args.hz:
+                rate(client, args.hz, count, args.seconds, args.timeout, args.json)
+            elif args.echo:
+                echo(client, args.echo, count, args.seconds, args.timeout, args.json)
+            else:
+                listing(client, args.timeout, args.json)
+    except GraphRefusedError as error:
+        print(f'topics: {error}', file=sys.stderr)
+        return 1
+    return 0

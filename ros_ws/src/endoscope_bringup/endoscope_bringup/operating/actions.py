@@ -1,0 +1,159 @@
+"""The actions of `endoscope operate`, each with what the graph answers."""
+
+import argparse
+import json
+import math
+import sys
+from dataclasses import dataclass, field
+from typing import Any
+
+from endoscope_bringup.operating.status import calibration_in_words, status_of
+from endoscope_nodes.graph_client import GraphClient, GraphRefusedError
+from endoscope_nodes.graph_parameters import read_parameter, set_parameters
+from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
+
+# An `enable` that brings a node's trouble to light is a fault within this time.
+_STEADY_S = 0.3
+_NEXT_WORD_S = 1.5
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What the graph answered.
+
+    Attributes
+    ----------
+    lines
+        In words, the answer itself first.
+    values
+        The same for programs.
+    """
+
+    lines: tuple[str, ...]
+    values: dict[str, Any] = field(default_factory=dict)
+
+
+def act(client: GraphClient, args: argparse.Namespace) -> Reply:
+    """Do what the command line asks for.
+
+    Raises
+    ------
+    GraphRefusedError
+        The graph refuses it, or does not do it in time.
+    UnknownParameterError
+        There is no such node, parameter or value.
+    """
+    action, patience_s = args.action, args.timeout
+    if action == 'get':
+        return _get(client, args.parameter, patience_s)
+    if action == 'set':
+        return _set(client, args.parameter, args.value, patience_s)
+    if action == 'record':
+        service = RECORDER_START if args.what == 'start' else RECORDER_STOP
+        client.find(patience_s)
+        said = client.trigger(service, patience_s)
+        return Reply((f'recording to {said}' if args.what == 'start' else said,))
+    client.find(patience_s)
+    if action == 'status':
+        return Reply(*status_of(client))
+    if action == 'calibrate':
+        return _calibrate(client, patience_s)
+    if action == 'home':
+        return Reply((client.home(patience_s),))
+    state = client.ask(action, patience_s)
+    if state == 'ENABLED':
+        if client.wait_until(lambda: client.state != 'ENABLED', _STEADY_S):
+            client.wait_until(lambda: bool(client.why), patience_s)
+            raise GraphRefusedError(f'{client.state}: {client.why}')
+        return Reply((f'{state}, {client.session}',), {'session': client.session})
+    return Reply((state,))
+
+
+def _calibrate(client: GraphClient, patience_s: float) -> Reply:
+    progress = _Progress()
+    try:
+        result = client.calibrate(progress, patience_s)
+    except GraphRefusedError as error:
+        # An aborted calibration tells what it saw: the session ended. The supervisor knows why.
+        if client.state == 'FAULT' and client.wait_until(lambda: bool(client.why), patience_s):
+            raise GraphRefusedError(f'{error} ({client.state}: {client.why})') from error
+        raise
+    finally:
+        progress.end()
+    return Reply(calibration_in_words(result), {'result': result.values})
+
+
+class _Progress:
+    """Shows how far a calibration is: one line that changes, or where nobody looks on, one a step.
+
+    It goes to stderr: stdout is for the result.
+    """
+
+    def __init__(self) -> None:
+        self._shows = sys.stderr.isatty()
+        self._step = ''
+
+    def __call__(self, step: str, share: float) -> None:
+        if self._shows:
+            done = round(20 * share)
+            bar = '#' * done + '.' * (20 - done)
+            print(f'\r[{bar}] {100 * share:3.0f} %  {step:<18}', end='', file=sys.stderr)
+        elif step != self._step:
+            print(step, file=sys.stderr)
+        sys.stderr.flush()
+        self._step = step
+
+    def end(self) -> None:
+        if self._shows and self._step:
+            print(file=sys.stderr)
+
+
+def _get(client: GraphClient, name: str, patience_s: float) -> Reply:
+    parameter = read_parameter(client, name, patience_s)
+    return Reply(
+        (f'{name} = {_in_words(parameter.value)}', f'    {parameter.description}'),
+        {
+            'node': parameter.node,
+            'parameter': parameter.name,
+            'value': _of_json(parameter.value),
+            'description': parameter.description,
+        },
+    )
+
+
+def _set(client: GraphClient, name: str, text: str, patience_s: float) -> Reply:
+    parameter = read_parameter(client, name, patience_s)
+    node, value = parameter.node, parameter.parse(text)
+    set_parameters(client, node, {parameter.name: value}, patience_s)
+    now = read_parameter(client, name, patience_s).value
+    # What a node thinks of it, it says within a second.
+    client.hear()
+    before_ns = client.heard_ns.get(node, 0)
+    client.wait_until(lambda: client.heard_ns.get(node, 0) > before_ns, _NEXT_WORD_S)
+    troubles = {
+        part: said.message
+        for part, said in client.health.items()
+        if part.partition(':')[0] == node and said.level
+    }
+    return Reply(
+        (
+            f'{name} = {_in_words(now)}, was {_in_words(parameter.value)}',
+            *(f'    {part}: {message}' for part, message in troubles.items()),
+        ),
+        {
+            'node': node,
+            'parameter': parameter.name,
+            'value': _of_json(now),
+            'was': _of_json(parameter.value),
+            'troubles': troubles,
+        },
+    )
+
+
+def _of_json(value: Any) -> Any:
+    """JSON knows neither infinity nor NaN."""
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _in_words(value: Any) -> str:
+    return value or "''" if isinstance(value, str) else json.dumps(_of_json(value))

@@ -1,0 +1,154 @@
+"""A terminal whose keys are read one by one, and which is put back as it was found."""
+
+import contextlib
+import os
+import select
+import shutil
+import sys
+import termios
+import time
+
+from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.teleop import KeyEvent, TerminalKeys
+from endoscope_core.teleop.terminal_keys import (
+    ASK_FOR_EVENTS,
+    ASK_FOR_FOCUS,
+    ASK_WHETHER,
+    END_EVENTS,
+    END_FOCUS,
+)
+
+_ANSWERED_S = 0.3
+_ESCAPE_S = 0.05
+_LOCAL, _INPUT, _CONTROL_CHARACTERS = 3, 0, 6
+_CLEAR = '\r\x1b[K'
+
+
+class NoTerminalError(EndoscopeError):
+    """There is none on stdin or stdout."""
+
+
+class TerminalLostError(Exception):
+    """It was closed, or hung up."""
+
+
+def check_terminal() -> None:
+    """Refuse to go on without a terminal.
+
+    Raises
+    ------
+    NoTerminalError
+        Stdin or stdout is none.
+    """
+    for stream, name in ((sys.stdin, 'stdin'), (sys.stdout, 'stdout')):
+        if not stream.isatty():
+            raise NoTerminalError(
+                f'teleop needs a terminal, and {name} is none: a held key is its dead-man'
+            )
+
+
+class Terminal(ClosedOnExit):
+    """Stdin without lines and echo, and one line of stdout that is written again and again.
+
+    Signals of keys stay on: Ctrl-C interrupts even where this program hangs.
+
+    Attributes
+    ----------
+    keys
+        Reads what comes.
+    """
+
+    def __init__(self) -> None:
+        self._in, self._out = sys.stdin.fileno(), sys.stdout.fileno()
+        self._before: list | None = None
+        self._begun_s: float | None = None
+        self.keys = TerminalKeys()
+
+    @property
+    def told_apart(self) -> bool:
+        """Whether it tells presses and releases apart."""
+        return bool(self.keys.told_apart)
+
+    def open(self) -> None:
+        """Take the terminal over, and ask it what it can do.
+
+        Raises
+        ------
+        TerminalLostError
+            The terminal is gone.
+        """
+        try:
+            self._before = termios.tcgetattr(self._in)
+            self._read_keys()
+        except termios.error as error:
+            raise TerminalLostError(str(error)) from error
+        self.keys = TerminalKeys()
+        self._write(ASK_WHETHER.decode())
+        end = time.monotonic() + _ANSWERED_S
+        while self.keys.told_apart is None and (left := end - time.monotonic()) > 0.0:
+            select.select([self._in], [], [], left)
+            self.read()
+        if self.told_apart:
+            self._write(ASK_FOR_EVENTS.decode())
+        self._write(ASK_FOR_FOCUS.decode())
+
+    def _read_keys(self) -> None:
+        """Have single keys instead of lines, without echo."""
+        ours = termios.tcgetattr(self._in)
+        ours[_LOCAL] &= ~(termios.ICANON | termios.ECHO | termios.IEXTEN)
+        # Ctrl-S would stop the output, and with it this program.
+        ours[_INPUT] &= ~(termios.IXON | termios.ICRNL)
+        ours[_CONTROL_CHARACTERS][termios.VMIN] = 1
+        ours[_CONTROL_CHARACTERS][termios.VTIME] = 0
+        termios.tcsetattr(self._in, termios.TCSAFLUSH, ours)
+
+    def read(self) -> list[KeyEvent]:
+        """Take the key events that have come.
+
+        Raises
+        ------
+        TerminalLostError
+            The terminal is gone.
+        """
+        events: list[KeyEvent] = []
+        while select.select([self._in], [], [], 0.0)[0]:
+            try:
+                data = os.read(self._in, 1024)
+            except OSError as error:
+                raise TerminalLostError(str(error)) from error
+            if not data:
+                raise TerminalLostError('end of input')
+            events += self.keys.read(data)
+            self._begun_s = time.monotonic()
+        if self.keys.waiting and self._begun_s and time.monotonic() - self._begun_s > _ESCAPE_S:
+            events += self.keys.flush()
+        return events
+
+    def show(self, line: str) -> None:
+        """Write the one line anew, cut to the width; not at all while the terminal is stuck."""
+        self._write(_CLEAR + line[: shutil.get_terminal_size().columns - 1])
+
+    def say(self, text: str) -> None:
+        """Write text above the one line."""
+        self._write(_CLEAR + text.replace('\n', '\r\n') + '\r\n')
+
+    def _write(self, text: str) -> None:
+        # A stuck or lost terminal must not hold up whoever has the clutch.
+        with contextlib.suppress(OSError):
+            if select.select([], [self._out], [], 0.0)[1]:
+                os.write(self._out, text.encode())
+
+    def close(self) -> None:
+        """Put the terminal back as it was found."""
+        if self._before is None:
+            return
+        before, self._before = self._before, None
+        if self.told_apart:
+            self._write(END_EVENTS.decode())
+        self._write(END_FOCUS.decode() + '\r\n')
+        # Repeats that are still to be read are not for the shell. A terminal that is lost has no
+        # settings left to restore.
+        with contextlib.suppress(termios.error):
+            termios.tcflush(self._in, termios.TCIFLUSH)
+            termios.tcsetattr(self._in, termios.TCSANOW, before)

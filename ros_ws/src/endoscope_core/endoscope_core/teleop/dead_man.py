@@ -1,0 +1,85 @@
+"""The dead-man: whether an operator holds on, judged by signs that may come late or not at all."""
+
+# A loop that stood still for longer has neither heard nor watched anything.
+STALL_NS = 100_000_000
+
+
+class DeadMan:
+    """Is held from a grip on, for as long as signs of that grip keep coming; all else lets go.
+
+    Each time that the operator takes hold is a grip with a number of its own, larger than all
+    before.  A grip that has ended, or that was begun while something forbade it, never holds again,
+    however many signs of it come: the operator has to let go and take hold anew.
+
+    Every time is steady and in ns.  Call :meth:`hear` for each sign of the operator and
+    :meth:`turn` at each turn of the loop.
+
+    Attributes
+    ----------
+    held
+        Whether it was held at the last turn.
+    reason
+        Why it is not held; empty while it is.
+    """
+
+    def __init__(self) -> None:
+        self.held = False
+        self.reason = 'not held yet'
+        self._grip = 0
+        self._spent = 0
+        self._until_ns = 0
+        self._turned_ns: int | None = None
+
+    def hear(self, now_ns: int, grip: int, lasts_ns: int) -> None:
+        """Take a sign of the operator.
+
+        Parameters
+        ----------
+        now_ns
+            When it came.
+        grip
+            Number of the grip; 0 for a hand that has let go.
+        lasts_ns
+            Within what time the next sign has to come.
+        """
+        if grip != self._grip:
+            self._spent = max(self._spent, self._grip)
+        self._grip = grip
+        self._until_ns = now_ns + lasts_ns
+
+    def turn(self, now_ns: int, hindrance: str = '') -> bool:
+        """Judge.
+
+        Parameters
+        ----------
+        now_ns
+            Now.
+        hindrance
+            What forbids motion; empty for nothing.
+
+        Returns
+        -------
+        bool
+            Whether it is held.
+        """
+        late = self._turned_ns is not None and now_ns - self._turned_ns > STALL_NS
+        self._turned_ns = now_ns
+        if late:
+            self.let_go('this program was not run in time')
+        elif not self._grip:
+            self.let_go('let go')
+        elif now_ns > self._until_ns:
+            self.let_go('no sign of the operator')
+        elif hindrance:
+            self.let_go(hindrance)
+        elif self._grip > self._spent:
+            self.held, self.reason = True, ''
+        return self.held
+
+    def let_go(self, reason: str) -> None:
+        """End the grip, whatever signs of it are still to come."""
+        self._spent = max(self._spent, self._grip)
+        self._grip = 0
+        if self.held or reason != 'let go':
+            self.reason = reason
+        self.held = False

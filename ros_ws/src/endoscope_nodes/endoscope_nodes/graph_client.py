@@ -1,0 +1,517 @@
+"""The operator's side of a running graph: asks it for something, and hears what it answers."""
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, cast
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.client import Client
+from rclpy.context import Context
+from rclpy.exceptions import InvalidNamespaceException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import LoggingSeverity, set_logger_level
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from rclpy.time import Time
+from std_msgs.msg import Header, String
+from std_srvs.srv import Trigger
+
+from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.errors import EndoscopeError
+from endoscope_nodes.discovery import stay_on_this_machine
+from endoscope_nodes.names import (
+    CALIBRATION_RESULT,
+    CALIBRATION_RUN,
+    COMPENSATOR_STATE,
+    DIAGNOSTICS,
+    HOME_REACHED,
+    MOTION_SESSION,
+    OPERATING_STATE,
+    PROCEDURE_WAITING,
+    STATE_COMMAND,
+)
+from endoscope_nodes.qos import EVENT, profile
+from endoscope_nodes.raw_subscription import RawSubscription
+from endoscope_nodes.topics import Qos
+
+PATIENCE_S = 20.0
+POLL_S = 0.05
+SUPERVISOR = 'supervisor: operating state'
+PROCEDURE = 'calibration: procedure'
+CONSOLE = 'console: commands'
+_OPENS = {'enable': 'ENABLED', 'resume': 'ENABLED', 'disable': 'DISABLED', 'pause': 'PAUSED'}
+# What was refused is told at once; the same words a second later are an old story.
+_JUST_NOW_S = 0.1
+_REPEATED_AFTER_S = 1.0
+# A loop that reads as seldom as this still hears every word.
+_HEARD = profile(Qos(200))
+_HEARD_LATCHED = profile(Qos(200, latched=True))
+
+
+class GraphRefusedError(EndoscopeError):
+    """The graph refused what was asked of it, or did not do it in time."""
+
+
+class NoGraphError(GraphRefusedError):
+    """Nobody answers."""
+
+
+@dataclass(frozen=True)
+class Health:
+    """What a node last said of a part of itself on ``/diagnostics``, or of a result.
+
+    Attributes
+    ----------
+    level
+        0 for good health, 1 for a warning, 2 for an error.
+    message
+        In words.
+    values
+        By key.
+    stamp_ns, received_ns
+        When it was said by the graph's clock, and heard by this machine's.
+    session
+        Motion session that it is of, for results.
+    """
+
+    level: int
+    message: str
+    values: dict[str, str]
+    stamp_ns: int
+    received_ns: int
+    session: str = ''
+
+
+class GraphClient(ClosedOnExit):
+    """Listens to a graph and asks it for things; it hears only while it waits for something.
+
+    Parameters
+    ----------
+    node
+        In the namespace of the graph, by which to listen and ask.
+    serve
+        Lets the node be served for so many seconds; what is waited for is looked at in between.
+    clock
+        Time in s by which patience is measured.
+
+    Attributes
+    ----------
+    state, session
+        Operating state and motion session as last heard; empty before.
+    state_ns, open_ns
+        When the state was heard, and when a session was last heard to be open.
+    health
+        By status, without the namespace: ``supervisor: operating state``.
+    heard_ns
+        When each node was last heard on ``/diagnostics``.
+    calibration, compensator
+        Last result of a calibration, and the model in force; None before the first.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        serve: Callable[[float], object],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.node = node
+        self.serve = serve
+        self._clock = clock
+        self.state = self.session = ''
+        self.state_ns = self.open_ns = 0
+        self.health: dict[str, Health] = {}
+        self.heard_ns: dict[str, int] = {}
+        self.calibration: Health | None = None
+        self.compensator: Health | None = None
+        self._busy_stamp_ns: int | None = None
+        self._prefix = f'{node.get_namespace().rstrip("/")}/'
+        self._orders = node.create_publisher(String, STATE_COMMAND, EVENT)
+        self._heard: list[tuple[RawSubscription, Callable[[bytes, int], object]]] = []
+        self.listen(String, OPERATING_STATE, self._on_state, latched=True)
+        self.listen(Header, MOTION_SESSION, self._on_session)
+        self.listen(DiagnosticArray, DIAGNOSTICS, self._on_health)
+        self.listen(DiagnosticArray, CALIBRATION_RESULT, self._on_result, latched=True)
+        self.listen(DiagnosticArray, COMPENSATOR_STATE, self._on_model, latched=True)
+        self._clients: dict[str, Client] = {}
+
+    def listen(
+        self,
+        kind: type,
+        topic: str,
+        take: Callable[[bytes, int], object],
+        *,
+        latched: bool = False,
+        qos: QoSProfile | None = None,
+    ) -> RawSubscription:
+        """Hear one more topic: ``take`` gets each message's bytes and its receipt in ns."""
+        asked = qos or (_HEARD_LATCHED if latched else _HEARD)
+        subscription = RawSubscription(self.node, kind, topic, asked)
+        self._heard.append((subscription, take))
+        return subscription
+
+    def hear(self) -> None:
+        """Take all that has come."""
+        for subscription, take in self._heard:
+            for data, info in subscription.take():
+                take(data, info['received_timestamp'])
+
+    def is_connected(self) -> bool:
+        """Whether every topic that is heard has a sender, and the commands a reader."""
+        return self._is_heard() and all(s.count_publishers() for s, _ in self._heard)
+
+    def _on_state(self, data: bytes, received_ns: int) -> None:
+        self.state = deserialize_message(data, String).data
+        self.state_ns = received_ns
+
+    def _on_session(self, data: bytes, received_ns: int) -> None:
+        self.session = deserialize_message(data, Header).frame_id
+        if self.session:
+            self.open_ns = received_ns
+
+    def _on_health(self, data: bytes, received_ns: int) -> None:
+        message = deserialize_message(data, DiagnosticArray)
+        for status in message.status:
+            if not status.name.startswith(self._prefix):
+                continue
+            name = status.name.removeprefix(self._prefix)
+            health = _health(message, status, received_ns)
+            self.health[name] = health
+            self.heard_ns[name.partition(':')[0]] = received_ns
+            if name == PROCEDURE and health.message != PROCEDURE_WAITING:
+                self._busy_stamp_ns = health.stamp_ns
+
+    def _on_result(self, data: bytes, received_ns: int) -> None:
+        message = deserialize_message(data, DiagnosticArray)
+        self.calibration = _health(message, message.status[0], received_ns)
+
+    def _on_model(self, data: bytes, received_ns: int) -> None:
+        message = deserialize_message(data, DiagnosticArray)
+        self.compensator = _health(message, message.status[0], received_ns)
+
+    @property
+    def why(self) -> str:
+        """Why the supervisor forbids motion; empty where it does not."""
+        said = self.health.get(SUPERVISOR)
+        if said is None:
+            return ''
+        return said.values.get('cause') or said.values.get('present causes', '')
+
+    @property
+    def where(self) -> str:
+        """Namespace and domain, in words."""
+        namespace = self.node.get_namespace()
+        return f'namespace {namespace}, ROS_DOMAIN_ID {self.node.context.get_domain_id()}'
+
+    def nodes(self) -> list[str]:
+        """Names of the nodes in the namespace, without this one."""
+        own, namespace = self.node.get_name(), self.node.get_namespace()
+        found = self.node.get_node_names_and_namespaces()
+        return sorted({name for name, space in found if space == namespace and name != own})
+
+    def wait_until(self, condition: Callable[[], bool], patience_s: float = PATIENCE_S) -> bool:
+        """Listen until something has come true, or for so long; whether it has."""
+        end = self._clock() + patience_s
+        while True:
+            self.hear()
+            if condition():
+                return True
+            if self._clock() > end:
+                return False
+            self.serve(POLL_S)
+
+    def wait_for(
+        self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
+    ) -> None:
+        """Listen until something has come true.
+
+        Raises
+        ------
+        GraphRefusedError
+            It has not within so long.
+        """
+        if not self.wait_until(condition, patience_s):
+            raise GraphRefusedError(f'waited {patience_s:g} s in vain for {what}')
+
+    def find(self, patience_s: float) -> None:
+        """Wait until the supervisor is heard and hears.
+
+        Raises
+        ------
+        NoGraphError
+            Nobody does within so long.
+        """
+        if self.wait_until(lambda: bool(self.state) and self._is_heard(), patience_s):
+            return
+        others = self.nodes()
+        if others:
+            raise NoGraphError(
+                f'no supervisor answers in {self.where}; there are {", ".join(others)}'
+            )
+        raise NoGraphError(f'no graph answers in {self.where}: start one with `graph`')
+
+    def _is_heard(self) -> bool:
+        known = self.node.get_subscriptions_info_by_topic(self._orders.topic_name)
+        return 0 < len(known) <= self._orders.get_subscription_count()
+
+    def order(self, command: str) -> None:
+        """Give a state command and wait for nothing."""
+        self._orders.publish(String(data=command))
+
+    def ask(self, command: str, patience_s: float = PATIENCE_S) -> str:
+        """Give a state command and wait for the state that it leads to; that state.
+
+        Raises
+        ------
+        GraphRefusedError
+            With the supervisor's reason, or because the state is not reached in time.
+        """
+        target = _OPENS[command]
+        asked_ns = time.time_ns()
+        self._ask(
+            command,
+            lambda: self.state == target and self.state_ns > asked_ns,
+            target,
+            patience_s,
+        )
+        return target
+
+    def _ask(self, command: str, done: Callable[[], bool], what: str, patience_s: float) -> None:
+        """Give a command, again where it brought no answer, until it is done."""
+        asked_ns = time.time_ns()
+        end = self._clock() + patience_s
+        while self._clock() <= end:
+            self.order(command)
+            if self.wait_until(lambda: done() or bool(self._refused(asked_ns)), _REPEATED_AFTER_S):
+                refused = self._refused(asked_ns)
+                if refused:
+                    raise GraphRefusedError(refused)
+                return
+        raise GraphRefusedError(f'waited {patience_s:g} s in vain for {what}')
+
+    def _refused(self, asked_ns: int) -> str:
+        """What was refused just now, by the supervisor or calibration; empty for nothing."""
+        for name, text, age, begins in (
+            (SUPERVISOR, 'last refusal', 'since last refusal [s]', ''),
+            (PROCEDURE, 'last', 'since last [s]', 'home: '),
+        ):
+            said = self.health.get(name)
+            if said is None or said.received_ns <= asked_ns or age not in said.values:
+                continue
+            words = said.values[text]
+            if float(said.values[age]) < _JUST_NOW_S and words and words.startswith(begins):
+                return words
+        return ''
+
+    def home(self, patience_s: float = PATIENCE_S) -> str:
+        """Go home, and wait until the slave is there; what calibration says of it.
+
+        Raises
+        ------
+        GraphRefusedError
+            With the reason of the supervisor or of calibration.
+        """
+        asked_ns = time.time_ns()
+        self._busy_stamp_ns = None
+        self._ask(
+            'home',
+            lambda: self._begun(asked_ns),
+            'the way home: calibration does not begin it',
+            patience_s,
+        )
+        said = self._procedure_to_its_end(patience_s)
+        if said != HOME_REACHED:
+            raise GraphRefusedError(said)
+        return said
+
+    def _begun(self, asked_ns: int) -> bool:
+        said = self.health.get(PROCEDURE)
+        return self._busy_stamp_ns is not None and said is not None and said.received_ns > asked_ns
+
+    def _procedure_to_its_end(
+        self, patience_s: float, progress: Callable[[str, float], None] = lambda step, share: None
+    ) -> str:
+        """Wait while calibration moves the slave; what it said last."""
+        while True:
+            said = self.health[PROCEDURE]
+            if said.message == PROCEDURE_WAITING:
+                return said.values['last']
+            progress(said.message, float(said.values['progress']))
+            heard_ns = said.received_ns
+            if not self.wait_until(
+                lambda heard=heard_ns: self.health[PROCEDURE].received_ns > heard, patience_s
+            ):
+                raise GraphRefusedError(f'calibration has been silent for {patience_s:g} s')
+
+    def calibrate(
+        self,
+        progress: Callable[[str, float], None] = lambda step, share: None,
+        patience_s: float = PATIENCE_S,
+    ) -> Health:
+        """Calibrate, and wait for the result.
+
+        Parameters
+        ----------
+        progress
+            Called about once a second with what is being done and the share that is done.
+        patience_s
+            For how long calibration may say nothing.
+
+        Raises
+        ------
+        GraphRefusedError
+            It was refused or aborted, or the tube is of no known class; with the reason.
+        """
+        self._busy_stamp_ns = None
+        self.trigger(CALIBRATION_RUN, patience_s)
+        # A result that was latched before this calibration began is another's.
+        self.wait_for(
+            lambda: self._busy_stamp_ns is not None, 'calibration to say that it begins', patience_s
+        )
+        begun_ns = cast(int, self._busy_stamp_ns)
+        said = self._procedure_to_its_end(patience_s, progress)
+
+        def is_told() -> bool:
+            return self.calibration is not None and self.calibration.stamp_ns > begun_ns
+
+        self.wait_for(is_told, f'{CALIBRATION_RESULT}; calibration says: {said}', patience_s)
+        result = cast(Health, self.calibration)
+        if result.level != 0:
+            raise GraphRefusedError(result.message)
+        return result
+
+    def trigger(self, service: str, patience_s: float = PATIENCE_S) -> str:
+        """Call a service that only begins or ends something; what it answers.
+
+        Raises
+        ------
+        GraphRefusedError
+            With the node's reason.
+        """
+        answer = self.call(Trigger, service, Trigger.Request(), patience_s)
+        if not answer.success:
+            raise GraphRefusedError(answer.message)
+        return str(answer.message)
+
+    def client(self, kind: type, service: str) -> Client:
+        """Client of a service; made when it is asked for first."""
+        if service not in self._clients:
+            self._clients[service] = self.node.create_client(kind, service)
+        return self._clients[service]
+
+    def call(self, kind: type, service: str, request: Any, patience_s: float = PATIENCE_S) -> Any:
+        """Call a service and wait for its answer.
+
+        Raises
+        ------
+        NoGraphError
+            Nobody serves it, or nobody answers.
+        """
+        client = self.client(kind, service)
+        if not self.wait_until(client.service_is_ready, patience_s):
+            raise NoGraphError(f'nobody serves {service} in {self.where}')
+        return self.answer(client.call_async(request), service, patience_s)
+
+    def answer(self, future: Future, what: str, patience_s: float = PATIENCE_S) -> Any:
+        """Wait for the answer to a call.
+
+        Raises
+        ------
+        NoGraphError
+            Nobody answers.
+        """
+        if not self.wait_until(future.done, patience_s):
+            raise NoGraphError(f'{what} has not answered for {patience_s:g} s')
+        return future.result()
+
+    def close(self) -> None:
+        """Listen and ask no more; the node remains."""
+        for subscription, _ in self._heard:
+            subscription.close()
+        for client in self._clients.values():
+            self.node.destroy_client(client)
+        self.node.destroy_publisher(self._orders)
+
+
+def _health(message: DiagnosticArray, status: DiagnosticStatus, received_ns: int) -> Health:
+    return Health(
+        status.level[0],
+        status.message,
+        {item.key: item.value for item in status.values},
+        Time.from_msg(message.header.stamp).nanoseconds,
+        received_ns,
+        message.header.frame_id,
+    )
+
+
+@contextmanager
+def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterator[GraphClient]:
+    """Join the graph of a namespace as a node of this name, for as long as the block lasts.
+
+    Raises
+    ------
+    EndoscopeError
+        The namespace or the domain cannot be one.
+    """
+    stay_on_this_machine()
+    context = Context()
+    # What rcl says to the log besides raising it would be a second line.
+    set_logger_level('rcl', LoggingSeverity.FATAL)
+    try:
+        rclpy.init(
+            args=[],
+            context=context,
+            domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+    except rclpy_implementation.RCLError as error:
+        given = os.environ.get('ROS_DOMAIN_ID', '')
+        raise EndoscopeError(
+            f'ROS_DOMAIN_ID is {given!r}; give a whole number from 0 to 232'
+        ) from error
+    finally:
+        set_logger_level('rcl', LoggingSeverity.UNSET)
+    try:
+        with _node(name, namespace, context) as node:
+            executor = SingleThreadedExecutor(context=context)
+            executor.add_node(node)
+
+            def serve(seconds: float) -> None:
+                end = time.monotonic() + seconds
+                while (left := end - time.monotonic()) > 0.0:
+                    executor.spin_once(timeout_sec=left)
+
+            try:
+                with GraphClient(node, serve) as client:
+                    yield client
+            finally:
+                executor.shutdown()
+    finally:
+        context.try_shutdown()
+
+
+@contextmanager
+def _node(name: str, namespace: str, context: Context) -> Iterator[Node]:
+    try:
+        node = Node(
+            name,
+            context=context,
+            namespace=f'/{namespace.strip("/")}',
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+    except InvalidNamespaceException as error:
+        raise EndoscopeError(
+            f'--namespace {namespace!r} cannot be one: letters, digits, _ and /'
+        ) from error
+    try:
+        yield node
+    finally:
+        node.destroy_node()

@@ -1,0 +1,53 @@
+"""Speaks for a console handle: where it is, and whether its clutch is held."""
+
+from collections.abc import Sequence
+
+from rclpy.node import Node
+from sensor_msgs.msg import Joy
+
+from endoscope_nodes.joint_stream import JointPublisher
+from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MASTER_MEASURED
+from endoscope_nodes.qos import EVENT, SENSOR_OFFERED
+
+CLUTCH_PERIOD_NS = 100_000_000
+
+
+class HandleSender:
+    """The one sender of ``master/measured_js`` and ``master/clutch``.
+
+    Parameters
+    ----------
+    node
+        In the namespace of the graph.
+
+    Attributes
+    ----------
+    clutch
+        Whether it is held, as was last said.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._angles = JointPublisher(node, MASTER_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
+        self._clutch = node.create_publisher(Joy, MASTER_CLUTCH, EVENT)
+        self._said_ns = 0
+        self.clutch = False
+
+    def press(self, held: bool, stamp_ns: int) -> None:
+        """Say at once whether the clutch is held; stamped in ns."""
+        self.clutch = held
+        self._said_ns = stamp_ns
+        message = Joy(buttons=[int(held)])
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
+        self._clutch.publish(message)
+
+    def send(self, stamp_ns: int, position: Sequence[float]) -> None:
+        """Say where the handle is, in rad, and ten times a second whether the clutch is held."""
+        self._angles.publish(stamp_ns, *position)
+        if stamp_ns - self._said_ns >= CLUTCH_PERIOD_NS:
+            self.press(self.clutch, stamp_ns)
+
+    def close(self) -> None:
+        """Leave both topics to another sender."""
+        self._angles.close()
+        self._node.destroy_publisher(self._clutch)
