@@ -153,7 +153,6 @@ class Proposal:
         for column in unused:
             yield f'#   column {column.number} {column.title}'.rstrip() + f' ({_range(column)})'
 
-
     def _source(self, column: ColumnGuess) -> str:
         alike = sum(each.title == column.title for each in self.columns)
         plain = column.title and column.title.isprintable() and alike == 1
@@ -283,7 +282,9 @@ def _topic_and_quantity(name: str, unit: str | None) -> tuple[str, str] | None:
         quantity = 'velocity'
     elif unit in ('N m', 'mN m') or _TORQUE.search(name):
         quantity = 'effort'
-    if unit in ('N', 'mN', 'kN') or (unit is None and _WIRE.search(name) and quantity != 'velocity'):
+    if unit in ('N', 'mN', 'kN') or (
+        unit is None and _WIRE.search(name) and quantity != 'velocity'
+    ):
         return WIRES, 'effort'
     if _COMMAND.search(name):
         return (SHAFT if _MOTOR.search(name) else DESIRED), quantity
