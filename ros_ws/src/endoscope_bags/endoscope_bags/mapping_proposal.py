@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_bags.delimited_text import WHITESPACE, DelimitedText, is_date, is_number
+from endoscope_bags.delimited_text import WHITESPACE, DelimitedText, is_date
 from endoscope_bags.units import DATE, TIME_UNITS, UNITS
 from endoscope_core.errors import printable
 
@@ -109,8 +109,10 @@ class Proposal:
         rows = [head, *map(_row, self.columns)]
         widths = [max(len(row[k]) for row in rows) for k in range(len(head))]
         lines = [
-            f'{self.table}: {self.rows} rows from line {self.first_line}, separated by '
-            f'{named}{comma}',
+            (
+                f'{self.table}: {self.rows} rows from line {self.first_line}, separated by '
+                f'{named}{comma}'
+            ),
             *('  '.join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in rows),
         ]
         return '\n'.join(printable(line.rstrip()) for line in lines)

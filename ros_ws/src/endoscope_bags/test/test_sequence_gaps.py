@@ -52,7 +52,7 @@ def test_the_losses_of_two_publishers_add_up(dropped_a, dropped_b):
 
 @given(st.lists(st.integers(2, 58), min_size=1, max_size=5, unique=True))
 def test_numbers_that_come_late_are_not_lost(early):
-    sequences = [k for k in range(1, 60)]
+    sequences = list(range(1, 60))
     for number in early:
         sequences.remove(number)
         sequences.insert(max(number - 5, 1), number)
