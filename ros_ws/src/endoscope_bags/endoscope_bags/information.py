@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +16,13 @@ from endoscope_core.errors import printable
 
 LOST_PREFIX = 'lost '
 _NUMBER = re.compile('[0-9]{1,18}')
-# A silence of this many periods is a dropout; a topic slower than this is not periodic.
-_DROPOUT_PERIODS = 2.5
+# A topic is silent if nothing comes for so many periods; one slower than this is not periodic.
+_SILENT_PERIODS = 2.5
 _SLOWEST_PERIOD_S = 0.2
 _FEWEST_MESSAGES = 10
+# Several sources that report once a second give a median interval that is nobody's period.
+_REGULAR_SHARE = 0.8
+_REGULAR = 0.5
 
 
 @dataclass(frozen=True)
@@ -32,16 +36,22 @@ class TopicInformation:
     message_count
         Number of messages.
     rate_hz
-        One over the median interval; None for fewer than two messages.
+        One over the median interval; over the mean where the topic is not periodic; None for fewer
+        than two messages.
     duration_s
         First to last message.
-    dropouts
-        Silences longer than 2.5 periods, by header stamp (by publication where there is none); 0
-        for topics that are not periodic.
-    longest_gap_s
-        The longest silence; None for fewer than two messages.
+    pauses
+        Silences longer than 2.5 periods in which nothing was published: the numbers of the messages
+        go on, or the topic is latched and has news now and then. By header stamp (by publication
+        where there is none); 0 for topics that are not periodic.
+    paused_s
+        Total of the pauses, each less one period.
+    gaps
+        Silences in which messages were lost or, where nothing numbers them, may have been.
     missing_s
-        Total of the dropouts, each less one period.
+        Total of the gaps, each less one period.
+    longest_silence_s
+        The longest interval; None for fewer than two messages.
     lost
         Messages that were published and did not arrive; None where the recorder did not tell.
     """
@@ -51,9 +61,11 @@ class TopicInformation:
     message_count: int
     rate_hz: float | None
     duration_s: float
-    dropouts: int
-    longest_gap_s: float | None
+    pauses: int
+    paused_s: float
+    gaps: int
     missing_s: float
+    longest_silence_s: float | None
     lost: int | None
 
 
@@ -93,6 +105,15 @@ class BagInformation:
         """Messages lost, as far as is known."""
         return sum(topic.lost or 0 for topic in self.topics)
 
+    def as_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            **vars(self),
+            'message_count': self.message_count,
+            'lost': self.lost,
+            'topics': [vars(topic) for topic in self.topics],
+        }
+
     def __str__(self) -> str:
         begin = np.datetime64(self.start_ns, 'ns')
         lines = [
@@ -101,7 +122,17 @@ class BagInformation:
         ]
         lines += [f'{key}: {value}' for key, value in self.notes.items()]
         lines += [f'damage: {what}' for what in self.damage]
-        head = ('topic', 'type', 'messages', 'rate', 'duration', 'dropouts', 'longest gap', 'lost')
+        head = (
+            'topic',
+            'type',
+            'messages',
+            'rate',
+            'duration',
+            'pauses',
+            'gaps',
+            'longest silence',
+            'lost',
+        )
         rows = [head, *(_row(topic) for topic in self.topics)]
         widths = [max(len(row[k]) for row in rows) for k in range(len(head))]
         lines += [
@@ -115,17 +146,22 @@ class BagInformation:
 
 
 def _row(topic: TopicInformation) -> tuple[str, ...]:
-    dropouts = f'{topic.dropouts} ({topic.missing_s:.3f} s)' if topic.dropouts else '0'
+    silence = topic.longest_silence_s
     return (
         topic.name,
         topic.type or '?',
         str(topic.message_count),
         '-' if topic.rate_hz is None else f'{topic.rate_hz:.4g} Hz',
         f'{topic.duration_s:.3f} s',
-        dropouts,
-        '-' if topic.longest_gap_s is None else f'{topic.longest_gap_s:.4g} s',
+        _counted(topic.pauses, topic.paused_s),
+        _counted(topic.gaps, topic.missing_s),
+        '-' if silence is None else f'{silence:.4g} s',
         '?' if topic.lost is None else str(topic.lost),
     )
+
+
+def _counted(silences: int, seconds: float) -> str:
+    return f'{silences} ({seconds:.3f} s)' if silences else '0'
 
 
 def bag_information(recording: Recording) -> BagInformation:
@@ -158,29 +194,47 @@ def _topic_information(
     recording: Recording, name: str, lost: int | None, stamps: npt.NDArray[np.int64] | None
 ) -> TopicInformation:
     topic = recording.topics[name]
-    if lost is None and recording.library == LIBRARY:
+    numbered = recording.library == LIBRARY
+    lost_before = np.zeros(topic.message_count, dtype=np.int64)
+    if numbered:
         gaps = SequenceGaps()
-        for sequence in recording.times(name).sequence.tolist():
-            gaps.add(sequence)
-        lost = gaps.lost
+        lost_before[:] = [gaps.add(n) for n in recording.times(name).sequence.tolist()]
+        lost = gaps.lost if lost is None else lost
     # Times of the source: header stamps where all messages have them, otherwise publication.
     if stamps is None or len(stamps) != topic.message_count:
         stamps = recording.times(name).publish_ns
-    times = np.sort(stamps)
-    intervals = np.diff(times) * 1e-9
-    period = float(np.median(intervals)) if len(intervals) else None
-    periodic = (
-        period is not None and len(times) >= _FEWEST_MESSAGES and 0 < period <= _SLOWEST_PERIOD_S
-    )
-    silent = intervals[intervals > _DROPOUT_PERIODS * period] if periodic and period else ()
+    order = np.argsort(stamps, kind='stable')
+    intervals = np.diff(stamps[order]) * 1e-9
+    period = _period(intervals)
+    silent = intervals > _SILENT_PERIODS * period if period else np.zeros(len(intervals), bool)
+    latched = any(profile.durability == 'transient_local' for profile in topic.qos)
+    paused = silent & ((lost_before[order][1:] == 0) if numbered else latched)
+    duration = float(intervals.sum())
+    mean = duration / len(intervals) if len(intervals) else 0.0
     return TopicInformation(
         name=name,
         type=topic.type,
         message_count=topic.message_count,
-        rate_hz=1 / period if period else None,
-        duration_s=float(times[-1] - times[0]) * 1e-9 if len(times) else 0.0,
-        dropouts=len(silent),
-        longest_gap_s=float(intervals.max()) if len(intervals) else None,
-        missing_s=float(np.sum(silent)) - len(silent) * (period or 0.0),
+        rate_hz=1 / (period or mean) if period or mean else None,
+        duration_s=duration,
+        pauses=int(paused.sum()),
+        paused_s=_less_one_period(intervals[paused], period),
+        gaps=int((silent & ~paused).sum()),
+        missing_s=_less_one_period(intervals[silent & ~paused], period),
+        longest_silence_s=float(intervals.max()) if len(intervals) else None,
         lost=lost,
     )
+
+
+def _period(intervals: npt.NDArray[np.float64]) -> float | None:
+    """Period of a topic in s; None where it has none."""
+    if len(intervals) + 1 < _FEWEST_MESSAGES:
+        return None
+    usual = float(np.median(intervals))
+    regular = np.abs(intervals - usual) <= _REGULAR * usual
+    periodic = 0.0 < usual <= _SLOWEST_PERIOD_S and regular.mean() >= _REGULAR_SHARE
+    return usual if periodic else None
+
+
+def _less_one_period(silences: npt.NDArray[np.float64], period: float | None) -> float:
+    return float(silences.sum()) - len(silences) * (period or 0.0)

@@ -8,6 +8,7 @@ has the last word on the hash, because `rosbags` hashes the rare fields of type 
 import functools
 import json
 import os
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,6 +25,8 @@ JOY = 'sensor_msgs/msg/Joy'
 STRING = 'std_msgs/msg/String'
 DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
 CLOCK = 'rosgraph_msgs/msg/Clock'
+# The name of a type comes out of files and becomes that of a file.
+_NAME = re.compile('[A-Za-z][A-Za-z0-9_]{0,99}/msg/[A-Za-z][A-Za-z0-9_]{0,99}')
 
 
 @dataclass(frozen=True)
@@ -123,6 +126,8 @@ def _generated_hash(name: str) -> str | None:
 
 
 def _installed_file(name: str, suffix: str) -> Path | None:
+    if not _NAME.fullmatch(name):
+        return None
     package, _, kind = name.partition('/msg/')
     sourced = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     for prefix in (*filter(None, sourced), sys.prefix):

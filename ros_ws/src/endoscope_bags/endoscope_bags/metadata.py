@@ -24,13 +24,13 @@ _ROOT = 'rosbag2_bagfile_information'
 
 
 def bag_files(path: Path) -> list[Path]:
-    """Return the ``.mcap`` files of a recording in their order.
+    """Return the ``.mcap`` or ``.db3`` files of a recording in their order.
 
     Parameters
     ----------
     path
-        A ``.mcap`` file, or a rosbag2 folder. A folder without ``metadata.yaml`` (its recorder was
-        killed) is taken with all the ``.mcap`` in it.
+        Such a file, or a rosbag2 folder. A folder without ``metadata.yaml`` (its recorder was
+        killed) is taken with all the ``.mcap``, or else all the ``.db3``, in it.
 
     Raises
     ------
@@ -39,16 +39,18 @@ def bag_files(path: Path) -> list[Path]:
     NotABagError
         The folder holds no recording, or its metadata are not rosbag2's.
     UnsupportedBagError
-        The recording is in sqlite3 or compressed as a whole.
+        The recording is in a storage of its own or compressed as a whole.
     """
     if not path.exists():
         raise BagNotFoundError(f'{path}: no such file or folder')
     if path.is_file():
         return [path]
     if not (path / METADATA).is_file():
-        found = sorted(path.glob('*.mcap'))
+        found = sorted(path.glob('*.mcap')) or sorted(path.glob('*.db3'))
         if not found:
-            raise NotABagError(f'{path}: a folder with neither metadata.yaml nor any .mcap in it')
+            raise NotABagError(
+                f'{path}: a folder with neither metadata.yaml nor any .mcap or .db3 in it'
+            )
         return found
     files = [path / name for name in _listed_files(path / METADATA)]
     for file in files:
@@ -70,10 +72,11 @@ def _listed_files(path: Path) -> list[str]:
         raise NotABagError(f'{path}: not the metadata of a rosbag2 recording')
     storage = information.get('storage_identifier')
     compression = information.get('compression_mode') or 'none'
-    if storage != 'mcap' or str(compression).lower() != 'none':
+    if storage not in ('mcap', 'sqlite3') or str(compression).lower() != 'none':
         raise UnsupportedBagError(
-            f'{path}: storage {storage}, compression mode {compression}; '
-            'convert it to plain mcap first (ros2 bag convert)'
+            f'{path}: storage {storage}, compression mode {compression}: only mcap and sqlite3 '
+            'without compression of whole files or messages are read; convert it where it was '
+            'recorded (ros2 bag convert)'
         )
     if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
         raise NotABagError(

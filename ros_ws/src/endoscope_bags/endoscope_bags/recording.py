@@ -31,10 +31,12 @@ from endoscope_bags.mcap_scan import McapScan, scan_mcap
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, typestore
 from endoscope_bags.metadata import bag_files
 from endoscope_bags.qos_profile import QosProfile, qos_from_yaml
+from endoscope_bags.sqlite3_scan import Sqlite3Scan, is_sqlite3, scan_sqlite3
 from endoscope_bags.topic import MessageTimes, RawMessage, Topic
 from endoscope_core.strict_yaml import LARGEST, YamlError
 
 IntArray = npt.NDArray[np.int64]
+Scan = McapScan | Sqlite3Scan
 
 
 @contextmanager
@@ -60,7 +62,7 @@ class _Block(NamedTuple):
     sequence: IntArray
 
 
-def _rows_of_topics(scan: McapScan) -> dict[str, IntArray]:
+def _rows_of_topics(scan: Scan) -> dict[str, IntArray]:
     """For each topic of a file the rows of its messages in the file's table."""
     names = list(dict.fromkeys(channel.topic for channel in scan.channels.values()))
     numbers = {name: k for k, name in enumerate(names)}
@@ -90,7 +92,7 @@ class Recording:
         What is wrong, one line each; empty unless it was opened with `salvage`.
     """
 
-    def __init__(self, path: Path, scans: Sequence[McapScan], salvage: bool = False) -> None:
+    def __init__(self, path: Path, scans: Sequence[Scan], salvage: bool = False) -> None:
         self.path = path
         self._salvage = salvage
         self.library = scans[0].header.library
@@ -104,7 +106,7 @@ class Recording:
         for scan in scans:
             self._add(scan)
 
-    def _add(self, scan: McapScan) -> None:
+    def _add(self, scan: Scan) -> None:
         rows = _rows_of_topics(scan)
         uncounted = dict(rows)
         self._rows.append(rows)
@@ -386,12 +388,12 @@ class Recording:
 
 
 def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
-    """Open a rosbag2 folder or a bare ``.mcap`` file.
+    """Open a rosbag2 folder, or a bare ``.mcap`` or ``.db3`` file.
 
     Parameters
     ----------
     path
-        Folder with ``metadata.yaml`` and one or more ``.mcap``, or one such file.
+        Folder with ``metadata.yaml`` and one or more ``.mcap`` or ``.db3``, or one such file.
     salvage
         Read what is sound of a damaged recording (see `Recording.damage`) instead of raising.
 
@@ -402,7 +404,10 @@ def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
         All of them `BagError`; the message names the file and what to do.
     """
     path = Path(path)
-    scans = [scan_mcap(file, salvage=salvage) for file in bag_files(path)]
+    scans: list[Scan] = [
+        (scan_sqlite3 if is_sqlite3(file) else scan_mcap)(file, salvage=salvage)
+        for file in bag_files(path)
+    ]
     for scan in scans:
         foreign = {c.message_encoding for c in scan.channels.values()} - {'cdr'}
         if foreign:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 # Every message is compared with the last one of each; numbers at random would make thousands.
 _MOST_PUBLISHERS = 64
+_MOST_GAPS = 64
 
 
 def one_publisher() -> int:
@@ -22,13 +23,16 @@ class SequenceGaps:
     received
         Messages seen.
     lost
-        Messages that never came, between the first and the last that did.
+        Messages that never came, between the first and the last that did; those that came late
+        are none.
     """
 
     def __init__(self) -> None:
         self.received = 0
         self.lost = 0
         self._last: list[int] = []
+        # First and last number of what is missing; the latest gaps only.
+        self._missing: list[tuple[int, int]] = []
 
     @property
     def publisher_count(self) -> int:
@@ -53,6 +57,8 @@ class SequenceGaps:
             if before + 1 == sequence:
                 last[k] = sequence
                 return 0
+        if self._came_late(sequence):
+            return 0
         earlier = [k for k, before in enumerate(last) if before < sequence]
         if not earlier and len(last) >= _MOST_PUBLISHERS:
             last[min(range(len(last)), key=last.__getitem__)] = sequence
@@ -64,4 +70,15 @@ class SequenceGaps:
         gap = sequence - last[nearest] - 1
         last[nearest] = sequence
         self.lost += gap
+        if gap:
+            self._missing = [*self._missing, (sequence - gap, sequence - 1)][-_MOST_GAPS:]
         return gap
+
+    def _came_late(self, sequence: int) -> bool:
+        for k, (first, final) in enumerate(self._missing):
+            if first <= sequence <= final:
+                rest = [(first, sequence - 1), (sequence + 1, final)]
+                self._missing[k : k + 1] = [(a, b) for a, b in rest if a <= b]
+                self.lost -= 1
+                return True
+        return False

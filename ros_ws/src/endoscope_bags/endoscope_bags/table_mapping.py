@@ -1,17 +1,6 @@
 """How the columns of a text table become topics: the mapping file of `endoscope convert`.
 
-    time: {column: 1, unit: s}
-    topics:
-      slave/servo_jp:
-        position: {bend_x: {column: 2, unit: deg}}
-      wires/measured_js:
-        effort: {wire_x_pos: {column: 5, unit: N}, wire_x_neg: {column: 6, unit: N}}
-
-Further keys, all optional: `delimiter` (`,`, or `whitespace`), `header_lines` (lines to skip),
-`namespace`, `start_s` (added to every time), `drop_repeats` (whether a row whose time is that of
-the row before is dropped; true), `sample_and_hold` (whether the table was written faster than its
-sources gave new numbers, and repeats old ones until then; false). A column may have a `scale`
-(after the unit) and an `offset`.
+`EXAMPLE` shows a whole one and names every key.
 """
 
 import math
@@ -20,26 +9,57 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from endoscope_bags.delimited_text import WHITESPACE, known_unit
 from endoscope_bags.errors import BagError
+from endoscope_bags.units import TIME_UNITS, UNITS
+from endoscope_core.errors import nearest
 from endoscope_core.strict_yaml import YamlError, load_yaml
 
 _TYPES = {str: 'a text', int: 'a whole number', bool: 'true or false'}
 QUANTITIES = ('position', 'velocity', 'effort')
-UNITS = {
-    's': 1.0,
-    'ms': 1e-3,
-    'us': 1e-6,
-    'rad': 1.0,
-    'deg': math.pi / 180.0,
-    'rad/s': 1.0,
-    'deg/s': math.pi / 180.0,
-    'N': 1.0,
-    'mN': 1e-3,
-    'N m': 1.0,
-    'mN m': 1e-3,
-    '-': 1.0,
-}
-"""SI value of one of each unit."""
+KEYS = (
+    'time',
+    'topics',
+    'delimiter',
+    'decimal_comma',
+    'header_lines',
+    'namespace',
+    'start_s',
+    'drop_repeats',
+    'sample_and_hold',
+)
+EXAMPLE = """\
+time: {column: time, unit: ms}          # a column by its name or by its number, from 1
+topics:                                 # what each topic takes from the table
+  slave/servo_jp:                       # the desired angle (or motor/servo_jp: the shaft's)
+    position: {bend_x: {column: "target [deg]", unit: deg}}
+  motor/measured_js:
+    position: {motor_x: {column: 3, unit: rad, scale: 0.5, offset: 0.1}}
+  slave/measured_js:
+    position: {bend_x: {column: angle}}          # no unit: the one in the table's heading, else SI
+  wires/measured_js:
+    effort: {wire_x_pos: {column: 5, unit: N}, wire_x_neg: {column: 6, unit: N}}
+# All that follows may be left out.
+delimiter: ';'          # one character, or whitespace; found from the table if left out
+decimal_comma: true     # numbers such as 0,25; found if left out
+header_lines: 2         # lines above the numbers; found if left out
+namespace: /endoscope   # of the topics
+start_s: 0.0            # added to every time
+drop_repeats: true      # drop rows whose time is that of the row before
+"""
+"""A mapping with every key but `sample_and_hold`, which excludes `drop_repeats`."""
+HELP = f"""\
+A mapping file says what the columns are:
+
+{EXAMPLE}
+sample_and_hold: true   # in place of drop_repeats, for a table that was written faster than its
+                        # sources gave new numbers: a topic has a message where one of its
+                        # columns changes, at a time between that of the row and the next
+Topics hold position, velocity or effort. Units of time are {', '.join(TIME_UNITS)}
+(date: ISO 8601, such as 2026-01-31 13:45:00.250, or a time of day), other units
+{', '.join(unit for unit in UNITS if unit not in TIME_UNITS)}.
+The value is (number * scale + offset) in the unit. An empty cell is no sample.
+"""
 
 
 class TableMappingError(BagError, ValueError):
@@ -52,15 +72,18 @@ class Column:
 
     Attributes
     ----------
-    number : int
-        From 1.
+    source : int or str
+        Its number, from 1, or its name.
+    unit : str or None
+        None for that of the table's heading.
     scale, offset : float
-        `scale` times the number in the table plus `offset` is the SI value.
+        `scale` times the number in the table plus `offset` is the value in the unit.
     """
 
-    number: int
-    scale: float
-    offset: float
+    source: int | str
+    unit: str | None = None
+    scale: float = 1.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -72,8 +95,11 @@ class TableMapping:
     time : Column
     topics : mapping of topic to mapping of quantity to mapping of name to Column
     delimiter : str or None
-        None for whitespace.
-    header_lines : int
+        One character or `whitespace`; None where it is to be found.
+    decimal_comma : bool or None
+        None where it is to be found.
+    header_lines : int or None
+        None where they are to be found.
     namespace : str
     start_s : float
     drop_repeats : bool
@@ -84,8 +110,9 @@ class TableMapping:
 
     time: Column
     topics: Mapping[str, Mapping[str, Mapping[str, Column]]]
-    delimiter: str | None = ','
-    header_lines: int = 0
+    delimiter: str | None = None
+    decimal_comma: bool | None = None
+    header_lines: int | None = None
     namespace: str = '/endoscope'
     start_s: float = 0.0
     drop_repeats: bool = True
@@ -119,20 +146,7 @@ def load_table_mapping(path: str | Path) -> TableMapping:
 
 
 def _mapping(content: Any) -> TableMapping:
-    given = _section(
-        content,
-        'the mapping',
-        (
-            'time',
-            'topics',
-            'delimiter',
-            'header_lines',
-            'namespace',
-            'start_s',
-            'drop_repeats',
-            'sample_and_hold',
-        ),
-    )
+    given = _section(content, 'the mapping', KEYS)
     for key in ('time', 'topics'):
         if key not in given:
             raise ValueError(f'{key} is missing')
@@ -144,16 +158,20 @@ def _mapping(content: Any) -> TableMapping:
         raise ValueError('topics is empty')
     if 'drop_repeats' in given and given.get('sample_and_hold'):
         raise ValueError('drop_repeats has no meaning beside sample_and_hold: leave it out')
-    delimiter = _of_type(str, given, 'delimiter', ',')
-    if delimiter != 'whitespace' and len(delimiter) != 1:
-        raise ValueError(f'delimiter is {delimiter!r}: give one character, or whitespace')
-    header_lines = _of_type(int, given, 'header_lines', 0)
-    if header_lines < 0:
+    delimiter = _of_type(str, given, 'delimiter', None)
+    if delimiter not in (None, WHITESPACE) and len(delimiter) != 1:
+        raise ValueError(f'delimiter is {delimiter!r}: give one character, or {WHITESPACE}')
+    header_lines = _of_type(int, given, 'header_lines', None)
+    if header_lines is not None and header_lines < 0:
         raise ValueError(f'header_lines is {header_lines}: give how many lines to skip')
+    time = _column(given['time'], 'time')
+    if time.unit is not None and time.unit not in TIME_UNITS:
+        raise ValueError(f'time.unit is {time.unit!r}: valid are {", ".join(TIME_UNITS)}')
     return TableMapping(
-        _column(given['time'], 'time'),
+        time,
         topics,
-        None if delimiter == 'whitespace' else delimiter,
+        delimiter,
+        _of_type(bool, given, 'decimal_comma', None),
         header_lines,
         _of_type(str, given, 'namespace', '/endoscope').rstrip('/'),
         _number(given.get('start_s', 0.0), 'start_s'),
@@ -162,8 +180,12 @@ def _mapping(content: Any) -> TableMapping:
     )
 
 
-def _of_type[Kind](kind: type[Kind], given: Mapping[str, Any], key: str, default: Kind) -> Kind:
-    value = given.get(key, default)
+def _of_type[Kind, Default](
+    kind: type[Kind], given: Mapping[str, Any], key: str, default: Default
+) -> Kind | Default:
+    if key not in given:
+        return default
+    value = given[key]
     if type(value) is not kind:
         raise ValueError(f'{key} is {value!r}: give {_TYPES[kind]}')
     return value
@@ -187,15 +209,26 @@ def _topic(topic: str, content: Any) -> dict[str, dict[str, Column]]:
 
 def _column(content: Any, where: str) -> Column:
     given = _section(content, where, ('column', 'unit', 'scale', 'offset'))
-    number = given.get('column')
-    if isinstance(number, bool) or not isinstance(number, int) or number < 1:
-        raise ValueError(f'{where}.column is {number!r}: give the number of a column, from 1')
-    unit = str(given.get('unit', '-'))
-    if unit not in UNITS:
-        raise ValueError(f'{where}.unit is {unit!r}: valid are {", ".join(UNITS)}')
-    scale = _number(given.get('scale', 1.0), f'{where}.scale')
-    offset = _number(given.get('offset', 0.0), f'{where}.offset')
-    return Column(number, UNITS[unit] * scale, UNITS[unit] * offset)
+    source = given.get('column')
+    numbered = isinstance(source, int) and not isinstance(source, bool) and source >= 1
+    if not numbered and not (isinstance(source, str) and source.strip()):
+        raise ValueError(
+            f'{where}.column is {source!r}: give the number of a column, from 1, or its name'
+        )
+    unit = given.get('unit')
+    if unit is not None:
+        known = known_unit(unit) if isinstance(unit, str) and unit not in UNITS else unit
+        if not isinstance(known, str):
+            raise ValueError(f'{where}.unit is {unit!r}: valid are {", ".join(UNITS)}')
+        unit = known
+    if where != 'time' and unit in TIME_UNITS:
+        raise ValueError(f'{where}.unit is {unit!r}, a unit of time')
+    return Column(
+        source,
+        unit,
+        _number(given.get('scale', 1.0), f'{where}.scale'),
+        _number(given.get('offset', 0.0), f'{where}.offset'),
+    )
 
 
 def _section(value: Any, where: str, valid: tuple[str, ...] | None = None) -> Mapping[str, Any]:
@@ -205,7 +238,7 @@ def _section(value: Any, where: str, valid: tuple[str, ...] | None = None) -> Ma
         if not isinstance(key, str):
             raise ValueError(f'{key!r} in {where} is no name: put it in quotes')
         if valid is not None and key not in valid:
-            raise ValueError(f'unknown key {key} in {where}: valid are {", ".join(valid)}')
+            raise ValueError(f'unknown key {key} in {where}: {nearest(key, valid)}')
     return value
 
 

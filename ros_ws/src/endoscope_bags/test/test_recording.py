@@ -235,8 +235,8 @@ def test_other_storages_and_missing_files_are_named(tmp_path):
     folder = write(tmp_path / 'bag', n=1)
     metadata = folder / 'metadata.yaml'
     good = metadata.read_text()
-    metadata.write_text(good.replace('storage_identifier: mcap', 'storage_identifier: sqlite3'))
-    with pytest.raises(UnsupportedBagError, match=r'storage sqlite3.*ros2 bag convert'):
+    metadata.write_text(good.replace('storage_identifier: mcap', 'storage_identifier: tape'))
+    with pytest.raises(UnsupportedBagError, match=r'storage tape.*ros2 bag convert'):
         open_bag(folder)
     metadata.write_text(good.replace("compression_mode: ''", 'compression_mode: FILE'))
     with pytest.raises(UnsupportedBagError, match='compression mode FILE'):

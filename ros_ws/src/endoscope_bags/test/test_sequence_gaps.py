@@ -48,3 +48,12 @@ def test_the_losses_of_two_publishers_add_up(dropped_a, dropped_b):
     b = [(k + 0.5, 5000 + k) for k in range(1, 51) if k not in dropped_b]
     sequences = [number for _, number in sorted(a + b)]
     assert lost(sequences, publishers=2) == len(dropped_a) + len(dropped_b)
+
+
+@given(st.lists(st.integers(2, 58), min_size=1, max_size=5, unique=True))
+def test_numbers_that_come_late_are_not_lost(early):
+    sequences = list(range(1, 60))
+    for number in early:
+        sequences.remove(number)
+        sequences.insert(max(number - 5, 1), number)
+    assert lost(sequences) == 0

@@ -100,7 +100,7 @@ def test_what_samples_and_holds_needs_more_than_one_time(tmp_path):
     ('old', 'new', 'message'),
     [
         ('time: {column: 1, unit: s}', '', 'time is missing'),
-        ('unit: deg}', 'unit: degrees}', "unit is 'degrees': valid are"),
+        ('unit: deg}', 'unit: grad}', "unit is 'grad': valid are"),
         ('column: 3', 'colum: 3', 'unknown key colum'),
         ('column: 3', 'column: 0', 'from 1'),
         ('position: {bend_x: {column: 2', 'angle: {bend_x: {column: 2', 'unknown key angle'),
@@ -123,13 +123,13 @@ def test_a_wrong_mapping_is_refused_by_its_key(tmp_path, old, new, message):
     ('text', 'error', 'message'),
     [
         ('0,1,1,5,5\n1,1,1,5\n', TableError, 'line 2 has 4 columns, 5 are needed'),
-        ('0,1,1,5,5\n1,one,1,5,5\n', TableError, 'line 2 holds something else than numbers'),
+        ('0,1,1,5,5\n1,one,1,5,5\n', TableError, "line 2, column 2: 'one' is no number"),
         ('0,1,1,5,5\n', TableError, 'fewer than two rows'),
         ('1,1,1,5,5\n0,1,1,5,5\n', TableError, 'time runs backwards after 101 s'),
         (
             '0,1,1,5,5\n1,1,nan,5,5\n',
             BagError,
-            'position of slave/measured_js is not finite in row 2',
+            'position of slave/measured_js is not finite in line 2',
         ),
     ],
 )

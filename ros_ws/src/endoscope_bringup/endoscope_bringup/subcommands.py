@@ -2,7 +2,9 @@
 
 import argparse
 import importlib
-from collections.abc import Iterable
+import json
+import math
+from collections.abc import Iterable, Mapping
 from typing import NoReturn
 
 
@@ -44,3 +46,34 @@ def add_subcommands(
 def run_chosen(args: argparse.Namespace, *, dest: str) -> int:
     """Run the module that `add_subcommands` with the same `dest` chose; return its exit status."""
     return int(getattr(args, f'run_{dest}')(args))
+
+
+def add_json_option(parser: argparse.ArgumentParser) -> None:
+    """Add `--json` to a command that prints a table; see `print_json`."""
+    parser.add_argument(
+        '--json', action='store_true', help='print JSON, with all digits, instead of a table'
+    )
+
+
+def print_json(content: object) -> None:
+    """Print what a table shows as one JSON document, numbers as numbers.
+
+    Parameters
+    ----------
+    content
+        Mappings, sequences, texts, numbers, truth values and None. What is not finite becomes null,
+        which JSON has; paths become texts.
+    """
+    print(json.dumps(_plain(content), indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [_plain(each) for each in value]
+    if value is None or isinstance(value, bool | int):
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return str(value)

@@ -12,6 +12,7 @@ from pathlib import Path
 from endoscope_core.atomic_output import atomic_directory, require_free_directory
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.worker_pool import worker_pool
+from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
 from endoscope_explain.report.writing import REPORT_JSON, write_report
@@ -49,6 +50,19 @@ class Reported:
         return parsed
 
 
+def explained_case(
+    sources: Sources, jobs: int = 1, progress: Progress | None = None
+) -> ExplainedCase:
+    """Explain one bag; parameters and errors as in `explain_one`."""
+    inputs = read_inputs(sources)
+    for note in inputs.audit.recording.notes:
+        if progress is not None:
+            progress(f'note: {note}')
+    return explain_case(
+        inputs, explain_recording, jobs=jobs, progress=progress, extras=not sources.quick
+    )
+
+
 def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = None) -> Reported:
     """Explain one bag.
 
@@ -68,13 +82,7 @@ def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = Non
     BagError
         If a recording cannot be used.
     """
-    inputs = read_inputs(sources)
-    for note in inputs.audit.recording.notes:
-        if progress is not None:
-            progress(f'note: {note}')
-    case = explain_case(
-        inputs, explain_recording, jobs=jobs, progress=progress, extras=not sources.quick
-    )
+    case = explained_case(sources, jobs, progress)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         write_report(case, folder)

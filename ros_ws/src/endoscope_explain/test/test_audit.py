@@ -1,4 +1,5 @@
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,6 +54,24 @@ def test_a_topic_that_starts_late_has_a_gap(sound):
 def test_one_lost_sample_is_no_gap(sound):
     lost = np.arange(len(sound.bending.time)) != 100
     assert named(sound.with_series({'bending': sound.bending.taken(lost)})) == {}
+
+
+def test_a_command_that_pauses_is_no_gap(sound):
+    """A console that rests publishes nothing; the last command stays in force."""
+    command = sound.command
+    paused = (command.time > 5.0) & (command.time < 6.0)
+    held = command.values[np.searchsorted(command.time, 5.0)]
+    values = np.where(paused[:, None], held, command.values)
+    after = command.time >= 6.0
+    values[after] += held - command.values[np.argmax(after)]
+    pausing = replace(command, values=values).taken(~paused)
+    assert named(sound.with_series({'command': pausing})) == {}
+
+
+def test_a_command_that_begins_late_or_ends_early_is_no_gap(sound):
+    command = sound.command
+    amidst = (command.time > 1.0) & (command.time < command.time[-1] - 1.0)
+    assert named(sound.with_series({'command': command.taken(amidst)})) == {}
 
 
 def test_nothing_is_judged_while_the_command_is_unknown(sound):

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from endoscope_bringup.subcommands import add_json_option, print_json
+
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `bag` with `info` and `recover`."""
@@ -10,12 +12,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     actions = parser.add_subparsers(dest='action', metavar='ACTION', required=True)
     info = actions.add_parser(
         'info',
-        help='topics, counts, rates, duration, dropouts and losses',
-        description='Says what is in BAG, and what is missing from it. Dropouts are silences of '
-        'more than 2.5 periods by the stamps of the source; lost are messages that were published '
-        'and did not arrive ("?" where the recorder did not tell).',
+        help='topics, counts, rates, duration, pauses, gaps and losses',
+        description='Says what is in BAG, and what is missing from it. A periodic topic is silent '
+        'where nothing comes for more than 2.5 periods by the stamps of the source. It paused if '
+        'nothing was published meanwhile, as a console does whose handle is not followed; it has a '
+        'gap if messages are missing there, or if nothing tells that none are. Lost are messages '
+        'that were published and did not arrive ("?" where the recorder did not tell).',
     )
-    info.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder or .mcap file')
+    info.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder, .mcap or .db3 file')
+    add_json_option(info)
     recover = actions.add_parser(
         'recover',
         help='write the sound part of a damaged recording to a new one',
@@ -31,7 +36,11 @@ def run(args: argparse.Namespace) -> int:
         from endoscope_bags import open_bag
         from endoscope_bags.information import bag_information
 
-        print(bag_information(open_bag(args.bag)))
+        information = bag_information(open_bag(args.bag))
+        if args.json:
+            print_json(information.as_json())
+        else:
+            print(information)
     else:
         from endoscope_bags.recovery import recover
 

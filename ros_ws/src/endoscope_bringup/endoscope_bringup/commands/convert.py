@@ -3,42 +3,96 @@
 import argparse
 from pathlib import Path
 
+from endoscope_bringup.subcommands import add_json_option, print_json
+from endoscope_core.errors import EndoscopeError
+
+
+class NoMappingError(EndoscopeError, ValueError):
+    """A bag was asked for, and nobody said what the columns are."""
+
+
+class _MappingHelp(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from endoscope_bags.table_mapping import HELP
+
+        parser.exit(message=f'{parser.format_help()}\n{HELP}')
+
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `convert`."""
     parser = subparsers.add_parser(
         'convert',
+        add_help=False,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         help='turn a text table of measurements into a bag',
         description='Writes the columns of TABLE, described by a mapping file, as topics of a bag. '
-        'Rows whose time is that of the row before are dropped, unless the mapping says that the '
-        'table was written faster than its sources (sample_and_hold): then a topic has a message '
-        'where one of its columns changes.',
+        'Without a\nmapping it says what the columns seem to be; nothing is converted by a guess:\n\n'
+        '    endoscope convert run.csv                              what is in the table\n'
+        '    endoscope convert run.csv --propose mapping.yaml       a mapping to be checked\n'
+        '    endoscope convert run.csv --mapping mapping.yaml --out run',
+    )
+    # The keys of a mapping are read from where they are, and only when somebody asks.
+    parser.add_argument(
+        '-h', '--help', action=_MappingHelp, nargs=0, help='show this, with all keys of a mapping'
     )
     parser.add_argument('table', type=Path, metavar='TABLE', help='text, one row a sample')
     parser.add_argument(
         '--mapping',
         type=Path,
-        required=True,
         metavar='M.yaml',
         help='which column is which topic, quantity, joint and unit',
     )
     parser.add_argument(
+        '--propose', type=Path, metavar='M.yaml', help='write a mapping to be checked; new file'
+    )
+    parser.add_argument(
         '--out',
         type=Path,
-        required=True,
         metavar='BAG',
         help='where to write: a bare file if it ends in .mcap, else a folder',
     )
+    add_json_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Convert and write; return 0."""
+    """Convert and write, or say what is in the table; return 0."""
     from endoscope_bags.table_mapping import load_table_mapping
     from endoscope_bags.text_table import convert_table
 
+    if args.mapping is None:
+        return _propose(args)
+    if args.out is None or args.propose is not None:
+        raise NoMappingError('--mapping takes --out BAG, and no --propose')
     done = convert_table(args.table, load_table_mapping(args.mapping), args.out)
+    if args.json:
+        print_json({'bag': args.out, **vars(done)})
+        return 0
     print(
         f'{args.out}: {done.messages} messages of {done.rows} rows, '
         f'{done.repeated} repeated rows dropped'
     )
+    return 0
+
+
+def _propose(args: argparse.Namespace) -> int:
+    from endoscope_bags.delimited_text import read_table
+    from endoscope_bags.mapping_proposal import propose_mapping
+    from endoscope_core.atomic_output import write_text
+
+    if args.out is not None:
+        raise NoMappingError(
+            f'{args.out} is not written: say what the columns of {args.table} are with --mapping; '
+            '--propose M.yaml writes one to begin with'
+        )
+    proposal = propose_mapping(read_table(args.table))
+    if args.propose is not None:
+        write_text(args.propose, proposal.mapping(), overwrite=False)
+    if args.json:
+        print_json({**proposal.as_json(), 'mapping': proposal.mapping()})
+        return 0
+    print(proposal)
+    if args.propose is None:
+        print('Nothing is written: --propose M.yaml writes these guesses as a mapping to check.')
+    else:
+        print(f'{args.propose}: check it, then give it with --mapping {args.propose} --out BAG')
     return 0

@@ -42,8 +42,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     """Simulate and write; return 0."""
     from endoscope_bags import open_bag
-    from endoscope_bringup.simulation.answer_bag import write_answer
     from endoscope_core.physics import load_plant
+    from endoscope_explain.simulation.answer_bag import write_answer
 
     plant = load_plant(args.plant)
     count = write_answer(plant, open_bag(args.commands), args.out, args.noise)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.random import Generator
 
 from endoscope_bringup.hostile_files.mcap_case import McapCase
+from endoscope_bringup.hostile_files.sqlite3_case import Sqlite3Case
 from endoscope_bringup.hostile_files.text_case import (
     CellsCase,
     CommandCase,
@@ -47,6 +48,7 @@ KINDS = (
     'command CSV',
     'weights',
     'text table',
+    'db3',
 )
 _BATCH = 50
 
@@ -160,7 +162,16 @@ def _case(kind: str, folder: Path) -> HostileCase:
         from endoscope_bringup.hostile_files.weights_case import WeightsCase
 
         return WeightsCase(folder)
-    cases = (McapCase, MetadataCase, PlantCase, CellsCase, MappingCase, CommandCase, TableCase)
+    cases = (
+        McapCase,
+        MetadataCase,
+        PlantCase,
+        CellsCase,
+        MappingCase,
+        CommandCase,
+        TableCase,
+        Sqlite3Case,
+    )
     return next(case for case in cases if case.name == kind)(folder)
 
 

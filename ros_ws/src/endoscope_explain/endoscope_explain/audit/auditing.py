@@ -86,8 +86,11 @@ def _without_commandless_times(recording: Recording, findings: list[Finding]) ->
     end = max(float(s.time[-1]) for s in every.values())
     gaps = {topic: find_gaps(s, start, end) for topic, s in every.items()}
     intervals = {topic: usual_interval(s.time) for topic, s in every.items()}
-    findings += gap_findings(gaps, intervals, recording.joints[0])
+    # A command is in force until the next one: a console that pauses, or whose clutch is released,
+    # leaves nothing out. Only where the command has moved on meanwhile some of it is missing.
     blind = _unknown_command(recording.command, gaps[recording.command.topic], end)
+    gaps[recording.command.topic] = tuple(blind)
+    findings += gap_findings(gaps, intervals, recording.joints[0])
     if not blind:
         return recording
     changed = {}

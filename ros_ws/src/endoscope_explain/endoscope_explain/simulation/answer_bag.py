@@ -10,15 +10,6 @@ from numpy.typing import NDArray
 from endoscope_bags import BagWriter, JointStateSeries, MessageStream, Recording
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
-from endoscope_bringup.simulation.answer_poses import answer_poses
-from endoscope_bringup.simulation.commands_of_bag import (
-    ANGLE_TOPIC,
-    SHAFT_TOPIC,
-    BagCommands,
-    commands_of_bag,
-    motor_name,
-    wire_names,
-)
 from endoscope_core.physics import PlantDescription, SensorModel
 from endoscope_core.physics.on_stamps import (
     NANOSECONDS,
@@ -29,6 +20,15 @@ from endoscope_core.physics.on_stamps import (
 from endoscope_core.physics.recording import recording_faults
 from endoscope_core.physics.samples import TOPICS
 from endoscope_core.physics.simulator import TICK
+from endoscope_explain.simulation.answer_poses import answer_poses
+from endoscope_explain.simulation.commands_of_bag import (
+    ANGLE_TOPIC,
+    SHAFT_TOPIC,
+    BagCommands,
+    commands_of_bag,
+    motor_name,
+    wire_names,
+)
 
 MOTOR_TOPIC = 'motor/measured_js'
 WIRES_TOPIC = 'wires/measured_js'

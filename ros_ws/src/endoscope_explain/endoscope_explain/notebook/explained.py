@@ -1,0 +1,173 @@
+"""What an explanation found, to be looked at, drawn and gone on with."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from endoscope_core.atomic_output import atomic_directory
+from endoscope_core.physics.description import PlantDescription
+from endoscope_explain.case import ExplainedCase
+from endoscope_explain.explanation import NamedEffect, NominalEstimate
+from endoscope_explain.notebook.drawing import embedded, html_table, table
+from endoscope_explain.predicted_signals import RecordedView, view
+from endoscope_explain.report.html_page import html_page
+from endoscope_explain.report.report_mapping import report_mapping
+from endoscope_explain.report.sentences import HEADLINES, verdict_sentence
+from endoscope_explain.report.writing import write_report
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_EFFECTS = ('effect', 'joint', 'probability', 'parameter', 'value', '90 % interval', 'unit')
+_FITS = ('signal', 'given plant', 'refitted', 'improved')
+GIVEN, IMPROVED = 'nominal', 'augmented'
+
+
+@dataclass(frozen=True)
+class Explained:
+    """An explained recording; prints itself as a table, in a notebook with a picture.
+
+    Attributes
+    ----------
+    case : ExplainedCase
+        Everything that is known about it.
+    """
+
+    case: ExplainedCase
+
+    @property
+    def verdict(self) -> str:
+        """One of the words of `report.json`, such as `missing_physics`."""
+        return str(self.case.verdict)
+
+    @property
+    def effects(self) -> tuple[NamedEffect, ...]:
+        """What the simulation left out, most certain first."""
+        return self.case.effects
+
+    @property
+    def parameters(self) -> Mapping[str, Mapping[str, NominalEstimate]]:
+        """Refitted parameters of the plant, by joint and name."""
+        return self.case.explanation.parameters
+
+    @property
+    def plant(self) -> PlantDescription:
+        """The improved plant, which `simulate` takes."""
+        return self.case.plant
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        """What `report.json` says."""
+        return report_mapping(self.case)
+
+    @cached_property
+    def predicted(self) -> RecordedView:
+        """Every signal as measured, and as the plant given and the improved one predict it."""
+        explanation = self.case.explanation
+        plants = {GIVEN: explanation.nominal, IMPROVED: explanation.augmented}
+        return view(self.case.recording, plants)
+
+    def page(self) -> str:
+        """Return `report.html`."""
+        return html_page(self.case)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write report.json, report.html and plant.yaml to a new or empty folder; return it.
+
+        Raises
+        ------
+        OutputExistsError
+            There is something in it.
+        """
+        with atomic_directory(folder) as partial:
+            write_report(self.case, partial)
+        return Path(folder)
+
+    def plot(self) -> 'Figure':
+        """Draw each joint's angle: as measured, and by the plant given and the improved one.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A row for each joint, with the error in degrees below it.
+        """
+        from matplotlib.figure import Figure
+
+        bending = [s for s in self.predicted.signals.values() if s.quantity == 'bending']
+        figure = Figure(figsize=(9.0, 3.6 * len(bending) + 0.4), layout='constrained')
+        ratios = [2.0, 1.0] * len(bending)
+        axes = figure.subplots(
+            2 * len(bending), 1, sharex=True, squeeze=False, height_ratios=ratios
+        )[:, 0].tolist()
+        for angle, error, signal in zip(axes[::2], axes[1::2], bending, strict=True):
+            angle.plot(signal.time, np.degrees(signal.measured), c='#1f2933', lw=1.2)
+            for name, colour in ((GIVEN, '#b3261e'), (IMPROVED, '#136b4f')):
+                predicted = signal.predicted[name]
+                wrong = np.degrees(predicted - signal.measured)
+                angle.plot(signal.time, np.degrees(predicted), c=colour, lw=1.0)
+                rmse = float(np.sqrt(np.mean(wrong**2)))
+                label = {GIVEN: 'plant given', IMPROVED: 'improved plant'}[name]
+                error.plot(signal.time, wrong, c=colour, lw=0.9, label=f'{label}: {rmse:.2f} rms')
+            angle.legend(
+                ['measured', 'plant given', 'improved plant'], fontsize=7, loc='upper right'
+            )
+            angle.set_ylabel(f'{signal.joint} [deg]')
+            error.set_ylabel('error [deg]')
+            error.legend(fontsize=7, loc='upper right')
+            for axis in (angle, error):
+                axis.grid(alpha=0.3)
+        axes[-1].set_xlabel('time [s]')
+        return figure
+
+    def _effect_rows(self) -> list[tuple[str, ...]]:
+        rows = []
+        for effect in self.effects:
+            named = (effect.id, effect.joint, f'{effect.probability:.2f}')
+            for name, e in effect.parameters.items() or [('-', None)]:
+                told = ('-', '-', '-') if e is None else _told(e.value, e.low, e.high, e.unit)
+                rows.append((*named, name, *told))
+                named = ('', '', '')
+        return rows
+
+    def _fit_rows(self) -> list[tuple[str, ...]]:
+        rungs = [self.case.ladder.get(rung, {}) for rung in (GIVEN, 'refitted', IMPROVED)]
+        return [
+            (signal, *(f'{rung[signal].ratio:.2f}' if signal in rung else '-' for rung in rungs))
+            for signal in rungs[0]
+        ]
+
+    def __repr__(self) -> str:
+        parts = [
+            f'{self.case.recording.name}: {self.verdict}. {HEADLINES[self.case.verdict]}.',
+            verdict_sentence(self.case),
+        ]
+        if self.effects:
+            parts.append(table(_EFFECTS, self._effect_rows()))
+        fits = self._fit_rows()
+        if fits:
+            parts += ['rms error over noise, on samples held out:', table(_FITS, fits)]
+        return '\n'.join(parts)
+
+    def _repr_html_(self) -> str:
+        name = escape(self.case.recording.name)
+        parts = [
+            f'<p><b>{name}: {HEADLINES[self.case.verdict]}</b> ({self.verdict})</p>',
+            f'<p>{escape(verdict_sentence(self.case))}</p>',
+        ]
+        if self.effects:
+            parts.append(html_table(_EFFECTS, self._effect_rows()))
+        fits = self._fit_rows()
+        if fits:
+            parts.append('<p>rms error over noise, on samples held out</p>')
+            parts.append(html_table(_FITS, fits))
+            parts.append(embedded(self.plot()))
+        return ''.join(parts)
+
+
+def _told(value: float, low: float, high: float, unit: str) -> tuple[str, str, str]:
+    return f'{value:.4g}', f'{low:.4g} to {high:.4g}', unit

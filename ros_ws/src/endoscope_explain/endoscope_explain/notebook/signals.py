@@ -1,0 +1,220 @@
+"""Everything that a recording measured or commanded, as arrays by name."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_bags import open_bag
+from endoscope_bags.errors import MissingTopicError
+from endoscope_bags.message_types import JOINT_STATE
+from endoscope_core.errors import EndoscopeError, nearest
+from endoscope_explain.notebook.drawing import embedded, html_table, table
+from endoscope_explain.recording.series import MOTOR, WIRES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+_UNITS = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
+_COLOURS = ('#2f6fb7', '#b3261e', '#136b4f', '#a15c00', '#52606d', '#7b3fa0')
+
+
+class UnknownSignalError(EndoscopeError, KeyError):
+    """A name that no signal of the recording has."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One quantity of one joint, motor or wire.
+
+    Attributes
+    ----------
+    name : str
+        As reports write it, such as `wires/measured_js:wire_x_pos`.
+    unit : str
+        SI.
+    time : ndarray, shape (N,)
+        Header stamps in s from the recording's first one.
+    values : ndarray, shape (N,)
+        NaN where the recording has no number.
+    """
+
+    name: str
+    unit: str
+    time: Array
+    values: Array
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        return f'{self.name}: {", ".join(_cells(self)[1:])}'
+
+
+@dataclass(frozen=True)
+class Signals(Mapping[str, Signal]):
+    """The signals of a recording by name.
+
+    Attributes
+    ----------
+    path : Path
+        The bag.
+    origin : float
+        First stamp of all, in s of the recording's clock.
+    by_name : mapping of str to Signal
+    """
+
+    path: Path
+    origin: float
+    by_name: Mapping[str, Signal]
+    # A folder that goes when nobody looks at the recording in it any more.
+    _kept: Any = field(default=None, compare=False)
+
+    def __getitem__(self, name: str) -> Signal:
+        try:
+            return self.by_name[name]
+        except KeyError:
+            raise UnknownSignalError(
+                f'{self.path}: no signal {name}: {nearest(name, self.by_name)}'
+            ) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.by_name)
+
+    def __len__(self) -> int:
+        return len(self.by_name)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first stamp to the last."""
+        return max(float(signal.time[-1]) for signal in self.values())
+
+    @cached_property
+    def _rows(self) -> list[tuple[str, ...]]:
+        return [_cells(signal) for signal in self.values()]
+
+    def __repr__(self) -> str:
+        return f'{self.path.name}: {self.duration:.3f} s\n{table(_HEAD, self._rows)}'
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<p><b>{escape(self.path.name)}</b>: {self.duration:.3f} s</p>'
+            f'{html_table(_HEAD, self._rows)}{embedded(self.plot())}'
+        )
+
+    def plot(self, names: Sequence[str] | None = None, beside: 'Signals | None' = None) -> 'Figure':
+        """Draw signals over time, those of one unit and topic together.
+
+        Parameters
+        ----------
+        names : sequence of str, optional
+            Which; all if not given.
+        beside : Signals, optional
+            Another recording whose signals of the same names are drawn dashed.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Angles in degrees.
+        """
+        from matplotlib.figure import Figure
+
+        panels: dict[tuple[str, str], list[str]] = {}
+        for name in self if names is None else names:
+            panels.setdefault((name.partition(':')[0], self[name].unit), []).append(name)
+        figure = Figure(figsize=(9.0, 1.9 * len(panels) + 0.6), layout='constrained')
+        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        for (topic, unit), among, axis in zip(panels, panels.values(), axes.tolist(), strict=True):
+            scale, shown = _for_a_person(unit)
+            for colour, name in zip(_COLOURS * len(among), among, strict=False):
+                label = name.partition(':')[2]
+                axis.plot(self[name].time, scale * self[name].values, lw=1.0, c=colour, label=label)
+                if beside is not None and name in beside.by_name:
+                    other = beside[name]
+                    shift = beside.origin - self.origin
+                    axis.plot(other.time + shift, scale * other.values, lw=1.0, ls='--', c=colour)
+            axis.set_ylabel(f'{topic}\n{shown}', fontsize=8)
+            axis.legend(loc='upper right', fontsize=7)
+            axis.grid(alpha=0.3)
+        axes[-1].set_xlabel('time [s]')
+        if beside is not None:
+            figure.suptitle(f'{self.path.name}, dashed: {beside.path.name}', fontsize=9)
+        return figure
+
+
+_HEAD = ('signal', 'unit', 'samples', 'rate', 'range')
+
+
+def signals_of_bag(path: str | Path, namespace: str | None = None, kept: Any = None) -> Signals:
+    """Read all joint states of a bag.
+
+    Parameters
+    ----------
+    path : str or Path
+        rosbag2 folder, `.mcap` or `.db3`.
+    namespace : str, optional
+        Where several rigs are in one bag.
+    kept : object, optional
+        Held as long as the signals are.
+
+    Returns
+    -------
+    Signals
+
+    Raises
+    ------
+    BagError
+        The bag cannot be read, has no joint states, or a topic is under several namespaces.
+    """
+    path = Path(path)
+    bag = open_bag(path)
+    names = [n for n, t in bag.topics.items() if t.type == JOINT_STATE and t.message_count]
+    relative = sorted({'/'.join(name.split('/')[-2:]) for name in names})
+    series = {
+        topic: bag.joint_state(topic, namespace=namespace, finite=())
+        for topic in relative
+        if bag.has(topic, namespace)
+    }
+    if not series:
+        raise MissingTopicError(f'{path}: holds no joint states; it has {", ".join(bag.topics)}')
+    origin_ns = min(int(one.stamp_ns[0]) for one in series.values())
+    found = {}
+    for topic, one in series.items():
+        for quantity, unit in _UNITS.items():
+            values = getattr(one, quantity)
+            for column, name in enumerate(one.names if values is not None else ()):
+                signal = Signal(
+                    _name(topic, name, quantity),
+                    'N' if (topic, quantity) == (WIRES, 'effort') else unit,
+                    one.seconds(origin_ns),
+                    np.ascontiguousarray(values[:, column]),
+                )
+                found[signal.name] = signal
+    return Signals(path, origin_ns * 1e-9, found, kept)
+
+
+def _name(topic: str, name: str, quantity: str) -> str:
+    """Name as in `endoscope_explain.recording.signals`, for topics of all kinds."""
+    usual = {WIRES: 'effort', MOTOR: ''}.get(topic, 'position')
+    return f'{topic}:{name}' + ('' if quantity == usual else f'.{quantity}')
+
+
+def _cells(signal: Signal) -> tuple[str, ...]:
+    steps = np.diff(signal.time)
+    rate = f'{1.0 / np.median(steps):.4g} Hz' if len(steps) and np.median(steps) > 0.0 else '-'
+    finite = signal.values[np.isfinite(signal.values)]
+    span = f'{finite.min():.4g} to {finite.max():.4g}' if len(finite) else '-'
+    return signal.name, signal.unit, str(len(signal)), rate, span
+
+
+def _for_a_person(unit: str) -> tuple[float, str]:
+    if unit.startswith('rad'):
+        return float(np.degrees(1.0)), unit.replace('rad', 'deg')
+    return 1.0, unit
