@@ -129,8 +129,8 @@ def test_the_graph_says_what_it_was_given_when_it_is_ready_and_what_to_do(tmp_pa
     ]
     assert told[-1] == (
         'graph]: ready in /left at 200 Hz: motors simulated; load cells simulated; '
-        'tracker simulated; slave DISABLED; next: endoscope operate enable; '
-        'not recording: endoscope operate record start'
+        'tracker simulated; slave DISABLED; next: endoscope operate enable --namespace left; '
+        'not recording: endoscope operate record start --namespace left'
     )
 
 

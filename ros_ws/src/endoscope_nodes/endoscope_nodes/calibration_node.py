@@ -146,7 +146,7 @@ class CalibrationNode(EndoscopeNode):
         if self._run is not None:
             return f'busy: {self._run.step}'
         if not self._session.name:
-            return 'no motion session is open: endoscope operate enable opens one'
+            return 'no motion session is open: the slave has to be ENABLED'
         trouble, shafts = self._trouble(), self._pose.shafts()
         if trouble or shafts is None:
             return trouble

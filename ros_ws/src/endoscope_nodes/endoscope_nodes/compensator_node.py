@@ -376,7 +376,7 @@ class CompensatorNode(EndoscopeNode):
         if self.findings is None:
             return (
                 f'no feed-forward: {self._settings.mode} waits for a calibration; '
-                'endoscope operate calibrate'
+                f'{self.operate("calibrate")}'
             )
         return f'{self._settings.mode} by {self._settings.selected_by}: {_in_words(self.findings)}'
 

@@ -190,8 +190,8 @@ class ConsoleNode(EndoscopeNode):
             return ''
         return (
             f'the handle {"moves" if moves else "has its clutch held"} and nothing follows it: '
-            f"the console's source is {source}; endoscope operate set console.source "
-            f'{FOLLOW_THE_HANDLE}'
+            f"the console's source is {source}; "
+            + self.operate(f'set console.source {FOLLOW_THE_HANDLE}')
         )
 
     def _on_result(self, message: DiagnosticArray) -> None:

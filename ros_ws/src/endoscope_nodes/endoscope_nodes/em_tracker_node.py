@@ -83,11 +83,7 @@ class EmTrackerNode(EndoscopeNode):
         return f'tracker {self._device_name}'
 
     def _connect(self, device: str, p: EmTrackerParameters) -> AuroraTracker:
-        if self.ticker.simulated:
-            raise ParameterError(
-                f'em_tracker: the device is {device!r}, which needs real time; '
-                "give 'simulated', or leave 'use_sim_time' out"
-            )
+        self.require_real_time(device)
         if not p.port:
             raise ParameterError(f"em_tracker: parameter 'port' is empty: {device} needs it")
         if p.registration_file and Path(p.registration_file).exists():

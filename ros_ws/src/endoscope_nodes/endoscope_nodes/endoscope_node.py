@@ -9,10 +9,13 @@ from rclpy.time import Time
 
 from endoscope_nodes.declared_parameters import declare_parameters
 from endoscope_nodes.diagnostics import Diagnostics
-from endoscope_nodes.parameters import changed
+from endoscope_nodes.parameters import ParameterError, changed
 
 if TYPE_CHECKING:
     from endoscope_nodes.runtime import Runtime
+
+
+NAMESPACE = 'endoscope'
 
 
 class EndoscopeNode(Node):
@@ -43,7 +46,7 @@ class EndoscopeNode(Node):
         super().__init__(
             name,
             context=runtime.context,
-            namespace='endoscope',
+            namespace=NAMESPACE,
             parameter_overrides=runtime.overrides_of(name),
         )
         self.exit_code = 0
@@ -62,6 +65,27 @@ class EndoscopeNode(Node):
         values = declare_parameters(self, kind, on_change, check)
         self.given |= changed(values)
         return values
+
+    def operate(self, words: str) -> str:
+        """Return the command by which an operator does something to the graph of this node."""
+        namespace = self.get_namespace().strip('/')
+        return f'endoscope operate {words}' + (
+            '' if namespace == NAMESPACE else f' --namespace {namespace}'
+        )
+
+    def require_real_time(self, device: str) -> None:
+        """Refuse a real device in simulated time.
+
+        Raises
+        ------
+        ParameterError
+            Time is simulated.
+        """
+        if self.ticker.simulated:
+            raise ParameterError(
+                f'{self.get_name()}: the device is {device}, which needs real time; '
+                "give 'simulated', or leave 'use_sim_time' out"
+            )
 
     @property
     def announcement(self) -> str:

@@ -69,11 +69,7 @@ class LoadCellsNode(EndoscopeNode):
         return f'load cells {self._device_name}'
 
     def _connect(self, device: str, p: LoadCellsParameters) -> ModbusLoadCells:
-        if self.ticker.simulated:
-            raise ParameterError(
-                f'load_cells: the device is {device!r}, which needs real time; '
-                "give 'simulated', or leave 'use_sim_time' out"
-            )
+        self.require_real_time(device)
         for name, value in (('port', p.port), ('calibration_file', p.calibration_file)):
             if not value:
                 raise ParameterError(f"load_cells: parameter '{name}' is empty: {device} needs it")

@@ -102,10 +102,7 @@ class MotorDriverNode(EndoscopeNode):
         return f'motors {self._device_name}'
 
     def _dynamixel(self, parameters: DynamixelParameters) -> MotorDevice:
-        if self.ticker.simulated:
-            raise ParameterError(
-                "motor_driver: parameter 'use_sim_time' is true; real servos live in real time"
-            )
+        self.require_real_time(self._device_name)
         motors = build_motors(parameters, MOTORS, self.rig.timeouts.command)
         self.create_service(Trigger, MOTOR_REBOOT, lambda _, answer: self._reboot(motors, answer))
         return motors

@@ -93,7 +93,7 @@ class RecorderNode(EndoscopeNode):
     @property
     def announcement(self) -> str:
         """Say how to begin a recording, where none is being made."""
-        return '' if self._session else 'not recording: endoscope operate record start'
+        return '' if self._session else f'not recording: {self.operate("record start")}'
 
     def _on_parameters(self, new: RecorderParameters) -> None:
         self._bag = new.bag

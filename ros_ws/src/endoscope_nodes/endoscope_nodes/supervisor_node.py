@@ -67,7 +67,7 @@ class SupervisorNode(EndoscopeNode):
         """Say in which state the slave is, and what to do about it."""
         state = self.machine.state
         if state is OperatingState.DISABLED:
-            return f'slave {state}; next: endoscope operate enable'
+            return f'slave {state}; next: {self.operate("enable")}'
         return f'slave {state}{f" ({self.machine.cause})" if self.machine.cause else ""}'
 
     @property
