@@ -46,7 +46,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--speed',
-        type=positive,
+        type=_speed,
         default=17.0,
         metavar='DEG_S',
         help='of the handle at the start, 3 to 57 deg/s (default: %(default)g)',
@@ -66,6 +66,13 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         metavar='S',
         help='how long to wait for an answer of the graph (default: %(default)g)',
     )
+
+
+def _speed(text: str) -> float:
+    value = float(text)
+    if not 3.0 <= value <= 57.0:
+        raise ValueError(text)
+    return value
 
 
 def run(args: argparse.Namespace) -> int:

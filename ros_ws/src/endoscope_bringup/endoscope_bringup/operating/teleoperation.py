@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from endoscope_bags.errors import MalformedMessageError
 from endoscope_bringup.operating.terminal import Terminal, TerminalLostError
 from endoscope_core.errors import printable
-from endoscope_core.teleop import SPEEDS, KeyboardHandle, Request, Turn
+from endoscope_core.teleop import KeyboardHandle, Request, Turn
 from endoscope_nodes.graph_client import CONSOLE, PROCEDURE, GraphClient, GraphRefusedError
 from endoscope_nodes.graph_parameters import read_parameter, request_parameters, set_parameters
 from endoscope_nodes.handle_sender import HandleSender
@@ -59,16 +59,21 @@ def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
     with ExitStack() as stack:
         signals = stack.enter_context(_signals_noted())
         terminal = Terminal()
+        before: dict[str, str | float] = {}
+        stack.callback(_give_back, client, terminal, before, args.timeout)
+        asked: dict[str, str | float] = {}
         if source != 'master':
-            stack.callback(_give_back, client, terminal, source, args.timeout)
-            set_parameters(client, 'console', {'source': 'master'}, args.timeout)
+            asked['source'], before['source'] = 'master', source
+        if args.scale is not None:
+            asked['scale'], before['scale'] = args.scale, scale
+        if asked:
+            set_parameters(client, 'console', asked, args.timeout)
         _wait_for_the_handles_place(client)
         sender = HandleSender(client.node)
         stack.callback(sender.close)
-        teleoperation = _Teleoperation(client, terminal, sender, signals, args, scale)
-        stack.callback(teleoperation.restore_scale, args.timeout)
-        if args.scale is not None:
-            teleoperation.set_scale(args.scale)
+        speed = math.radians(args.speed)
+        scale = args.scale or scale
+        teleoperation = _Teleoperation(client, terminal, sender, signals, speed, scale, before)
         stack.enter_context(terminal)
         return teleoperation.run()
 
@@ -78,7 +83,10 @@ def _check_consent(source: str, taken: bool) -> None:
         return
     plays = '; what it plays ends' if source in _PLAYS else ''
     print(f'console.source is {source}: the console follows no handle.')
-    answer = input(f'Set it to master until teleop ends{plays}? [y/N] ')
+    try:
+        answer = input(f'Set it to master until teleop ends{plays}? [y/N] ')
+    except EOFError:
+        answer = ''
     if answer.strip().lower() not in ('y', 'yes'):
         raise GraphRefusedError(f'console.source stays {source}: nothing would follow the keys')
 
@@ -104,14 +112,19 @@ def _wait_for_the_handles_place(client: GraphClient) -> None:
         )
 
 
-def _give_back(client: GraphClient, terminal: Terminal, source: str, patience_s: float) -> None:
-    """Set the console's source back; a motion does not begin anew with nobody looking."""
+def _give_back(
+    client: GraphClient, terminal: Terminal, before: dict[str, str | float], patience_s: float
+) -> None:
+    """Set the console's parameters back; a motion does not begin anew with nobody looking."""
+    if not before:
+        return
     # The supervisor has to know that this handle is gone.
     client.wait_until(lambda: False, _SETTLED_S)
+    source = before.get('source')
     if source in _PLAYS and client.state == 'ENABLED':
         client.ask('pause', patience_s)
         terminal.say(f'paused: console.source {source} begins anew when you resume')
-    set_parameters(client, 'console', {'source': source}, patience_s)
+    set_parameters(client, 'console', before, patience_s)
 
 
 class _Signals:
@@ -168,15 +181,17 @@ class _Teleoperation:
         terminal: Terminal,
         sender: HandleSender,
         signals: _Signals,
-        args: argparse.Namespace,
+        speed: float,
         scale: float,
+        before: dict[str, str | float],
     ) -> None:
         self._client = client
         self._terminal = terminal
         self._sender = sender
         self._signals = signals
-        self._speed = min(SPEEDS[1], max(SPEEDS[0], math.radians(args.speed)))
-        self._scale = self._scale_before = scale
+        self._speed = speed
+        self._scale = self._scale_asked = scale
+        self._before = before
         self._setting: Future | None = None
         self._wanted = _Heard(client, SLAVE_COMMAND)
         self._measured = _Heard(client, SLAVE_MEASURED)
@@ -302,13 +317,10 @@ class _Teleoperation:
             self._client.order('resume' if self._client.state == 'PAUSED' else 'enable')
         elif self._setting is None:
             factor = _LARGER if request is Request.LARGER else 1.0 / _LARGER
-            self.set_scale(self._scale * factor)
-
-    def set_scale(self, scale: float) -> None:
-        """Ask the console for another scale."""
-        scale = min(_SCALES[1], max(_SCALES[0], scale))
-        self._scale_asked = scale
-        self._setting = request_parameters(self._client, 'console', {'scale': scale})
+            scale = min(_SCALES[1], max(_SCALES[0], self._scale * factor))
+            self._scale_asked = scale
+            self._before.setdefault('scale', self._scale)
+            self._setting = request_parameters(self._client, 'console', {'scale': scale})
 
     def _settle(self) -> None:
         """Take the console's answer about its scale."""
@@ -321,11 +333,6 @@ class _Teleoperation:
             self._note = '' if result.successful else result.reason
             if result.successful:
                 self._scale = self._scale_asked
-
-    def restore_scale(self, patience_s: float) -> None:
-        """Set the scale back to what it was."""
-        if self._scale != self._scale_before:
-            set_parameters(self._client, 'console', {'scale': self._scale_before}, patience_s)
 
     def _line(self, turn: Turn) -> str:
         wall_ns = time.time_ns()

@@ -55,20 +55,16 @@ class Terminal(ClosedOnExit):
 
     Attributes
     ----------
-    keys
-        Reads what comes.
+    told_apart
+        Whether it tells presses and releases apart.
     """
 
     def __init__(self) -> None:
         self._in, self._out = sys.stdin.fileno(), sys.stdout.fileno()
         self._before: list | None = None
         self._begun_s: float | None = None
-        self.keys = TerminalKeys()
-
-    @property
-    def told_apart(self) -> bool:
-        """Whether it tells presses and releases apart."""
-        return bool(self.keys.told_apart)
+        self._keys = TerminalKeys()
+        self.told_apart = False
 
     def open(self) -> None:
         """Take the terminal over, and ask it what it can do.
@@ -83,12 +79,14 @@ class Terminal(ClosedOnExit):
             self._read_keys()
         except termios.error as error:
             raise TerminalLostError(str(error)) from error
-        self.keys = TerminalKeys()
+        self._keys = TerminalKeys()
         self._write(ASK_WHETHER.decode())
         end = time.monotonic() + _ANSWERED_S
-        while self.keys.told_apart is None and (left := end - time.monotonic()) > 0.0:
+        while self._keys.told_apart is None and (left := end - time.monotonic()) > 0.0:
             select.select([self._in], [], [], left)
             self.read()
+        # An answer that comes later changes nothing any more.
+        self.told_apart = bool(self._keys.told_apart)
         if self.told_apart:
             self._write(ASK_FOR_EVENTS.decode())
         self._write(ASK_FOR_FOCUS.decode())
@@ -119,10 +117,10 @@ class Terminal(ClosedOnExit):
                 raise TerminalLostError(str(error)) from error
             if not data:
                 raise TerminalLostError('end of input')
-            events += self.keys.read(data)
+            events += self._keys.read(data)
             self._begun_s = time.monotonic()
-        if self.keys.waiting and self._begun_s and time.monotonic() - self._begun_s > _ESCAPE_S:
-            events += self.keys.flush()
+        if self._keys.waiting and self._begun_s and time.monotonic() - self._begun_s > _ESCAPE_S:
+            events += self._keys.flush()
         return events
 
     def show(self, line: str) -> None:

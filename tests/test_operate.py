@@ -1,0 +1,331 @@
+"""`endoscope operate` and `endoscope topics` beside the whole graph: answers and exit statuses."""
+
+import json
+import math
+import re
+import signal
+import subprocess
+
+import pytest
+from operated_graph import ENDOSCOPE, OperatedGraph
+from private_domain import private_domain
+from std_msgs.msg import String
+
+from endoscope_nodes.qos import EVENT
+
+
+@pytest.fixture(scope='module')
+def graph(tmp_path_factory):
+    with OperatedGraph(tmp_path_factory.mktemp('operated')) as graph:
+        yield graph
+
+
+@pytest.fixture(autouse=True)
+def disabled(request):
+    yield
+    if 'graph' in request.fixturenames:
+        request.getfixturevalue('graph').command('disable')
+
+
+def operate(graph, *words):
+    status, out, errors = graph.run('operate', *words)
+    assert 'Traceback' not in errors, errors
+    return status, (out + errors).strip()
+
+
+def test_enable_pause_resume_disable_wait_for_the_state_and_say_it(graph):
+    status, said = operate(graph, 'enable')
+    assert status == 0, said
+    assert said == f'ENABLED, {graph.session}'
+    assert operate(graph, 'pause') == (0, 'PAUSED')
+    assert graph.state == 'PAUSED'
+    status, said = operate(graph, 'resume')
+    assert (status, said) == (0, f'ENABLED, {graph.session}')
+    assert operate(graph, 'disable') == (0, 'DISABLED')
+    assert graph.state == 'DISABLED'
+
+
+def test_what_the_supervisor_refuses_is_said_with_its_reason(graph):
+    assert operate(graph, 'pause') == (1, "pause: 'pause' is not possible in DISABLED")
+    assert operate(graph, 'home') == (1, "home: 'home' is not possible in DISABLED")
+    status, said = operate(graph, 'calibrate')
+    assert status == 1
+    assert said == 'calibrate: no motion session is open: the slave has to be ENABLED'
+
+
+def test_enable_is_refused_while_a_cause_is_present(graph):
+    graph.set('load_cells', connected=False)
+    graph.advance(1.0)
+    status, said = operate(graph, 'enable')
+    assert status == 1
+    assert said.startswith('enable: not enabled: ')
+    assert 'wires/measured_js' in said or 'load_cells' in said
+    status, said = operate(graph, 'status')
+    assert status == 0
+    assert 'DISABLED: cannot be enabled: ' in said
+    graph.set('load_cells', connected=True)
+    graph.advance(1.0)
+    assert operate(graph, 'enable')[0] == 0
+
+
+def test_calibrate_shows_progress_and_ends_with_class_size_and_reach(graph):
+    assert operate(graph, 'enable')[0] == 0
+    status, out, errors = graph.run('operate', 'calibrate')
+    assert status == 0, errors
+    lines = out.splitlines()
+    assert re.fullmatch(r'class \d+ deg with probability 0\.\d+|class .* 1\.000', lines[0])
+    assert re.fullmatch(r'backlash \d+\.\d deg by the classifier', lines[1])
+    size = re.fullmatch(
+        r'size (\S+) deg by the tensions, with 90 % between (\S+) and (\S+) deg', lines[2]
+    )
+    assert float(size[2]) < float(size[1]) < float(size[3])
+    assert [line.partition(' from ')[0] for line in lines[3:]] == [
+        'bend_x can be bent',
+        'bend_y can be bent',
+    ]
+    assert 'moving' in errors.splitlines()
+    status, out, _ = graph.run('operate', 'status', '--json')
+    said = json.loads(out)
+    assert said['calibration']['message'] == lines[0]
+    assert said['calibration']['session'] == graph.session
+    assert said['compensator']['message'].startswith('bouc_wen by ')
+    assert operate(graph, 'home') == (0, 'home reached')
+
+
+def test_a_calibration_that_is_ended_by_a_pause_says_so(graph):
+    assert operate(graph, 'enable')[0] == 0
+    process = graph.start('operate', 'calibrate', '--timeout', '60')
+    graph.until(lambda: graph.nodes['calibration'].active)
+    graph.command('pause')
+    status, _, errors = graph.finish(process)
+    assert status == 1
+    assert 'aborted: the motion session has ended' in errors
+    assert operate(graph, 'disable')[0] == 0
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_whoever_interrupts_a_calibration_pauses_the_graph(graph, number):
+    assert operate(graph, 'enable')[0] == 0
+    process = graph.start('operate', 'calibrate', '--timeout', '60')
+    graph.until(lambda: graph.nodes['calibration'].active)
+    graph.advance(0.5)
+    process.send_signal(number)
+    status, _, errors = graph.finish(process)
+    assert status == 128 + number
+    assert 'the graph is PAUSED' in errors
+    assert graph.state == 'PAUSED'
+    assert not graph.nodes['calibration'].active
+
+
+def test_home_is_refused_while_a_calibration_is_running(graph):
+    assert operate(graph, 'enable')[0] == 0
+    assert graph.call_calibration().success
+    process = graph.start('operate', 'home', '--timeout', '60')
+    # A calibration that is over before the program speaks would refuse nothing.
+    while process.poll() is None:
+        if not graph.nodes['calibration'].active:
+            graph.call_calibration()
+        graph.pace()
+    _, errors = process.communicate()
+    assert process.returncode == 1
+    assert errors.startswith('home: home: busy: ')
+
+
+@pytest.mark.parametrize(
+    ('name', 'text', 'value'),
+    [
+        ('compensator.mode', 'physical', 'physical'),
+        ('console.scale', '0.5', 0.5),
+        ('console.scale', '1', 1.0),
+        ('console.joints', '[bend_x]', ['bend_x']),
+        ('controller.active', 'false', False),
+        ('controller.active', 'true', True),
+        ('console.joints', 'bend_x, bend_y', ['bend_x', 'bend_y']),
+        ('compensator.mode', 'bouc_wen', 'bouc_wen'),
+    ],
+)
+def test_parameters_are_set_by_their_own_type_and_can_be_read_again(graph, name, text, value):
+    status, said = operate(graph, 'set', name, text)
+    assert status == 0, said
+    assert said.startswith(f'{name} = ')
+    status, out, _ = graph.run('operate', 'get', name, '--json')
+    assert status == 0
+    assert json.loads(out)['value'] == value
+
+
+@pytest.mark.parametrize(
+    ('words', 'status', 'said'),
+    [
+        (['get', 'compensator.mod'], 2, 'endoscope: no parameter compensator.mod; mode?'),
+        (['set', 'compensator.mod', 'x'], 2, 'endoscope: no parameter compensator.mod; mode?'),
+        (
+            ['get', 'mode'],
+            2,
+            "endoscope: 'mode': give NODE.PARAMETER, for example compensator.mode",
+        ),
+        (['set', 'console.scale', 'big'], 2, "endoscope: console.scale is a number, not 'big'"),
+        (['set', 'controller.active', '1'], 2, 'controller.active is true or false'),
+        (['set', 'console.scale', '100'], 1, "'scale' is 100.0; give a finite number, from 0.01"),
+        (['set', 'compensator.mode', 'physicl'], 1, 'did you mean physical?'),
+        (['set', 'motor_driver.tick_rate', '100'], 1, 'read-only'),
+    ],
+)
+def test_wrong_names_and_values_are_told_from_refused_ones(graph, words, status, said):
+    given, text = operate(graph, *words)
+    assert given == status, text
+    assert said in text
+    assert len(text.splitlines()) == 1
+
+
+def test_an_unknown_node_is_named_with_the_nearest(graph):
+    process = graph.start('operate', 'get', 'compensater.mode', '--timeout', '2')
+    status, _, errors = graph.finish(process)
+    assert status == 2
+    assert errors.strip().endswith('; compensator?')
+
+
+def test_a_recording_is_begun_and_ended(graph, tmp_path):
+    bag = tmp_path / 'bag'
+    assert operate(graph, 'record', 'stop') == (1, 'record stop: not recording')
+    assert operate(graph, 'set', 'recorder.bag', str(bag))[0] == 0
+    assert operate(graph, 'record', 'start') == (0, f'recording to {bag}')
+    status, said = operate(graph, 'record', 'start')
+    assert status == 1
+    assert said.startswith(f'record start: already recording to {bag}')
+    assert f'recording to {bag}' in operate(graph, 'status')[1]
+    status, said = operate(graph, 'record', 'stop')
+    assert status == 0
+    assert said.startswith(f'{bag}: ')
+    assert (bag / 'metadata.yaml').is_file()
+
+
+def test_status_names_every_node_and_the_source_of_the_console(graph):
+    status, out, _ = graph.run('operate', 'status')
+    assert status == 0
+    lines = {line.split()[0]: line for line in out.splitlines()}
+    assert lines['state'].endswith('DISABLED; `endoscope operate enable` lets it move')
+    assert lines['console'].split()[1:] == ['source', 'none'] or 'ok' in lines['console']
+    for name in graph.nodes:
+        assert name in out or name == 'conductor'
+    said = json.loads(graph.run('operate', 'status', '--json')[1])
+    assert said['state'] == 'DISABLED'
+    assert said['console_source'] == 'none'
+    assert said['silent'] == []
+    assert set(said['nodes']) >= {'supervisor: operating state', 'calibration: procedure'}
+
+
+@pytest.mark.parametrize('words', [['status'], ['enable'], ['get', 'console.scale'], ['calibrate']])
+def test_without_a_graph_it_says_what_was_not_found(words):
+    domain = private_domain()
+    process = subprocess.run(
+        [*ENDOSCOPE, 'operate', *words, '--timeout', '0.5'],
+        env=OperatedGraph.environment_of(domain),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert process.returncode == 1
+    assert process.stderr == (
+        f'{words[0]}: no graph answers in namespace /endoscope, ROS_DOMAIN_ID {domain}: '
+        'start one with `graph`\n'
+    )
+
+
+@pytest.mark.parametrize(
+    'words',
+    [
+        ['operate'],
+        ['operate', 'enabel'],
+        ['operate', 'set', 'console.scale'],
+        ['operate', 'record', 'pause'],
+        ['operate', 'enable', '--timeout', '-1'],
+        ['topics', '--hz', 'a', '--echo', 'b'],
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_status_2(words):
+    process = subprocess.run([*ENDOSCOPE, *words], capture_output=True, text=True, check=False)
+    assert process.returncode == 2
+    assert len(process.stderr.splitlines()) == 1
+
+
+# ---- topics
+
+
+def test_topics_are_listed_with_senders_readers_and_what_is_missing(graph):
+    status, out, errors = graph.run('topics')
+    assert status == 0, errors
+    rows = {line.split()[0]: line for line in out.splitlines()[1:]}
+    assert 'sensor_msgs/msg/JointState' in rows['motor/servo_jp']
+    assert 'compensator' in rows['motor/servo_jp']
+    assert rows['motor/servo_jp'].rstrip().endswith('motor_driver')
+    assert rows['slave/servo_jp'].endswith('console does not send it now')
+    assert rows['master/measured_js'].endswith('no sender outside the graph')
+    status, out, _ = graph.run('topics', '--json')
+    rows = {row['topic']: row for row in json.loads(out)}
+    assert rows['slave/operating_state']['senders'] == ['supervisor']
+
+
+def test_a_rate_is_measured_by_the_times_of_receipt(graph):
+    status, out, errors = graph.run('topics', '--hz', 'wires/measured_js', '--count', '50')
+    assert status == 0, errors
+    found = re.fullmatch(
+        r'wires/measured_js: (\S+) Hz over 50 messages; '
+        r'gaps from (\S+) to (\S+) ms, std (\S+) ms\n',
+        out,
+    )
+    rate, low, high, _ = map(float, found.groups())
+    assert low <= 1e3 / rate <= high
+    status, out, _ = graph.run(
+        'topics', '--hz', '/endoscope/wires/measured_js', '--seconds', '0.5', '--json'
+    )
+    assert json.loads(out)['messages'] > 1
+
+
+def test_a_rate_is_measured_until_somebody_interrupts(graph):
+    process = graph.start('topics', '--hz', 'wires/measured_js', '--timeout', '60')
+    wires = graph.probe.resolve_topic_name('wires/measured_js')
+    graph.until(
+        lambda: (
+            'topics' in {i.node_name for i in graph.probe.get_subscriptions_info_by_topic(wires)}
+        )
+    )
+    graph.advance(1.0)
+    process.send_signal(signal.SIGINT)
+    status, out, errors = graph.finish(process)
+    assert status == 0, errors
+    assert ' Hz over ' in out
+
+
+def test_joints_are_printed_in_a_row_with_units(graph):
+    status, out, _ = graph.run('topics', '--echo', 'wires/measured_js', '--once')
+    assert status == 0
+    number = r'[+-]\d+\.\d{4}'
+    assert re.fullmatch(
+        rf'\d+\.\d{{9}}  wire_x_pos={number} N  wire_x_neg={number} N  '
+        rf'wire_y_pos={number} N  wire_y_neg={number} N\n',
+        out,
+    )
+    out = graph.run('topics', '--echo', 'motor/measured_js', '--once')[1]
+    assert re.search(rf'motor_x={number} rad {number} rad/s {number} N m  motor_y=', out)
+    out = graph.run('topics', '--echo', 'slave/measured_js', '--once', '--json')[1]
+    assert all(map(math.isfinite, json.loads(out)['position']))
+
+
+def test_control_characters_of_a_stranger_are_shown_and_steer_no_terminal(graph):
+    publisher = graph.speak(String, 'stranger', EVENT)
+    process = graph.start('topics', '--echo', 'stranger', '--count', '1', '--timeout', '60')
+    while process.poll() is None:
+        publisher.publish(String(data='\x1b]0;title\x07\x1b[2Jgone\nforged: line'))
+        graph.pace()
+    out, _ = process.communicate()
+    graph.probe.destroy_publisher(publisher)
+    assert '\x1b' not in out
+    assert out == 'data: \\x1b]0;title\\x07\\x1b[2Jgone\\nforged: line\n'
+
+
+def test_a_topic_that_nobody_sends_is_named_with_the_nearest(graph):
+    process = graph.start('topics', '--hz', 'wire/measured_js', '--timeout', '2')
+    status, _, errors = graph.finish(process)
+    assert status == 1
+    assert errors.startswith('topics: nobody sends wire/measured_js in namespace /endoscope')
+    assert 'did you mean wires/measured_js?' in errors

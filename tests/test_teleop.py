@@ -1,0 +1,256 @@
+"""`endoscope teleop` in a pseudo-terminal: keys move the slave, and nothing else does."""
+
+import os
+import signal
+import subprocess
+import termios
+
+import numpy as np
+import pytest
+from operated_graph import ENDOSCOPE, OperatedGraph, Typist
+from sensor_msgs.msg import Joy
+
+from endoscope_nodes.names import MASTER_CLUTCH
+from endoscope_nodes.qos import EVENT
+
+UP, LEFT = b'\x1b[A', b'\x1b[D'
+
+
+@pytest.fixture(scope='module')
+def running(tmp_path_factory):
+    with OperatedGraph(tmp_path_factory.mktemp('operated')) as graph:
+        graph.clutches = []
+        graph.probe.create_subscription(
+            Joy, MASTER_CLUTCH, lambda m: graph.clutches.append(m.buttons[0]), EVENT
+        )
+        yield graph
+
+
+@pytest.fixture
+def graph(running):
+    running.command('disable')
+    running.set('console', source='none', scale=1.0)
+    running.clutches.clear()
+    return running
+
+
+def source(graph):
+    return graph.nodes['console'].get_parameter('source').value
+
+
+def moved(typist):
+    """How far each joint was asked to go since it was first asked, rad."""
+    if not typist.wanted:
+        return np.zeros(2)
+    return np.subtract(typist.wanted[-1].position, typist.wanted[0].position)
+
+
+def check_left_as_found(graph, typist, kitty=False):
+    assert graph.clutches[-1] == 0
+    assert source(graph) == 'none'
+    if typist.slave is not None:
+        assert termios.tcgetattr(typist.slave) == typist.before
+        assert typist.screen.count(b'\x1b[>11u') == typist.screen.count(b'\x1b[<u') == int(kitty)
+        assert typist.screen.count(b'\x1b[?1004h') == typist.screen.count(b'\x1b[?1004l')
+
+
+def test_a_held_key_moves_the_slave_and_its_release_stops_it(graph):
+    with Typist(graph, '--take') as typist:
+        typist.enable()
+        typist.type(UP)
+        assert typist.stands()
+        assert not typist.goals
+        typist.hold(UP, lambda: moved(typist)[1] > 0.1)
+        assert 'FOLLOW' in typist.text
+        assert abs(moved(typist)[0]) < 0.01
+        typist.shows('OPEN')
+        assert 1 in graph.clutches
+        assert graph.clutches[-1] == 0
+        assert typist.stands()
+        typist.wanted.clear()
+        typist.hold(b'a', lambda: moved(typist)[0] < -0.1)
+        typist.shows('OPEN')
+        assert typist.stands()
+        assert abs(moved(typist)[1]) < 0.01
+        typist.type(b'q')
+        assert typist.end() == 0
+        check_left_as_found(graph, typist)
+    assert graph.state == 'ENABLED'
+
+
+def test_where_press_and_release_are_told_two_keys_move_both_joints(graph):
+    with Typist(graph, '--take', kitty=True) as typist:
+        typist.shows('DISABLED')
+        typist.type(b'\x1b[101;1:1u\x1b[101;1:3u')
+        typist.shows('ENABLED')
+        typist.type(b'\x1b[1;1:1A')
+        typist.type(b'\x1b[100;1:1u')
+        due = graph.conductor.now_ns
+
+        def repeat():
+            nonlocal due
+            if graph.conductor.now_ns >= due:
+                due += 30_000_000
+                typist.type(b'\x1b[100;1:2u')
+            return min(moved(typist)) > 0.1
+
+        typist.until(repeat)
+        typist.type(b'\x1b[100;1:3u\x1b[1;1:3A')
+        typist.shows('OPEN')
+        assert 'let go' in typist.line
+        assert typist.stands()
+        typist.type(b'\x1b[113;1:1u')
+        assert typist.end() == 0
+        check_left_as_found(graph, typist, kitty=True)
+
+
+def test_a_press_without_release_ends_by_itself(graph):
+    """A connection that dies between the two moves nothing for long."""
+    with Typist(graph, '--take', kitty=True) as typist:
+        typist.enable()
+        typist.type(b'\x1b[119;1:1u')
+        typist.until(lambda: 1 in graph.clutches)
+        typist.shows('no sign of the operator')
+        assert graph.clutches[-1] == 0
+        assert typist.stands()
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_releases_the_clutch_and_restores_everything(graph, number):
+    with Typist(graph, '--take', '--scale', '0.5') as typist:
+        typist.enable()
+        typist.until(lambda: graph.nodes['console'].get_parameter('scale').value == 0.5)
+        typist.hold(b'w', lambda: moved(typist)[1] > 0.05)
+        typist.process.send_signal(number)
+        assert typist.end() == 128 + number
+        check_left_as_found(graph, typist)
+        assert graph.nodes['console'].get_parameter('scale').value == 1.0
+        assert typist.stands()
+
+
+def test_a_terminal_that_is_closed_releases_the_clutch(graph):
+    with Typist(graph, '--take') as typist:
+        typist.enable()
+        typist.hold(b'w', lambda: moved(typist)[1] > 0.05)
+        typist.hang_up()
+        assert typist.end() == 128 + signal.SIGHUP
+        check_left_as_found(graph, typist)
+        assert typist.stands()
+
+
+def test_a_program_that_is_killed_moves_nothing_any_more(graph):
+    with Typist(graph, '--take') as typist:
+        typist.enable()
+        typist.hold(b'w', lambda: moved(typist)[1] > 0.05)
+        typist.process.kill()
+        typist.process.wait()
+        # Until the handle and the clutch are missed: 0.1 and 0.35 s.
+        graph.advance(0.5)
+        assert typist.stands()
+
+
+def test_ctrl_z_lets_go_and_the_shell_brings_it_back(graph):
+    command = [
+        '/bin/sh',
+        '-ic',
+        'eval "$1"; stty -a; fg',
+        'sh',
+        ' '.join([*ENDOSCOPE, 'teleop', '--take', '--timeout', '60']),
+    ]
+    with Typist(graph, command=command) as typist:
+        typist.enable()
+        typist.hold(b'w', lambda: moved(typist)[1] > 0.05)
+        typist.type(b'\x1a')
+        typist.until(lambda: ' icanon' in typist.text and ' echo ' in typist.text)
+        assert graph.clutches[-1] == 0
+        typist.shows('ENABLED')
+        assert typist.stands()
+        before = typist.wanted[-1].position[1]
+        typist.hold(b'w', lambda: typist.wanted[-1].position[1] > before + 0.05)
+        typist.type(b'q')
+        typist.end()
+        check_left_as_found(graph, typist)
+
+
+def test_home_goes_on_while_its_key_is_held_and_is_paused_otherwise(graph):
+    with Typist(graph, '--take', '--speed', '57') as typist:
+        typist.enable()
+        typist.hold(b'w', lambda: moved(typist)[1] > 0.6)
+        typist.shows('OPEN')
+        typist.hold(b'h', lambda: graph.nodes['calibration'].active)
+        typist.shows('PAUSED')
+        assert not graph.nodes['calibration'].active
+        assert typist.stands()
+        typist.type(b'e')
+        typist.shows('ENABLED')
+        homed = graph.nodes['calibration']
+        typist.hold(b'h', lambda: homed._last == 'home reached')
+        typist.shows('OPEN')
+        assert typist.stands()
+        assert graph.state == 'ENABLED'
+        assert max(abs(x) for x in typist.goals[-1].position) < 0.01
+
+
+def test_it_says_why_nothing_moves(graph):
+    with Typist(graph, '--take') as typist:
+        typist.shows('E enables')
+        began = graph.conductor.now_ns
+        typist.hold(b'w', lambda: graph.conductor.now_ns > began + 1_000_000_000)
+        assert 1 not in graph.clutches
+        assert not typist.wanted
+        typist.type(b'e')
+        typist.shows('ENABLED')
+        typist.type(b'p')
+        typist.shows('E resumes')
+        typist.type(b'-')
+        typist.shows('x 0.8')
+        typist.type(b']')
+        typist.shows('21 deg/s')
+        typist.type(b'\x03')
+        assert typist.end() == 128 + signal.SIGINT
+        check_left_as_found(graph, typist)
+
+
+def test_a_motion_that_the_console_played_does_not_begin_anew_with_nobody_looking(graph):
+    graph.set('console', source='motion')
+    with Typist(graph, '--take') as typist:
+        typist.enable()
+        typist.type(b'q')
+        assert typist.end() == 0
+        assert source(graph) == 'motion'
+        assert graph.state == 'PAUSED'
+        assert 'begins anew when you resume' in typist.text
+        assert typist.stands()
+
+
+def test_it_asks_before_it_takes_the_console(graph):
+    with Typist(graph) as typist:
+        typist.until(lambda: 'Set it to master until teleop ends? [y/N]' in typist.text)
+        typist.type(b'n\n')
+        assert typist.end() == 1
+        assert source(graph) == 'none'
+        assert 'nothing would follow the keys' in typist.text
+
+
+def test_another_handle_is_left_alone(graph):
+    publisher = graph.speak(Joy, MASTER_CLUTCH, EVENT)
+    with Typist(graph, '--take') as typist:
+        assert typist.end() == 1
+        assert 'probe speaks for the handle already' in typist.text
+        assert source(graph) == 'none'
+    graph.probe.destroy_publisher(publisher)
+
+
+def test_without_a_terminal_it_says_so():
+    process = subprocess.run(
+        [*ENDOSCOPE, 'teleop'],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {'ROS_DOMAIN_ID': '99'},
+    )
+    assert process.returncode == 2
+    assert process.stderr.splitlines() == [
+        'endoscope: teleop needs a terminal, and stdin is none: a held key is its dead-man'
+    ]
