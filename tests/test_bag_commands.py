@@ -1,5 +1,7 @@
 """`endoscope bag info` and `endoscope bag recover`."""
 
+import json
+
 import pytest
 
 from endoscope_bags import BagWriter, open_bag
@@ -56,3 +58,13 @@ def test_recover_does_not_overwrite(bag, capsys):
     assert main(['bag', 'recover', str(bag), str(bag)]) == 2
     assert 'exists already' in capsys.readouterr().err
     assert bag.read_bytes() == before
+
+
+def test_info_as_json_has_numbers(bag, capsys):
+    assert main(['bag', 'info', '--json', str(bag)]) == 0
+    information = json.loads(capsys.readouterr().out)
+    assert information['message_count'] == 1000
+    [topic] = information['topics']
+    assert topic['name'] == '/a'
+    assert topic['rate_hz'] == pytest.approx(1000.0)
+    assert (topic['pauses'], topic['gaps'], topic['lost']) == (0, 0, 0)

@@ -1,4 +1,4 @@
-"""What the columns of an unknown text table probably are, as a mapping to be checked by a person."""
+"""What the columns of an unknown table probably are, as a mapping for a person to check."""
 
 import json
 import re
@@ -25,7 +25,7 @@ _JOINTS = {
 _TIME = re.compile(r'(t|time|zeit|stamp|timestamps?|times?|date|datetime|clock|elapsed)')
 _COMMAND = re.compile(r'cmd|command|desired|target|goal|setpoint|reference|\bref\b|soll|demand')
 _MOTOR = re.compile(r'motor|shaft|encoder|servo|spool|pulley')
-_WIRE = re.compile(r'tension|force|load|cell|wire|cable|tendon|newton|kraft')
+_WIRE = re.compile(r'tension|force|load ?cell|wire|cable|tendon|newton|kraft')
 _RATE = re.compile(r'vel|speed|omega|rate')
 _TORQUE = re.compile(r'torque|moment|effort')
 _ANGLE = re.compile(r'angle|bend|pos|deg|theta|phi|tip|joint|measured|actual|tracker|winkel|\bq\b')
@@ -33,6 +33,8 @@ _NEGATIVE = re.compile(r'neg|minus|right|\b2\b|_b\b|-')
 _Y = re.compile(r'\by\b|_y|y_|pitch')
 # Numbers beyond two turns are no radians of a joint.
 _MOST_RAD = 4.0 * np.pi
+# And these are no degrees: counts of an encoder perhaps.
+_MOST_DEG = 720.0
 # Since 1973 in these many of the unit, until far beyond any recording.
 _EPOCH = ((1e17, 'ns'), (1e14, 'us'), (1e11, 'ms'), (1e8, 's'))
 
@@ -305,6 +307,8 @@ def _unit(
     if quantity == 'effort':
         return ('N' if topic == WIRES else 'N m'), 'the unit is assumed'
     largest = max(abs(column.low or 0.0), abs(column.high or 0.0))
+    if largest > _MOST_DEG:
+        return None, 'no angle has its range: give unit and scale'
     unit = 'deg' if largest > _MOST_RAD else 'rad'
     return (unit if quantity == 'position' else f'{unit}/s'), 'the unit by its range'
 
@@ -316,7 +320,7 @@ def _of_like_quantities(guesses: Sequence[ColumnGuess]) -> Iterator[ColumnGuess]
         if guess.role and guess.role != 'time':
             topic, quantity, joint = guess.role.split()
             joints.setdefault((topic, quantity), []).append(joint)
-    leading = {}
+    leading: dict[str, str] = {}
     for topic, quantity in joints:
         leading.setdefault(topic, 'position' if (topic, 'position') in joints else quantity)
     for guess in guesses:

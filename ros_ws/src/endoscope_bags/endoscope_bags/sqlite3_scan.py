@@ -34,7 +34,7 @@ _LATEST = 1 << 63
 # A row has a head, a number and a time beside its data; a file without rows has pages all the same.
 _LEAST_ROW = 8
 _FREE_ROWS = 1 << 10
-# Steps of sqlite's machine: a row takes twenty at most. Crafted trees of pages could go on for ever.
+# Steps of sqlite's machine: a row takes twenty at most. Crafted trees of pages could be endless.
 _STEPS = 1 << 20
 _FREE_STEPS, _STEPS_PER_BYTE = 1 << 26, 16
 _MOST_TOPICS = (1 << 16) - 1

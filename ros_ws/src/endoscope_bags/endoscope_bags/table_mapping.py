@@ -210,8 +210,9 @@ def _topic(topic: str, content: Any) -> dict[str, dict[str, Column]]:
 def _column(content: Any, where: str) -> Column:
     given = _section(content, where, ('column', 'unit', 'scale', 'offset'))
     source = given.get('column')
+    named = isinstance(source, str) and source.strip()
     numbered = isinstance(source, int) and not isinstance(source, bool) and source >= 1
-    if not numbered and not (isinstance(source, str) and source.strip()):
+    if not isinstance(source, int | str) or not (named or numbered):
         raise ValueError(
             f'{where}.column is {source!r}: give the number of a column, from 1, or its name'
         )

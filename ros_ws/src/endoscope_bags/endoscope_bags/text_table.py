@@ -99,7 +99,9 @@ def convert_table(table: str | Path, mapping: TableMapping, out: str | Path) -> 
                 encode_joint_states(
                     names,
                     stamps,
-                    **{quantity: array[fresh] for quantity, array in values.items()},
+                    position=values['position'][fresh] if 'position' in values else None,
+                    velocity=values['velocity'][fresh] if 'velocity' in values else None,
+                    effort=values['effort'][fresh] if 'effort' in values else None,
                 ),
                 stamps,
             )

@@ -105,8 +105,8 @@ def test_it_becomes_an_mcap(tmp_path):
         (
             (
                 'CREATE TABLE new(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, '
-                'data BLOB AS (zeroblob(60000000))); INSERT INTO new SELECT id, topic_id, timestamp '
-                'FROM messages; DROP TABLE messages; ALTER TABLE new RENAME TO messages'
+                'data BLOB AS (zeroblob(60000000))); INSERT INTO new SELECT id, topic_id, '
+                'timestamp FROM messages; DROP TABLE messages; ALTER TABLE new RENAME TO messages'
             ),
             CorruptBagError,
             'its tables hold more than the file',

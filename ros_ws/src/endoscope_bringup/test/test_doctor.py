@@ -1,5 +1,7 @@
 """`endoscope doctor` on emulated servos."""
 
+import json
+
 import pytest
 
 from endoscope_bringup.cli import main
@@ -55,3 +57,11 @@ def test_a_line_without_servos_and_a_port_that_is_none(capsys, emulator):
 def test_wrong_usage_is_one_line(arguments, words, capsys):
     assert main(['doctor', '--port', '/dev/ttyNone', *arguments]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_findings_as_json(emulator, capsys):
+    assert main(['doctor', '--json', '--port', emulator.port, *SPEEDS]) == 0
+    [port] = json.loads(capsys.readouterr().out)
+    servo = port['servos'][0]
+    assert (servo['device'], servo['baud'], servo['model']) == (1, 1_000_000, 'XM430-W350')
+    assert servo['voltage'] == 12.0

@@ -1,7 +1,12 @@
 """`endoscope effects`."""
 
+import json
+
 from endoscope_bringup.cli import main
+from endoscope_core.physics import PlantDescription, load_plant
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.nominal_plant_file import MEANING
+from endoscope_core.physics.plant_file import REACH, plant_from_mapping
 
 
 def test_lists_every_effect(capsys):
@@ -31,3 +36,24 @@ def test_an_unknown_effect_is_one_line_and_exit_2(capsys):
     err = capsys.readouterr().err
     assert 'joint_stop' in err
     assert err.count('\n') == 1
+
+
+def test_a_complete_plant_is_printed_that_is_the_nominal_one(tmp_path, capsys):
+    assert main(['effects', '--plant']) == 0
+    text = capsys.readouterr().out
+    (tmp_path / 'plant.yaml').write_text(text)
+    assert load_plant(tmp_path / 'plant.yaml') == PlantDescription()
+    for key in REACH:
+        assert f'{key}: ' in text
+        assert MEANING[key] in text
+
+
+def test_the_catalogue_as_json(capsys):
+    assert main(['effects', '--json']) == 0
+    effects = json.loads(capsys.readouterr().out)
+    assert [effect['id'] for effect in effects] == list(CATALOGUE)
+    gravity = next(effect for effect in effects if effect['id'] == 'gravity')
+    [moment] = [p for p in gravity['parameters'] if p['name'] == 'moment_nm']
+    assert (moment['unit'], moment['high']) == ('N m', 0.1)
+    assert main(['effects', '--plant', '--json']) == 0
+    assert plant_from_mapping(json.loads(capsys.readouterr().out)) == PlantDescription()

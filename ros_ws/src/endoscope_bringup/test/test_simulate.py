@@ -206,3 +206,16 @@ def test_the_answer_is_stamped_as_the_recording_stamps_its_readings(plant_file, 
     bending = open_bag(tmp_path / 'answer').joint_state('slave/measured_js')
     rows = np.arange(0, TICKS - 1, 25)
     np.testing.assert_allclose(bending.position[: len(rows)], truth.bending[rows + late], atol=1e-9)
+
+
+def test_commands_without_stamps_are_one_line(plant_file, tmp_path, capsys):
+    """Zero stamps, as a driver leaves them that does not set the header."""
+    unset = np.zeros(TICKS, dtype=np.int64)
+    with BagWriter(tmp_path / 'unset') as writer:
+        payloads = encode_joint_states(['motor_x', 'motor_y'], unset, position=SHAFT)
+        writer.write_streams([MessageStream('/a/motor/servo_jp', JOINT_STATE, payloads, STAMPS)])
+    assert run(plant_file, tmp_path / 'unset', tmp_path / 'out') == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert 'all 1200 messages of /a/motor/servo_jp are stamped 0.000 s' in line
+    assert 'its driver must set the header' in line
+    assert not (tmp_path / 'out').exists()

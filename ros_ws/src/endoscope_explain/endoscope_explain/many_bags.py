@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from endoscope_core.atomic_output import atomic_directory, require_free_directory
 from endoscope_core.errors import EndoscopeError
@@ -97,7 +98,7 @@ def explain_bags(
     dask_address: str | None = None,
     same_physics: bool = False,
     say: Say = print,
-) -> None:
+) -> dict[str, Reported]:
     """Explain bags and write their reports, all or none.
 
     Parameters
@@ -113,6 +114,11 @@ def explain_bags(
         Whether all bags show one rig, so that one choice of effects has to explain all of them.
     say : callable
         Told each line for the terminal.
+
+    Returns
+    -------
+    dict of str to Reported
+        By the bag's name, which is that of its folder where there are several.
 
     Raises
     ------
@@ -132,7 +138,7 @@ def explain_bags(
         with atomic_directory(out) as folder:
             _write(reported, folder)
         say(sentence(reported))
-        return
+        return {unique_names([sources[0].bag])[0]: reported}
     if dask_address is None and not same_physics:
         for one in sources:
             read_inputs(one)
@@ -149,6 +155,7 @@ def explain_bags(
         in_order = {name: rows[name] for name in names}
         (folder / SUMMARY_CSV).write_text(summary_table(in_order), encoding='utf-8')
         (folder / PARAMETERS_CSV).write_text(parameter_table(in_order), encoding='utf-8')
+    return in_order
 
 
 def unique_names(bags: Sequence[Path]) -> list[str]:
@@ -174,6 +181,22 @@ def sentence(reported: Reported) -> str:
     return f'{content["verdict"]}: {named}'
 
 
+def summary(name: str, reported: Reported) -> dict[str, Any]:
+    """Return one bag's line of the summary as plain data."""
+    content = json.loads(reported.files[REPORT_JSON])
+    return {
+        'bag': name,
+        'verdict': content['verdict'],
+        'effects': [
+            {key: effect[key] for key in ('id', 'joint', 'probability')}
+            for effect in content['effects']
+        ],
+        'nominal_rmse_over_noise': _largest(content['fit']['nominal']),
+        'augmented_rmse_over_noise': _largest(content['fit']['augmented']),
+        'runtime_s': content['runtime_s'],
+    }
+
+
 def summary_table(reports: Mapping[str, Reported]) -> str:
     """Return one CSV line for each bag: verdict, effects, largest misfit before and after."""
     text = io.StringIO()
@@ -190,16 +213,18 @@ def summary_table(reports: Mapping[str, Reported]) -> str:
         ]
     )
     for name, reported in reports.items():
-        content = json.loads(reported.files[REPORT_JSON])
-        effects = content['effects']
+        line = summary(name, reported)
+        effects = line['effects']
+        # Where the rig moved too little to tell, nothing was fitted.
+        ratios = (line['nominal_rmse_over_noise'], line['augmented_rmse_over_noise'])
         writer.writerow(
             [
                 name,
-                content['verdict'],
+                line['verdict'],
                 ' '.join(f'{e["id"]}@{e["joint"]}' for e in effects),
                 ' '.join(f'{e["probability"]:.3f}' for e in effects),
-                *(_worst(content['fit'][rung]) for rung in ('nominal', 'augmented')),
-                f'{content["runtime_s"]:.1f}',
+                *('' if ratio is None else f'{ratio:.2f}' for ratio in ratios),
+                f'{line["runtime_s"]:.1f}',
             ]
         )
     return text.getvalue()
@@ -226,10 +251,8 @@ def parameter_table(reports: Mapping[str, Reported]) -> str:
     return text.getvalue()
 
 
-def _worst(rung: Mapping[str, Mapping[str, float]]) -> str:
-    # Where the rig moved too little to tell, nothing was fitted.
-    ratios = [fit['rmse_over_noise'] for fit in rung.values()]
-    return f'{max(ratios):.2f}' if ratios else ''
+def _largest(rung: Mapping[str, Mapping[str, float]]) -> float | None:
+    return max((fit['rmse_over_noise'] for fit in rung.values()), default=None)
 
 
 def _write(reported: Reported, folder: Path) -> None:

@@ -15,7 +15,8 @@ class _MappingHelp(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from endoscope_bags.table_mapping import HELP
 
-        parser.exit(message=f'{parser.format_help()}\n{HELP}')
+        print(f'{parser.format_help()}\n{HELP}', end='')
+        parser.exit()
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -25,8 +26,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         add_help=False,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         help='turn a text table of measurements into a bag',
-        description='Writes the columns of TABLE, described by a mapping file, as topics of a bag. '
-        'Without a\nmapping it says what the columns seem to be; nothing is converted by a guess:\n\n'
+        description='Writes the columns of TABLE, described by a mapping file, as topics of a '
+        'bag. Without\na mapping it says what the columns seem to be; nothing is converted by a '
+        'guess:\n\n'
         '    endoscope convert run.csv                              what is in the table\n'
         '    endoscope convert run.csv --propose mapping.yaml       a mapping to be checked\n'
         '    endoscope convert run.csv --mapping mapping.yaml --out run',

@@ -1,6 +1,9 @@
 """`endoscope doctor`: finds serial ports and servos, and says what to change."""
 
 import argparse
+from dataclasses import asdict
+
+from endoscope_bringup.subcommands import add_json_option, print_json
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -20,6 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--reboot', type=int, metavar='ID', help='restart this servo (with one --port and --baud)'
     )
+    add_json_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -40,6 +44,10 @@ def run(args: argparse.Namespace) -> int:
         reboot(ports[0], bauds[0], args.reboot)
         print(f'{ports[0]}: servo {args.reboot} restarts')
         return 0
+    if args.json:
+        findings = [examine(port, bauds) for port in ports]
+        print_json([asdict(finding) for finding in findings])
+        return 1 if not ports or any(finding.advice for finding in findings) else 0
     if not ports:
         print('no serial port: plug the adapter in, or name one with --port')
         return 1

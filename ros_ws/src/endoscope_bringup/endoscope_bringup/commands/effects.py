@@ -5,6 +5,8 @@ import math
 import textwrap
 from typing import TYPE_CHECKING
 
+from endoscope_bringup.subcommands import add_json_option, print_json
+
 if TYPE_CHECKING:
     from endoscope_core.physics.effect import Effect, Parameter
 
@@ -17,6 +19,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         description='Lists the catalogue, or tells equation, source and parameters of an effect.',
     )
     parser.add_argument('ids', nargs='*', metavar='ID', help='effects to tell all about')
+    parser.add_argument(
+        '--plant',
+        action='store_true',
+        help='print the nominal plant.yaml instead: every key with value, unit and meaning',
+    )
+    add_json_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -24,16 +32,49 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.errors import EndoscopeError
     from endoscope_core.physics.effects import CATALOGUE, UnknownEffectError, describe
 
+    if args.plant:
+        if args.ids:
+            raise EndoscopeError('--plant prints the nominal plant: it takes no effects')
+        return _print_plant(args.json)
     try:
         chosen = [describe(effect_id) for effect_id in args.ids]
     except UnknownEffectError as error:
         raise EndoscopeError(str(error)) from error
+    if args.json:
+        print_json([_as_json(each) for each in chosen or CATALOGUE.values()])
+        return 0
     if chosen:
         print('\n\n'.join(_told(definition) for definition in chosen))
         return 0
     for definition in CATALOGUE.values():
         print(f'{definition.id:22} {definition.stage:13} {definition.physics}')
     return 0
+
+
+def _print_plant(as_json: bool) -> int:
+    from endoscope_core.physics import PlantDescription
+    from endoscope_core.physics.nominal_plant_file import nominal_plant_text
+    from endoscope_core.physics.plant_file import plant_to_mapping
+
+    if as_json:
+        print_json(plant_to_mapping(PlantDescription()))
+    else:
+        print(nominal_plant_text(), end='')
+    return 0
+
+
+def _as_json(definition: 'Effect') -> dict[str, object]:
+    keys = ('id', 'stage', 'physics', 'equation', 'source')
+    return {
+        **{key: getattr(definition, key) for key in keys},
+        'parameters': [
+            {
+                key: getattr(parameter, key)
+                for key in ('name', 'unit', 'low', 'high', 'typical', 'off', 'choices', 'counted')
+            }
+            for parameter in definition.parameters
+        ],
+    }
 
 
 def _told(definition: 'Effect') -> str:

@@ -1,8 +1,11 @@
 """`endoscope explain`: where simulation and recording differ, what was left out, and the proof."""
 
 import argparse
+import sys
+from functools import partial
 from pathlib import Path
 
+from endoscope_bringup.subcommands import add_json_option, print_json
 from endoscope_core.errors import EndoscopeError
 
 
@@ -88,12 +91,13 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         metavar='ADDRESS',
         help='explain several bags on the Dask cluster whose scheduler is there',
     )
+    add_json_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Explain and write; return 0."""
     from endoscope_core.physics import load_plant
-    from endoscope_explain.many_bags import explain_bags
+    from endoscope_explain.many_bags import explain_bags, summary
     from endoscope_explain.pipeline import Sources
 
     plant = load_plant(args.plant)
@@ -111,13 +115,17 @@ def run(args: argparse.Namespace) -> int:
         )
         for bag, second in zip(args.bags, _seconds(args), strict=True)
     ]
-    explain_bags(
+    found = explain_bags(
         sources,
         args.out,
         jobs=args.jobs,
         dask_address=args.dask,
         same_physics=args.same_physics,
+        # What is printed is then one document; progress goes beside it.
+        say=partial(print, file=sys.stderr) if args.json else print,
     )
+    if args.json:
+        print_json([summary(name, reported) for name, reported in found.items()])
     return 0
 
 

@@ -26,9 +26,9 @@ TABLES_THAT_ARE_NONE = (
         'zeroblob(100000) AS data FROM n'
     ),
     (
-        'DROP TABLE messages; CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER DEFAULT '
-        '1, timestamp INTEGER DEFAULT 1, data BLOB AS (zeroblob(60000000))); INSERT INTO messages(id) '
-        'VALUES (1)'
+        'DROP TABLE messages; CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER '
+        'DEFAULT 1, timestamp INTEGER DEFAULT 1, data BLOB AS (zeroblob(60000000))); '
+        'INSERT INTO messages(id) VALUES (1)'
     ),
     'UPDATE messages SET data = zeroblob(50000000) WHERE id = 7',
     "UPDATE messages SET data = 'text', timestamp = 'soon'",

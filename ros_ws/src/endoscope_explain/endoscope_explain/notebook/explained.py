@@ -13,7 +13,7 @@ from endoscope_core.atomic_output import atomic_directory
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explanation import NamedEffect, NominalEstimate
-from endoscope_explain.notebook.drawing import embedded, html_table, table
+from endoscope_explain.notebook.drawing import OUTSIDE, embedded, html_table, table
 from endoscope_explain.predicted_signals import RecordedView, view
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.report_mapping import report_mapping
@@ -105,27 +105,26 @@ class Explained:
             2 * len(bending), 1, sharex=True, squeeze=False, height_ratios=ratios
         )[:, 0].tolist()
         for angle, error, signal in zip(axes[::2], axes[1::2], bending, strict=True):
-            angle.plot(signal.time, np.degrees(signal.measured), c='#1f2933', lw=1.2)
+            angle.plot(signal.time, np.degrees(signal.measured), c='#9aa5b1', lw=2.4)
             for name, colour in ((GIVEN, '#b3261e'), (IMPROVED, '#136b4f')):
                 predicted = signal.predicted[name]
                 wrong = np.degrees(predicted - signal.measured)
-                angle.plot(signal.time, np.degrees(predicted), c=colour, lw=1.0)
+                style = {GIVEN: '-', IMPROVED: '--'}[name]
+                angle.plot(signal.time, np.degrees(predicted), style, c=colour, lw=1.1)
                 rmse = float(np.sqrt(np.mean(wrong**2)))
                 label = {GIVEN: 'plant given', IMPROVED: 'improved plant'}[name]
                 error.plot(signal.time, wrong, c=colour, lw=0.9, label=f'{label}: {rmse:.2f} rms')
-            angle.legend(
-                ['measured', 'plant given', 'improved plant'], fontsize=7, loc='upper right'
-            )
+            angle.legend(['measured', 'plant given', 'improved plant'], **OUTSIDE)
             angle.set_ylabel(f'{signal.joint} [deg]')
             error.set_ylabel('error [deg]')
-            error.legend(fontsize=7, loc='upper right')
+            error.legend(**OUTSIDE)
             for axis in (angle, error):
                 axis.grid(alpha=0.3)
         axes[-1].set_xlabel('time [s]')
         return figure
 
     def _effect_rows(self) -> list[tuple[str, ...]]:
-        rows = []
+        rows: list[tuple[str, ...]] = []
         for effect in self.effects:
             named = (effect.id, effect.joint, f'{effect.probability:.2f}')
             for name, e in effect.parameters.items() or [('-', None)]:

@@ -14,7 +14,7 @@ from endoscope_bags import open_bag
 from endoscope_bags.errors import MissingTopicError
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import EndoscopeError, nearest
-from endoscope_explain.notebook.drawing import embedded, html_table, table
+from endoscope_explain.notebook.drawing import OUTSIDE, embedded, html_table, table
 from endoscope_explain.recording.series import MOTOR, WIRES
 
 if TYPE_CHECKING:
@@ -139,9 +139,9 @@ class Signals(Mapping[str, Signal]):
                 if beside is not None and name in beside.by_name:
                     other = beside[name]
                     shift = beside.origin - self.origin
-                    axis.plot(other.time + shift, scale * other.values, lw=1.0, ls='--', c=colour)
+                    axis.plot(other.time + shift, scale * other.values, '--', lw=1.1, c='#1f2933')
             axis.set_ylabel(f'{topic}\n{shown}', fontsize=8)
-            axis.legend(loc='upper right', fontsize=7)
+            axis.legend(**OUTSIDE)
             axis.grid(alpha=0.3)
         axes[-1].set_xlabel('time [s]')
         if beside is not None:

@@ -41,6 +41,21 @@ def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, list[str]
     return series.ordered(np.flatnonzero(~far)), [note]
 
 
+def require_running_stamps(path: object, series: JointStateSeries) -> None:
+    """Refuse a topic all of whose messages have one stamp, zero as a rule.
+
+    Raises
+    ------
+    UnusableStampsError
+        They do; a single message passes.
+    """
+    if len(series) > 1 and np.ptp(series.stamp_ns) == 0:
+        raise UnusableStampsError(
+            f'{path}: all {len(series)} messages of {series.topic} are stamped '
+            f'{int(series.stamp_ns[0]) * 1e-9:.3f} s: its driver must set the header'
+        )
+
+
 def require_common_time(path: object, topics: Sequence[JointStateSeries]) -> None:
     """Refuse topics that cannot be laid beside each other.
 
@@ -57,11 +72,7 @@ def require_common_time(path: object, topics: Sequence[JointStateSeries]) -> Non
         All messages of a topic have one stamp, or two topics no time in common.
     """
     for one in topics:
-        if np.ptp(one.stamp_ns) == 0:
-            raise UnusableStampsError(
-                f'{path}: all {len(one)} messages of {one.topic} are stamped '
-                f'{int(one.stamp_ns[0]) * 1e-9:.3f} s: its driver must set the header'
-            )
+        require_running_stamps(path, one)
     commands = topics[0]
     origin = int(commands.stamp_ns.min())
     for one in topics[1:]:

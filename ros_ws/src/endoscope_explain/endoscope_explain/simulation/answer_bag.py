@@ -20,6 +20,7 @@ from endoscope_core.physics.on_stamps import (
 from endoscope_core.physics.recording import recording_faults
 from endoscope_core.physics.samples import TOPICS
 from endoscope_core.physics.simulator import TICK
+from endoscope_explain.recording.usable_stamps import require_running_stamps
 from endoscope_explain.simulation.answer_poses import answer_poses
 from endoscope_explain.simulation.commands_of_bag import (
     ANGLE_TOPIC,
@@ -173,6 +174,7 @@ def _answer_as_stamped(
 def _times(recording: Recording, commands: BagCommands, suffix: str, rate: float) -> _Times:
     if recording.has(suffix):
         series = recording.joint_state(suffix, order='recorded', finite=())
+        require_running_stamps(recording.path, series)
         return _Times(series.topic, series.stamp_ns, series.log_ns, series.publish_ns)
     namespace = commands.topic.removesuffix(SHAFT_TOPIC).removesuffix(ANGLE_TOPIC)
     first, last = int(commands.stamp_ns[0]), int(commands.stamp_ns[-1])

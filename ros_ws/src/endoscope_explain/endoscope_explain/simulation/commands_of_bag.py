@@ -9,6 +9,7 @@ from endoscope_bags import JointStateSeries, Recording
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
+from endoscope_explain.recording.usable_stamps import require_running_stamps
 
 SHAFT_TOPIC = 'motor/servo_jp'
 ANGLE_TOPIC = 'slave/servo_jp'
@@ -68,7 +69,7 @@ def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommand
     NoCommandsError
         If neither topic is there, or no joint of the plant is commanded.
     BagError
-        If a command is not finite or does not decode.
+        If a command is not finite or does not decode, or all are stamped alike.
     """
     if recording.has(SHAFT_TOPIC):
         series = recording.joint_state(SHAFT_TOPIC, finite=('position',))
@@ -81,6 +82,7 @@ def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommand
         raise NoCommandsError(
             f'{recording.path}: lacks topic {SHAFT_TOPIC} or {ANGLE_TOPIC}; it has {found}'
         )
+    require_running_stamps(recording.path, series)
     joints = tuple(joint for joint, name in names.items() if name in series.names)
     if not joints:
         raise NoCommandsError(

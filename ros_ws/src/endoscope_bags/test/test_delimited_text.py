@@ -1,0 +1,236 @@
+"""Tables as loggers and spreadsheets write them."""
+
+import re
+
+import numpy as np
+import pytest
+
+from endoscope_bags import open_bag
+from endoscope_bags.delimited_text import TableError, date_ns, read_table
+from endoscope_bags.errors import NonFiniteError
+from endoscope_bags.mapping_proposal import propose_mapping
+from endoscope_bags.table_mapping import EXAMPLE, KEYS, load_table_mapping
+from endoscope_bags.text_table import convert_table
+
+ROWS = [(0.0, 10.0, -1.5), (0.01, 11.0, -1.25), (0.02, 12.0, -1.0), (0.03, 13.5, 0.5)]
+
+
+def table(path, text, encoding='utf-8'):
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def lines(separator, comma=False, rows=ROWS):
+    text = '\n'.join(separator.join(str(number) for number in row) for row in rows)
+    return text.replace('.', ',') if comma else text
+
+
+def mapped(tmp_path, text, mapping):
+    (tmp_path / 'm.yaml').write_text(mapping)
+    done = convert_table(
+        table(tmp_path / 't.csv', text), load_table_mapping(tmp_path / 'm.yaml'), tmp_path / 'bag'
+    )
+    return done, open_bag(tmp_path / 'bag')
+
+
+@pytest.mark.parametrize('newline', ['\n', '\r\n', '\r'])
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
+@pytest.mark.parametrize(
+    ('separator', 'comma'),
+    [(',', False), (';', False), (';', True), ('\t', False), ('\t', True), ('  ', False)],
+)
+@pytest.mark.parametrize(
+    'above',
+    [
+        [],
+        ['time|angle|force'],
+        ['# time|angle|force'],
+        ['% rig 4, tube 2', '%', '% time|angle|force'],
+        ['Rig 4', 'sampling rate|1000', '', 'time|angle|force'],
+        ['time|angle|force', 's|deg|N'],
+    ],
+)
+def test_separator_decimal_sign_and_headings_are_found(
+    tmp_path, separator, comma, above, encoding, newline
+):
+    head = ''.join(line.replace('|', separator) + '\n' for line in above)
+    text = (head + lines(separator, comma) + '\n').replace('\n', newline)
+    read = read_table(table(tmp_path / 't.csv', text, encoding))
+    values = np.stack([read.numbers(k)[0] for k in range(3)], axis=1)
+    assert values.tolist() == [list(row) for row in ROWS]
+    assert [heading.name for heading in read.headings] == (
+        ['time', 'angle', 'force'] if above else ['', '', '']
+    )
+    if above[-1:] == ['s|deg|N']:
+        assert [heading.unit for heading in read.headings] == ['s', 'deg', 'N']
+
+
+@pytest.mark.parametrize(
+    ('title', 'name', 'unit'),
+    [
+        ('angle [deg]', 'angle', 'deg'),
+        ('angle (°)', 'angle', 'deg'),
+        ('time_ms', 'time', 'ms'),
+        ('t [µs]', 't', 'us'),
+        ('force (N)', 'force', 'N'),
+        ('torque[Nm]', 'torque', 'N m'),
+        ('pos (5)', 'pos (5)', None),
+        ('wire_x_pos', 'wire_x_pos', None),
+        ('angle', 'angle', None),
+    ],
+)
+def test_units_are_read_from_headings(tmp_path, title, name, unit):
+    read = read_table(table(tmp_path / 't.csv', f'{title};b\n0;1\n1;2\n'))
+    assert (read.headings[0].name, read.headings[0].unit) == (name, unit)
+    for asked in (title, name, title.upper()):
+        assert read.column(asked) == 0
+
+
+def test_quoted_cells_may_hold_the_separator(tmp_path):
+    read = read_table(table(tmp_path / 't.csv', '"time, s","angle"\n"0","1"\n"1","2"\n'))
+    assert [heading.title for heading in read.headings] == ['time, s', 'angle']
+    assert read.numbers(1)[0].tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ('time', 'unit', 'first', 'step'),
+    [
+        (['0.5', '0.75'], 's', 500_000_000, 250_000_000),
+        (['500', '750'], 'ms', 500_000_000, 250_000_000),
+        (['500000', '750000'], 'us', 500_000_000, 250_000_000),
+        (['1700000000123456789', '1700000000123457789'], 'ns', 1_700_000_000_123_456_789, 1000),
+        (['1700000000.123456789', '1700000000.123457789'], 's', 1_700_000_000_123_456_789, 1000),
+        (
+            ['2026-01-31T13:45:00.000000001Z', '2026-01-31 14:45:00.25+01:00'],
+            'date',
+            1_769_867_100_000_000_001,
+            249_999_999,
+        ),
+        (['13:45:00', '13:45:01.5'], 'date', 49_500_000_000_000, 1_500_000_000),
+    ],
+)
+def test_times_of_all_kinds_are_exact(tmp_path, time, unit, first, step):
+    text = 't,q\n' + '\n'.join(f'{t},{k}' for k, t in enumerate(time))
+    mapping = (
+        f'time: {{column: t, unit: {unit}}}\ntopics: {{a/b: {{position: {{q: {{column: q}}}}}}}}'
+    )
+    _, bag = mapped(tmp_path, text, mapping)
+    assert bag.joint_state('a/b').stamp_ns.tolist() == [first, first + step]
+
+
+def test_a_heading_gives_the_unit_that_a_mapping_leaves_out(tmp_path):
+    text = 'time_ms;angle [deg];force (mN)\n' + lines(';', rows=[(0, 90, 1), (10, 180, 2)])
+    mapping = """
+time: {column: time}
+topics:
+  slave/measured_js: {position: {bend_x: {column: angle, scale: 0.5, offset: 1.0}}}
+  wires/measured_js: {effort: {wire_x_pos: {column: 3}}}
+"""
+    _, bag = mapped(tmp_path, text, mapping)
+    angle = bag.joint_state('slave/measured_js')
+    assert angle.stamp_ns.tolist() == [0, 10_000_000]
+    assert np.degrees(angle.position[:, 0]) == pytest.approx([46.0, 91.0])
+    assert bag.joint_state('wires/measured_js').effort[:, 0] == pytest.approx([1e-3, 2e-3])
+
+
+def test_an_empty_cell_is_no_sample(tmp_path):
+    """As loggers write what is slower than their fastest source."""
+    text = 't,q,f\n0,1,5\n1,,6\n2,3,7\n'
+    mapping = """
+time: {column: t}
+topics: {a/q: {position: {q: {column: q}}}, a/f: {effort: {f: {column: f}}}}
+"""
+    done, bag = mapped(tmp_path, text, mapping)
+    assert bag.joint_state('a/q').stamp_ns.tolist() == [0, 2 * 10**9]
+    assert bag.joint_state('a/f').effort[:, 0].tolist() == [5.0, 6.0, 7.0]
+    assert (done.rows, done.repeated, done.messages) == (3, 0, 5)
+
+
+@pytest.mark.parametrize(
+    ('text', 'error', 'message'),
+    [
+        ('t,q\n0,1\n1,x\n', TableError, "line 3, column 2 (q): 'x' is no number"),
+        ('# a\nt,q\n0,1\n\n1\n', TableError, 'line 5 has 1 columns, 2 are needed'),
+        ('t,q\n0,1\nsoon,2\n', TableError, "line 3, column 1 (t): 'soon' is no number"),
+        ('t,q\n0,1\nnan,2\n', TableError, "line 3, column 1 (t): the time 'nan' is not finite"),
+        ('t,q\n0,1\n1e30,2\n', TableError, 'no stamp reaches it'),
+        ('t,q\n0,1\n1,inf\n', NonFiniteError, 'position of a/b is not finite in line 3'),
+        ('t,angle\n0,1\n1,2\n', TableError, "no column is named 'q': "),
+        ('t,q,q\n0,1,1\n1,2,2\n', TableError, "2 columns are named 'q': give the number"),
+        ('0,1\n1,2\n', TableError, 'the table names no columns: give the number'),
+        ('t,q\n', TableError, 'fewer than two rows'),
+        ('t,q\n-1,1\n0,2\n', TableError, 'set start_s'),
+    ],
+)
+def test_what_cannot_be_read_is_one_line_with_its_place(tmp_path, text, error, message):
+    mapping = 'time: {column: t}\ntopics: {a/b: {position: {q: {column: q}}}}'
+    with pytest.raises(error, match=re.escape(message)) as caught:
+        mapped(tmp_path, text, mapping)
+    assert '\n' not in str(caught.value)
+    assert not (tmp_path / 'bag').exists()
+
+
+def test_a_date_that_is_none_is_named(tmp_path):
+    mapping = 'time: {column: t, unit: date}\ntopics: {a/b: {position: {q: {column: q}}}}'
+    with pytest.raises(TableError, match=re.escape("line 3, column 1 (t): '31.1.2026' is no date")):
+        mapped(tmp_path, 't,q\n2026-01-31 10:00:00,1\n31.1.2026,2\n', mapping)
+
+
+def test_the_example_in_the_help_is_valid_and_complete(tmp_path):
+    (tmp_path / 'm.yaml').write_text(EXAMPLE)
+    mapping = load_table_mapping(tmp_path / 'm.yaml')
+    assert set(mapping.topics) == {
+        'slave/servo_jp',
+        'motor/measured_js',
+        'slave/measured_js',
+        'wires/measured_js',
+    }
+    assert all(f'{key}:' in EXAMPLE for key in KEYS if key != 'sample_and_hold')
+
+
+def test_columns_are_proposed_by_name_range_and_step(tmp_path):
+    text = (
+        'counter,timestamp,target [deg],motor position,force left (N),force right (N),'
+        'measured angle,note\n'
+    )
+    text += '\n'.join(
+        f'{k},{1000 + 5 * k},{40 * np.sin(k / 9):.3f},{0.3 * np.sin(k / 9):.4f},'
+        f'{5 + np.sin(k / 9):.3f},{5 - np.sin(k / 9):.3f},{30 * np.sin(k / 9 - 0.3):.3f},fine'
+        for k in range(100)
+    )
+    proposal = propose_mapping(read_table(table(tmp_path / 't.csv', text)))
+    assert {(c.title, c.role, c.unit) for c in proposal.columns if c.role} == {
+        ('timestamp', 'time', 'ms'),
+        ('target [deg]', 'slave/servo_jp position bend_x', 'deg'),
+        ('motor position', 'motor/measured_js position motor_x', 'rad'),
+        ('force left (N)', 'wires/measured_js effort wire_x_pos', 'N'),
+        ('force right (N)', 'wires/measured_js effort wire_x_neg', 'N'),
+        ('measured angle', 'slave/measured_js position bend_x', 'deg'),
+    }
+    assert '#   column 8 note' in proposal.mapping()
+
+
+def test_a_proposal_converts_as_it_is(tmp_path):
+    text = 'time_ms;target [deg];angle [deg]\n' + lines(';', comma=True)
+    source = table(tmp_path / 't.csv', text)
+    (tmp_path / 'm.yaml').write_text(propose_mapping(read_table(source)).mapping())
+    convert_table(source, load_table_mapping(tmp_path / 'm.yaml'), tmp_path / 'bag')
+    command = open_bag(tmp_path / 'bag').joint_state('slave/servo_jp')
+    assert np.degrees(command.position[:, 0]) == pytest.approx([10.0, 11.0, 12.0, 13.5])
+
+
+@pytest.mark.parametrize(('first', 'unit'), [(0, 'ms'), (1_700_000_000_000_000_000, 'ns')])
+def test_nameless_columns_are_told_and_only_the_time_is_taken(tmp_path, first, unit):
+    text = '\n'.join(f'{first + 25 * k} {np.sin(k):.3f} {np.cos(k):.3f}' for k in range(50))
+    proposal = propose_mapping(read_table(table(tmp_path / 't.txt', text)))
+    assert [(c.role, c.unit) for c in proposal.columns] == [
+        ('time', unit),
+        (None, None),
+        (None, None),
+    ]
+    assert '# topics:' in proposal.mapping()
+
+
+def test_a_date_before_the_epoch_and_one_without_a_zone():
+    assert date_ns('1969-12-31 23:59:59.5') == -500_000_000
+    assert date_ns('1970-01-01T01:00:00+01:00') == 0

@@ -1,0 +1,91 @@
+"""`endoscope convert`, and a recording of a real machine that comes with the project."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from endoscope_bags import open_bag
+from endoscope_bringup.cli import main
+
+REAL = Path(__file__).parent / 'recordings/servo_backlash'
+TABLE = str(REAL / 'motor_telemetry_single.csv')
+COUNT = 2.0 * np.pi / 4096.0
+
+
+def test_without_a_mapping_columns_are_told_and_nothing_is_written(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(['convert', TABLE]) == 0
+    told = capsys.readouterr().out
+    assert 'target pos (5)' in told
+    assert '--propose' in told
+    assert main(['convert', TABLE, '--out', 'bag']) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert 'bag is not written' in line
+    assert '--mapping' in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_proposal_is_written_once_and_told_as_json(tmp_path, capsys):
+    path = tmp_path / 'mapping.yaml'
+    assert main(['convert', TABLE, '--propose', str(path), '--json']) == 0
+    proposal = json.loads(capsys.readouterr().out)
+    assert path.read_text() == proposal['mapping']
+    assert proposal['rows'] == 138
+    time, target = proposal['columns'][:2]
+    assert (time['role'], time['unit']) == ('time', 'date')
+    assert (target['low'], target['high']) == (1947.0, 2147.0)
+    # Counts of an encoder are no angle: the unit is left to a person.
+    assert target['unit'] is None
+    assert main(['convert', TABLE, '--propose', str(path)]) == 2
+    assert 'exists already' in capsys.readouterr().err
+
+
+def test_the_help_has_every_key_of_a_mapping(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(['convert', '--help'])
+    assert stop.value.code == 0
+    told = capsys.readouterr().out
+    for key in ('delimiter', 'decimal_comma', 'header_lines', 'start_s', 'sample_and_hold'):
+        assert f'{key}: ' in told
+
+
+@pytest.fixture
+def servo(tmp_path):
+    out = tmp_path / 'servo'
+    assert main(['convert', TABLE, '--mapping', str(REAL / 'mapping.yaml'), '--out', str(out)]) == 0
+    bag = open_bag(out)
+    return bag.joint_state('slave/servo_jp'), bag.joint_state('slave/measured_js')
+
+
+def test_a_real_servo_is_read_with_its_dates(servo, capsys):
+    target, position = servo
+    assert len(target) == len(position) == 138
+    # 2025-11-09T09:27:03.748Z
+    assert target.stamp_ns[0] == 1_762_680_423_748_000_000
+    assert target.seconds()[-1] == pytest.approx(13.809)
+    assert np.unique(np.round(target.position / COUNT)).tolist() == [-100.0, 0.0, 100.0]
+    assert position.position.min() / COUNT == pytest.approx(-94.0)
+    assert position.position.max() / COUNT == pytest.approx(95.0)
+
+
+def test_a_real_servo_shows_its_backlash(servo):
+    """It comes to rest short of its target from either side; a light pull moves it in between."""
+    target, position = servo
+    seconds, counts = target.seconds(), position.position[:, 0] / COUNT
+    at_zero = np.abs(target.position[:, 0]) < COUNT / 2
+    from_below = counts[at_zero & (seconds > 1.4) & (seconds < 1.9)]
+    from_above = counts[at_zero & (seconds > 7.9) & (seconds < 8.3)]
+    assert (np.ptp(from_below), np.ptp(from_above)) == (0.0, 0.0)
+    assert from_below[0] == pytest.approx(-5.0)
+    assert from_above[0] == pytest.approx(6.0)
+    assert np.degrees((from_above[0] - from_below[0]) * COUNT) == pytest.approx(0.967, abs=1e-3)
+    held = at_zero & (seconds > 1.4) & (seconds < 6.3)
+    assert np.degrees(np.ptp(counts[held]) * COUNT) == pytest.approx(1.494, abs=1e-3)
+    # It starts 0.2 s after its target jumps, and needs 0.6 s.
+    jump = int(np.argmax(target.position[:, 0] > 50 * COUNT))
+    moved = counts[jump:] - counts[jump]
+    assert seconds[jump + int(np.argmax(moved > 1))] - seconds[jump] == pytest.approx(0.2, abs=0.03)
+    arrived = seconds[jump + int(np.argmax(moved >= moved.max()))] - seconds[jump]
+    assert arrived == pytest.approx(0.6, abs=0.03)
