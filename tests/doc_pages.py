@@ -33,7 +33,7 @@ NOT_RUN = {
     'yours': 'needs recordings that are yours',
     'TODO-MERGE': 'is not there yet',
 }
-"""Words after `console` with which a block is not run, and why."""
+"""Words after the language with which a block is not run, and why."""
 
 _FENCE = re.compile(r'^(`{3,})([^`\n]*)\n(.*?)^\1$', re.MULTILINE | re.DOTALL)
 
@@ -54,6 +54,11 @@ class Block:
     words: tuple[str, ...]
     text: str
     line: int
+
+    @property
+    def name(self) -> str:
+        """Name of the file that the page asks to save, or nothing."""
+        return next((word for word in self.words if '.' in word), '')
 
     @property
     def is_run(self) -> bool:
@@ -98,12 +103,12 @@ def run_page(page: Path, folder: Path) -> None:
     try:
         for block in blocks(page):
             where = f'{page.name}:{block.line}'
-            if block.language in ('yaml', 'python') and block.words:
-                (folder / block.words[0]).write_text(block.text)
+            if not block.is_run:
+                continue
+            if block.name:
+                (folder / block.name).write_text(block.text)
             elif block.language == 'python':
                 _run([sys.executable, '-c', block.text], folder, environment, where)
-            elif not block.is_run:
-                continue
             elif block.language == 'console' and 'background' in block.words:
                 for command in block.commands():
                     background.append(_start(command, folder, environment))

@@ -20,7 +20,14 @@ from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.parameters import described
 from endoscope_nodes.topics import SERVICES, TOPICS
 
-NOT_YET = {'operate', 'teleop', 'topics', 'train', 'endoscope.svg'}  # TODO-MERGE: delete
+NOT_YET = {
+    'operate',
+    'teleop',
+    'topics',
+    'train',
+    'endoscope.svg',
+    'explain_a_recording.ipynb',
+}  # TODO-MERGE: delete
 TUTORIAL = WORKSPACE / 'doc/tutorial.md'
 
 each_page = pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -53,8 +60,8 @@ def test_blocks_say_what_they_are(page: Path) -> None:
     for block in blocks(page):
         where = f'line {block.line}'
         assert block.language in LANGUAGES, where
+        assert set(block.words) <= {*NOT_RUN, 'background', block.name}, where
         if block.language == 'console':
-            assert set(block.words) <= {*NOT_RUN, 'background'}, where
             assert block.commands(), f'{where}: no line begins with "$ "'
             if 'ros2 ' in block.text and block.is_run:
                 pytest.fail(f'{where}: a command of a sourced ROS 2 is not marked')
