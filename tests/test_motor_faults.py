@@ -6,9 +6,6 @@ from std_srvs.srv import Trigger
 from endoscope_bringup.device_faults.motor_faults import MOTOR_FAULTS, undergo
 from endoscope_bringup.device_faults.motor_rig import MotorRig
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 # The bench tries the others too.
 FAULTS = (
     'adapter out',

@@ -15,9 +15,6 @@ from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.recorded_topics import type_name
 from endoscope_nodes.runtime import Runtime
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 ROOT = Path(__file__).parents[1]
 README = (ROOT / 'README.md').read_text(encoding='utf-8')
 NAMESPACE = '/endoscope/'

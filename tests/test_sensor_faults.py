@@ -25,9 +25,6 @@ from endoscope_nodes.load_cells_node import LoadCellsNode
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.runtime import Runtime
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 CELLS = 'load_cells: cells'
 TRACKER = 'em_tracker: tracker'
 LATENCY = 0.03

@@ -3,16 +3,12 @@
 import time
 
 import pytest
+from patient_clients import PATIENCE_S, opened
 
-from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
 from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 MOUNTS = (ServoMount('motor_x', 1), ServoMount('motor_y', 2))
-PATIENCE_S = 20.0
 FASTEST = 4.9
 
 
@@ -21,8 +17,7 @@ class Rig:
 
     def __init__(self, tmp_path):
         self.emulator = EmulatorProcess(link=tmp_path / 'servos')
-        self.motors = DynamixelMotors(BusSettings(self.emulator.port), MOUNTS)
-        self.motors.open()
+        self.motors = opened(BusSettings(self.emulator.port), MOUNTS)
         self.readings = []
         self.began = time.monotonic()
 
@@ -202,8 +197,7 @@ def test_a_node_that_no_longer_renews_its_goal_is_noticed(rig):
 
 def test_the_current_limit_of_the_firmware_stops_a_shaft(tmp_path):
     with EmulatorProcess(stiffness=2.0) as emulator:
-        motors = DynamixelMotors(BusSettings(emulator.port, current_limit=0.3), MOUNTS)
-        motors.open()
+        motors = opened(BusSettings(emulator.port, current_limit=0.3), MOUNTS)
         try:
             motors.set_torque(True)
             reach, effort = 0.0, 0.0
