@@ -1,9 +1,9 @@
 """The tracker's driver over a real pseudo-terminal, with what goes wrong there."""
 
+import contextlib
 import math
 import random
 import time
-from contextlib import contextmanager
 from itertools import pairwise
 
 import ndicapy
@@ -12,7 +12,11 @@ import pytest
 from aurora_rig import Instrument
 from device_readings import collect, figure, until
 
-from endoscope_core.kinematics import angle_between, bending_from_orientation
+from endoscope_core.kinematics import (
+    RegistrationError,
+    angle_between,
+    bending_from_orientation,
+)
 from endoscope_devices.em_tracker import (
     AuroraTracker,
     RegistrationWindow,
@@ -40,51 +44,48 @@ def emulator(tmp_path, instrument):
         yield emulator
 
 
-@contextmanager
-def tracking(emulator):
-    tracker = AuroraTracker(str(emulator.link), TrackerSettings(latency=LATENCY))
-    tracker.open()
-    try:
-        yield tracker
-    finally:
-        tracker.close()
-
-
 @pytest.fixture
 def tracker(emulator):
-    with tracking(emulator) as tracker:
-        yield tracker
+    """A tracker that is tracked, and remembers how long its frames were waited for."""
+    tracker = AuroraTracker(str(emulator.link), TrackerSettings(latency=LATENCY))
+    ask, ended = tracker._port.ask, [time.monotonic()]
+    tracker.waits = []
+
+    def timed(command):
+        try:
+            return ask(command)
+        finally:
+            now = time.monotonic()
+            if command.startswith('TX'):
+                tracker.waits.append(now - ended[0])
+            ended[0] = now
+
+    tracker._port.ask = timed
+    tracker.open()
+    yield tracker
+    tracker.close()
 
 
-def lateness(emulator, readings):
-    """By how much readings are stamped later than their frames were measured, in s."""
-    zero = emulator.unit.frame_zero
-    return np.array([r.time_ns * 1e-9 - zero - r.frame / 40.0 for r in readings])
+def are_well_timed(emulator, tracker, readings):
+    """Whether stamps are when the frames were measured, whatever came late, early or again.
 
-
-def are_timed_as_before(emulator, readings, before):
-    """Whether stamps lie on the line of the readings before, whatever came late since.
-
-    A question that the emulator could not answer at once, on a busy machine, makes the line
-    earlier, by less than 0.1 s; nothing makes it later.
+    What is stamped is when the promptest reply was asked for.  Its frame was the newest one when
+    the emulator came to answer, which a busy machine delays: so a stamp is less than a frame late,
+    and no earlier than the longest wait for a reply.
     """
-    change = lateness(emulator, readings) - lateness(emulator, before)[-1]
-    return bool((change < 0.01).all() and (change > -0.3).all())
+    zero = emulator.unit.frame_zero
+    late = np.array([r.time_ns * 1e-9 - zero - r.frame / 40.0 for r in readings])
+    return bool((late < 0.025).all() and (late > -max(tracker.waits)).all())
 
 
-def test_each_frame_comes_once_with_the_time_at_which_it_was_measured(emulator):
-    """Tried anew where the machine kept the emulator from answering at once."""
-    for _ in range(50):
-        with tracking(emulator) as tracker:
-            readings = collect(tracker, 25)
-            frames = [reading.frame for reading in readings]
-            assert frames == sorted(set(frames))
-            lost = frames[-1] - frames[0] + 1 - len(frames)
-            assert figure(tracker, 'lost frames') >= lost
-            late = lateness(emulator, readings[10:])
-            if np.ptp(late) < 0.012 and -0.01 < np.median(late) < 0.025:
-                return
-    pytest.fail(f'the last readings were {late} s late')
+def test_each_frame_comes_once_with_the_time_at_which_it_was_measured(tracker, emulator):
+    readings = collect(tracker, 25)
+    frames = [reading.frame for reading in readings]
+    assert frames == sorted(set(frames))
+    lost = frames[-1] - frames[0] + 1 - len(frames)
+    # Those between two connections are not counted.
+    assert figure(tracker, 'lost frames') >= lost or figure(tracker, 'connections') > 1
+    assert are_well_timed(emulator, tracker, readings)
 
 
 def test_a_frame_that_was_not_asked_for_is_counted_as_lost(tracker, emulator):
@@ -148,7 +149,7 @@ def test_a_tracker_left_at_another_rate_is_reset_by_a_break(emulator):
 
 
 def test_a_late_reply_keeps_its_frame_and_is_left_out(tracker, emulator):
-    before = collect(tracker, 20)
+    collect(tracker, 20)
     number = [0]
 
     def late(data):
@@ -157,7 +158,7 @@ def test_a_late_reply_keeps_its_frame_and_is_left_out(tracker, emulator):
 
     emulator.tap = late
     until(lambda: figure(tracker, 'late') + figure(tracker, 'silences') >= 2)
-    assert are_timed_as_before(emulator, collect(tracker, 10), before)
+    assert are_well_timed(emulator, tracker, collect(tracker, 10))
 
 
 def test_a_tracker_whose_frames_come_late_for_good_is_timed_anew(tracker, emulator):
@@ -185,13 +186,12 @@ def test_old_replies_are_told_by_their_frame_and_left_out(tracker, emulator, ins
         number[0] += 1
         return [(0.0, kept[number[0] % 100] if number[0] % 4 == 0 else data)]
 
-    before = collect(tracker, 20)
     emulator.tap = replay
     until(lambda: figure(tracker, 'old frames') > 100)
     readings = tracker.take()
     frames = [reading.frame for reading in readings]
     assert frames == sorted(set(frames))
-    assert are_timed_as_before(emulator, readings, before)
+    assert are_well_timed(emulator, tracker, readings)
     # Nothing but silence makes it connect again.
     assert figure(tracker, 'connections') == 1 or figure(tracker, 'silences') >= 5
 
@@ -240,7 +240,7 @@ def test_frames_ahead_of_their_time_and_poses_that_no_tip_reaches_are_left_out(
 
     emulator.tap = early
     until(lambda: figure(tracker, 'frames ahead of time') >= 5)
-    assert are_timed_as_before(emulator, collect(tracker, 20), before)
+    assert are_well_timed(emulator, tracker, collect(tracker, 20))
 
 
 def test_a_missing_sensor_is_named(tmp_path, instrument):
@@ -255,9 +255,18 @@ def test_a_missing_sensor_is_named(tmp_path, instrument):
 
 def test_registered_straight_it_gives_both_bending_angles(tracker, instrument, tmp_path):
     window = RegistrationWindow()
-    for reading in collect(tracker, 45):
-        window.add(reading)
-    registration = window.register(time.monotonic_ns())
+    registered = []
+
+    def registers():
+        """Where the machine lets the tracker be read often enough within a second."""
+        for reading in collect(tracker, 1):
+            window.add(reading)
+        with contextlib.suppress(RegistrationError):
+            registered.append(window.register(time.monotonic_ns()))
+        return registered
+
+    until(registers)
+    (registration,) = registered
     save_registration(tmp_path / 'straight.yaml', registration)
     again = load_registration(tmp_path / 'straight.yaml')
     assert again.position == registration.position

@@ -28,7 +28,7 @@ def opened(settings: BusSettings, mounts) -> DynamixelMotors:
 class PatientPort(PortHandler):
     """ROBOTIS's own port, which waits so much longer for an answer, in s."""
 
-    patience = 2.0
+    patience = 10.0
 
     def setPacketTimeout(self, packet_length):
         super().setPacketTimeout(packet_length)
