@@ -10,3 +10,5 @@ sys.path.insert(0, str(Path(__file__).parent))
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 # Tests talk to nobody outside this machine.
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+pytest_plugins = ['not_tried']

@@ -34,7 +34,7 @@ from endoscope_nodes.recorder_node import RecorderNode
 from endoscope_nodes.runtime import Runtime
 from endoscope_nodes.supervisor_node import SupervisorNode
 
-PATIENCE_S = 30.0
+PATIENCE_S = 120.0
 NODES = (
     MotorDriverNode,
     LoadCellsNode,
@@ -72,7 +72,7 @@ class SensorGraph(ProbedGraph):
         cells=None,
         follow_bending=None,
         nodes=NODES,
-        tick_rate: int = 500,
+        tick_rate: int = 250,
         **overrides,
     ) -> None:
         runtime = Runtime(

@@ -33,7 +33,7 @@ def _compose_command() -> list[str]:
             done = subprocess.run([*command, 'version'], capture_output=True, check=False)
             if done.returncode == 0:
                 return command
-    pytest.skip('neither docker compose nor docker-compose is installed')
+    pytest.skip('no container engine on this machine: install docker with its compose command')
 
 
 def test_every_node_is_a_service() -> None:

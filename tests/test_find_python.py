@@ -39,7 +39,7 @@ def _fake_python(path: Path, body: str) -> Path:
 
 needs_no_system_python = pytest.mark.skipif(
     Path('/usr/bin/python3.12').exists() or Path('/usr/local/bin/python3.12').exists(),
-    reason='this machine has a Python 3.12 that is always found',
+    reason='a Python 3.12 of the system is always found and cannot be missing',
 )
 
 

@@ -9,9 +9,6 @@ from endoscope_core.metrics import tracking_rmse
 from endoscope_core.signals import periodic_signal
 from endoscope_core.signals.command_file import write_command_file
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 SIGNAL = periodic_signal(2.5 * np.pi)
 
 

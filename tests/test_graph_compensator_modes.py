@@ -1,15 +1,11 @@
 """Every compensator as a mode of the running nodes, changed while the slave moves."""
 
 import numpy as np
-import pytest
 from simulated_graph import SimulatedGraph
 from tubes import tube_of_size
 
 from endoscope_core.control import MODES
 from endoscope_core.identification.law_choice import CalibrationFindings
-
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
 
 
 def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):

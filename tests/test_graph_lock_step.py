@@ -8,9 +8,6 @@ from endoscope_core.physics import PlantDescription, SensorModel, simulate
 from endoscope_nodes.conductor_node import BarrierTimeout
 from endoscope_nodes.names import MOTORS, WIRES
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 STREAMS = {
     'slave/servo_jp': ('bend_x', 'bend_y'),
     'motor/servo_jp': MOTORS,

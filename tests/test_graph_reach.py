@@ -11,9 +11,6 @@ from endoscope_core.physics import load_plant
 from endoscope_nodes.diagnostics import WARN
 from endoscope_nodes.names import JOINTS, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 
 def warnings(graph, name):
     return [told.message for told in graph.diagnostics[name] if told.level == WARN]

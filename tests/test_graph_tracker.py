@@ -1,14 +1,10 @@
 """A tracker that goes blind, dies, or reads single samples wrong."""
 
 import numpy as np
-import pytest
 from simulated_graph import SimulatedGraph
 from tubes import slave_of
 
 from endoscope_core.physics import EffectSpec, PlantDescription
-
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
 
 CALIBRATION = {'calibration': {'motion': 'brief'}}
 

@@ -13,9 +13,6 @@ from rosbags.highlevel import AnyReader
 from endoscope_bags import open_bag
 from endoscope_bags.message_types import message_type
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 READERS = Path(__file__).parent / 'independent_readers'
 
 
@@ -31,7 +28,7 @@ def recorded(tmp_path_factory):
 def foxglove(recorded, tmp_path_factory):
     """What Foxglove's packages say of the recording."""
     if not shutil.which('npm') or not shutil.which('node'):
-        pytest.skip('node and npm are not installed')
+        pytest.skip("Foxglove's readers need node and npm, which are not installed")
     folder = tmp_path_factory.mktemp('node')
     for file in READERS.iterdir():
         if file.is_file():
@@ -47,7 +44,7 @@ def foxglove(recorded, tmp_path_factory):
     if installed.returncode and any(
         word in installed.stderr for word in ('ENOTFOUND', 'ECONN', 'ETIMEDOUT', 'EAI_AGAIN')
     ):
-        pytest.skip('the npm registry cannot be reached')
+        pytest.skip("Foxglove's readers are fetched from the npm registry, which cannot be reached")
     assert installed.returncode == 0, installed.stderr
     done = subprocess.run(
         ['node', 'read.mjs', str(recorded[1] / 'bag_0.mcap')],

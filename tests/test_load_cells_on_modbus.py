@@ -14,9 +14,6 @@ from endoscope_devices.load_cells.modbus_line import SerialLine
 from endoscope_devices.load_cells.register_reader import RegisterReader
 from endoscope_nodes.names import WIRES
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 
 @pytest.fixture
 def calibration(tmp_path):

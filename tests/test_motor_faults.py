@@ -1,13 +1,11 @@
 """Motors and console fail in the running graph, over a real terminal; see doc/device_faults.md."""
 
 import pytest
+from private_domain import private_domain
 from std_srvs.srv import Trigger
 
 from endoscope_bringup.device_faults.motor_faults import MOTOR_FAULTS, undergo
 from endoscope_bringup.device_faults.motor_rig import MotorRig
-
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
 
 # The bench tries the others too.
 FAULTS = (
@@ -22,12 +20,27 @@ FAULTS = (
 )
 
 
+STALL = 'stood still for'
+"""A node that a busy machine did not run for 0.1 s ends the session by itself, and says this."""
+# A servo that a busy machine lets answer late must not look like one that is gone.
+PATIENCE_S = 1.0
+
+
+def undisturbed(fault, folder):
+    """What followed a fault; tried again where the machine stalled before the fault was found."""
+    for trial in range(20):
+        own = folder / str(trial)
+        own.mkdir()
+        outcome = undergo(fault, own, 0.4, PATIENCE_S, private_domain())
+        if STALL not in outcome.cause or fault is MOTOR_FAULTS['node hangs']:
+            return outcome
+    return pytest.fail(f'the machine stalls all the time: {outcome}')
+
+
 @pytest.mark.parametrize('name', FAULTS)
 def test_what_the_slave_makes_of(name, tmp_path):
     fault = MOTOR_FAULTS[name]
-    # Where motion shall go on, a stall of this machine must not look like a dead bus.
-    patience = 1.0 if fault.ends_in == 'ENABLED' else None
-    outcome = undergo(fault, tmp_path, aftermath=0.4, patience=patience)
+    outcome = undisturbed(fault, tmp_path)
     assert outcome.state == fault.ends_in, outcome
     assert fault.cause in outcome.cause
     assert (outcome.faults_in_bag > 0) == (fault.ends_in == 'FAULT')
@@ -35,9 +48,19 @@ def test_what_the_slave_makes_of(name, tmp_path):
     assert outcome.largest_error < 0.03
 
 
+def stalled(rig):
+    return STALL in rig.node('supervisor').machine.cause
+
+
 def shafts_move(rig):
     held = rig.shafts[-1][1].position
-    return rig.wait(lambda: abs(rig.shafts[-1][1].position[0] - held[0]) > 0.02)
+
+    def moved():
+        if stalled(rig):
+            rig.order('enable')
+        return abs(rig.shafts[-1][1].position[0] - held[0]) > 0.02
+
+    return rig.wait(moved)
 
 
 def shafts_stand_still(rig):
@@ -48,9 +71,12 @@ def shafts_stand_still(rig):
 
 
 def test_after_a_fault_nothing_moves_before_enable_is_given(tmp_path):
-    with MotorRig(tmp_path) as rig:
+    with MotorRig(tmp_path, patience=PATIENCE_S, domain=private_domain()) as rig:
         rig.enable_and_move()
         rig.emulator.do('silence', 1)
+        assert rig.wait(
+            lambda: 'servo 1 does not answer' in rig.last_message('/endoscope/motor_driver: device')
+        )
         assert rig.wait(lambda: rig.state == 'FAULT')
         rig.order('enable')
         assert rig.wait(lambda: 'not enabled' in rig.node('supervisor')._last_refusal)
@@ -62,7 +88,7 @@ def test_after_a_fault_nothing_moves_before_enable_is_given(tmp_path):
 
 
 def test_holding_letting_go_and_restarting(tmp_path):
-    with MotorRig(tmp_path) as rig:
+    with MotorRig(tmp_path, patience=PATIENCE_S, domain=private_domain()) as rig:
         reboot = rig.probe.create_client(Trigger, 'motor/reboot')
 
         def asked():
@@ -71,9 +97,18 @@ def test_holding_letting_go_and_restarting(tmp_path):
             return answer.result().success
 
         rig.enable_and_move()
-        assert not asked()
-        rig.order('pause')
-        assert rig.wait(lambda: rig.state == 'PAUSED')
+        while asked():
+            assert stalled(rig), 'a servo that holds the slave is not restarted'
+            rig.enable_and_move()
+
+        def pauses():
+            if rig.state == 'ENABLED':
+                rig.order('pause')
+            elif stalled(rig):
+                rig.order('enable')
+            return rig.state == 'PAUSED'
+
+        assert rig.wait(pauses)
         assert shafts_stand_still(rig)
         assert rig.emulator.state(1)['torque'] == 1
         rig.order('disable')

@@ -73,7 +73,7 @@ def test_the_top_level_is_what_it_is_meant_to_be() -> None:
         ['git', 'ls-files'], cwd=ROOT, capture_output=True, text=True, check=False
     )
     if listed.returncode:
-        pytest.skip('not a git checkout')
+        pytest.skip('this is no git checkout, whose files could be listed')
     top = {line.split('/')[0] for line in listed.stdout.splitlines()}
     assert {name for name in top if not name.startswith('.')} == {
         *('ros_ws', 'docker', 'bags', 'tests', 'README.md', 'colcon.meta')

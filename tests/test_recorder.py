@@ -24,9 +24,6 @@ from endoscope_bags.message_types import message_type
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import EVENT, LOCK_STEP, SENSOR_ASKED, SENSOR_OFFERED
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 MS = 10**6
 
 

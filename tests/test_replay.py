@@ -17,9 +17,6 @@ from endoscope_nodes.qos import EVENT, SENSOR_OFFERED
 from endoscope_nodes.replay_node import ReplayNode
 from endoscope_nodes.runtime import Runtime
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 MS = 10**6
 START = 1_790_000_000 * 10**9
 N = 1000

@@ -14,7 +14,7 @@ from aurora_rig import Instrument
 from load_cell_rig import BROKEN, SATURATED, Cells, transmitter, write_calibration
 from private_domain import private_domain
 from rclpy.context import Context
-from sensor_graph import SensorGraph
+from sensor_graph import PATIENCE_S, SensorGraph
 
 from endoscope_bags import open_bag
 from endoscope_bags.errors import BagError
@@ -24,9 +24,6 @@ from endoscope_nodes.em_tracker_node import EmTrackerNode
 from endoscope_nodes.load_cells_node import LoadCellsNode
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.runtime import Runtime
-
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
 
 CELLS = 'load_cells: cells'
 TRACKER = 'em_tracker: tracker'
@@ -92,12 +89,10 @@ def register(rig):
     """Until then nothing is published; it needs a second of readings."""
     graph = rig.graph
     assert graph.bendings == []
-    for _ in range(50):
-        answer = graph.call('em_tracker', 'register_straight')
-        if answer.success:
-            break
+    deadline = time.monotonic() + 4.0 * PATIENCE_S
+    while not (answer := graph.call('em_tracker', 'register_straight')).success:
+        assert time.monotonic() < deadline, answer.message
         graph.serve(0.1)
-    assert answer.success, answer.message
     graph.wait(lambda: len(graph.bendings) > 3)
     assert (rig.folder / 'straight.yaml').exists()
 
@@ -117,8 +112,8 @@ def moving(rig):
 
 
 def held(rig):
-    """Whether the shafts have stood still for 50 ms."""
-    recent = [s.position for at, s in rig.graph.shafts if at > time.monotonic() - 0.05]
+    """Whether the shafts have stood still for 100 ms."""
+    recent = [s.position for at, s in rig.graph.shafts if at > time.monotonic() - 0.1]
     return len(recent) > 10 and np.ptp(recent, axis=0).max() < 0.004
 
 
@@ -283,14 +278,25 @@ def test_what_the_tracker_says_is_where_the_slave_was(rig):
 
 
 def test_moving_wires_are_not_tared_and_a_bent_tip_is_not_registered(rig):
-    moving(rig)
-    rig.graph.serve(0.2)
-    answer = rig.graph.call('load_cells', 'tare')
-    assert not answer.success
-    assert 'the wires move' in answer.message
-    answer = rig.graph.call('em_tracker', 'register_straight')
-    assert not answer.success
-    assert 'kept turning' in answer.message or 'turned by' in answer.message
+    graph = rig.graph
+
+    def turns():
+        moving(rig)
+        recent = [s.position for at, s in graph.bendings if at > time.monotonic() - 0.5]
+        return len(recent) > 5 and np.ptp(recent, axis=0).max() > 0.2
+
+    stood = True
+    while stood:
+        while not turns():
+            graph.serve(0.05)
+        tared = graph.call('load_cells', 'tare')
+        registered = graph.call('em_tracker', 'register_straight')
+        # Where this machine stalled meanwhile, the slave stood and is tried again.
+        stood = graph.state != 'ENABLED'
+    assert not tared.success
+    assert 'the wires move' in tared.message
+    assert not registered.success
+    assert 'kept turning' in registered.message or 'turned by' in registered.message
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,8 @@ TOPICS = (
 )
 
 pytestmark = pytest.mark.skipif(
-    not RECORDINGS, reason=f'no recordings under {SHARED}/cases; set ENDOSCOPE_SHARED'
+    not RECORDINGS,
+    reason='no reference cases on this machine: set ENDOSCOPE_SHARED to the folder that has them',
 )
 
 

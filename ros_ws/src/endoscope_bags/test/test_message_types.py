@@ -39,7 +39,7 @@ def test_the_hash_of_joint_state_is_the_one_that_jazzy_announces():
 def test_installed_types_beyond_the_common_ones_are_found():
     folder = Path(sys.prefix) / 'share' / 'rmw_dds_common' / 'msg'
     if not folder.is_dir():
-        pytest.skip('rmw_dds_common is not installed in this environment')
+        pytest.skip('the messages of rmw_dds_common are not installed')
     kind = message_type('rmw_dds_common/msg/ParticipantEntitiesInfo')
     assert 'MSG: rmw_dds_common/NodeEntitiesInfo' in kind.definition
     hashes = json.loads((folder / 'ParticipantEntitiesInfo.json').read_text())['type_hashes']

@@ -7,9 +7,6 @@ import pytest
 from endoscope_bringup.cli import main
 from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 SPEEDS = ['--baud', '57600', '1000000']
 
 

@@ -7,16 +7,13 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from typing import Literal
 
 _PR_SET_PDEATHSIG = 1
 
 
 @contextmanager
-def worker_pool(
-    jobs: int, start: Literal['spawn', 'fork'] = 'spawn'
-) -> Iterator[ProcessPoolExecutor]:
-    """Processes that end with the block or with the process that started them.
+def worker_pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
+    """Fresh processes that end with the block or with the process that started them.
 
     An executor of its own, left by an error or a signal, would first do every task that was
     submitted, and workers of a killed process would go on with theirs, each for minutes.
@@ -25,8 +22,6 @@ def worker_pool(
     ----------
     jobs : int
         Number of processes.
-    start : str
-        Whether they are fresh or forked.
 
     Yields
     ------
@@ -34,7 +29,7 @@ def worker_pool(
         Left without an error, it waits for its tasks; otherwise they are given up.
     """
     before = set(multiprocessing.active_children())
-    context = multiprocessing.get_context(start)
+    context = multiprocessing.get_context('spawn')
     pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_follow_parent)
     try:
         yield pool

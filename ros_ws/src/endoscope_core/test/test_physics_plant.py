@@ -86,7 +86,10 @@ def test_a_held_shaft_holds_everything():
     assert np.ptp(made.tension[-2000:], axis=0).max() < 2e-3
 
 
-@pytest.mark.skipif(not REFERENCE.is_dir(), reason=f'no {REFERENCE}; set ENDOSCOPE_SHARED')
+@pytest.mark.skipif(
+    not REFERENCE.is_dir(),
+    reason='no reference cases on this machine: set ENDOSCOPE_SHARED to the folder that has them',
+)
 def test_answers_made_elsewhere():
     for path in sorted(REFERENCE.glob('*.csv')):
         differs = re.findall(r'(\w+)=([-\d.e]+)', path.read_text().split(';', 1)[0])

@@ -10,7 +10,8 @@ from endoscope_core.trials.real_recordings import (
 
 RECORDINGS = real_recordings()
 pytestmark = pytest.mark.skipif(
-    not RECORDINGS, reason='no real recordings: set ENDOSCOPE_SHARED to the folder that has them'
+    not RECORDINGS,
+    reason='no real recordings on this machine: set ENDOSCOPE_SHARED to the folder that has them',
 )
 
 

@@ -205,7 +205,10 @@ def test_the_two_wires_are_each_other_s_mirror():
         np.testing.assert_allclose(own, other, atol=1e-7)
 
 
-@pytest.mark.skipif(not REFERENCE.is_dir(), reason=f'no {REFERENCE}; set ENDOSCOPE_SHARED')
+@pytest.mark.skipif(
+    not REFERENCE.is_dir(),
+    reason='no reference cases on this machine: set ENDOSCOPE_SHARED to the folder that has them',
+)
 @pytest.mark.parametrize(
     'name',
     [

@@ -45,7 +45,10 @@ def test_leaving_a_point_out_predicts_it_from_the_others():
     assert leave_one_out_errors([0.0, 1.0, 2.0], [0.0, 1.0, 5.0])[2] == pytest.approx(-3.0)
 
 
-@pytest.mark.skipif(not REAL.is_dir(), reason=f'no {REAL}; set ENDOSCOPE_SHARED')
+@pytest.mark.skipif(
+    not REAL.is_dir(),
+    reason='no real recordings on this machine: set ENDOSCOPE_SHARED to the folder that has them',
+)
 def test_real_backlash_sizes_from_tension_alone():
     sizes, widths = [], []
     for path in sorted(REAL.glob('[0-9]*.txt')):

@@ -131,7 +131,8 @@ def test_recordings_that_tell_nothing_are_refused():
 
 
 @pytest.mark.skipif(
-    FOLDER is None, reason='no real recordings: set ENDOSCOPE_SHARED to the folder that has them'
+    FOLDER is None,
+    reason='no real recordings on this machine: set ENDOSCOPE_SHARED to the folder that has them',
 )
 def test_the_shipped_family_reads_as_the_real_rig_does_in_the_cycle_not_fitted():
     assert FOLDER is not None

@@ -6,9 +6,6 @@ from endoscope_devices.dynamixel.doctor import examine
 from endoscope_devices.dynamixel.emulator.bus import EmulatedBus
 from endoscope_devices.dynamixel.emulator.servo import EmulatedServo
 
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
-
 
 @pytest.fixture
 def bus():

@@ -1,15 +1,13 @@
 """The emulator serves ROBOTIS's own client, unchanged, and keeps to the manual."""
 
 import pytest
-from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, GroupSyncWrite, PortHandler
+from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, GroupSyncWrite
 from dynamixel_sdk import PacketHandler as SdkPacketHandler
+from patient_clients import PatientPort
 
 from endoscope_devices.dynamixel import control_table as table
 from endoscope_devices.dynamixel.emulator.bus import EmulatedBus
 from endoscope_devices.dynamixel.emulator.servo import EmulatedServo, ErrorNumber
-
-# In real time, on a machine that may stall for longer than a device may be silent.
-pytestmark = pytest.mark.flaky(reruns=2)
 
 ACCESS, RANGE, LENGTH, LIMIT = (
     ErrorNumber.ACCESS,
@@ -27,7 +25,7 @@ def bus():
 
 @pytest.fixture
 def port(bus):
-    port = PortHandler(bus.port)
+    port = PatientPort(bus.port)
     port.setBaudRate(1_000_000)
     yield port
     port.closePort()
@@ -42,6 +40,7 @@ def test_the_sdk_finds_both_servos(port):
     found, result = sdk.broadcastPing(port)
     assert result == COMM_SUCCESS
     assert found == {1: [1020, 45], 2: [1030, 45]}
+    port.patience = 0.0
     assert sdk.ping(port, 3)[1] != COMM_SUCCESS
 
 
@@ -105,14 +104,24 @@ def test_indirect_data_show_what_their_addresses_say_until_a_reboot(port):
         sdk.write2ByteTxRx(port, 1, 168 + 2 * k, 132 + k)
     assert sdk.read4ByteTxRx(port, 1, 224)[0] == 2048
     assert sdk.reboot(port, 1) == (COMM_SUCCESS, 0)
-    assert sdk.ping(port, 1)[1] != COMM_SUCCESS
+    port.patience = 0.0
     while sdk.ping(port, 1)[1] != COMM_SUCCESS:
         pass
+    port.patience = PatientPort.patience
     assert sdk.read4ByteTxRx(port, 1, 224)[0] == 0
+
+
+def test_a_servo_that_restarts_is_silent_for_a_moment():
+    servo = servo_in_motion()
+    servo.restart(1.0)
+    assert not servo.answers(1.01)
+    assert servo.answers(2.0)
+    assert servo.value(table.TORQUE_ENABLE) == 0
 
 
 def test_another_speed_hears_nothing(port):
     port.setBaudRate(57_600)
+    port.patience = 0.0
     assert sdk.ping(port, 1)[1] != COMM_SUCCESS
 
 

@@ -38,7 +38,7 @@ def anchored(
     band : float
         Relative tolerance of its parameters.
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------

@@ -129,7 +129,7 @@ def grow(
         Anchors are fits of the parent's own model; see `rank.look`.
     effect_ids : sequence of str
     jobs : int
-        Processes side by side.
+        Tasks side by side.
     most : int
         How many to fit fully, at most, over all parents.
 
@@ -204,6 +204,6 @@ def _looks(
 
 
 def polished(looks: Sequence[Look], jobs: int) -> list[Composition]:
-    """Full fits of what was looked at, in the same order, with `jobs` processes side by side."""
+    """Full fits of what was looked at, in the same order, with `jobs` tasks side by side."""
     fits = parallel_fits(lambda i: polish(looks[i]), [item.model for item in looks], jobs)
     return [Composition(item.effects, f, score(f)) for item, f in zip(looks, fits, strict=True)]

@@ -67,7 +67,7 @@ def explain_recording(
     given : mapping of joint to GivenPhysics, optional
         The physics of each joint, if it is not to be searched.
     jobs : int
-        Processes side by side.
+        Tasks side by side.
     progress : callable, optional
         Told in a few words what is being done.
 

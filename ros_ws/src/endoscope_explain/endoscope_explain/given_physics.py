@@ -66,7 +66,7 @@ def explained_by(anchors: tuple[Fit, Fit], given: GivenPhysics, jobs: int) -> Jo
         Nominal plant refitted, and as described.
     given : GivenPhysics
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------

@@ -38,7 +38,7 @@ def ladders(
     black_boxes : bool
         Whether to train them.
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------

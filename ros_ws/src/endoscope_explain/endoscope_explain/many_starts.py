@@ -28,7 +28,7 @@ def from_many_starts(composition: Composition, anchor: Fit, jobs: int) -> Compos
     anchor : Fit
         The nominal plant as described: refitted to slips that it cannot make, it lies in a corner.
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------

@@ -1,12 +1,10 @@
-"""The same function on many tasks, side by side on a few processes."""
+"""The same function on many tasks, side by side on a few threads."""
 
-import threading
+from collections import deque
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from threading import Thread
 from typing import Any
-
-from endoscope_core.worker_pool import worker_pool
-
-_function: Callable[[Any], Any] | None = None
 
 
 def parallel_map[Task, Result](
@@ -14,34 +12,46 @@ def parallel_map[Task, Result](
 ) -> list[Result]:
     """Results of `function` on every task, in order.
 
-    Workers are forked, so that the function may be a closure over large arrays, which are not
-    copied. A process with other threads alive cannot be forked safely; there the tasks run one
-    after the other.
+    Threads are enough, as the compiled physics and linear algebra, where the time goes, let others
+    run meanwhile; and closures over large recordings need not travel to other processes.
 
     Parameters
     ----------
     function : callable
-        Its result must be picklable.
     tasks : sequence
     jobs : int
-        Number of processes.
+        Number of threads.
 
     Returns
     -------
     list
+
+    Raises
+    ------
+    BaseException
+        What `function` raised first, in the order of the tasks; tasks that were not begun are
+        given up then.
     """
-    global _function
-    if jobs <= 1 or len(tasks) <= 1 or threading.active_count() > 1:
+    if jobs <= 1 or len(tasks) <= 1:
         return [function(task) for task in tasks]
-    _function = function
+    waiting = deque((Future[Result](), task) for task in tasks)
+    futures = [future for future, _ in waiting]
+    for _ in range(min(jobs, len(tasks))):
+        # An executor's threads would keep an interrupted program until their tasks are done.
+        Thread(target=_work, args=(function, waiting), daemon=True).start()
     try:
-        with worker_pool(min(jobs, len(tasks)), 'fork') as pool:
-            return list(pool.map(_call, tasks))
+        return [future.result() for future in futures]
     finally:
-        _function = None
+        waiting.clear()
 
 
-def _call(task: Any) -> Any:
-    if _function is None:
-        raise RuntimeError('a worker was started without a function')
-    return _function(task)
+def _work(function: Callable[[Any], Any], waiting: deque[tuple[Future[Any], Any]]) -> None:
+    while True:
+        try:
+            future, task = waiting.popleft()
+        except IndexError:
+            return
+        try:
+            future.set_result(function(task))
+        except BaseException as error:  # noqa: BLE001 it is the caller's
+            future.set_exception(error)

@@ -175,7 +175,7 @@ def explain_case(
     engine : callable
         `explain_recording`.
     jobs : int
-        Processes side by side.
+        Tasks side by side.
     progress : callable, optional
         Told in a few words what is being done.
     extras : bool

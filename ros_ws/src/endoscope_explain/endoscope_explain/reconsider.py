@@ -50,7 +50,7 @@ def reconsidered(
     effects : sequence of str
         Those that may be tried in place of one of the pair.
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------

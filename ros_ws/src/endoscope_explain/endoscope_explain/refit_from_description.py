@@ -31,7 +31,7 @@ def from_description(found: Sequence[Composition], described: Fit, jobs: int) ->
     described : Fit
         The nominal plant as described.
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def promised_by_description(
     effect_ids : sequence of str
         Those that may be chosen.
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------

@@ -70,7 +70,7 @@ def search(
     anchors : (Fit, Fit)
         Nominal plant refitted, and as described.
     jobs : int
-        Processes side by side.
+        Tasks side by side.
     depth : int
         Largest number of effects.
     known : tuple of str

@@ -75,7 +75,7 @@ def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
     ----------
     choice : SharedChoice
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def settled_together(choices: Sequence[SharedChoice], jobs: int) -> list[SharedC
     ----------
     choices : sequence of SharedChoice
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------

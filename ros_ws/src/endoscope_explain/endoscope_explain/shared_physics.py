@@ -38,7 +38,7 @@ def physics_of_all(
     ----------
     sources : sequence of Sources
     jobs : int
-        Processes side by side.
+        Tasks side by side.
     tell : callable
         Told what is being done.
 
@@ -90,7 +90,7 @@ def shared_effects(
     most_effects : int
         Largest number of effects on a joint.
     jobs : int
-        Processes side by side.
+        Tasks side by side.
     tell : callable
         Told each effect when it is chosen.
 

@@ -31,7 +31,7 @@ def with_counted_numbers(composition: Composition, jobs: int) -> Composition:
     ----------
     composition : Composition
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------

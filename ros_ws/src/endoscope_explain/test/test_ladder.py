@@ -3,7 +3,7 @@ import pytest
 
 from endoscope_explain.black_box.features import PLAY_WIDTHS, motion_features
 from endoscope_explain.black_box.held_out_times import judged, trained_on
-from endoscope_explain.black_box.regressors import GaussianProcess, NeuralNetwork
+from endoscope_explain.black_box.regressors import GaussianProcess, NeuralNetwork, training
 from endoscope_explain.ladder import ladders
 
 
@@ -12,7 +12,8 @@ def test_a_black_box_learns_a_smooth_function_of_several_outputs(kind):
     rng = np.random.default_rng(2)
     x = rng.uniform(-2.0, 2.0, (400, 3))
     y = np.stack([np.sin(x[:, 0]), 5.0 + x[:, 1] ** 2], axis=1)
-    model = kind(x[:300], y[:300] + 0.01 * rng.standard_normal((300, 2)))
+    with training():
+        model = kind(x[:300], y[:300] + 0.01 * rng.standard_normal((300, 2)))
     error = model.predict(x[300:]) - y[300:]
     assert np.sqrt(np.mean(error**2, axis=0)) == pytest.approx([0.0, 0.0], abs=0.25)
 

@@ -17,7 +17,8 @@ FOLDER = SHARED / 'cases' / 'sheath'
 CASE = FOLDER / 'nominal.mcap'
 
 pytestmark = pytest.mark.skipif(
-    not CASE.exists(), reason=f'no {CASE}; set ENDOSCOPE_SHARED to where the cases are'
+    not CASE.exists(),
+    reason='no reference cases on this machine: set ENDOSCOPE_SHARED to the folder that has them',
 )
 
 

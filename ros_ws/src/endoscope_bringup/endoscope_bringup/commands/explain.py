@@ -81,7 +81,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'explain all of them together',
     )
     parser.add_argument(
-        '--jobs', type=_positive, default=2, metavar='N', help='processes side by side (default 2)'
+        '--jobs', type=_positive, default=2, metavar='N', help='tasks side by side (default 2)'
     )
     parser.add_argument(
         '--quick', action='store_true', help='leave out the black boxes and the next experiment'

@@ -157,6 +157,7 @@ def undergo(
     folder: Path,
     aftermath: float = AFTERMATH_S,
     patience: float | None = None,
+    domain: int | None = None,
 ) -> FaultOutcome:
     """Make a fault happen in motion, and look at what follows.
 
@@ -170,8 +171,10 @@ def undergo(
         How long to look at least, in s.
     patience
         Silence of the servos in s that is a fault, instead of the usual.
+    domain
+        ROS domain; by default one that goes with the process.
     """
-    with MotorRig(folder, fault.apart, patience) as rig:
+    with MotorRig(folder, fault.apart, patience, domain) as rig:
         rig.enable_and_move()
         began, began_ns = time.monotonic(), time.time_ns()
         fault.inject(rig)

@@ -37,7 +37,7 @@ from endoscope_nodes.recorder_node import RecorderNode
 from endoscope_nodes.runtime import Runtime
 from endoscope_nodes.supervisor_node import SupervisorNode
 
-PATIENCE_S = 60.0
+PATIENCE_S = 240.0
 RATE_HZ = 250
 MOVING_RAD = 0.05
 TENSION_N = 5.0
@@ -64,10 +64,16 @@ class MotorRig(ClosedOnExit):
         Nodes that live in processes of their own, so that they can be killed.
     patience
         Silence of the servos in s that is a fault, instead of the usual.
+    domain
+        ROS domain; by default one that goes with the process.
     """
 
     def __init__(
-        self, folder: Path, apart: Sequence[str] = (), patience: float | None = None
+        self,
+        folder: Path,
+        apart: Sequence[str] = (),
+        patience: float | None = None,
+        domain: int | None = None,
     ) -> None:
         self.bag = folder / 'bag'
         self.emulator = EmulatorProcess(link=folder / 'servos')
@@ -76,7 +82,7 @@ class MotorRig(ClosedOnExit):
         self.states: list[tuple[float, str]] = []
         self.shafts: list[tuple[float, JointSample]] = []
         self.messages: list[tuple[float, str, str]] = []
-        domain = 100 + os.getpid() % 130
+        domain = 100 + os.getpid() % 130 if domain is None else domain
         overrides = self._parameters(apart, patience, folder / 'rig.yaml')
         self.runtime = Runtime(
             args=['--ros-args', '--log-level', 'fatal'],

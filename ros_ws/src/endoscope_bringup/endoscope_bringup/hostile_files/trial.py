@@ -124,8 +124,7 @@ def try_files(kind: str, cases: int, seed: int, jobs: int) -> Iterator[Outcomes]
     jobs
         Processes.
     """
-    # The other libraries that a worker needs are forked with it; PyTorch minds being forked.
-    with worker_pool(jobs, 'spawn') as pool:
+    with worker_pool(jobs) as pool:
         batches: dict[Future[Outcomes], range] = {}
         for first in range(0, cases, _BATCH):
             numbers = range(first, min(first + _BATCH, cases))

@@ -50,10 +50,9 @@ class GaussianProcess:
         )
         kernel = RBF(np.full(x.shape[1], 3.0), (0.1, 1e3)) + WhiteKernel(0.1, (1e-3, 2.0))
         tuning = GaussianProcessRegressor(kernel, optimizer=_few_steps)
-        with _training():
-            tuning.fit(x[few], y[few])
-            self._process = GaussianProcessRegressor(tuning.kernel_, optimizer=None)
-            self._process.fit(x[many], y[many])
+        tuning.fit(x[few], y[few])
+        self._process = GaussianProcessRegressor(tuning.kernel_, optimizer=None)
+        self._process.fit(x[many], y[many])
 
     def predict(self, features: Array) -> Array:
         """Return the posterior mean (M, K)."""
@@ -87,8 +86,7 @@ class NeuralNetwork:
             n_iter_no_change=NETWORK_STEPS,
             random_state=seed,
         )
-        with _training():
-            self._network.fit(x, y)
+        self._network.fit(x, y)
 
     def predict(self, features: Array) -> Array:
         """Return the network's outputs (M, K)."""
@@ -97,7 +95,8 @@ class NeuralNetwork:
 
 
 @contextmanager
-def _training() -> Iterator[None]:
+def training() -> Iterator[None]:
+    """What black boxes are trained in, side by side or one after the other."""
     from sklearn.exceptions import ConvergenceWarning
     from threadpoolctl import threadpool_limits
 

@@ -7,7 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.black_box.features import motion_features
-from endoscope_explain.black_box.regressors import GaussianProcess, NeuralNetwork, Regressor
+from endoscope_explain.black_box.regressors import (
+    GaussianProcess,
+    NeuralNetwork,
+    Regressor,
+    training,
+)
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.predicted_signals import RecordedView, SignalView
@@ -104,8 +109,7 @@ def black_box_rungs(
         With the prediction `BASE`.
     exams : sequence of Exam
     jobs : int
-        Processes side by side. With two or more the libraries of the black boxes, which start
-        threads, stay out of this process, so that it can still be forked.
+        Threads side by side.
 
     Returns
     -------
@@ -120,7 +124,9 @@ def black_box_rungs(
         return _judged(ResidualModel(kind, recording, recorded, joint, exam.use), exam, joint)
 
     rungs: list[dict[str, dict[str, ChannelFit]]] = [{kind: {} for kind in KINDS} for _ in exams]
-    for (index, kind, _), found in zip(tasks, parallel_map(judged, tasks, jobs), strict=True):
+    with training():
+        answers = parallel_map(judged, tasks, jobs)
+    for (index, kind, _), found in zip(tasks, answers, strict=True):
         rungs[index][kind] |= found
     return rungs
 

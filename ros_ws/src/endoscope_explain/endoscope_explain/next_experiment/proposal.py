@@ -46,7 +46,7 @@ def propose(
         With the effect in it.
     effect : NamedEffect
     jobs : int
-        Processes side by side.
+        Tasks side by side.
 
     Returns
     -------
