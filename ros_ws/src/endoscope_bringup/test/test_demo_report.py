@@ -1,60 +1,95 @@
-"""The report of `endoscope demo`: all that was measured is in one page that needs no other file."""
+"""The report of `endoscope demo`: what is said and marked follows from the figures alone."""
 
 import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from endoscope_bringup.demo.page import report_page, table_rows
-from endoscope_bringup.demo.procedure import MOTIONS, TABLE_5, TUBES, Mode
-from endoscope_bringup.demo.results import CalibrationOutcome, DemoResults, TrackingRun
-from endoscope_bringup.demo.run_demo import figures_table
+from endoscope_bringup.demo import sentences
+from endoscope_bringup.demo.analysis import (
+    Angles,
+    longest_crossing,
+    reversals,
+    run_of,
+    start_of_motion,
+)
+from endoscope_bringup.demo.page import endoscope_picture, report_page
+from endoscope_bringup.demo.procedure import (
+    MOTIONS,
+    TABLE_5,
+    TUBES,
+    CalibrationFacts,
+    Method,
+    Segment,
+)
+from endoscope_bringup.demo.results import CalibrationOutcome, Crossing, DemoResults, TrackingRun
+from endoscope_bringup.demo.table import (
+    BACKLASH,
+    LARGEST,
+    RMSE,
+    figures_table,
+    of_figure,
+    ranking,
+    table_rows,
+)
+from endoscope_core.signals import motion_by_name
 
-TIME = 0.025 * np.arange(800)
-RMSE = {Mode.NONE: 37.48, Mode.FEED_FORWARD: 5.02, Mode.ADAPTIVE: 4.97}
-BACKLASH = {Mode.NONE: 91.07, Mode.FEED_FORWARD: 4.78, Mode.ADAPTIVE: 0.27}
+ROOT = Path(__file__).parents[4]
+NO_TURNS = (np.array([]), np.array([]))
+LAG = {Method.NONE: 0.4, Method.BOUC_WEN: 0.1, Method.INVERSE: 0.02, Method.FEEDBACK: 0.01}
+REACH = ((-61.7, 51.5), (-61.7, 51.5))
 
 
 def calibration(tube: str) -> CalibrationOutcome:
     time = 1e-3 * np.arange(9000)
-    desired = 90.0 * np.sin(time)
+    both = np.column_stack([time, time])
     return CalibrationOutcome(
-        tube,
+        CalibrationFacts(
+            tube,
+            3.0,
+            90.0,
+            {40: 0.0, 50: 0.0, 60: 0.0, 70: 0.0, 80: 0.02, 90: 0.97, 100: 0.01},
+            10.52,
+            REACH,
+        ),
         time,
         5.0 + np.outer(np.sin(time), [1.0, -1.0, 1.0, -1.0]),
         ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg'),
-        desired,
-        90.0 * np.sin(time - 0.4),
-        93.7,
-        90.0,
-        {40: 0.0, 50: 0.0, 60: 0.0, 70: 0.0, 80: 0.02, 90: 0.97, 100: 0.01},
-        10.52,
+        90.0 * np.sin(both),
+        90.0 * np.sin(both - 0.4),
+    )
+
+
+def run(tube: str, motion: str, method: Method, lag: float) -> TrackingRun:
+    """A tip that does what was asked of it some time ago."""
+    signal = motion_by_name(motion)
+    time = np.arange(*signal.steady, 0.025)
+    desired, late = (np.degrees(signal.sample(t)[0]) for t in (time, time - lag))
+    return TrackingRun(tube, motion, method, time, desired, late, NO_TURNS, Crossing(0.2, 50.0))
+
+
+def results_of(lag: dict[Method, float]) -> DemoResults:
+    return DemoResults(
+        tuple(calibration(tube.name) for tube in TUBES),
+        tuple(
+            run(tube.name, motion, method, lag[method])
+            for tube in TUBES
+            for motion in MOTIONS
+            for method in Method
+        ),
+        0.25,
+        {'/endoscope/motor/servo_jp': 61234, '/endoscope/slave/measured_js': 2449},
+        {'/endoscope/motor/servo_jp': 3, '/endoscope/slave/measured_js': 0},
     )
 
 
 @pytest.fixture(scope='module')
 def results() -> DemoResults:
-    desired = 60.0 * np.sin(TIME)
-    return DemoResults(
-        tuple(calibration(tube.name) for tube in TUBES),
-        tuple(
-            TrackingRun(
-                tube.name,
-                motion,
-                mode,
-                TIME,
-                desired,
-                60.0 * np.sin(TIME - 0.01 * RMSE[mode]),
-                RMSE[mode],
-                BACKLASH[mode],
-            )
-            for tube in TUBES
-            for motion in MOTIONS
-            for mode in Mode
-        ),
-        {'/endoscope/motor/servo_jp': 61234, '/endoscope/slave/measured_js': 2449},
-        {'/endoscope/motor/servo_jp': 3, '/endoscope/slave/measured_js': 0},
-    )
+    return results_of(LAG)
 
 
 @pytest.fixture(scope='module')
@@ -69,27 +104,218 @@ def test_the_page_needs_no_other_file(page):
     assert not re.search(r'url\((?!["\']?(#|data:))', page)
 
 
-def test_everything_that_was_measured_is_shown(page):
-    # Loops, tracking of each motion, and a calibration, for each tube.
-    assert page.count('<svg') == len(TUBES) * (2 + len(MOTIONS))
-    for text in ('37.48', '5.02', '4.97', '91.07', '0.27', '10.5', '61234', '2026-11-21 08:00 UTC'):
-        assert text in page.replace('\u202f', '').replace(',', ''), text
-    for tube in TUBES:
-        assert tube.name in page
+def test_headings_alone_tell_what_was_wrong_and_what_became_better(page, results):
+    headings = re.findall(r'<h[12]>(.*?)</h[12]>', page)
+    rows = table_rows(results)
+    widest = max(row.values[Method.NONE] for row in of_figure(rows, BACKLASH))
+    assert f'{widest:.0f}° wide' in headings[0]
+    assert 'physical inverse + feedback leaves' in headings[0]
+    assert [heading.split(':')[0] for heading in headings[1:]] == [
+        'What is wrong',
+        'What helps',
+        'What is left',
+        'How it was measured',
+        *(f'{tube.name.capitalize()}, in detail' for tube in TUBES),
+        'How this was made',
+    ]
+
+
+def test_every_picture_has_a_caption_and_every_method_one_name(page, results):
+    # The endoscope; loops, tracking of each motion and a calibration for each tube.
+    assert (
+        page.count('<figure') == page.count('<figcaption>') == 1 + len(TUBES) * (2 + len(MOTIONS))
+    )
+    assert page.count('<svg') == page.count('<figure')
+    terminal = ' '.join(figures_table(table_rows(results)).split())
+    for method in Method:
+        assert f'</span>{method}</th>' in page
+        assert method.split()[0] in terminal
+    for wire in ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg'):
+        assert page.count(f'>{wire}<') == len(TUBES)
+    for text in ('61234', '2026-11-21 08:00 UTC', '10.5 s'):
+        assert text in page
+
+
+def test_the_best_of_a_row_is_marked_by_its_number_and_the_best_method_comes_first():
+    worse = results_of(LAG | {Method.FEEDBACK: 0.05})
+    rows = table_rows(worse)
+    assert all(row.is_best(m) == (m is Method.INVERSE) for row in rows for m in Method)
+    assert ranking(rows) == [Method.INVERSE, Method.FEEDBACK, Method.BOUC_WEN, Method.NONE]
+    marked = re.findall(r'<td class="best">([\d.]+)', report_page(worse, {}))
+    assert marked == [f'{row.values[Method.INVERSE]:.2f}' for row in rows]
+    assert figures_table(rows).count('*') == len(rows)
+
+
+def test_one_row_in_which_another_method_is_best_is_marked_so(results):
+    odd = [
+        replace(r, actual_deg=r.desired_deg + 30.0)
+        if (r.tube, r.motion, r.method) == (TUBES[0].name, MOTIONS[0], Method.FEEDBACK)
+        else r
+        for r in results.runs
+    ]
+    rows = table_rows(replace(results, runs=tuple(odd)))
+    for row, best in zip(
+        of_figure(rows, RMSE), [Method.INVERSE, *[Method.FEEDBACK] * 3], strict=True
+    ):
+        assert row.is_best(best)
+        assert not any(row.is_best(m) for m in Method if m is not best)
 
 
 def test_the_table_stands_beside_the_papers(results):
     rows = table_rows(results)
-    assert len(rows) == 2 * len(TUBES) * len(MOTIONS)
-    for row, (tube, motion) in zip(rows[::2], TABLE_5, strict=True):
+    assert len(rows) == 3 * len(TUBES) * len(MOTIONS)
+    for row, (tube, motion) in zip(of_figure(rows, RMSE), TABLE_5, strict=True):
         assert row.tube == tube
         assert (row.paper_none, row.paper_proposed) == TABLE_5[tube, motion][:2]
-        assert row.feed_forward_left == pytest.approx(5.02 / 37.48)
-    text = figures_table(results).splitlines()
-    assert len(text) == 1 + len(rows)
-    assert '18.08 ± 0.35' in text[1]
+    for rmse, largest in zip(of_figure(rows, RMSE), of_figure(rows, LARGEST), strict=True):
+        assert all(largest.values[m] > rmse.values[m] for m in Method)
+    text = figures_table(rows)
+    assert '18.08 ± 0.35' in text
+    assert max(map(len, text.splitlines())) <= 100
+
+
+@pytest.mark.parametrize(
+    ('feedback', 'said'),
+    [
+        (0.01, 'smaller in 4 of 4 runs and larger in 0:'),
+        (0.05, 'smaller in 0 of 4 runs and larger in 4:'),
+        (0.02, 'smaller in 0 of 4 runs and larger in 0:'),
+    ],
+)
+def test_what_feedback_does_is_said_by_the_numbers(feedback, said):
+    rows = table_rows(results_of(LAG | {Method.FEEDBACK: feedback}))
+    assert said in sentences.what_feedback_does(rows)
+
+
+def test_feedback_that_helps_in_one_run_only_is_not_praised_for_all(results):
+    runs = tuple(
+        replace(r, actual_deg=r.desired_deg + 30.0)
+        if r.method is Method.FEEDBACK and r.motion == MOTIONS[0]
+        else r
+        for r in results.runs
+    )
+    said = sentences.what_feedback_does(table_rows(replace(results, runs=runs)))
+    assert 'smaller in 2 of 4 runs and larger in 2:' in said
+
+
+def test_no_method_is_praised_where_none_helps():
+    lag = {Method.NONE: 0.1, Method.BOUC_WEN: 0.2, Method.INVERSE: 0.3, Method.FEEDBACK: 0.4}
+    worse = results_of(lag)
+    assert 'no compensation makes the error smaller' in sentences.headline(table_rows(worse))
+    assert 'is best' not in report_page(worse, {})
+
+
+def test_what_is_left_is_located_after_the_reversals():
+    time = np.arange(0.0, 12.0, 0.025)
+    desired = np.column_stack([60.0 * np.sin(time)] * 2)
+    turns = reversals(time, desired[:, 0])
+    assert turns == pytest.approx(np.pi * np.array([0.5, 1.5, 2.5, 3.5]), abs=0.03)
+    error = np.zeros_like(desired)
+    for turn in turns:
+        error[(time >= turn) & (time < turn + 0.2)] = 10.0
+    spikes = replace(
+        run('t', 'periodic', Method.INVERSE, 0.0),
+        time=time,
+        desired_deg=desired,
+        actual_deg=desired + error,
+        reversals=(turns, turns),
+    )
+    square, share = sentences.share_after_reversals([spikes])
+    assert square == 1.0
+    assert share == pytest.approx(4 * sentences.AFTER_REVERSAL_S / 12.0, rel=0.1)
+    assert sentences.longest_excursion([spikes], 1.0) == pytest.approx(0.175)
+
+
+def test_an_angle_that_was_cut_turns_where_it_comes_off_its_end():
+    time = np.arange(0.0, 3.0, 0.001)
+    cut = np.minimum(60.0 * np.sin(time), 50.0)
+    # What shapes a command rounds the corner: it goes a little too far.
+    cut[np.argmax(cut == 50.0) + np.arange(50)] = 50.5
+    assert reversals(time, cut) == pytest.approx([np.pi - np.arcsin(50 / 60)], abs=2e-3)
+
+
+def test_a_signal_that_a_tube_cannot_follow_is_said_to_be_cut(results):
+    assert sentences.where_signals_were_cut(results, Method.INVERSE) == []
+    runs = tuple(replace(r, desired_deg=np.minimum(r.desired_deg, 51.5)) for r in results.runs)
+    said = sentences.where_signals_were_cut(replace(results, runs=runs), Method.INVERSE)
+    assert len(said) == len(TUBES)
+    assert 'can be bent from -62° to 52° only' in said[0]
+    assert '60 sin t by up to 8.5°' in said[0]
+
+
+def test_a_run_is_compared_with_what_was_asked_for_in_that_run():
+    """Each run begins when the tip has come to the signal's start, which takes its own time."""
+    signal = motion_by_name('periodic')
+    asked_time = 1e-3 * np.arange(17_000)
+    for way in (0.2, 1.1):
+        asked = signal.sample(asked_time - way)[0]
+        early = asked_time < way
+        asked[early] = 0.3 * (way - asked_time[early, None])
+        stamps = asked_time[::25]
+        angles = Angles(100.0 + stamps, asked[::25] + 0.01, 100.0 + asked_time, asked)
+        shafts = 100.0 + asked_time, 0.5 * asked
+        made = run_of(angles, shafts, Segment('t', 'periodic', Method.NONE, 100.0, 116.0))
+        assert made.desired_deg[:, 0] == pytest.approx(60.0 * np.sin(made.time), abs=0.1)
+        assert made.rmse_deg == pytest.approx(np.degrees(0.01))
+        assert made.crossing == Crossing(0.0, 0.0)
+
+
+def test_the_start_of_a_motion_is_found_though_it_was_cut():
+    signal = motion_by_name('non_periodic').joints['bend_x']
+    time = 1e-3 * np.arange(26_000)
+    desired = np.clip(signal(time - 0.437)[0], -0.7, 0.6)
+    assert start_of_motion(time, desired, signal) == pytest.approx(0.437, abs=1e-3)
+
+
+def test_a_run_that_ended_before_its_motion_did_is_refused():
+    signal = motion_by_name('periodic')
+    time = 1e-3 * np.arange(15_000)
+    asked = signal.sample(time - 2.5)[0]
+    angles = Angles(time[::25], asked[::25], time, asked)
+    with pytest.raises(ValueError, match='descending colon, periodic, uncompensated'):
+        run_of(
+            angles, (time, asked), Segment('descending colon', 'periodic', Method.NONE, 0.0, 15.0)
+        )
+
+
+def test_the_dead_zone_is_where_a_motor_turns_fast():
+    time = 1e-3 * np.arange(2000)
+    shafts = np.column_stack([0.1 * time, 0.1 * time])
+    shafts[1000:, 1] += np.minimum(4.0 * (time[1000:] - 1.0), 0.8)
+    crossing = longest_crossing(time, shafts, 0.0, 2.0)
+    assert crossing.seconds == pytest.approx(0.2, abs=0.02)
+    assert crossing.width_deg == pytest.approx(np.degrees(0.8 / 0.5), rel=0.1)
+
+
+def test_a_first_line_is_said_before_anything_slow_is_loaded(tmp_path):
+    """The folder is not empty, so that nothing is run."""
+    (tmp_path / 'mine').touch()
+    code = (
+        'import sys\n'
+        'from endoscope_bringup.commands import demo\n'
+        'from endoscope_bringup.cli import main\n'
+        "slow = ('numpy', 'matplotlib', 'rclpy', 'torch')\n"
+        'def say(began, what):\n'
+        '    print(what, [name for name in slow if name in sys.modules])\n'
+        'demo._print_progress = say\n'
+        "status = main(['demo', '--out', sys.argv[1]])\n"
+        "say(0.0, 'then')\n"
+        'sys.exit(status)\n'
+    )
+    made = subprocess.run(
+        [sys.executable, '-c', code, str(tmp_path)], capture_output=True, text=True, check=False
+    )
+    assert made.returncode == 2, made.stderr
+    first, then = made.stdout.splitlines()
+    assert first.startswith('calibrating and moving') and first.endswith('[]')
+    # What runs the nodes loads them: processes of their own.
+    assert 'rclpy' not in then and 'torch' not in then
 
 
 def test_a_run_that_was_not_made_is_named(results):
     with pytest.raises(KeyError, match='sigmoid colon'):
-        results.run('sigmoid colon', MOTIONS[0], Mode.NONE)
+        results.run('sigmoid colon', MOTIONS[0], Method.NONE)
+
+
+def test_the_documentation_shows_the_drawing_that_the_page_has():
+    assert (ROOT / 'ros_ws/doc/endoscope.svg').read_text() == endoscope_picture()

@@ -344,10 +344,11 @@ class GraphClient(ClosedOnExit):
             if said.message == PROCEDURE_WAITING:
                 return said.values['last']
             progress(said.message, float(said.values['progress']))
-            heard_ns = said.received_ns
-            if not self.wait_until(
-                lambda heard=heard_ns: self.health[PROCEDURE].received_ns > heard, patience_s
-            ):
+
+            def says_more(heard_ns: int = said.received_ns) -> bool:
+                return self.health[PROCEDURE].received_ns > heard_ns
+
+            if not self.wait_until(says_more, patience_s):
                 raise GraphRefusedError(f'calibration has been silent for {patience_s:g} s')
 
     def calibrate(

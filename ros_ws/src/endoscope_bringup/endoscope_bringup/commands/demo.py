@@ -13,9 +13,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'demo',
         help='the whole procedure on the simulated slave, recorded, with a report',
-        description='Enables the simulated slave, calibrates it, classifies its wire tensions, and '
-        "tracks the first paper's signals uncompensated, with feed-forward and with feedback; "
-        'writes bags and report.html.',
+        description='Enables the simulated slave, calibrates it by its wire tensions, and tracks '
+        "the first paper's signals uncompensated, by the first paper's method, and by the inverse "
+        'of the plant that the calibration identified, without and with feedback; writes bags and '
+        'report.html.',
     )
     parser.add_argument(
         '--out',
@@ -39,19 +40,26 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demonstration and return 0."""
+    progress = partial(_print_progress, time.monotonic())
+    # Before anything is imported that takes seconds.
+    shapes = 'both shapes' if args.tube == 'both' else f'the {args.tube} shape'
+    progress(f'calibrating and moving a simulated endoscope in {shapes} of the colon')
+    from endoscope_bringup.demo import sentences
     from endoscope_bringup.demo.procedure import TUBES
-    from endoscope_bringup.demo.run_demo import REPORT, figures_table, run_demo
+    from endoscope_bringup.demo.run_demo import REPORT, run_demo
+    from endoscope_bringup.demo.table import figures_table, table_rows
     from endoscope_core.atomic_output import atomic_directory
 
     out = args.out or Path(time.strftime('bags/demo-%Y%m%d-%H%M%S'))
     tubes = [tube for tube in TUBES if args.tube == 'both' or tube.name.startswith(args.tube)]
-    progress = partial(_print_progress, time.monotonic())
     with atomic_directory(out) as folder:
         results = run_demo(
             folder, tubes=tubes, seed=args.seed, real_time=args.real_time, progress=progress
         )
-    print(figures_table(results))
-    print(f'recordings and report: {out / REPORT}')
+    rows = table_rows(results)
+    print(figures_table(rows))
+    print(f'{sentences.headline(rows)}.')
+    print(f'report and recordings: {out / REPORT}')
     return 0
 
 

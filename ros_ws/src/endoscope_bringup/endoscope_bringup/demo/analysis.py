@@ -1,6 +1,7 @@
 """Reads the demonstration's recordings back and takes the figures from them."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,18 +9,35 @@ from numpy.typing import NDArray
 
 from endoscope_bags import Recording, open_bag
 from endoscope_bringup.demo.procedure import CalibrationFacts, Segment
-from endoscope_bringup.demo.results import CalibrationOutcome, DemoResults, TrackingRun
-from endoscope_core.metrics import tracking_rmse, width_at_mid_height
+from endoscope_bringup.demo.results import CalibrationOutcome, Crossing, DemoResults, TrackingRun
+from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import (
     CALIBRATION_RECORD_DURATION,
+    Signal,
     calibration_sinusoid,
     motion_by_name,
+)
+from endoscope_nodes.names import (
+    JOINTS,
+    MOTOR_MEASURED,
+    MOTORS,
+    SLAVE_COMMAND,
+    SLAVE_MEASURED,
+    WIRES_MEASURED,
 )
 
 Array = NDArray[np.float64]
 
-SHOWN_JOINT = 'bend_x'
-JOINTS = ('bend_x', 'bend_y')
+REST_S = 0.5
+"""Before a run, in which nothing has moved for some time."""
+
+LATEST_START_S = 3.0
+
+TURNED_DEG, STILL_DEG = 1.0, 1e-4
+"""A way back that counts; a step that is none."""
+
+HALF_SPAN = 5
+"""Samples of the shafts, either way, over which their speed is taken."""
 
 
 def analyse(
@@ -48,77 +66,220 @@ def analyse(
     BagError
         If a recording lacks what is needed.
     ValueError
-        If a run shows no loop.
+        If a run ended before its motion did.
     """
     recordings = {tube: open_bag(path) for tube, path in bags.items()}
+    angles = {tube: Angles.of(recording) for tube, recording in recordings.items()}
+    shafts = {tube: _shafts(recording) for tube, recording in recordings.items()}
     messages: dict[str, int] = {}
     for recording in recordings.values():
         for name, topic in recording.topics.items():
             messages[name] = messages.get(name, 0) + topic.message_count
     return DemoResults(
-        tuple(_calibration(recordings[facts.tube], facts) for facts in calibrations),
-        tuple(_run(recordings[segment.tube], segment) for segment in segments),
+        tuple(
+            _calibration(recordings[facts.tube], angles[facts.tube], facts)
+            for facts in calibrations
+        ),
+        tuple(run_of(angles[s.tube], shafts[s.tube], s) for s in segments),
+        _noise(angles, segments),
         dict(sorted(messages.items())),
         lost,
     )
 
 
-def _run(recording: Recording, segment: Segment) -> TrackingRun:
-    time, actual = _tracked(recording, segment.start, segment.end)
-    desired = _desired(recording, time + segment.start)
-    steady = motion_by_name(segment.motion).steady
-    inside = (time >= steady[0]) & (time <= steady[1])
-    errors, sizes = [], []
-    for joint in range(len(JOINTS)):
-        pair = np.degrees(desired[inside, joint]), np.degrees(actual[inside, joint])
-        errors.append(tracking_rmse(*pair))
-        sizes.append(abs(width_at_mid_height(*pair)))
-    shown = JOINTS.index(SHOWN_JOINT)
+@dataclass(frozen=True)
+class Angles:
+    """What was asked of the joints of one tube and what the tracker saw, s and rad.
+
+    Attributes
+    ----------
+    time : array (N,)
+    actual : array (N, J)
+    asked_time : array (M,)
+    asked : array (M, J)
+    """
+
+    time: Array
+    actual: Array
+    asked_time: Array
+    asked: Array
+
+    @classmethod
+    def of(cls, recording: Recording) -> 'Angles':
+        """Those of a recording."""
+        actual = recording.joint_state(SLAVE_MEASURED).select(JOINTS)
+        asked = recording.joint_state(SLAVE_COMMAND).select(JOINTS)
+        return cls(
+            actual.seconds(0),
+            actual.require('position'),
+            asked.seconds(0),
+            asked.require('position'),
+        )
+
+    def between(self, start: float, end: float) -> 'Angles':
+        """Those of an interval, its start at 0 s."""
+        tracked = (self.time >= start) & (self.time < end)
+        asked = (self.asked_time >= start) & (self.asked_time < end)
+        return Angles(
+            self.time[tracked] - start,
+            self.actual[tracked],
+            self.asked_time[asked] - start,
+            self.asked[asked],
+        )
+
+    @property
+    def desired(self) -> Array:
+        """What was asked for at the tracker's stamps, (N, J)."""
+        columns = [np.interp(self.time, self.asked_time, asked) for asked in self.asked.T]
+        return np.column_stack(columns)
+
+
+def run_of(angles: Angles, shafts: tuple[Array, Array], segment: Segment) -> TrackingRun:
+    """The steady part of a run, beside what was asked for in this very run.
+
+    Parameters
+    ----------
+    angles : Angles
+    shafts : tuple of array (K,), (K, J)
+        Stamps in s and shaft angles in rad.
+    segment : Segment
+
+    Raises
+    ------
+    ValueError
+        If the run ended before its motion did.
+    """
+    own = angles.between(segment.start, segment.end)
+    signal = motion_by_name(segment.motion).joints[JOINTS[0]]
+    began = start_of_motion(own.asked_time, own.asked[:, 0], signal)
+    if own.asked_time[-1] < began + signal.steady[1]:
+        raise ValueError(
+            f'{segment.tube}, {segment.motion}, {segment.method}: it began {began:.1f} s late and '
+            'was not tracked to its end'
+        )
+    time = own.time - began
+    inside = (time >= signal.steady[0]) & (time <= signal.steady[1])
     return TrackingRun(
         segment.tube,
         segment.motion,
-        segment.mode,
-        time,
-        np.degrees(desired[:, shown]),
-        np.degrees(actual[:, shown]),
-        float(np.mean(errors)),
-        float(np.mean(sizes)),
+        segment.method,
+        time[inside],
+        np.degrees(own.desired[inside]),
+        np.degrees(own.actual[inside]),
+        tuple(reversals(own.asked_time - began, np.degrees(asked)) for asked in own.asked.T),
+        longest_crossing(*shafts, segment.start + began + signal.steady[0], segment.end),
     )
 
 
-def _calibration(recording: Recording, facts: CalibrationFacts) -> CalibrationOutcome:
-    wires = recording.joint_state('wires/measured_js')
+def start_of_motion(time: Array, desired: Array, signal: Signal) -> float:
+    """When a motion began: the way to it from the measured pose comes first.
+
+    Parameters
+    ----------
+    time : array (N,)
+        Seconds.
+    desired : array (N,)
+        What was asked for then, rad: the signal, cut where the reach of the tube ends.
+    signal : Signal
+
+    Returns
+    -------
+    float
+        Seconds, to a millisecond.
+    """
+    late = np.flatnonzero(time >= LATEST_START_S)[::10]
+    least, most = desired[late].min(), desired[late].max()
+
+    def misfit(start: float) -> float:
+        asked = np.clip(signal(time[late] - start)[0], least, most)
+        return float(np.sum((asked - desired[late]) ** 2))
+
+    coarse = min(np.arange(0.0, LATEST_START_S, 0.02), key=misfit)
+    return float(min(np.arange(coarse - 0.02, coarse + 0.02, 0.001), key=misfit))
+
+
+def reversals(time: Array, desired_deg: Array) -> Array:
+    """Instants at which a desired angle turns back.
+
+    Parameters
+    ----------
+    time : array (N,)
+        Seconds.
+    desired_deg : array (N,)
+        An angle that was cut turns where it comes off its end.
+
+    Returns
+    -------
+    array (R,)
+        Where the way back begins that leads back by `TURNED_DEG` at least, s.
+    """
+    turns = []
+    moves = np.diff(desired_deg)
+    way, furthest = 0.0, float(desired_deg[0])
+    for k, angle in enumerate(desired_deg.tolist()):
+        if way * (angle - furthest) >= 0.0:
+            way, furthest = way or float(np.sign(angle - furthest)), angle
+        elif abs(angle - furthest) > TURNED_DEG:
+            way, furthest = -way, angle
+            turns.append(time[np.flatnonzero(way * moves[:k] <= STILL_DEG)[-1] + 1])
+    return np.array(turns)
+
+
+def longest_crossing(time: Array, shafts: Array, start: float, end: float) -> Crossing:
+    """Longest stretch at more than half the motors' top speed.
+
+    Parameters
+    ----------
+    time : array (K,)
+        Seconds.
+    shafts : array (K, J)
+        Shaft angles, rad.
+    start, end : float
+        Of the interval that is looked at, s.
+    """
+    rig = shipped_rig()
+    inside = (time >= start) & (time < end)
+    time, shafts = time[inside], shafts[inside]
+    span = 2 * HALF_SPAN
+    # An encoder counts: its speed is told over more than a tick.
+    speed = np.abs(shafts[span:] - shafts[:-span]) / (time[span:] - time[:-span])[:, None]
+    longest = Crossing(0.0, 0.0)
+    for fast, shaft in zip((speed > 0.5 * rig.motors.speed).T, shafts.T, strict=True):
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], fast, [0]))))
+        for first, last in zip(edges[::2] + HALF_SPAN, edges[1::2] + HALF_SPAN - 1, strict=True):
+            seconds = float(time[last] - time[first])
+            if seconds > longest.seconds:
+                turned = abs(shaft[last] - shaft[first]) / rig.joints.gear
+                longest = Crossing(seconds, float(np.degrees(turned)))
+    return longest
+
+
+def _shafts(recording: Recording) -> tuple[Array, Array]:
+    series = recording.joint_state(MOTOR_MEASURED).select(MOTORS)
+    return series.seconds(0), series.require('position')
+
+
+def _noise(angles: dict[str, Angles], segments: Sequence[Segment]) -> float:
+    """Of the tracker in degrees, rms, from the rests before the runs."""
+    rests = [angles[s.tube].between(s.start - REST_S, s.start).actual for s in segments]
+    return float(np.degrees(np.sqrt(np.mean([np.var(rest, axis=0, ddof=1) for rest in rests]))))
+
+
+def _calibration(
+    recording: Recording, angles: Angles, facts: CalibrationFacts
+) -> CalibrationOutcome:
+    wires = recording.joint_state(WIRES_MEASURED)
     wire_time = wires.seconds(0) - facts.start
     recorded = (wire_time >= 0) & (wire_time < CALIBRATION_RECORD_DURATION)
-    time, actual = _tracked(recording, facts.start, facts.start + CALIBRATION_RECORD_DURATION)
+    own = angles.between(facts.start, facts.start + CALIBRATION_RECORD_DURATION)
     signal = calibration_sinusoid()
-    shown = time >= signal.steady[0]
-    desired = np.degrees(signal(time[shown])[0])
-    loop = np.degrees(actual[shown, JOINTS.index(SHOWN_JOINT)])
+    steady = own.time >= signal.steady[0]
+    desired = np.degrees(signal(own.time[steady])[0])
     return CalibrationOutcome(
-        facts.tube,
+        facts,
         wire_time[recorded],
         wires.require('effort')[recorded],
         wires.names,
-        desired,
-        loop,
-        width_at_mid_height(desired, loop),
-        facts.class_deg,
-        facts.probabilities,
-        facts.duration,
-    )
-
-
-def _tracked(recording: Recording, start: float, end: float) -> tuple[Array, Array]:
-    series = recording.joint_state('slave/measured_js').select(JOINTS)
-    time = series.seconds(0)
-    inside = (time >= start) & (time < end)
-    return time[inside] - start, series.require('position')[inside]
-
-
-def _desired(recording: Recording, times: Array) -> Array:
-    series = recording.joint_state('slave/servo_jp').select(JOINTS)
-    stamps, position = series.seconds(0), series.require('position')
-    return np.column_stack(
-        [np.interp(times, stamps, position[:, joint]) for joint in range(len(JOINTS))]
+        np.column_stack([desired] * len(JOINTS)),
+        np.degrees(own.actual[steady]),
     )

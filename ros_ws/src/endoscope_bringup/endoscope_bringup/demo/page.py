@@ -1,81 +1,24 @@
 """The demonstration's report as one self-contained page."""
 
-from dataclasses import dataclass
+from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from endoscope_bringup.demo import sentences
 from endoscope_bringup.demo.figures import (
-    MOTION_TITLE,
+    COLOUR,
     calibration_figure,
     loops_figure,
     tracking_figure,
 )
-from endoscope_bringup.demo.procedure import MOTIONS, TABLE_5, Mode, PaperFigure
+from endoscope_bringup.demo.procedure import MEANING, MOTION_TITLE, MOTIONS, Method
 from endoscope_bringup.demo.results import DemoResults
+from endoscope_bringup.demo.table import ranking, table_rows
 
 
-@dataclass(frozen=True)
-class TableRow:
-    """One line of the table beside the paper's Table 5; degrees."""
-
-    tube: str
-    motion: str
-    figure: str
-    paper_none: PaperFigure
-    paper_proposed: PaperFigure
-    none: float
-    feed_forward: float
-    adaptive: float
-
-    @property
-    def paper_left(self) -> float:
-        """Share of the uncompensated figure that the paper's compensator leaves."""
-        return self.paper_proposed.mean / self.paper_none.mean
-
-    @property
-    def feed_forward_left(self) -> float:
-        """Share of the uncompensated figure that feed-forward leaves."""
-        return self.feed_forward / self.none
-
-    @property
-    def adaptive_left(self) -> float:
-        """Share of the uncompensated figure that feed-forward and feedback leave."""
-        return self.adaptive / self.none
-
-
-def table_rows(results: DemoResults) -> list[TableRow]:
-    """RMSE and backlash of each tube and motion, ours beside the paper's."""
-    rows = []
-    for calibration in results.calibrations:
-        tube = calibration.tube
-        for motion in MOTIONS:
-            none, forward, adaptive = (results.run(tube, motion, mode) for mode in Mode)
-            paper = TABLE_5[tube, motion]
-            rows.append(
-                TableRow(
-                    tube,
-                    MOTION_TITLE[motion],
-                    'RMSE',
-                    paper[0],
-                    paper[1],
-                    none.rmse_deg,
-                    forward.rmse_deg,
-                    adaptive.rmse_deg,
-                )
-            )
-            rows.append(
-                TableRow(
-                    tube,
-                    MOTION_TITLE[motion],
-                    'backlash size',
-                    paper[2],
-                    paper[3],
-                    none.backlash_deg,
-                    forward.backlash_deg,
-                    adaptive.backlash_deg,
-                )
-            )
-    return rows
+def endoscope_picture() -> str:
+    """The drawing of an endoscope that stands at the top of the page, as SVG."""
+    return (files('endoscope_bringup') / 'demo/templates/endoscope.svg').read_text()
 
 
 def report_page(results: DemoResults, facts: dict[str, str]) -> str:
@@ -100,23 +43,40 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
         lstrip_blocks=True,
     )
     rows = table_rows(results)
-    rmse = [row for row in rows if row.figure == 'RMSE']
+    order = ranking(rows)
+    best, shown = order[0], MOTIONS[0]
     tubes = [
         {
             'calibration': calibration,
+            'title': calibration.facts.tube.capitalize(),
+            'none': results.run(calibration.facts.tube, shown, Method.NONE),
+            'best': results.run(calibration.facts.tube, shown, best),
             'calibration_svg': calibration_figure(calibration),
-            'loops_svg': loops_figure(results, calibration.tube),
-            'tracking_svg': [tracking_figure(results, calibration.tube, m) for m in MOTIONS],
+            'loops_svg': loops_figure(results, calibration.facts.tube, shown, best),
+            'tracking': [
+                (MOTION_TITLE[m], tracking_figure(results, calibration.facts.tube, m, order))
+                for m in MOTIONS
+            ],
         }
         for calibration in results.calibrations
     ]
     return environment.get_template('report.html.j2').render(
-        tubes=tubes,
+        picture=endoscope_picture(),
+        headline=sentences.headline(rows),
+        wrong=sentences.what_is_wrong(rows),
+        helps=[(m, sentences.what_helps(rows, m)) for m in order if m is not Method.NONE],
+        feedback=sentences.what_feedback_does(rows),
+        paper=sentences.beside_the_paper(rows, Method.BOUC_WEN),
+        left=sentences.what_is_left(results, best),
+        cut=sentences.where_signals_were_cut(results, best),
+        order=order,
+        best=best,
+        meaning=MEANING,
+        colour=COLOUR,
+        shown=MOTION_TITLE[shown],
         rows=rows,
+        tubes=tubes,
         facts=facts,
         messages=results.messages,
         lost=results.lost,
-        worst_forward=max(row.feed_forward_left for row in rmse),
-        worst_adaptive=max(row.adaptive_left for row in rmse),
-        worst_paper=max(row.paper_left for row in rmse),
     )

@@ -3,14 +3,35 @@
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 
 
-class Mode(StrEnum):
-    """How the slave is compensated during one run."""
+class Method(StrEnum):
+    """How the slave is compensated during one run; the name is that of page and terminal."""
 
-    NONE = 'none'
-    FEED_FORWARD = 'feed-forward'
-    ADAPTIVE = 'adaptive'
+    NONE = 'uncompensated'
+    BOUC_WEN = 'Bouc-Wen of the class'
+    INVERSE = 'physical inverse'
+    FEEDBACK = 'physical inverse + feedback'
+
+
+MEANING = {
+    Method.NONE: 'the motors do what the tip is asked to do',
+    Method.BOUC_WEN: "the first paper's: a hysteresis model of the class that the tube's wire "
+    'tensions put it in, inverted',
+    Method.INVERSE: 'the friction of this very tube, identified from its wire tensions in the '
+    'calibration, inverted',
+    Method.FEEDBACK: "the same, and the second paper's law learns from the tip's tracker what is "
+    'left',
+}
+
+# Parameters of the compensator; the controller is active with feedback alone.
+COMPENSATOR = {
+    Method.NONE: {'mode': 'none'},
+    Method.BOUC_WEN: {'mode': 'bouc_wen', 'selected_by': 'class'},
+    Method.INVERSE: {'mode': 'physical', 'selected_by': 'plant'},
+    Method.FEEDBACK: {'mode': 'physical', 'selected_by': 'plant'},
+}
 
 
 @dataclass(frozen=True)
@@ -31,11 +52,11 @@ class Tube:
 
 @dataclass(frozen=True)
 class Segment:
-    """One recorded run: a motion tracked in one mode, in seconds of the headers' clock."""
+    """One recorded run: a motion tracked by one method, in seconds of the headers' clock."""
 
     tube: str
     motion: str
-    mode: Mode
+    method: Method
     start: float
     end: float
 
@@ -55,6 +76,8 @@ class CalibrationFacts:
         By class in degrees.
     duration : float
         Seconds from request to result.
+    reach_deg : tuple of (float, float)
+        Least and greatest angle to which each joint can be bent in this tube.
     """
 
     tube: str
@@ -62,6 +85,17 @@ class CalibrationFacts:
     class_deg: float
     probabilities: dict[int, float]
     duration: float
+    reach_deg: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class TubeRecording:
+    """What became of one tube: its bag, what was done when, and what the recorder missed."""
+
+    bag: Path
+    segments: tuple[Segment, ...]
+    calibration: CalibrationFacts
+    lost: dict[str, int]
 
 
 @dataclass(frozen=True)
@@ -76,6 +110,7 @@ class PaperFigure:
 
 
 MOTIONS = ('periodic', 'non_periodic')
+MOTION_TITLE = {'periodic': '60 sin t', 'non_periodic': '30 sin t + 30 sin √3 t'}
 
 # Tubes of the recorded family whose backlash under 60 sin(t) deg is that of Table 5 without
 # compensation, 50 and 68 deg: by that signal, not by the calibration's.

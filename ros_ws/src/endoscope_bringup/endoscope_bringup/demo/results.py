@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_bringup.demo.procedure import Mode
+from endoscope_bringup.demo.procedure import CalibrationFacts, Method
+from endoscope_core.metrics import tracking_rmse, width_at_mid_height
 
 Array = NDArray[np.float64]
 
@@ -16,59 +17,94 @@ class CalibrationOutcome:
 
     Attributes
     ----------
-    tube : str
+    facts : CalibrationFacts
+        What was announced.
     time : array (N,)
         Seconds since the sinusoid began.
     tension : array (N, 4)
         Load cells in N, in the order of `wires`.
     wires : tuple of str
-    loop_desired_deg, loop_actual_deg : array (M,)
-        Commanded and tracked angle of `bend_x`.
-    backlash_deg : float
-        Width of that loop at mid-height.
-    class_deg : float
-        The class that the classifier chose.
-    probabilities : dict of int to float
-        By class in degrees.
-    duration : float
-        Seconds from request to result.
+    desired_deg, actual_deg : array (M, J)
+        Commanded and tracked angle of each joint.
     """
 
-    tube: str
+    facts: CalibrationFacts
     time: Array
     tension: Array
     wires: tuple[str, ...]
-    loop_desired_deg: Array
-    loop_actual_deg: Array
-    backlash_deg: float
-    class_deg: float
-    probabilities: dict[int, float]
-    duration: float
+    desired_deg: Array
+    actual_deg: Array
+
+    @property
+    def backlash_deg(self) -> float:
+        """Width of the loop at mid-height, the mean over the joints."""
+        return _mean_width(self.desired_deg, self.actual_deg)
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """The longest stretch of a run in which a motor turned at more than half its top speed.
+
+    No signal of the demonstration asks for that: it is the dead zone of a reversal.
+
+    Attributes
+    ----------
+    seconds : float
+        0 where there was none.
+    width_deg : float
+        Bending for which the shaft would have turned as far without friction.
+    """
+
+    seconds: float
+    width_deg: float
 
 
 @dataclass(frozen=True)
 class TrackingRun:
-    """One tracked motion of `bend_x`, at the tracker's stamps.
+    """One motion tracked by one method, over its steady part, at the tracker's stamps.
 
     Attributes
     ----------
     tube, motion : str
-    mode : Mode
+    method : Method
     time : array (N,)
         Seconds since the motion began.
-    desired_deg, actual_deg : array (N,)
-    rmse_deg, backlash_deg : float
-        Over the steady part of the motion, the mean over both joints.
+    desired_deg, actual_deg : array (N, J)
+        What each joint was asked for in this very run, and what the tracker saw.
+    reversals : tuple of array
+        For each joint the instants on the same clock at which what was asked for turned back.
+    crossing : Crossing
     """
 
     tube: str
     motion: str
-    mode: Mode
+    method: Method
     time: Array
     desired_deg: Array
     actual_deg: Array
-    rmse_deg: float
-    backlash_deg: float
+    reversals: tuple[Array, ...]
+    crossing: Crossing
+
+    @property
+    def error_deg(self) -> Array:
+        """Actual less desired angle, (N, J)."""
+        return self.actual_deg - self.desired_deg
+
+    @property
+    def rmse_deg(self) -> float:
+        """Root of the mean square error, the mean over the joints."""
+        pairs = zip(self.desired_deg.T, self.actual_deg.T, strict=True)
+        return float(np.mean([tracking_rmse(*pair) for pair in pairs]))
+
+    @property
+    def largest_deg(self) -> float:
+        """Largest error of any joint."""
+        return float(np.abs(self.error_deg).max())
+
+    @property
+    def backlash_deg(self) -> float:
+        """Width of the loop at mid-height, the mean over the joints."""
+        return _mean_width(self.desired_deg, self.actual_deg)
 
 
 @dataclass(frozen=True)
@@ -79,6 +115,8 @@ class DemoResults:
     ----------
     calibrations : tuple of CalibrationOutcome
     runs : tuple of TrackingRun
+    noise_deg : float
+        What the tracker says of a tip that rests, rms.
     messages : dict of str to int
         Recorded messages by topic.
     lost : dict of str to int
@@ -87,11 +125,12 @@ class DemoResults:
 
     calibrations: tuple[CalibrationOutcome, ...]
     runs: tuple[TrackingRun, ...]
+    noise_deg: float
     messages: dict[str, int]
     lost: dict[str, int]
 
-    def run(self, tube: str, motion: str, mode: Mode) -> TrackingRun:
-        """The run of that tube, motion and mode.
+    def run(self, tube: str, motion: str, method: Method) -> TrackingRun:
+        """The run of that tube, motion and method.
 
         Raises
         ------
@@ -99,6 +138,11 @@ class DemoResults:
             If it was not made.
         """
         for run in self.runs:
-            if (run.tube, run.motion, run.mode) == (tube, motion, mode):
+            if (run.tube, run.motion, run.method) == (tube, motion, method):
                 return run
-        raise KeyError((tube, motion, mode))
+        raise KeyError((tube, motion, method))
+
+
+def _mean_width(desired_deg: Array, actual_deg: Array) -> float:
+    pairs = zip(desired_deg.T, actual_deg.T, strict=True)
+    return float(np.mean([abs(width_at_mid_height(*pair)) for pair in pairs]))

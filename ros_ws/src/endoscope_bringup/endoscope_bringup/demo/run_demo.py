@@ -9,12 +9,13 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from endoscope_bringup.demo.analysis import analyse
-from endoscope_bringup.demo.page import report_page, table_rows
-from endoscope_bringup.demo.procedure import TUBES, Tube
+from endoscope_bringup.demo.page import report_page
+from endoscope_bringup.demo.procedure import TUBES, Tube, TubeRecording
 from endoscope_bringup.demo.results import DemoResults
-from endoscope_bringup.demo.run_tube import TubeRecording, run_tube
+from endoscope_bringup.demo.table import table_rows
 from endoscope_core.atomic_output import write_text
 from endoscope_core.worker_pool import worker_pool
 
@@ -58,7 +59,7 @@ def run_demo(
     """
     began = time.monotonic()
     recordings = _run_tubes(folder, tubes, seed, real_time, progress)
-    progress('reading the recordings back')
+    progress('reading the recordings back and drawing the report')
     results = analyse(
         {tube.name: made.bag for tube, made in zip(tubes, recordings, strict=True)},
         [segment for made in recordings for segment in made.segments],
@@ -100,8 +101,9 @@ def _run_tubes(
 
     By the wall clock they run one after the other: graphs that share two cores would be late.
     """
+    progress('loading the nodes, which takes some seconds')
     here = int(os.environ.get('ROS_DOMAIN_ID', '0'))
-    procedure = partial(run_tube, folder=folder, seed=seed, real_time=real_time, progress=progress)
+    procedure = partial(_run_tube, folder=folder, seed=seed, real_time=real_time, progress=progress)
     if real_time or len(tubes) == 1:
         return [procedure(tube, domain=here) for tube in tubes]
     with worker_pool(len(tubes)) as pool:
@@ -112,23 +114,15 @@ def _run_tubes(
         return [run.result() for run in runs]
 
 
+def _run_tube(tube: Tube, **how: Any) -> TubeRecording:
+    # Imported by the process that runs the nodes alone: it takes seconds.
+    from endoscope_bringup.demo.run_tube import run_tube
+
+    return run_tube(tube, **how)
+
+
 def _summed_losses(recordings: Sequence[TubeRecording]) -> dict[str, int]:
     losses: Counter[str] = Counter()
     for recording in recordings:
         losses.update(recording.lost)
     return dict(losses)
-
-
-def figures_table(results: DemoResults) -> str:
-    """The table of the report as text for a terminal."""
-    heading = (
-        f'{"tube":17s} {"signal":22s} {"figure":14s} {"paper none":>13s} '
-        f'{"paper":>13s} {"none":>7s} {"ff":>7s} {"ff+fb":>7s}'
-    )
-    lines = [heading]
-    lines += [
-        f'{row.tube:17s} {row.motion:22s} {row.figure:14s} {row.paper_none!s:>13s} '
-        f'{row.paper_proposed!s:>13s} {row.none:7.2f} {row.feed_forward:7.2f} {row.adaptive:7.2f}'
-        for row in table_rows(results)
-    ]
-    return '\n'.join(lines)

@@ -1,9 +1,10 @@
 """Runs the whole procedure for one shape of the tube and records it."""
 
+import math
 import struct
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +13,19 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 from endoscope_bringup.demo.procedure import (
+    COMPENSATOR,
+    MOTION_TITLE,
     MOTIONS,
     CalibrationFacts,
-    Mode,
+    Method,
     Segment,
     Tube,
+    TubeRecording,
 )
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.family import shipped_family
 from endoscope_core.signals import calibration_sinusoid, motion_by_name
+from endoscope_nodes.calibration_result import REACH
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
@@ -36,22 +41,17 @@ POLL_S = 0.05
 PATIENCE_S = 20.0
 SETTLING_S = 1.0
 _STAMP = struct.Struct('<iI')
+APPROACH_S = 0.5
+"""To the motion's start from wherever the tip is; its last second is no longer steady."""
 
-
-@dataclass(frozen=True)
-class TubeRecording:
-    """What became of one tube: its bag, what was done when, and what the recorder missed."""
-
-    bag: Path
-    segments: tuple[Segment, ...]
-    calibration: CalibrationFacts
-    lost: dict[str, int]
+STEPS = 2 + len(MOTIONS) * len(Method)
+PATIENCE_OF_TIME_S = 120.0
 
 
 def run_tube(
     tube: Tube, folder: Path, *, domain: int, seed: int, real_time: bool, progress: Progress
 ) -> TubeRecording:
-    """Enable, calibrate, and track every motion in every mode on one simulated tube.
+    """Enable, calibrate, and track every motion by every method on one simulated tube.
 
     Parameters
     ----------
@@ -81,11 +81,18 @@ def run_tube(
     joint = shipped_family().joint(tube.bend)
     save_plant(PlantDescription(dict.fromkeys(JOINTS, joint)), plant_file)
     bag = folder / name
+    steps = count(1)
+
+    def say(what: str) -> None:
+        progress(f'{tube.name}, {next(steps)} of {STEPS}: {what}')
+
+    say('starting the nodes (compiles for half a minute the first time)')
     with _GraphSession(plant_file, bag, domain, seed, real_time) as session:
         session.start()
+        say('calibrating')
         calibration = session.calibrate(tube, progress)
         segments = tuple(
-            session.track(tube, motion, mode, progress) for motion in MOTIONS for mode in Mode
+            session.track(tube, motion, method, say) for motion in MOTIONS for method in Method
         )
         lost = session.stop()
     return TubeRecording(bag, segments, calibration, lost)
@@ -104,9 +111,9 @@ class _GraphSession:
             domain_id=domain,
             overrides={
                 'motor_driver': {'plant_file': str(plant_file), 'seed': seed},
-                # The paper's signals are asked for in full, also where the tube ends them.
-                'calibration': {'identify_plant': False},
                 'recorder': {'bag': str(bag)},
+                # Identifying a plant compiles on a machine's first run, in one tick.
+                'conductor': {'timeout': PATIENCE_OF_TIME_S},
             },
         )
         for factory in (*SLAVE_NODES, *CONTROL_NODES):
@@ -155,7 +162,6 @@ class _GraphSession:
 
     def calibrate(self, tube: Tube, progress: Progress) -> CalibrationFacts:
         """Run the calibration and wait for its result."""
-        progress(f'{tube.name}: calibrating')
         values = self._client.calibrate().values
         facts = CalibrationFacts(
             tube.name,
@@ -167,26 +173,33 @@ class _GraphSession:
                 if key.startswith('probability_') and key.endswith('_deg')
             },
             float(values['duration']),
+            tuple(
+                (
+                    math.degrees(float(values[f'{REACH}{joint}.low'])),
+                    math.degrees(float(values[f'{REACH}{joint}.high'])),
+                )
+                for joint in JOINTS
+            ),
         )
         progress(
             f'{tube.name}: class {facts.class_deg:.0f} deg with probability '
-            f'{facts.probabilities[round(facts.class_deg)]:.2f}, '
+            f'{facts.probabilities[round(facts.class_deg)]:.2f}, plant identified, '
             f'{facts.duration:.1f} s after the request'
         )
         return facts
 
-    def track(self, tube: Tube, motion: str, mode: Mode, progress: Progress) -> Segment:
-        """Track one motion in one mode."""
-        progress(f'{tube.name}: tracking {motion}, {mode}')
-        self._set('compensator', mode='none' if mode is Mode.NONE else 'bouc_wen')
-        self._set('controller', active=mode is Mode.ADAPTIVE)
+    def track(self, tube: Tube, motion: str, method: Method, progress: Progress) -> Segment:
+        """Track one motion by one method."""
+        progress(f'tracking {MOTION_TITLE[motion]}, {method}')
+        self._set('compensator', **COMPENSATOR[method])
+        self._set('controller', active=method is Method.FEEDBACK)
         self._advance(SETTLING_S)
         self._set('console', source='motion', motion=motion)
         start = self._now()
-        self._advance(motion_by_name(motion).duration)
+        self._advance(APPROACH_S + motion_by_name(motion).duration)
         end = self._now()
         self._set('console', source='none')
-        return Segment(tube.name, motion, mode, start, end)
+        return Segment(tube.name, motion, method, start, end)
 
     def _now(self) -> float:
         return self._node.ticker.now_ns() * 1e-9

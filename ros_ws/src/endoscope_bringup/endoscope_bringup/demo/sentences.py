@@ -1,0 +1,200 @@
+"""What the demonstration's figures say, in sentences that follow from the figures alone."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_bringup.demo.procedure import MOTION_TITLE, MOTIONS, CalibrationFacts, Method
+from endoscope_bringup.demo.results import DemoResults, TrackingRun
+from endoscope_bringup.demo.table import BACKLASH, LARGEST, RMSE, TableRow, of_figure, ranking
+from endoscope_core.metrics import tracking_rmse
+from endoscope_core.signals import motion_by_name
+from endoscope_nodes.names import JOINTS
+
+Array = NDArray[np.float64]
+
+AFTER_REVERSAL_S = 0.5
+NOISES = 4.0
+"""Standard deviations of the tracker beyond which an error is taken for more than its noise."""
+
+LEAST_CUT_DEG = 0.1
+
+
+def headline(rows: Sequence[TableRow]) -> str:
+    """What was wrong and what became of it, in one sentence without its stop."""
+    best = ranking(rows)[0]
+    widths = [row.values[Method.NONE] for row in of_figure(rows, BACKLASH)]
+    wrong = f'The tip lags: a loop {_degrees(widths)} wide opens'
+    if best is Method.NONE:
+        return f'{wrong}, and no compensation makes the error smaller'
+    return f'{wrong}; {best} leaves {_shares(rows, best)} of the error'
+
+
+def what_is_wrong(rows: Sequence[TableRow]) -> str:
+    """How far an uncompensated tip is from where it shall be."""
+    rmse = [row.values[Method.NONE] for row in of_figure(rows, RMSE)]
+    largest = max(row.values[Method.NONE] for row in of_figure(rows, LARGEST))
+    return (
+        f'Uncompensated, the tip is {_degrees(rmse)} (RMSE) and up to {_degree(largest)} away from '
+        'where it was asked to be.'
+    )
+
+
+def what_helps(rows: Sequence[TableRow], method: Method) -> str:
+    """What a method leaves."""
+    rmse = [row.values[method] for row in of_figure(rows, RMSE)]
+    largest = max(row.values[method] for row in of_figure(rows, LARGEST))
+    return (
+        f'leaves {_shares(rows, method)} of the uncompensated RMSE: {_degrees(rmse)}, and at most '
+        f'{_degree(largest)} at any instant.'
+    )
+
+
+def what_feedback_does(rows: Sequence[TableRow]) -> str:
+    """Whether feedback is better than the same compensation without it, run by run."""
+    pairs = [
+        (round(row.values[Method.INVERSE], 2), round(row.values[Method.FEEDBACK], 2))
+        for row in of_figure(rows, RMSE)
+    ]
+    smaller = sum(after < before for before, after in pairs)
+    larger = sum(after > before for before, after in pairs)
+    said = ', '.join(f'{before:.2f}° to {after:.2f}°' for before, after in pairs)
+    return (
+        f'Feedback makes the RMSE smaller in {smaller} of {len(pairs)} runs and larger in '
+        f'{larger}: {said}.'
+    )
+
+
+def beside_the_paper(rows: Sequence[TableRow], method: Method) -> str:
+    """What a method leaves beside what the first paper's compensator leaves on its rig."""
+    papers = [
+        row.paper_proposed.mean / row.paper_none.mean
+        for row in of_figure(rows, RMSE)
+        if row.paper_none is not None and row.paper_proposed is not None
+    ]
+    return (
+        f"The first paper's compensator leaves {_percent(papers)} of the RMSE on its rig; its "
+        f'method leaves {_shares(rows, method)} here.'
+    )
+
+
+def share_after_reversals(runs: Sequence[TrackingRun]) -> tuple[float, float]:
+    """Share of the squared error, and of the time, within `AFTER_REVERSAL_S` of a reversal."""
+    squares, after = [], []
+    for run in runs:
+        for turns, error in zip(run.reversals, run.error_deg.T, strict=True):
+            since = run.time[:, None] - turns
+            after.append(np.any((since >= 0.0) & (since < AFTER_REVERSAL_S), axis=1))
+            squares.append(error**2)
+    square, near = np.concatenate(squares), np.concatenate(after)
+    return float(square[near].sum() / square.sum()), float(near.mean())
+
+
+def longest_excursion(runs: Sequence[TrackingRun], limit_deg: float) -> float:
+    """Longest time in s that an error stays beyond a limit."""
+    longest = 0.0
+    for run in runs:
+        for error in np.abs(run.error_deg).T:
+            beyond = np.flatnonzero(np.diff(np.concatenate(([0], error > limit_deg, [0]))))
+            for start, end in zip(beyond[::2], beyond[1::2], strict=True):
+                longest = max(longest, float(run.time[end - 1] - run.time[start]))
+    return longest
+
+
+def what_is_left(results: DemoResults, method: Method) -> list[str]:
+    """Where the error is that a method leaves, for how long, and why; the first is a heading."""
+    runs = [run for run in results.runs if run.method is method]
+    limit = NOISES * results.noise_deg
+    worst = max(runs, key=lambda run: run.largest_deg)
+    left = _degrees([run.rmse_deg for run in runs])
+    noise = f"The tracker's noise alone is {results.noise_deg:.2f}° RMSE; {method} leaves {left}."
+    if worst.largest_deg <= limit:
+        return ["What is left: the tracker's noise", noise]
+    square, time = share_after_reversals(runs)
+    heading = (
+        f'What is left: up to {_degree(worst.largest_deg)}, beyond {limit:.1f}° never longer than '
+        f'{longest_excursion(runs, limit):.1f} s'
+    )
+    where = (
+        f'{100 * square:.0f} % of the squared error falls within {AFTER_REVERSAL_S:g} s after a '
+        f'reversal, {100 * time:.0f} % of the time. The largest error is in the {worst.tube} under '
+        f'{MOTION_TITLE[worst.motion]}.'
+    )
+    sentences = [heading, noise, where]
+    crossing = max((run.crossing for run in runs), key=lambda c: c.seconds)
+    if crossing.seconds > 0.0:
+        sentences.append(
+            'At a reversal the friction along the whole sheath has to turn round before the tip '
+            f'follows: a dead zone of up to {_degree(crossing.width_deg)}, which the motor crosses '
+            f'at full speed in up to {crossing.seconds:.1f} s.'
+        )
+    return sentences
+
+
+def where_signals_were_cut(results: DemoResults, best: Method) -> list[str]:
+    """Which signals go beyond the reach of a tube, and what is left of them uncut."""
+    sentences = []
+    for calibration in results.calibrations:
+        facts = calibration.facts
+        cuts, uncut = [], []
+        for motion in MOTIONS:
+            run = results.run(facts.tube, motion, best)
+            cut = np.abs(_whole_signal(run) - run.desired_deg).max(axis=1)
+            if cut.max() < LEAST_CUT_DEG:
+                continue
+            none = _whole_rmse(results.run(facts.tube, motion, Method.NONE))
+            cuts.append(
+                f'{MOTION_TITLE[motion]} by up to {_degree(cut.max())}, '
+                f'{100 * np.mean(cut >= LEAST_CUT_DEG):.0f} % of the time'
+            )
+            uncut.append(f'{_whole_rmse(run):.2f}° of {none:.2f}°')
+        if cuts:
+            sentences.append(
+                f'The {facts.tube} can be bent {_reach(facts)} only, as its calibration found; '
+                f'there the signals were cut for every method: {"; ".join(cuts)}. Against the '
+                f'whole signals {best} leaves {" and ".join(uncut)} RMSE.'
+            )
+    return sentences
+
+
+def _whole_signal(run: TrackingRun) -> Array:
+    motion = motion_by_name(run.motion)
+    return np.degrees(motion.sample(run.time)[0])
+
+
+def _whole_rmse(run: TrackingRun) -> float:
+    pairs = zip(_whole_signal(run).T, run.actual_deg.T, strict=True)
+    return float(np.mean([tracking_rmse(*pair) for pair in pairs]))
+
+
+def _reach(facts: CalibrationFacts) -> str:
+    ranges = [f'from {low:.0f}° to {high:.0f}°' for low, high in facts.reach_deg]
+    if len(set(ranges)) == 1:
+        return ranges[0]
+    return ', '.join(f'{joint} {way}' for joint, way in zip(JOINTS, ranges, strict=True))
+
+
+def _shares(rows: Sequence[TableRow], method: Method) -> str:
+    return _percent([row.left(method) for row in of_figure(rows, RMSE)])
+
+
+def _percent(shares: Sequence[float]) -> str:
+    return f'{_range([100 * share for share in shares])} %'
+
+
+def _degrees(values: Sequence[float]) -> str:
+    return f'{_range(values)}°'
+
+
+def _degree(value: float) -> str:
+    return _degrees([value])
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = (f'{x:.0f}' if x >= 9.95 else f'{x:.1f}' for x in (min(values), max(values)))
+    return low if low == high else f'{low} to {high}'
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
