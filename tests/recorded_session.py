@@ -1,6 +1,7 @@
 """A recorder in the process of a test, real topics that it hears, and what was sent on them."""
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -49,8 +50,17 @@ class RecordedSession(ProbedRuntime):
         publisher = self.probe.create_publisher(kind, topic, qos)
         self.wait(publisher.get_subscription_count)
         # The reader has to find the writer, too.
-        self.serve(0.2)
+        self.wait(lambda: dict(self.recorder.extra_readers()).get(publisher.topic_name))
         return publisher
+
+    def wait_for(self, counts: Mapping[str, int]) -> None:
+        """Wait until so many messages of topics are recorded, or more."""
+
+        def recorded() -> bool:
+            found = self.recorder._session.report().counts
+            return all(found[topic] >= count for topic, count in counts.items())
+
+        self.wait(recorded)
 
     def close(self):
         """End the recording like a process does, and return its report."""
@@ -107,6 +117,6 @@ def record_all_types(path: Path):
 
         session.probe.create_timer(0.001, publish)
         session.wait(lambda: len(sent[SERVO]) == N)
-        session.serve(0.3)
+        session.wait_for({topic: len(messages) for topic, messages in sent.items()})
         report = session.recorder.stop()
     return sent, report

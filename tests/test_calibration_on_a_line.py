@@ -1,6 +1,7 @@
 """The whole calibration in the running graph, with load cells read over a real line."""
 
 import math
+import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -14,6 +15,7 @@ from endoscope_nodes.names import CALIBRATION_RESULT
 from endoscope_nodes.qos import RESULT
 
 # What a calibration says where this machine lets the graph or the line wait for too long.
+LONGEST_S = 600.0
 STALLED = ('can be bridged', 'silent', 'the motion session has ended')
 
 
@@ -36,7 +38,7 @@ def tcp():
 
 @pytest.mark.parametrize(
     ('line', 'cell_rate', 'tick_rate', 'size_deg'),
-    [('rtu', 200, 200, 50), ('tcp', 1000, 500, 80)],
+    [('rtu', 200, 200, 50), ('tcp', 500, 250, 80)],
 )
 def test_a_calibration_ends_with_the_class_of_the_tube(
     tmp_path, request, line, cell_rate, tick_rate, size_deg
@@ -64,7 +66,8 @@ def test_a_calibration_ends_with_the_class_of_the_tube(
 
 def calibrated(graph, results):
     """Values of a result; where this machine stalls, the rig is enabled and asked again."""
-    for _ in range(8):
+    deadline = time.monotonic() + LONGEST_S
+    while time.monotonic() < deadline:
         graph.enable()
         known = len(results)
         answer = graph.call('calibration', 'run')
@@ -73,6 +76,6 @@ def calibrated(graph, results):
         graph.wait(lambda known=known: len(results) > known)
         values = {v.key: v.value for v in results[-1].status[0].values}
         if not any(words in values.get('reason', '') for words in STALLED):
-            break
-    assert results[-1].status[0].level == b'\x00', (values, graph.situation())
-    return values
+            assert results[-1].status[0].level == b'\x00', (values, graph.situation())
+            return values
+    return pytest.fail(f'this machine stalls all the time: {graph.situation()}')

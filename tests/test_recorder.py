@@ -121,7 +121,7 @@ def test_other_topics_are_recorded_once_their_type_is_known(tmp_path):
     with RecordedSession(bag=str(tmp_path / 'bag'), topics=['own', '/absolute']) as session:
         own = session.publisher(String, 'own', SENSOR_OFFERED)
         own.publish(String(data='x'))
-        session.serve(0.2)
+        session.wait_for({'/endoscope/own': 1})
     bag = open_bag(tmp_path / 'bag')
     assert bag.topics['/endoscope/own'].type == 'std_msgs/msg/String'
     assert bag.message_count == 1
@@ -134,7 +134,7 @@ def test_a_publisher_that_offers_less_is_heard_all_the_same(tmp_path):
         for _ in range(10):
             wires.publish(encode_joint_state(['a'], 1, effort=[1.0]))
         state.publish(String(data='ENABLED'))
-        session.serve(0.2)
+        session.wait_for({WIRES: 10, STATE: 1})
     bag = open_bag(tmp_path / 'bag')
     assert [q.reliability for q in bag.topics[WIRES].qos] == ['best_effort']
     assert [q.durability for q in bag.topics[STATE].qos] == ['volatile']

@@ -50,7 +50,7 @@ def test_what_is_replayed_is_what_was_recorded(bag, tmp_path):
         # The recorder learns the type of /clock from a first publisher.
         session.publisher(Clock, '/clock', EVENT)
         node = replay_beside(session)
-        session.serve(0.3)
+        session.wait_for({SERVO: N, STATE: 1, '/clock': N})
     assert node.published == N + 1
     assert session.recorder.last_report.complete
     original, again = open_bag(bag), open_bag(path)
@@ -69,7 +69,7 @@ def test_the_clock_goes_before_the_messages_of_its_tick(bag, tmp_path):
     with RecordedSession(bag=str(path), topics=[SERVO, '/clock'], replay=replay) as session:
         session.publisher(Clock, '/clock', EVENT)
         replay_beside(session)
-        session.serve(0.3)
+        session.wait_for({SERVO: N, '/clock': N})
     again = open_bag(path)
     clock = np.array([m.clock.sec * 10**9 + m.clock.nanosec for _, m in again.decoded('/clock')])
     servo = again.joint_state('motor/servo_jp', order='recorded')
