@@ -307,9 +307,11 @@ def test_a_first_line_is_said_before_anything_slow_is_loaded(tmp_path):
     )
     assert made.returncode == 2, made.stderr
     first, then = made.stdout.splitlines()
-    assert first.startswith('calibrating and moving') and first.endswith('[]')
+    assert first.startswith('calibrating and moving')
+    assert first.endswith('[]')
     # What runs the nodes loads them: processes of their own.
-    assert 'rclpy' not in then and 'torch' not in then
+    assert 'rclpy' not in then
+    assert 'torch' not in then
 
 
 def test_a_run_that_was_not_made_is_named(results):

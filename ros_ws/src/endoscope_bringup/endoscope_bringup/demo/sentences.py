@@ -194,7 +194,3 @@ def _degree(value: float) -> str:
 def _range(values: Sequence[float]) -> str:
     low, high = (f'{x:.0f}' if x >= 9.95 else f'{x:.1f}' for x in (min(values), max(values)))
     return low if low == high else f'{low} to {high}'
-
-
-def _capital(text: str) -> str:
-    return text[0].upper() + text[1:]
