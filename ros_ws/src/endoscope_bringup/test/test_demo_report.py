@@ -136,14 +136,20 @@ def test_every_picture_has_a_caption_and_every_method_one_name(page, results):
         assert text in page
 
 
-def test_the_best_of_a_row_is_marked_by_its_number_and_the_best_method_comes_first():
-    worse = results_of(LAG | {Method.FEEDBACK: 0.05})
-    rows = table_rows(worse)
-    assert all(row.is_best(m) == (m is Method.INVERSE) for row in rows for m in Method)
+def test_the_best_method_comes_first_by_its_numbers():
+    rows = table_rows(results_of(LAG | {Method.FEEDBACK: 0.05}))
     assert ranking(rows) == [Method.INVERSE, Method.FEEDBACK, Method.BOUC_WEN, Method.NONE]
-    marked = re.findall(r'<td class="best">([\d.]+)', report_page(worse, {}))
-    assert marked == [f'{row.values[Method.INVERSE]:.2f}' for row in rows]
+    assert all(row.is_best(m) == (m is Method.INVERSE) for row in rows for m in Method)
     assert figures_table(rows).count('*') == len(rows)
+
+
+def test_the_best_of_a_row_is_marked_on_the_page(page, results):
+    marked = re.findall(r'<td class="best">([\d.]+)', page)
+    rows = table_rows(results)
+    assert marked == [
+        f'{row.values[m]:.2f}' for row in rows for m in ranking(rows) if row.is_best(m)
+    ]
+    assert len(marked) >= len(rows)
 
 
 def test_one_row_in_which_another_method_is_best_is_marked_so(results):
