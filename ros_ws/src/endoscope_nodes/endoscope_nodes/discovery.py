@@ -1,6 +1,8 @@
 """Keeps DDS on this machine unless the operator says otherwise."""
 
 import os
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from endoscope_core.errors import EndoscopeError
@@ -8,6 +10,9 @@ from endoscope_core.errors import EndoscopeError
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 PEERS = 'ROS_STATIC_PEERS'
 PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+PROFILES_OF_FAST_DDS_3 = 'FASTDDS_DEFAULT_PROFILES_FILE'
+"""Its name from ROS 2 Kilted on, which heeds the old one too and warns of it."""
+_RCLPY_OF_JAZZY = 7
 LOOPBACK = Path(__file__).with_name('this_machine.xml')
 # OFF is nobody but this process, for which Fast DDS listens at every address all the same.
 _ON_THIS_MACHINE = ('LOCALHOST', 'OFF')
@@ -40,4 +45,15 @@ def stay_on_this_machine() -> None:
         )
     os.environ[RANGE] = chosen
     if chosen in _ON_THIS_MACHINE and not os.environ.get(PEERS):
-        os.environ.setdefault(PROFILES, str(LOOPBACK))
+        heeded = _heeded()
+        if not any(name in os.environ for name in heeded):
+            os.environ[heeded[0]] = str(LOOPBACK)
+
+
+def _heeded() -> tuple[str, ...]:
+    """The variables that name a profile for the Fast DDS that is there, its own name first."""
+    for distribution in ('ros-rclpy', 'rclpy'):
+        with suppress(PackageNotFoundError):
+            major = int(version(distribution).split('.')[0])
+            return (PROFILES,) if major <= _RCLPY_OF_JAZZY else (PROFILES_OF_FAST_DDS_3, PROFILES)
+    return (PROFILES,)

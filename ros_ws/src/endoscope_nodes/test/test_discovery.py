@@ -30,7 +30,8 @@ with Runtime(['--ros-args'], Context(), {DOMAIN}) as runtime:
             print(address)
     node.destroy_node()
 """
-NAMES = ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS', 'FASTRTPS_DEFAULT_PROFILES_FILE')
+PROFILES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
+NAMES = ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS', *PROFILES)
 LOOPBACK = '0100007F'
 ANY_ADDRESS = '00000000'
 
@@ -40,6 +41,7 @@ def shown(**given):
     done = subprocess.run(
         [sys.executable, '-c', SHOW], env=environment, capture_output=True, text=True, check=True
     )
+    assert done.stderr == ''
     found, *addresses = done.stdout.split()
     return found, set(addresses)
 
@@ -118,7 +120,7 @@ def test_a_killed_process_is_forgotten_long_before_the_lease_of_fast_dds_ends(tm
     rclpy.init(args=[], context=context, domain_id=DOMAIN)
     node = rclpy.create_node('watcher', context=context)
     processes = [
-        process_that_is_there('slow', FASTRTPS_DEFAULT_PROFILES_FILE=str(profile)),
+        process_that_is_there('slow', **dict.fromkeys(PROFILES, str(profile))),
         process_that_is_there('quick'),
         process_that_is_there('alive'),
     ]

@@ -5,7 +5,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete, lfilter
 
 from endoscope_core.physics import JointParameters
 
@@ -24,6 +23,9 @@ class Servo:
 
     def answer(self, command: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
         """Motor angle (N,) for a command (N,) held for `dt` s each, beginning at rest on it."""
+        # A node imports this module and never asks: scipy.signal is 26 MB of its memory.
+        from scipy.signal import lfilter
+
         numerator, denominator = _filter(self.bandwidth, self.damping_ratio, dt)
         start = command[0]
         moved: NDArray[np.float64] = lfilter(numerator, denominator, command - start)
@@ -32,5 +34,7 @@ class Servo:
 
 @lru_cache
 def _filter(w: float, z: float, dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    from scipy.signal import cont2discrete
+
     numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2.0 * z * w, w * w]), dt)
     return numerator[0], denominator
