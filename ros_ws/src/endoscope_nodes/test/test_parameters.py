@@ -6,6 +6,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.motor_driver_node import MotorDriverNode
 from endoscope_nodes.parameters import ParameterError, parameter
 from endoscope_nodes.runtime import Runtime
 
@@ -103,3 +104,12 @@ def test_a_dynamic_parameter_changes_and_a_wrong_value_does_not():
 def test_unreadable_arguments_are_one_clear_error():
     with pytest.raises(ParameterError, match="'-p gain'"):
         start(Example, args=['-p', 'gain'])
+
+
+def test_real_servos_need_real_time():
+    with pytest.raises(ParameterError, match='motor_driver: the device is dynamixel, which needs'):
+        start(
+            MotorDriverNode,
+            args=['-p', 'use_sim_time:=true'],
+            motor_driver={'device': 'dynamixel'},
+        )
