@@ -1,13 +1,18 @@
 """The simulated graph, and programs beside it that operate it from a shell or a terminal."""
 
+import fcntl
 import os
 import pty
 import re
+import struct
 import subprocess
 import sys
 import termios
+import threading
 import time
+from dataclasses import dataclass
 
+import numpy as np
 from simulated_graph import SimulatedGraph
 
 from endoscope_nodes.names import JOINTS, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
@@ -20,8 +25,16 @@ import fcntl, os, sys, termios
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 os.execv(sys.argv[1], sys.argv[1:])
 """
+# A test that runs in the background of a shell ignores SIGINT, and so would its programs.
+_HEAR_INTERRUPTS = """
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+os.execv(sys.argv[1], sys.argv[1:])
+"""
 _STEP_S = 0.02
-_LONGEST_S = 300.0
+_LONGEST_S = 200.0
+# A keyboard's delay and rate. On a machine that runs nothing in time a hold ends and is begun anew.
+_DELAY_S, _PERIOD_S, _LONGEST_HOLD_S = 0.4, 1.0 / 30.0, 6.0
 
 
 class OperatedGraph(SimulatedGraph):
@@ -63,7 +76,7 @@ class OperatedGraph(SimulatedGraph):
 
     def start(self, *words) -> subprocess.Popen:
         return subprocess.Popen(
-            [*ENDOSCOPE, *words],
+            [sys.executable, '-c', _HEAR_INTERRUPTS, *ENDOSCOPE, *words],
             env=self.environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -74,7 +87,7 @@ class OperatedGraph(SimulatedGraph):
     def finish(self, process) -> tuple[int, str, str]:
         """Exit status, stdout and stderr of a program that ends while the graph goes on."""
         try:
-            self.until(lambda: process.poll() is not None, ' '.join(process.args[3:]))
+            self.until(lambda: process.poll() is not None, ' '.join(process.args[6:]))
             return (process.returncode, *process.communicate())
         finally:
             process.kill()
@@ -84,13 +97,36 @@ class OperatedGraph(SimulatedGraph):
         return self.finish(self.start(*words, '--timeout', '60'))
 
 
+@dataclass
+class Key:
+    """What a terminal sends for a key: when it is pressed, at each repeat, and when released."""
+
+    press: bytes
+    repeat: bytes
+    release: bytes = b''
+
+
+def plain(sent: bytes) -> Key:
+    """Key of a terminal that tells nothing apart."""
+    return Key(sent, sent)
+
+
+def told(code: str, final: str = 'u') -> Key:
+    """Key of a terminal with the protocol of kitty."""
+    return Key(*(f'\x1b[{code};1:{kind}{final}'.encode() for kind in (1, 2, 3)))
+
+
 class Typist:
     """`endoscope teleop` in a pseudo-terminal, and the one who types there.
+
+    A thread of its own answers and types as terminal and keyboard do, however slow the graph is.
 
     Parameters
     ----------
     kitty
         Whether the terminal speaks kitty's keyboard protocol.
+    command
+        Instead of teleop with these words.
     """
 
     def __init__(self, graph, *words, kitty=False, command=None) -> None:
@@ -101,19 +137,23 @@ class Typist:
         self.screen = b''
         self._answer = b'\x1b[?0u\x1b[?62c' if kitty else b'\x1b[?62c'
         self._answered = 0
-        self.master, slave = pty.openpty()
-        self.before = termios.tcgetattr(slave)
-        self.slave = slave
+        self._held: list[Key] = []
+        self._open = True
+        self.master, self.slave = pty.openpty()
+        fcntl.ioctl(self.slave, termios.TIOCSWINSZ, struct.pack('4H', 24, 80, 0, 0))
+        self.before = termios.tcgetattr(self.slave)
         teleop = [*ENDOSCOPE, 'teleop', *words, '--timeout', '60']
         self.process = subprocess.Popen(
             [sys.executable, '-c', _TAKE_TERMINAL, *(command or teleop)],
             env=graph.environment | {'TERM': 'xterm'},
-            stdin=slave,
-            stdout=slave,
-            stderr=slave,
+            stdin=self.slave,
+            stdout=self.slave,
+            stderr=self.slave,
             start_new_session=True,
         )
         os.set_blocking(self.master, False)
+        self._thread = threading.Thread(target=self._live, daemon=True)
+        self._thread.start()
 
     def __enter__(self):
         return self
@@ -121,42 +161,55 @@ class Typist:
     def __exit__(self, *_):
         self.process.kill()
         self.process.wait()
-        for end in (self.master, self.slave):
-            if end is not None:
-                os.close(end)
+        self.hang_up()
 
-    def read(self) -> None:
-        """Take what the program wrote, and answer as the terminal does."""
-        if self.master is None:
-            return
+    def _live(self) -> None:
+        """Read, answer, and have held keys repeat, as terminal and keyboard do."""
+        typing, due, until = [], 0.0, 0.0
+        while self._open:
+            self._read()
+            now = time.monotonic()
+            if typing and (typing != self._held or now > until):
+                self.type(b''.join(key.release for key in typing))
+                typing = []
+                time.sleep(0.3)
+            elif self._held and not typing:
+                typing = list(self._held)
+                self.type(b''.join(key.press for key in typing))
+                due, until = now + _DELAY_S, now + _LONGEST_HOLD_S
+            elif typing and now >= due:
+                due = now + _PERIOD_S
+                self.type(typing[-1].repeat)
+            time.sleep(0.005)
+
+    def _read(self) -> None:
         try:
             while data := os.read(self.master, 65536):
                 self.screen += data
         except OSError:
-            pass
-        for _ in range(self.screen.count(b'\x1b[?u\x1b[c') - self._answered):
-            self._answered += 1
-            self.type(self._answer)
+            return
+        finally:
+            for _ in range(self.screen.count(b'\x1b[?u\x1b[c') - self._answered):
+                self._answered += 1
+                self.type(self._answer)
 
     def type(self, data: bytes) -> None:
         os.write(self.master, data)
 
     @property
     def line(self) -> str:
-        """The line that shows what goes on."""
-        text = self.screen.decode(errors='replace')
-        return text.rpartition('\r\x1b[K')[2]
+        """The two lines that show what goes on."""
+        return self.screen.decode(errors='replace').rpartition('\r\x1b[J')[2]
 
     @property
     def text(self) -> str:
         return re.sub(r'\x1b\[[0-9;?<>]*[a-zA-Z]', '', self.screen.decode(errors='replace'))
 
     def until(self, condition, what='it') -> None:
-        def read_and_look():
-            self.read()
-            return condition()
-
-        self.graph.until(read_and_look, f'{what} ({self.text[-400:]!r})')
+        try:
+            self.graph.until(condition, what)
+        except AssertionError as error:
+            raise AssertionError(f'{error}; the terminal shows {self.text[-400:]!r}') from None
 
     def shows(self, words: str) -> None:
         self.until(lambda: words in self.line, words)
@@ -166,39 +219,32 @@ class Typist:
         self.type(b'e')
         self.shows('ENABLED')
 
-    def hold(self, key: bytes, condition, what='motion') -> None:
-        """Hold a key until something has come true: 0.4 s, then 30 repeats a second."""
-        self.type(key)
-        due = time.monotonic() + 0.4
-
-        def repeat():
-            nonlocal due
-            self.read()
-            if time.monotonic() >= due:
-                due = time.monotonic() + 1.0 / 30.0
-                self.type(key)
-            return condition()
-
-        self.graph.until(repeat, f'{what} ({self.text[-400:]!r})')
+    def hold(self, *keys: Key, until, what='motion') -> None:
+        """Hold keys until something has come true; press them anew where that has ended."""
+        self._held = list(keys)
+        try:
+            self.until(until, what)
+        finally:
+            self._held = []
 
     def stands(self) -> bool:
         """Let half a second go on; whether the goals of the motors stood still in it."""
         begin = self.graph.conductor.now_ns
         self.until(lambda: self.graph.conductor.now_ns > begin + 500_000_000)
-        return all(
-            abs(a - b) < 1e-9
-            for goal in [g for g in self.goals if g.stamp_ns > begin]
-            for a, b in zip(goal.position, self.goals[-1].position, strict=True)
-        )
+        goals = [goal.position for goal in self.goals if goal.stamp_ns > begin]
+        return not goals or bool(np.ptp(goals, axis=0).max() < 1e-9)
 
     def end(self) -> int:
         """Wait for the program to end; its status."""
         self.until(lambda: self.process.poll() is not None, 'the end')
-        self.read()
+        self._read()
         return self.process.returncode
 
     def hang_up(self) -> None:
         """Close the terminal, as closing its window does."""
-        os.close(self.master)
-        os.close(self.slave)
-        self.master = self.slave = None
+        if self._open:
+            self._open = False
+            self._thread.join()
+            os.close(self.master)
+            os.close(self.slave)
+            self.slave = None

@@ -7,13 +7,14 @@ import termios
 
 import numpy as np
 import pytest
-from operated_graph import ENDOSCOPE, OperatedGraph, Typist
+from operated_graph import ENDOSCOPE, OperatedGraph, Typist, plain, told
 from sensor_msgs.msg import Joy
 
 from endoscope_nodes.names import MASTER_CLUTCH
 from endoscope_nodes.qos import EVENT
 
-UP, LEFT = b'\x1b[A', b'\x1b[D'
+UP, W, A, H = plain(b'\x1b[A'), plain(b'w'), plain(b'a'), plain(b'h')
+FAR = 0.06
 
 
 @pytest.fixture(scope='module')
@@ -46,7 +47,7 @@ def moved(typist):
 
 
 def check_left_as_found(graph, typist, kitty=False):
-    assert graph.clutches[-1] == 0
+    typist.until(lambda: graph.clutches[-1] == 0, 'the release')
     assert source(graph) == 'none'
     if typist.slave is not None:
         assert termios.tcgetattr(typist.slave) == typist.before
@@ -57,10 +58,10 @@ def check_left_as_found(graph, typist, kitty=False):
 def test_a_held_key_moves_the_slave_and_its_release_stops_it(graph):
     with Typist(graph, '--take') as typist:
         typist.enable()
-        typist.type(UP)
+        typist.type(UP.press)
         assert typist.stands()
         assert not typist.goals
-        typist.hold(UP, lambda: moved(typist)[1] > 0.1)
+        typist.hold(UP, until=lambda: moved(typist)[1] > FAR)
         assert 'FOLLOW' in typist.text
         assert abs(moved(typist)[0]) < 0.01
         typist.shows('OPEN')
@@ -68,7 +69,7 @@ def test_a_held_key_moves_the_slave_and_its_release_stops_it(graph):
         assert graph.clutches[-1] == 0
         assert typist.stands()
         typist.wanted.clear()
-        typist.hold(b'a', lambda: moved(typist)[0] < -0.1)
+        typist.hold(A, until=lambda: moved(typist)[0] < -FAR)
         typist.shows('OPEN')
         assert typist.stands()
         assert abs(moved(typist)[1]) < 0.01
@@ -83,19 +84,8 @@ def test_where_press_and_release_are_told_two_keys_move_both_joints(graph):
         typist.shows('DISABLED')
         typist.type(b'\x1b[101;1:1u\x1b[101;1:3u')
         typist.shows('ENABLED')
-        typist.type(b'\x1b[1;1:1A')
-        typist.type(b'\x1b[100;1:1u')
-        due = graph.conductor.now_ns
-
-        def repeat():
-            nonlocal due
-            if graph.conductor.now_ns >= due:
-                due += 30_000_000
-                typist.type(b'\x1b[100;1:2u')
-            return min(moved(typist)) > 0.1
-
-        typist.until(repeat)
-        typist.type(b'\x1b[100;1:3u\x1b[1;1:3A')
+        both = told('1', 'A'), told('100')
+        typist.hold(*both, until=lambda: min(moved(typist)) > FAR)
         typist.shows('OPEN')
         assert 'let go' in typist.line
         assert typist.stands()
@@ -120,7 +110,7 @@ def test_a_signal_releases_the_clutch_and_restores_everything(graph, number):
     with Typist(graph, '--take', '--scale', '0.5') as typist:
         typist.enable()
         typist.until(lambda: graph.nodes['console'].get_parameter('scale').value == 0.5)
-        typist.hold(b'w', lambda: moved(typist)[1] > 0.05)
+        typist.hold(W, until=lambda: moved(typist)[1] > FAR)
         typist.process.send_signal(number)
         assert typist.end() == 128 + number
         check_left_as_found(graph, typist)
@@ -131,7 +121,7 @@ def test_a_signal_releases_the_clutch_and_restores_everything(graph, number):
 def test_a_terminal_that_is_closed_releases_the_clutch(graph):
     with Typist(graph, '--take') as typist:
         typist.enable()
-        typist.hold(b'w', lambda: moved(typist)[1] > 0.05)
+        typist.hold(W, until=lambda: moved(typist)[1] > FAR)
         typist.hang_up()
         assert typist.end() == 128 + signal.SIGHUP
         check_left_as_found(graph, typist)
@@ -141,7 +131,7 @@ def test_a_terminal_that_is_closed_releases_the_clutch(graph):
 def test_a_program_that_is_killed_moves_nothing_any_more(graph):
     with Typist(graph, '--take') as typist:
         typist.enable()
-        typist.hold(b'w', lambda: moved(typist)[1] > 0.05)
+        typist.hold(W, until=lambda: moved(typist)[1] > FAR)
         typist.process.kill()
         typist.process.wait()
         # Until the handle and the clutch are missed: 0.1 and 0.35 s.
@@ -159,14 +149,14 @@ def test_ctrl_z_lets_go_and_the_shell_brings_it_back(graph):
     ]
     with Typist(graph, command=command) as typist:
         typist.enable()
-        typist.hold(b'w', lambda: moved(typist)[1] > 0.05)
+        typist.hold(W, until=lambda: moved(typist)[1] > FAR)
         typist.type(b'\x1a')
         typist.until(lambda: ' icanon' in typist.text and ' echo ' in typist.text)
         assert graph.clutches[-1] == 0
         typist.shows('ENABLED')
         assert typist.stands()
-        before = typist.wanted[-1].position[1]
-        typist.hold(b'w', lambda: typist.wanted[-1].position[1] > before + 0.05)
+        typist.wanted.clear()
+        typist.hold(W, until=lambda: moved(typist)[1] > FAR)
         typist.type(b'q')
         typist.end()
         check_left_as_found(graph, typist)
@@ -175,16 +165,16 @@ def test_ctrl_z_lets_go_and_the_shell_brings_it_back(graph):
 def test_home_goes_on_while_its_key_is_held_and_is_paused_otherwise(graph):
     with Typist(graph, '--take', '--speed', '57') as typist:
         typist.enable()
-        typist.hold(b'w', lambda: moved(typist)[1] > 0.6)
+        typist.hold(W, until=lambda: typist.wanted and typist.wanted[-1].position[1] > 0.3)
         typist.shows('OPEN')
-        typist.hold(b'h', lambda: graph.nodes['calibration'].active)
+        typist.hold(H, until=lambda: graph.nodes['calibration'].active)
         typist.shows('PAUSED')
         assert not graph.nodes['calibration'].active
         assert typist.stands()
         typist.type(b'e')
         typist.shows('ENABLED')
         homed = graph.nodes['calibration']
-        typist.hold(b'h', lambda: homed._last == 'home reached')
+        typist.hold(H, until=lambda: homed._last == 'home reached')
         typist.shows('OPEN')
         assert typist.stands()
         assert graph.state == 'ENABLED'
@@ -195,7 +185,7 @@ def test_it_says_why_nothing_moves(graph):
     with Typist(graph, '--take') as typist:
         typist.shows('E enables')
         began = graph.conductor.now_ns
-        typist.hold(b'w', lambda: graph.conductor.now_ns > began + 1_000_000_000)
+        typist.hold(W, until=lambda: graph.conductor.now_ns > began + 1_000_000_000)
         assert 1 not in graph.clutches
         assert not typist.wanted
         typist.type(b'e')

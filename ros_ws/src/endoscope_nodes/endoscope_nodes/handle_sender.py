@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import Joy
 
@@ -10,6 +11,7 @@ from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MASTER_MEASURED
 from endoscope_nodes.qos import EVENT, SENSOR_OFFERED
 
 CLUTCH_PERIOD_NS = 100_000_000
+_RECEIVED = Duration(seconds=0.5)
 
 
 class HandleSender:
@@ -48,6 +50,7 @@ class HandleSender:
             self.press(self.clutch, stamp_ns)
 
     def close(self) -> None:
-        """Leave both topics to another sender."""
+        """Leave both topics to another sender, once the last word has been received."""
+        self._clutch.wait_for_all_acked(_RECEIVED)
         self._angles.close()
         self._node.destroy_publisher(self._clutch)

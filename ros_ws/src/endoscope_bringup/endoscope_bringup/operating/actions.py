@@ -55,7 +55,7 @@ def act(client: GraphClient, args: argparse.Namespace) -> Reply:
         return Reply((f'recording to {said}' if args.what == 'start' else said,))
     client.find(patience_s)
     if action == 'status':
-        return Reply(*status_of(client))
+        return Reply(*status_of(client, patience_s))
     if action == 'calibrate':
         return _calibrate(client, patience_s)
     if action == 'home':

@@ -11,15 +11,16 @@ from endoscope_nodes.program import NODES
 
 RECORDER = 'recorder: recording'
 _LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')
-_FULL_ROUND_S = 2.5
+_FULL_ROUND_S = 1.1
 # These say nothing on /diagnostics.
 _QUIET = ('conductor', 'replay')
 
 
-def status_of(client: GraphClient) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """Listen until every node has spoken, at most for some seconds; what they say."""
-    client.wait_until(lambda: not _silent(client), _FULL_ROUND_S)
-    client.hear()
+def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """Listen until every node has spoken, at most for so many seconds; what they say."""
+    # Nodes speak once a second; those that are found last would be missed otherwise.
+    client.wait_until(lambda: False, _FULL_ROUND_S)
+    client.wait_until(lambda: not _silent(client), patience_s)
     health, silent = client.health, _silent(client)
     console, recorder = health.get(CONSOLE), health.get(RECORDER)
     source = '' if console is None else console.values.get('source', '')

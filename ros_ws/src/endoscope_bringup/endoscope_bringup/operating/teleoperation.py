@@ -213,7 +213,7 @@ class _Teleoperation:
                 turn = self._take_turn(now_ns)
                 if now_ns >= shown_ns:
                     shown_ns = now_ns + _SHOWN_NS
-                    self._terminal.show(self._line(turn))
+                    self._terminal.show(*self._lines(turn))
                 due_ns = max(due_ns + _TURN_NS, time.monotonic_ns())
                 time.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
         except TerminalLostError:
@@ -334,7 +334,8 @@ class _Teleoperation:
             if result.successful:
                 self._scale = self._scale_asked
 
-    def _line(self, turn: Turn) -> str:
+    def _lines(self, turn: Turn) -> tuple[str, str]:
+        """State, lamp, angles and speed; and why it does not move."""
         wall_ns = time.time_ns()
         wanted = self._wanted.since(wall_ns - _FRESH_NS)
         measured = self._measured.since(wall_ns - 2 * _FRESH_NS)
@@ -344,10 +345,8 @@ class _Teleoperation:
         follows = turn.clutch and wanted is not None
         lamp = 'HOME' if turn.homing else 'FOLLOW' if follows else 'HELD' if turn.clutch else 'OPEN'
         speed = f'{math.degrees(self._hand.speed):.0f} deg/s x {self._scale:.2g}'
-        line = (
-            f'{self._client.state:<8} {lamp:<6} {joints} deg  {speed}  {self._why(turn, follows)}'
-        )
-        return printable(line)
+        line = f'{self._client.state:<8} {lamp:<6} {joints} deg  {speed}'
+        return line, printable(self._why(turn, follows))
 
     def _why(self, turn: Turn, follows: bool) -> str:
         """Why it does not move, in few words."""

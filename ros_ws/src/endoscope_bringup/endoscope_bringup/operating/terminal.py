@@ -22,7 +22,8 @@ from endoscope_core.teleop.terminal_keys import (
 _ANSWERED_S = 0.3
 _ESCAPE_S = 0.05
 _LOCAL, _INPUT, _CONTROL_CHARACTERS = 3, 0, 6
-_CLEAR = '\r\x1b[K'
+_CLEAR_BELOW = '\r\x1b[J'
+_UP = '\r\x1b[A'
 
 
 class NoTerminalError(EndoscopeError):
@@ -49,7 +50,7 @@ def check_terminal() -> None:
 
 
 class Terminal(ClosedOnExit):
-    """Stdin without lines and echo, and one line of stdout that is written again and again.
+    """Stdin without lines and echo, and two lines of stdout that are written again and again.
 
     Signals of keys stay on: Ctrl-C interrupts even where this program hangs.
 
@@ -123,13 +124,14 @@ class Terminal(ClosedOnExit):
             events += self._keys.flush()
         return events
 
-    def show(self, line: str) -> None:
-        """Write the one line anew, cut to the width; not at all while the terminal is stuck."""
-        self._write(_CLEAR + line[: shutil.get_terminal_size().columns - 1])
+    def show(self, first: str, second: str) -> None:
+        """Write the two lines anew, cut to the width; not at all while the terminal is stuck."""
+        width = shutil.get_terminal_size().columns - 1
+        self._write(f'{_CLEAR_BELOW}{first[:width]}\r\n{second[:width]}{_UP}')
 
     def say(self, text: str) -> None:
-        """Write text above the one line."""
-        self._write(_CLEAR + text.replace('\n', '\r\n') + '\r\n')
+        """Write text above the two lines."""
+        self._write(_CLEAR_BELOW + text.replace('\n', '\r\n') + '\r\n')
 
     def _write(self, text: str) -> None:
         # A stuck or lost terminal must not hold up whoever has the clutch.
@@ -144,7 +146,7 @@ class Terminal(ClosedOnExit):
         before, self._before = self._before, None
         if self.told_apart:
             self._write(END_EVENTS.decode())
-        self._write(END_FOCUS.decode() + '\r\n')
+        self._write(END_FOCUS.decode() + _CLEAR_BELOW)
         # Repeats that are still to be read are not for the shell. A terminal that is lost has no
         # settings left to restore.
         with contextlib.suppress(termios.error):
