@@ -12,6 +12,7 @@ from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 
+from endoscope_bags.table_mapping import EXAMPLE
 from endoscope_bringup.cli import build_parser
 from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, SensorParameters
 from endoscope_core.physics.effects import CATALOGUE
@@ -212,6 +213,14 @@ def _keys(kind: type) -> Iterator[tuple[str, ...]]:
         yield f'`{key.name}`', f'`{as_typed(key.default)}`', _range(low, high), unit
 
 
+class Mapping(_Generated):
+    """A mapping file with every key."""
+
+    def lines(self) -> Iterator[str]:
+        """Yield the file."""
+        yield from ('```yaml', *EXAMPLE.splitlines(), '```')
+
+
 class Effects(_Generated):
     """The catalogue of effects."""
 
@@ -277,6 +286,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         ('parameters', Parameters),
         ('nominal-plant', NominalPlant),
         ('plant-keys', PlantKeys),
+        ('mapping', Mapping),
         ('effects', Effects),
         ('modules', Modules),
     ):
