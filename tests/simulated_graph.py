@@ -37,11 +37,14 @@ class SimulatedGraph(ProbedGraph):
 
     def __init__(self, *, without=(), extra=(), overrides=None, rig=None) -> None:
         self.domain = private_domain()
+        overrides = overrides or {}
+        # A busy machine may keep the nodes from answering a tick for long.
+        conductor = {'timeout': PATIENCE_S} | overrides.get('conductor', {})
         runtime = Runtime(
             args=['--ros-args', '-p', 'use_sim_time:=true', '--log-level', 'fatal'],
             context=Context(),
             domain_id=self.domain,
-            overrides=overrides,
+            overrides=overrides | {'conductor': conductor},
             rig=rig,
         )
         for factory in (*SLAVE_NODES, *CONTROL_NODES, *extra, ConductorNode):
