@@ -78,11 +78,18 @@ def summary(out):
 def test_many_bags_have_one_report_each_and_one_table(rig, tmp_path, capsys):
     write_short_bag(tmp_path / 'other' / 'sound', seed=5)
     bags = (rig / 'sound', tmp_path / 'other' / 'sound')
-    assert explain(rig, tmp_path / 'out', *bags, '--quick', '--jobs', '2') == 0
+    assert explain(rig, tmp_path / 'out', *bags, '--quick', '--jobs', '2', '--json') == 0
     assert summary(tmp_path / 'out') == {'sound': 'consistent', 'sound_2': 'consistent'}
     for name in ('sound', 'sound_2'):
         assert (tmp_path / 'out' / name / 'report.html').is_file()
-    assert '2/2' in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert '2/2' in said.err
+    lines = json.loads(said.out)
+    assert [(line['bag'], line['verdict']) for line in lines] == [
+        ('sound', 'consistent'),
+        ('sound_2', 'consistent'),
+    ]
+    assert all(0.5 < line['augmented_rmse_over_noise'] < 2.0 for line in lines)
     with (tmp_path / 'out' / 'parameters.csv').open(newline='') as file:
         rows = {row['parameter']: row for row in csv.DictReader(file)}
     exponents = [float(rows['capstan_exponent'][name]) for name in ('sound', 'sound_2')]
