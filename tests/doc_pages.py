@@ -31,7 +31,6 @@ NOT_RUN = {
     'ros2': 'needs a sourced ROS 2',
     'docker': 'needs a container engine',
     'yours': 'needs recordings that are yours',
-    'TODO-MERGE': 'is not there yet',
 }
 """Words after the language with which a block is not run, and why."""
 

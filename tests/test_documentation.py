@@ -20,7 +20,6 @@ from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.parameters import described
 from endoscope_nodes.topics import SERVICES, TOPICS
 
-NOT_YET = {'endoscope.svg', 'explain_a_recording.ipynb'}  # TODO-MERGE: delete
 TUTORIAL = WORKSPACE / 'doc/tutorial.md'
 
 each_page = pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -68,10 +67,10 @@ def test_blocks_say_what_they_are(page: Path) -> None:
 def test_commands_and_targets_are_there(page: Path) -> None:
     text = page.read_text(encoding='utf-8')
     named = set(re.findall(r'(?:`|\$ )endoscope ([a-z]+)', text))
-    assert named <= {name.rstrip('_') for name in COMMANDS} | NOT_YET
+    assert named <= {name.rstrip('_') for name in COMMANDS}
     makefile = (WORKSPACE / 'Makefile').read_text()
     targets = set(re.findall(r'^([a-z-]+):', makefile, flags=re.M))
-    assert set(re.findall(r'make -C ros_ws ([a-z-]+)', text)) <= targets | NOT_YET
+    assert set(re.findall(r'make -C ros_ws ([a-z-]+)', text)) <= targets
 
 
 def test_readme_names_every_command() -> None:
