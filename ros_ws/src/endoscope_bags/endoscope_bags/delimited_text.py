@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags.errors import BagError
-from endoscope_bags.units import UNIT_SPELLINGS
+from endoscope_bags.table_mapping import WHITESPACE
+from endoscope_bags.units import known_unit
 from endoscope_core.errors import nearest
 
-WHITESPACE = 'whitespace'
 SEPARATORS = (';', '\t', ',', WHITESPACE)
 LARGEST = 1 << 30
 """Bytes of a table: an hour of ten columns at 1 kHz is 0.3 GB."""
@@ -437,9 +437,3 @@ def _heading(title: str) -> Heading:
         if match and known_unit(match['unit']):
             return Heading(title, match['name'].strip(), known_unit(match['unit']))
     return Heading(title, title)
-
-
-def known_unit(text: str) -> str | None:
-    """Return a unit as `units.UNITS` has it, however it is spelled; None for what is none."""
-    text = text.strip().replace('μ', 'µ')
-    return UNIT_SPELLINGS.get(text) or UNIT_SPELLINGS.get(text.casefold())

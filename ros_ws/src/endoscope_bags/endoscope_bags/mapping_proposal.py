@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_bags.delimited_text import WHITESPACE, DelimitedText, is_date
+from endoscope_bags.delimited_text import DelimitedText, is_date
+from endoscope_bags.table_mapping import WHITESPACE
 from endoscope_bags.units import DATE, TIME_UNITS, UNITS
 from endoscope_core.errors import printable
 

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from endoscope_bags.delimited_text import WHITESPACE, known_unit
 from endoscope_bags.errors import BagError
-from endoscope_bags.units import TIME_UNITS, UNITS
+from endoscope_bags.units import TIME_UNITS, UNITS, known_unit
 from endoscope_core.errors import nearest
 from endoscope_core.strict_yaml import YamlError, load_yaml
 
@@ -48,6 +47,9 @@ start_s: 0.0            # added to every time
 drop_repeats: true      # drop rows whose time is that of the row before
 """
 """A mapping with every key but `sample_and_hold`, which excludes `drop_repeats`."""
+WHITESPACE = 'whitespace'
+"""As a delimiter: one or more blanks or tabs."""
+
 HELP = f"""\
 A mapping file says what the columns are:
 

@@ -61,3 +61,9 @@ UNIT_SPELLINGS = {
     'mNm': 'mN m',
 }
 """By spelling; what is not found as it is written is looked for in lower case."""
+
+
+def known_unit(text: str) -> str | None:
+    """Return a unit as `UNITS` has it, however it is spelled; None for what is none."""
+    text = text.strip().replace('μ', 'µ')
+    return UNIT_SPELLINGS.get(text) or UNIT_SPELLINGS.get(text.casefold())

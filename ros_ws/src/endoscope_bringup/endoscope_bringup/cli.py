@@ -1,11 +1,13 @@
 """The program `endoscope`: runs one subcommand and turns errors into one line."""
 
+import argparse
 import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 from endoscope_bringup.commands import COMMANDS
 from endoscope_bringup.subcommands import OneLineParser, add_subcommands, run_chosen
@@ -16,12 +18,26 @@ EXIT_INTERRUPTED = 130
 EXIT_TERMINATED = 143
 
 
+class _Version(argparse.Action):
+    """Prints the version of the package that is installed; looked up only where it is asked for."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, **settings: Any) -> None:
+        super().__init__(option_strings, dest, nargs=0, **settings)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version
+
+        print(f'{parser.prog} {version("endoscope_bringup")}')
+        parser.exit()
+
+
 def build_parser() -> OneLineParser:
     """Return the parser of `endoscope` with all subcommands."""
     parser = OneLineParser(
         prog='endoscope',
         description='Compensation of hysteresis in a flexible endoscope, on ROS 2 Jazzy.',
     )
+    parser.add_argument('--version', action=_Version, help='print the version and exit')
     add_subcommands(parser, 'endoscope_bringup.commands', COMMANDS, dest='command')
     return parser
 

@@ -23,4 +23,5 @@ COMMANDS: tuple[str, ...] = (
     'effects',
     'doctor',
     'bench',
+    'completion',
 )
