@@ -138,6 +138,7 @@ class Typist:
         self._answer = b'\x1b[?0u\x1b[?62c' if kitty else b'\x1b[?62c'
         self._answered = 0
         self._held: list[Key] = []
+        self._longest_s = _LONGEST_HOLD_S
         self._open = True
         self.master, self.slave = pty.openpty()
         fcntl.ioctl(self.slave, termios.TIOCSWINSZ, struct.pack('4H', 24, 80, 0, 0))
@@ -176,7 +177,7 @@ class Typist:
             elif self._held and not typing:
                 typing = list(self._held)
                 self.type(b''.join(key.press for key in typing))
-                due, until = now + _DELAY_S, now + _LONGEST_HOLD_S
+                due, until = now + _DELAY_S, now + self._longest_s
             elif typing and now >= due:
                 due = now + _PERIOD_S
                 self.type(typing[-1].repeat)
@@ -219,8 +220,9 @@ class Typist:
         self.type(b'e')
         self.shows('ENABLED')
 
-    def hold(self, *keys: Key, until, what='motion') -> None:
+    def hold(self, *keys: Key, until, what='motion', longest_s=_LONGEST_HOLD_S) -> None:
         """Hold keys until something has come true; press them anew where that has ended."""
+        self._longest_s = longest_s
         self._held = list(keys)
         try:
             self.until(until, what)

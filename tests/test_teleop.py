@@ -174,7 +174,7 @@ def test_home_goes_on_while_its_key_is_held_and_is_paused_otherwise(graph):
         typist.type(b'e')
         typist.shows('ENABLED')
         homed = graph.nodes['calibration']
-        typist.hold(H, until=lambda: homed._last == 'home reached')
+        typist.hold(H, until=lambda: homed._last == 'home reached', longest_s=120.0)
         typist.shows('OPEN')
         assert typist.stands()
         assert graph.state == 'ENABLED'

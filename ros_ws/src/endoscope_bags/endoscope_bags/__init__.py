@@ -41,3 +41,7 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(f'endoscope_bags.{_HOME[name]}'), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -32,7 +32,7 @@ class MotorFault:
     stops
         Whether the shafts stand still afterwards.
     cause
-        Words that the cause of the FAULT must hold.
+        Pattern of words that the cause of the FAULT must hold.
     apart
         Nodes that must be processes of their own.
     """
@@ -146,7 +146,8 @@ MOTOR_FAULTS: dict[str, MotorFault] = {
     'motor driver killed': MotorFault(
         'motor driver killed (SIGKILL)',
         lambda rig: rig.kill('motor_driver'),
-        cause='motor/measured_js has been silent',
+        # Whoever misses it first says so.
+        cause='motor/measured_js has been silent|no measured position',
         apart=('motor_driver',),
     ),
 }

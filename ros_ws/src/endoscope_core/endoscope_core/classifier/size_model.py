@@ -128,9 +128,13 @@ class BacklashSizeModel:
         ValueError
             They are not, or a known size is no angle of a tube.
         """
-        if not np.allclose(self.basis @ self.basis.T, np.eye(len(self.basis)), atol=_ROUNDING):
+        # Numbers of a damaged file may be too large to be squared: then they are not these.
+        with np.errstate(over='ignore', invalid='ignore'):
+            products = self.basis @ self.basis.T
+            squares = np.mean(np.square(self.scores), axis=0)
+        if not np.allclose(products, np.eye(len(self.basis)), atol=_ROUNDING):
             raise ValueError('the components are not orthonormal')
-        if not np.allclose(np.mean(np.square(self.scores), axis=0), 1.0, atol=_ROUNDING):
+        if not np.allclose(squares, 1.0, atol=_ROUNDING):
             raise ValueError('the scores are not whitened')
         if not np.all((self.target >= 0.0) & (self.target <= 2.0 * np.pi)):
             raise ValueError('the known sizes are no angles')

@@ -47,7 +47,7 @@ def nominal_plant_text() -> str:
     lines += [
         '# Physics beyond that: `endoscope effects` lists it, `endoscope effects ID` tells all.',
         '# effects:',
-        '#   - {id: gravity, joint: bend_x, parameters: {moment_nm: 0.01}}',
+        '#   - {id: ID, joint: bend_x, parameters: {NAME: NUMBER}}',
         'effects: []',
     ]
     return '\n'.join(lines) + '\n'

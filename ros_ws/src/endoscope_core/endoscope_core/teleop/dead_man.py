@@ -66,13 +66,14 @@ class DeadMan:
         self._turned_ns = now_ns
         if late:
             self.let_go('this program was not run in time')
-        elif not self._grip:
+        elif self._grip <= self._spent:
+            # No grip, or a late sign of one that has ended.
             self.let_go('let go')
         elif now_ns > self._until_ns:
             self.let_go('no sign of the operator')
         elif hindrance:
             self.let_go(hindrance)
-        elif self._grip > self._spent:
+        else:
             self.held, self.reason = True, ''
         return self.held
 
