@@ -184,6 +184,13 @@ def test_an_unknown_node_is_named_with_the_nearest(graph):
     assert errors.strip().endswith('; compensator?')
 
 
+def test_what_only_a_device_can_do_is_refused_by_the_simulated_slave(graph):
+    status, said = operate(graph, 'tare')
+    assert (status, said) == (1, 'tare: simulated cells have no zero to find')
+    status, said = operate(graph, 'reboot', '--timeout', '1')
+    assert (status, said) == (1, 'reboot: nobody serves motor/reboot in /endoscope')
+
+
 def test_a_recording_is_begun_and_ended(graph, tmp_path):
     bag = tmp_path / 'bag'
     assert operate(graph, 'record', 'stop') == (1, 'record stop: not recording')

@@ -13,6 +13,9 @@ from endoscope_bringup.commands import COMMANDS
 from endoscope_bringup.subcommands import OneLineParser, add_subcommands, run_chosen
 from endoscope_core.errors import EndoscopeError, printable
 
+# Of the nodes, which no other command is to load.
+LOG_LEVEL = 'ENDOSCOPE_LOG_LEVEL'
+LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 EXIT_UNUSABLE_INPUT = 2
 EXIT_INTERRUPTED = 130
 EXIT_TERMINATED = 143
@@ -38,6 +41,11 @@ def build_parser() -> OneLineParser:
         description='Compensation of hysteresis in a flexible endoscope, on ROS 2 Jazzy.',
     )
     parser.add_argument('--version', action=_Version, help='print the version and exit')
+    parser.add_argument(
+        '--log-level',
+        choices=LEVELS,
+        help='the least that the nodes and libraries of this command say to the log (info)',
+    )
     add_subcommands(parser, 'endoscope_bringup.commands', COMMANDS, dest='command')
     return parser
 
@@ -49,6 +57,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     143 when terminated. An exception that is not the user's to act on keeps its traceback.
     """
     args = build_parser().parse_args(argv)
+    if args.log_level is not None:
+        _log_from(args.log_level)
     try:
         with _cleanup_on_sigterm():
             return run_chosen(args, dest='command')
@@ -65,6 +75,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print('endoscope: interrupted', file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _log_from(level: str) -> None:
+    """Let this process, and the processes that it starts, log from this level on."""
+    import logging
+
+    # ROS takes it from the environment; python has the same levels by the same names.
+    os.environ[LOG_LEVEL] = level
+    logging.basicConfig(level=getattr(logging, level.upper()))
 
 
 def _refuse(message: str) -> int:

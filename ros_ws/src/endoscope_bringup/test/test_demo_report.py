@@ -40,7 +40,7 @@ from endoscope_core.signals import motion_by_name
 
 ROOT = Path(__file__).parents[4]
 NO_TURNS = (np.array([]), np.array([]))
-LAG = {Method.NONE: 0.4, Method.BOUC_WEN: 0.1, Method.INVERSE: 0.02, Method.FEEDBACK: 0.01}
+LAG = {Method.NONE: 0.4, Method.BOUC_WEN: 0.1, Method.INVERSE: 0.02}
 REACH = ((-61.7, 51.5), (-61.7, 51.5))
 
 
@@ -109,7 +109,7 @@ def test_headings_alone_tell_what_was_wrong_and_what_became_better(page, results
     rows = table_rows(results)
     widest = max(row.values[Method.NONE] for row in of_figure(rows, BACKLASH))
     assert f'{widest:.0f}° wide' in headings[0]
-    assert 'physical inverse + feedback leaves' in headings[0]
+    assert 'physical inverse leaves' in headings[0]
     assert [heading.split(':')[0] for heading in headings[1:]] == [
         'What is wrong',
         'What helps',
@@ -137,9 +137,9 @@ def test_every_picture_has_a_caption_and_every_method_one_name(page, results):
 
 
 def test_the_best_method_comes_first_by_its_numbers():
-    rows = table_rows(results_of(LAG | {Method.FEEDBACK: 0.05}))
-    assert ranking(rows) == [Method.INVERSE, Method.FEEDBACK, Method.BOUC_WEN, Method.NONE]
-    assert all(row.is_best(m) == (m is Method.INVERSE) for row in rows for m in Method)
+    rows = table_rows(results_of(LAG | {Method.INVERSE: 0.2}))
+    assert ranking(rows) == [Method.BOUC_WEN, Method.INVERSE, Method.NONE]
+    assert all(row.is_best(m) == (m is Method.BOUC_WEN) for row in rows for m in Method)
     assert figures_table(rows).count('*') == len(rows)
 
 
@@ -155,13 +155,13 @@ def test_the_best_of_a_row_is_marked_on_the_page(page, results):
 def test_one_row_in_which_another_method_is_best_is_marked_so(results):
     odd = [
         replace(r, actual_deg=r.desired_deg + 30.0)
-        if (r.tube, r.motion, r.method) == (TUBES[0].name, MOTIONS[0], Method.FEEDBACK)
+        if (r.tube, r.motion, r.method) == (TUBES[0].name, MOTIONS[0], Method.INVERSE)
         else r
         for r in results.runs
     ]
     rows = table_rows(replace(results, runs=tuple(odd)))
     for row, best in zip(
-        of_figure(rows, RMSE), [Method.INVERSE, *[Method.FEEDBACK] * 3], strict=True
+        of_figure(rows, RMSE), [Method.BOUC_WEN, *[Method.INVERSE] * 3], strict=True
     ):
         assert row.is_best(best)
         assert not any(row.is_best(m) for m in Method if m is not best)
@@ -180,32 +180,8 @@ def test_the_table_stands_beside_the_papers(results):
     assert max(map(len, text.splitlines())) <= 100
 
 
-@pytest.mark.parametrize(
-    ('feedback', 'said'),
-    [
-        (0.01, 'smaller in 4 of 4 runs and larger in 0:'),
-        (0.05, 'smaller in 0 of 4 runs and larger in 4:'),
-        (0.02, 'smaller in 0 of 4 runs and larger in 0:'),
-    ],
-)
-def test_what_feedback_does_is_said_by_the_numbers(feedback, said):
-    rows = table_rows(results_of(LAG | {Method.FEEDBACK: feedback}))
-    assert said in sentences.what_feedback_does(rows)
-
-
-def test_feedback_that_helps_in_one_run_only_is_not_praised_for_all(results):
-    runs = tuple(
-        replace(r, actual_deg=r.desired_deg + 30.0)
-        if r.method is Method.FEEDBACK and r.motion == MOTIONS[0]
-        else r
-        for r in results.runs
-    )
-    said = sentences.what_feedback_does(table_rows(replace(results, runs=runs)))
-    assert 'smaller in 2 of 4 runs and larger in 2:' in said
-
-
 def test_no_method_is_praised_where_none_helps():
-    lag = {Method.NONE: 0.1, Method.BOUC_WEN: 0.2, Method.INVERSE: 0.3, Method.FEEDBACK: 0.4}
+    lag = {Method.NONE: 0.1, Method.BOUC_WEN: 0.2, Method.INVERSE: 0.3}
     worse = results_of(lag)
     assert 'no compensation makes the error smaller' in sentences.headline(table_rows(worse))
     assert 'is best' not in report_page(worse, {})

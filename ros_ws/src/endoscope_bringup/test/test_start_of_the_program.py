@@ -56,3 +56,19 @@ def test_bash_completes_a_command():
         ['bash', '-c', f'{script}\n{typed}'], capture_output=True, text=True, check=False
     )
     assert shown.stdout.split() == ['teleop'], shown.stderr
+
+
+@pytest.mark.parametrize(('level', 'said'), [('info', True), ('error', False)])
+def test_the_level_of_the_log_holds_for_the_nodes_of_a_command(tmp_path, level, said):
+    begun = (
+        'import sys; from endoscope_nodes.runtime import Runtime; '
+        'Runtime.spin = lambda runtime: None; '
+        'from endoscope_bringup.cli import main; sys.exit(main(sys.argv[1:]))'
+    )
+    shown = subprocess.run(
+        [sys.executable, '-c', begun, '--log-level', level, 'record', '--out', tmp_path / 'bag'],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ('recording to' in shown.stderr) is said, shown.stderr

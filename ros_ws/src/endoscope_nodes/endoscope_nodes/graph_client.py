@@ -27,6 +27,7 @@ from std_srvs.srv import Trigger
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.discovery import stay_on_this_machine
+from endoscope_nodes.log_level import log_as_asked
 from endoscope_nodes.names import (
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
@@ -462,6 +463,7 @@ def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterat
         The namespace or the domain cannot be one.
     """
     stay_on_this_machine()
+    log_as_asked()
     context = Context()
     # What rcl says to the log besides raising it would be a second line.
     set_logger_level('rcl', LoggingSeverity.FATAL)

@@ -40,6 +40,7 @@ class _Source:
     has_stamp: bool
     subscription: RawSubscription
     number: int
+    publishers_seen: int = -1
 
     def count_publishers(self) -> int:
         # The subscription may be replaced by another one.
@@ -221,6 +222,11 @@ class RecorderNode(EndoscopeNode):
             self.get_logger().error(str(report))
 
     def _adapt(self, source: _Source) -> None:
+        # Who publishes with what profile costs a tick to ask for; how many do costs little.
+        count = self.count_publishers(source.name)
+        if count == source.publishers_seen == source.count_publishers():
+            return
+        source.publishers_seen = count
         publishers = self.get_publishers_info_by_topic(source.name)
         qos = suitable_qos(source.latched, publishers)
         if publishers and (qos.durability, qos.reliability) != (

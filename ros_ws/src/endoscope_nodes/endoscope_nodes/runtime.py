@@ -28,6 +28,7 @@ from endoscope_nodes.announcement import Announcement
 from endoscope_nodes.declared_parameters import check_overrides, declare_parameters
 from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
 from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.log_level import LogLevelError, log_as_asked
 from endoscope_nodes.matching import all_matched
 from endoscope_nodes.node_parameters import BeatParameters, RealTimeParameters
 from endoscope_nodes.parameter_sections import check_sections
@@ -97,6 +98,7 @@ class Runtime(ClosedOnExit):
     ) -> None:
         self.context = rclpy.get_default_context() if context is None else context
         stay_on_this_machine()
+        log_as_asked()
         self._background_threads = threads_of_this_process()
         self._args = list(sys.argv[1:] if args is None else args)
         # What rcl says to the log besides raising it would be a second line.
@@ -384,6 +386,7 @@ def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -
     except (
         ParameterError,
         DiscoveryRangeError,
+        LogLevelError,
         InvalidNodeNameException,
         InvalidNamespaceException,
         InvalidParameterTypeException,

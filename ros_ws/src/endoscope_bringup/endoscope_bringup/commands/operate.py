@@ -15,6 +15,9 @@ _ACTIONS = {
     'resume': 'go on after a pause; waits for ENABLED',
     'calibrate': 'find the hysteresis class of the tube by a motion of some 10 s; waits for the '
     'result',
+    'tare': 'take the tension of the last second for zero; wires slack, shafts at rest',
+    'register_straight': "take the tracker's pose of the last second for straight",
+    'reboot': 'restart the servos without torque; not while the slave is ENABLED',
     'set': 'give a node a new value of a parameter',
     'get': "print a parameter's value",
     'record': 'begin or end a recording',

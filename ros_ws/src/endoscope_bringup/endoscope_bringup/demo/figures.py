@@ -16,7 +16,6 @@ COLOUR = {
     Method.NONE: '#c2571a',
     Method.BOUC_WEN: '#8a6fb0',
     Method.INVERSE: '#2f6fb7',
-    Method.FEEDBACK: '#1a8a66',
 }
 WIRE_COLOUR = '#2f6fb7'
 PLAIN = '#9aa5b1'

@@ -65,7 +65,6 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
         headline=sentences.headline(rows),
         wrong=sentences.what_is_wrong(rows),
         helps=[(m, sentences.what_helps(rows, m)) for m in order if m is not Method.NONE],
-        feedback=sentences.what_feedback_does(rows),
         paper=sentences.beside_the_paper(rows, Method.BOUC_WEN),
         left=sentences.what_is_left(results, best),
         cut=sentences.where_signals_were_cut(results, best),

@@ -12,7 +12,6 @@ class Method(StrEnum):
     NONE = 'uncompensated'
     BOUC_WEN = 'Bouc-Wen of the class'
     INVERSE = 'physical inverse'
-    FEEDBACK = 'physical inverse + feedback'
 
 
 MEANING = {
@@ -21,16 +20,13 @@ MEANING = {
     'tensions put it in, inverted',
     Method.INVERSE: 'the friction of this very tube, identified from its wire tensions in the '
     'calibration, inverted',
-    Method.FEEDBACK: "the same, and the second paper's law learns from the tip's tracker what is "
-    'left',
 }
 
-# Parameters of the compensator; the controller is active with feedback alone.
+# Parameters of the compensator.
 COMPENSATOR = {
     Method.NONE: {'mode': 'none'},
     Method.BOUC_WEN: {'mode': 'bouc_wen', 'selected_by': 'class'},
     Method.INVERSE: {'mode': 'physical', 'selected_by': 'plant'},
-    Method.FEEDBACK: {'mode': 'physical', 'selected_by': 'plant'},
 }
 
 

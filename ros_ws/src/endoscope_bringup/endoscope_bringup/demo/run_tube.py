@@ -192,7 +192,6 @@ class _GraphSession:
         """Track one motion by one method."""
         progress(f'tracking {MOTION_TITLE[motion]}, {method}')
         self._set('compensator', **COMPENSATOR[method])
-        self._set('controller', active=method is Method.FEEDBACK)
         self._advance(SETTLING_S)
         self._set('console', source='motion', motion=motion)
         start = self._now()

@@ -51,21 +51,6 @@ def what_helps(rows: Sequence[TableRow], method: Method) -> str:
     )
 
 
-def what_feedback_does(rows: Sequence[TableRow]) -> str:
-    """Whether feedback is better than the same compensation without it, run by run."""
-    pairs = [
-        (round(row.values[Method.INVERSE], 2), round(row.values[Method.FEEDBACK], 2))
-        for row in of_figure(rows, RMSE)
-    ]
-    smaller = sum(after < before for before, after in pairs)
-    larger = sum(after > before for before, after in pairs)
-    said = ', '.join(f'{before:.2f}° to {after:.2f}°' for before, after in pairs)
-    return (
-        f'Feedback makes the RMSE smaller in {smaller} of {len(pairs)} runs and larger in '
-        f'{larger}: {said}.'
-    )
-
-
 def beside_the_paper(rows: Sequence[TableRow], method: Method) -> str:
     """What a method leaves beside what the first paper's compensator leaves on its rig."""
     papers = [

@@ -10,7 +10,19 @@ from typing import Any
 from endoscope_bringup.operating.status import calibration_in_words, status_of
 from endoscope_nodes.graph_client import GraphClient, GraphRefusedError
 from endoscope_nodes.graph_parameters import read_parameter, set_parameters
-from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
+from endoscope_nodes.names import (
+    LOAD_CELLS_TARE,
+    MOTOR_REBOOT,
+    RECORDER_START,
+    RECORDER_STOP,
+    REGISTER_STRAIGHT,
+)
+
+_OF_A_DEVICE = {
+    'tare': LOAD_CELLS_TARE,
+    'register_straight': REGISTER_STRAIGHT,
+    'reboot': MOTOR_REBOOT,
+}
 
 # An `enable` that brings a node's trouble to light is a fault within this time.
 _STEADY_S = 0.3
@@ -54,6 +66,8 @@ def act(client: GraphClient, args: argparse.Namespace) -> Reply:
         said = client.trigger(service, patience_s)
         return Reply((f'recording to {said}' if args.what == 'start' else said,))
     client.find(patience_s)
+    if action in _OF_A_DEVICE:
+        return Reply((client.trigger(_OF_A_DEVICE[action], patience_s),))
     if action == 'status':
         return Reply(*status_of(client, patience_s))
     if action == 'calibrate':

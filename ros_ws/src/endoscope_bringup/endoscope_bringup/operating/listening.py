@@ -2,6 +2,7 @@
 
 import json
 import math
+import statistics
 import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -179,8 +180,7 @@ def rate(
     gaps = [(b - a) * 1e-6 for a, b in pairwise(times)]
     if not gaps:
         raise NoGraphError(f'{name}: {len(times)} message came, which is no rate')
-    mean = sum(gaps) / len(gaps)
-    spread = math.sqrt(sum((gap - mean) ** 2 for gap in gaps) / len(gaps))
+    mean, spread = statistics.fmean(gaps), statistics.pstdev(gaps)
     figures = {
         'messages': len(times),
         'rate_hz': 1e3 / mean if mean else math.inf,
