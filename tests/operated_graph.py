@@ -32,7 +32,7 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)
 os.execv(sys.argv[1], sys.argv[1:])
 """
 _STEP_S = 0.02
-_LONGEST_S = 200.0
+_LONGEST_S = 60.0
 # A keyboard's delay and rate. On a machine that runs nothing in time a hold ends and is begun anew.
 _DELAY_S, _PERIOD_S, _LONGEST_HOLD_S = 0.4, 1.0 / 30.0, 6.0
 
@@ -160,9 +160,14 @@ class Typist:
         return self
 
     def __exit__(self, *_):
-        self.process.kill()
-        self.process.wait()
-        self.hang_up()
+        """End it as its user would; one that is killed stays in the graph for a while."""
+        self.process.terminate()
+        try:
+            self.end()
+        finally:
+            self.process.kill()
+            self.process.wait()
+            self.hang_up()
 
     def _live(self) -> None:
         """Read, answer, and have held keys repeat, as terminal and keyboard do."""

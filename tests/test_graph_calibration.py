@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
-from simulated_graph import SimulatedGraph
+from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import slave_of, tube_of_size
 
 from endoscope_core.identification.law_choice import CalibrationFindings
@@ -58,7 +58,7 @@ def test_finds_the_class_of_a_known_tube_from_anywhere(tmp_path, size_deg, seed,
         moved = graph.calibrate()
         assert moved['class_deg'] == values['class_deg']
         sizes = [math.degrees(float(v['regressed_size'])) for v in (values, moved)]
-        assert sizes[0] == pytest.approx(sizes[1], abs=0.5)
+        assert sizes[0] == pytest.approx(sizes[1], abs=0.8)
 
 
 def test_a_brief_calibration_takes_less_than_five_seconds_to_compensated_motion(tmp_path):
@@ -129,7 +129,7 @@ def test_stale_load_cells_abort_and_the_slave_stands_still():
         graph.advance(1.0)
         assert 'wires/measured_js has been silent' in f'{abort_reason(graph)} {graph.cause}'
         positions = np.array([s.position for s in shafts])
-        assert np.ptp(positions[-500:], axis=0).max() < 0.003
+        assert np.ptp(positions[-TICK_RATE // 2 :], axis=0).max() < 0.003
         assert graph.states[-1] == 'FAULT'
         assert graph.nodes['compensator'].findings is None
 

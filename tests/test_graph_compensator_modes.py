@@ -1,7 +1,7 @@
 """Every compensator as a mode of the running nodes, changed while the slave moves."""
 
 import numpy as np
-from simulated_graph import SimulatedGraph
+from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import tube_of_size
 
 from endoscope_core.control import MODES
@@ -27,9 +27,9 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
             graph.advance(0.02)
             assert node._feedforward.law.mode == mode
             steps = np.abs(np.diff([s.position for s in drives], axis=0))
-            assert len(drives) >= 20
+            assert len(drives) >= 0.02 * TICK_RATE
             # 20 rad/s at the joint is what the feed-forward allows itself; a jump would be 0.1 rad.
-            assert steps.max() <= 0.5 * 20.0 * 1e-3 + 1e-9
+            assert steps.max() <= 0.5 * 20.0 / TICK_RATE + 1e-9
 
 
 def test_what_the_calibration_did_not_find_is_not_guessed():

@@ -51,7 +51,7 @@ def test_another_seed_gives_other_noise():
 
 def test_the_graphs_motors_are_the_plants():
     """A command acts from its stamp until the next: replaying them gives the same readings."""
-    with SimulatedGraph() as graph:
+    with SimulatedGraph(tick_rate=1000) as graph:
         shafts = graph.listen('motor/measured_js', MOTORS)
         wires = graph.listen('simulation/wires', WIRES)
         drives = graph.listen('motor/servo_jp', MOTORS)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from simulated_graph import SimulatedGraph
+from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import tube_of_size
 
 from endoscope_core.control import Reach, reach
@@ -51,4 +51,4 @@ def test_the_compensator_cuts_what_a_console_asks_for_beyond_it():
         assert max(d.position[0] for d in drives) == pytest.approx(0.3 * gear, abs=2e-3)
         said = warnings(graph, 'compensator: output')[-1]
         assert 'bend_y from -11 to 17 deg, more was asked for' in said
-        assert int(graph.reported('compensator: output')['cut to the reach']) > 1000
+        assert int(graph.reported('compensator: output')['cut to the reach']) > TICK_RATE

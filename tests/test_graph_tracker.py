@@ -1,7 +1,7 @@
 """A tracker that goes blind, dies, or reads single samples wrong."""
 
 import numpy as np
-from simulated_graph import SimulatedGraph
+from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import slave_of
 
 from endoscope_core.physics import EffectSpec, PlantDescription
@@ -30,7 +30,7 @@ def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
         assert corrections[-1].position == (0.0, 0.0)
         assert np.abs(corrections[0].position).max() > 0.01
         graph.advance(1.0)
-        assert len(drives) == 3000
+        assert len(drives) == 3 * TICK_RATE
         assert 'feed-forward alone' in graph.diagnostics['controller: feedback'][-1].message
         assert graph.diagnostics['em_tracker: tracker'][-1].level == b'\x03'
         graph.set('em_tracker', in_volume=True)
@@ -51,7 +51,7 @@ def test_a_dead_tracker_node_leaves_the_feed_forward_going():
         graph.kill('em_tracker')
         drives.clear()
         graph.advance(2.0)
-        assert len(drives) == 2000
+        assert len(drives) == 2 * TICK_RATE
         assert weight(graph) == 0.0
         assert graph.states[-1] == 'ENABLED'
 

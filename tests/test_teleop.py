@@ -29,6 +29,8 @@ def running(tmp_path_factory):
 
 @pytest.fixture
 def graph(running):
+    # A handle that was killed is missed by the middleware in its own time.
+    running.until(lambda: 'teleop' not in running.probe.get_node_names(), 'the end of teleop')
     running.command('disable')
     running.set('console', source='none', scale=1.0)
     running.clutches.clear()
@@ -171,10 +173,16 @@ def test_home_goes_on_while_its_key_is_held_and_is_paused_otherwise(graph):
         typist.shows('PAUSED')
         assert not graph.nodes['calibration'].active
         assert typist.stands()
-        typist.type(b'e')
-        typist.shows('ENABLED')
         homed = graph.nodes['calibration']
-        typist.hold(H, until=lambda: homed._last == 'home reached', longest_s=120.0)
+        # A key that a busy machine repeats too late is a key let go, and pauses once more.
+        while homed._last != 'home reached':
+            typist.type(b'e')
+            typist.shows('ENABLED')
+            typist.hold(
+                H,
+                until=lambda: homed._last == 'home reached' or graph.state == 'PAUSED',
+                longest_s=120.0,
+            )
         typist.shows('OPEN')
         assert typist.stands()
         assert graph.state == 'ENABLED'

@@ -1,5 +1,5 @@
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from endoscope_core.teleop import KeyEvent, KeyEventKind, TerminalKeys
@@ -68,6 +68,8 @@ def test_an_escape_that_leads_nowhere_is_the_key_esc():
 
 
 @given(st.binary(max_size=80), st.integers(0, 80))
+@example(b'\x00\xc2\x80', 2)
+@example('\N{EURO SIGN}'.encode() * 2, 4)
 def test_it_makes_no_difference_how_bytes_are_cut(data, cut):
     whole, parts = TerminalKeys(), TerminalKeys()
     expected = whole.read(data) + whole.flush()

@@ -21,7 +21,6 @@ from endoscope_nodes.node_parameters import FOLLOWED, ConductorParameters
 from endoscope_nodes.qos import LOCK_STEP
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.sampling import SampleClock
-from endoscope_nodes.ticker import TICK_NS
 
 _STAMP = struct.Struct('<iI')
 
@@ -43,7 +42,8 @@ class ConductorNode(EndoscopeNode):
         p = self.parameters(ConductorParameters)
         self._runtime = runtime
         self._settings = p
-        self._now_ns = round(p.start * 1e9) - TICK_NS
+        self._tick_ns = 1_000_000_000 // self.ticker.rate
+        self._now_ns = round(p.start * 1e9) - self._tick_ns
         self._until_ns = self._now_ns
         self._answered: dict[str, int] = dict.fromkeys(FOLLOWED, 0)
         self._pending: set[str] = set()
@@ -59,7 +59,7 @@ class ConductorNode(EndoscopeNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(min(p.grace, p.timeout) / 2, self._look, clock=steady)
         if p.speed > 0.0:
-            self.create_timer(TICK_NS * 1e-9 / p.speed, self._go_on, clock=steady)
+            self.create_timer(self._tick_ns * 1e-9 / p.speed, self._go_on, clock=steady)
         self.diagnostics.add('lock-step', self._report)
 
     def advance(self, seconds: float) -> Future:
@@ -103,7 +103,7 @@ class ConductorNode(EndoscopeNode):
                 future.set_result(None)
             return
         before = self._now_ns
-        self._now_ns = now = before + TICK_NS
+        self._now_ns = now = before + self._tick_ns
         self.ticks += 1
         tracked = self._tracker.due(now)
         self._pending.update(self._settings.wait_for)

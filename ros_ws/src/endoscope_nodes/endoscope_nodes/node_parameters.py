@@ -49,7 +49,11 @@ class BeatParameters:
     """Parameters of the first node of a process, for all of them."""
 
     tick_rate: int = parameter(
-        1000, 'beats of this process in real time; a divisor of 1000', unit='Hz', low=10, high=1000
+        1000,
+        'beats of this process, or of /clock where it has the conductor; a divisor of 1000',
+        unit='Hz',
+        low=10,
+        high=1000,
     )
     rig_file: str = parameter(
         '', 'rig.yaml with gear, limits, time-outs and devices; what it does not say is as shipped'

@@ -36,7 +36,7 @@ class Ticker:
     simulated
         Whether ``/clock`` gives the time.
     stride
-        Milliseconds from beat to beat in real time; simulated time beats as ``/clock`` does.
+        Milliseconds from beat to beat; simulated time beats as ``/clock`` does, whoever gives it.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Ticker:
     def __init__(self, node: Node, simulated: bool, stride: int = 1) -> None:
         self._node = node
         self.simulated = simulated
-        self._stride = 1 if simulated else stride
+        self._stride = stride
         self.ticks = 0
         self.missed = 0
         self.late_ns = 0
@@ -70,7 +70,7 @@ class Ticker:
 
     @property
     def rate(self) -> int:
-        """Beats a second in real time."""
+        """Beats a second in real time, and of a clock that this process gives."""
         return 1000 // self._stride
 
     def now_ns(self) -> int:
@@ -176,7 +176,7 @@ class Ticker:
 
     def _beat(self, stamp_ns: int, periods: int) -> None:
         self.ticks += 1
-        self.missed += periods // self._stride - 1
+        self.missed += max(0, periods // self._stride - 1)
         for listener in self._listeners:
             listener(stamp_ns, periods)
 

@@ -38,6 +38,8 @@ from endoscope_nodes.runtime import FOREVER_S, Runtime
 Progress = Callable[[str], None]
 
 POLL_S = 0.05
+TICK_RATE = 500
+"""Hz: that of a bus of servos at 4 Mbaud, and of nodes in processes of their own."""
 PATIENCE_S = 20.0
 SETTLING_S = 1.0
 _STAMP = struct.Struct('<iI')
@@ -105,6 +107,7 @@ class _GraphSession:
         self, plant_file: Path, bag: Path, domain: int, seed: int, real_time: bool
     ) -> None:
         arguments = ['--ros-args', '-p', f'use_sim_time:={str(not real_time).lower()}']
+        arguments += ['-p', f'tick_rate:={TICK_RATE}']
         self._runtime = Runtime(
             arguments,
             context=Context(),

@@ -5,6 +5,7 @@ repeat (ECMA-48, xterm control sequences); one that speaks the keyboard protocol
 presses, repeats and releases apart (https://sw.kovidgoyal.net/kitty/keyboard-protocol/).
 """
 
+import codecs
 import re
 from dataclasses import dataclass
 from enum import StrEnum
@@ -96,14 +97,18 @@ class TerminalKeys:
                 events.append(KeyEvent('escape'))
                 text = text[1:]
                 continue
-            event, text = _character(text)
+            event, length = _character(text)
+            if not length:
+                self._bytes = text
+                break
             events.append(event)
+            text = text[length:]
         return events
 
     def flush(self) -> list[KeyEvent]:
-        """Take a sequence that does not go on for the key Esc."""
+        """Take a sequence that does not go on for the key Esc, half a character for another key."""
         rest, self._bytes = self._bytes, b''
-        return [KeyEvent('escape')] if rest else []
+        return [KeyEvent('escape' if rest[0] == _ESC else 'other')] if rest else []
 
     def _sequence(self, found: re.Match[bytes]) -> list[KeyEvent]:
         body, final, single = (part.decode() if part else '' for part in found.groups())
@@ -150,14 +155,19 @@ def _printable(code: int) -> str:
     return character.lower() if character.isprintable() and character else 'other'
 
 
-def _character(text: bytes) -> tuple[KeyEvent, bytes]:
-    """Read the character that a text begins with; what is no character is another key."""
+def _character(text: bytes) -> tuple[KeyEvent, int]:
+    """Read the character that a text begins with, and its length: none while bytes are missing.
+
+    What is no character is another key.
+    """
     first = text[0]
     length = 1 if first < 0xC0 else 2 if first < 0xE0 else 3 if first < 0xF0 else 4
     try:
-        character = text[:length].decode()
+        character, length = codecs.utf_8_decode(text[:length])
     except UnicodeDecodeError:
-        return KeyEvent('other'), text[1:]
+        return KeyEvent('other'), 1
+    if not length:
+        return KeyEvent('other'), 0
     if first < 0x20 and first not in _NAMED:
-        return KeyEvent(f'ctrl+{chr(first + 0x60)}'), text[1:]
-    return KeyEvent(_NAMED.get(first) or _printable(ord(character))), text[length:]
+        return KeyEvent(f'ctrl+{chr(first + 0x60)}'), 1
+    return KeyEvent(_NAMED.get(first) or _printable(ord(character))), length
