@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import OUT_JOINT
 from endoscope_explain.compose import nominal_anchors, nominal_model
-from endoscope_explain.evaluate import packed_joint, simulate_joint
-from endoscope_explain.fit import Fit
-from endoscope_explain.free_parameters import BAND
+from endoscope_explain.fit.free_parameters import BAND
+from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.simulated_joint import packed_joint, simulate_joint
 from endoscope_explain.isolated_samples import without_isolated
 from endoscope_explain.observation import JointObservation, couple
 from endoscope_explain.parallel import parallel_map

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.fit import Fit
+from endoscope_explain.fit.model import Fit
 from endoscope_explain.observation import Channel, JointObservation
 
 Array = NDArray[np.float64]

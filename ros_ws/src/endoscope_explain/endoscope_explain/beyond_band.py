@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from endoscope_explain.compose import Composition
-from endoscope_explain.fit import Fit, fit
-from endoscope_explain.free_parameters import SCALED_NOMINAL, FreeParameter
-from endoscope_explain.score import score
+from endoscope_explain.fit.free_parameters import SCALED_NOMINAL, FreeParameter
+from endoscope_explain.fit.model import Fit, fit
+from endoscope_explain.fit.score import score
 
 FURTHEST = 4.0
 """Factor by which a description may be wrong, either way."""

@@ -9,7 +9,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import AuditReport, Finding
 from endoscope_explain.conclusions import has_changed
 from endoscope_explain.explanation import Explanation, NamedEffect, NominalEstimate, Verdict
-from endoscope_explain.free_parameters import FORM_SPREAD
+from endoscope_explain.fit.free_parameters import FORM_SPREAD
 
 PHYSICAL = ('actuator', 'transmission', 'joint')
 

@@ -7,16 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.fit import Fit, JointModel, fit, jacobian
-from endoscope_explain.free_parameters import BAND, nominal_parameters
+from endoscope_explain.fit.free_parameters import BAND, nominal_parameters
+from endoscope_explain.fit.model import Fit, JointModel, fit, jacobian
+from endoscope_explain.fit.score import FLOOR_PER_PARAMETER, score
+from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.glance import Glance, glance
 from endoscope_explain.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.rank import Look, polish
-from endoscope_explain.score import FLOOR_PER_PARAMETER, score
 from endoscope_explain.screen import Promise, promises, unexplained
-from endoscope_explain.whiteness import is_noise
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -10,7 +10,6 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.beyond_band import leaves_band_of
 from endoscope_explain.compose import Composition
 from endoscope_explain.decision import Decision
-from endoscope_explain.evaluate import joint_of
 from endoscope_explain.explanation import (
     Candidate,
     ChannelFit,
@@ -18,13 +17,14 @@ from endoscope_explain.explanation import (
     NominalEstimate,
     Verdict,
 )
-from endoscope_explain.fit import Fit
-from endoscope_explain.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
+from endoscope_explain.fit.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
+from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
+from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.score import misfit
+from endoscope_explain.fit.simulated_joint import joint_of
 from endoscope_explain.held_out import held_out_fit, held_out_masks, on_samples
-from endoscope_explain.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.observation import JointObservation
 from endoscope_explain.probability import probability
-from endoscope_explain.score import misfit
 from endoscope_explain.search import JointSearch
 
 CHANGED = 0.04

@@ -7,9 +7,9 @@ import numpy as np
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition
-from endoscope_explain.score import NEARLY_NOISE, PARAMETER_PRICE
+from endoscope_explain.fit.score import NEARLY_NOISE, PARAMETER_PRICE
+from endoscope_explain.fit.whiteness import is_noise, slips, worst_against_raw_noise
 from endoscope_explain.search import JointSearch
-from endoscope_explain.whiteness import is_noise, slips, worst_against_raw_noise
 
 NAMED = 20.0
 """Fall of the score that a first effect must bring; noise alone brings a few."""

@@ -18,12 +18,12 @@ from endoscope_explain.conclusions import (
     verdict_of,
 )
 from endoscope_explain.decision import Decision, decide, with_devices_agreed
-from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.free_parameters import BAND
+from endoscope_explain.fit.free_parameters import BAND
+from endoscope_explain.fit.intervals import nominal_estimates
+from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.given_physics import GivenJoints, explained_by
 from endoscope_explain.held_noise import with_held_noise
-from endoscope_explain.intervals import nominal_estimates
 from endoscope_explain.latent import unknown_term
 from endoscope_explain.observation import JointObservation, couple, observe
 from endoscope_explain.recording import Recording

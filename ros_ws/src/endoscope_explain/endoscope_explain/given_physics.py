@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.compose import Composition
-from endoscope_explain.fit import Fit, JointModel, fit, without_effect
-from endoscope_explain.free_parameters import FreeParameter
+from endoscope_explain.fit.free_parameters import FreeParameter
+from endoscope_explain.fit.model import Fit, JointModel, fit, without_effect
+from endoscope_explain.fit.score import score
 from endoscope_explain.parallel_fits import parallel_fits
-from endoscope_explain.score import score
 from endoscope_explain.search import JointSearch
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.fit import Fit
+from endoscope_explain.fit.model import Fit
 from endoscope_explain.rank import Look, look
 from endoscope_explain.screen import Promise, with_effect
 

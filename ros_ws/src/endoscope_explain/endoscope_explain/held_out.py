@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.explanation import ChannelFit
-from endoscope_explain.fit import Fit, fit
+from endoscope_explain.fit.model import Fit, fit
 from endoscope_explain.observation import JointObservation
 
 Array = NDArray[np.float64]

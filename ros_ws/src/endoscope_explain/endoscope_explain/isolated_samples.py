@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.fit import Fit
+from endoscope_explain.fit.model import Fit
 from endoscope_explain.observation import Channel, JointObservation
 from endoscope_explain.predicted_signals import view
 from endoscope_explain.recording import Recording

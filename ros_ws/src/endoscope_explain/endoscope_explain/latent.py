@@ -18,9 +18,9 @@ from endoscope_core.physics.layout import (
     IN_PUSH_STRETCH,
     OUT_BENDING,
 )
-from endoscope_explain.evaluate import residuals, simulate_joint
 from endoscope_explain.explanation import Estimate, UnknownTerm
-from endoscope_explain.fit import Fit
+from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.simulated_joint import residuals, simulate_joint
 from endoscope_explain.joint_states import STATE_NAMES, JointStates, joint_states
 from endoscope_explain.latent_library import NODES, Term, library
 from endoscope_explain.parallel import parallel_map

@@ -7,7 +7,7 @@ holds the joint it has none at all; a fit stays in the valley in which it starte
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.fit import Fit, fit
+from endoscope_explain.fit.model import Fit, fit
 
 Array = NDArray[np.float64]
 

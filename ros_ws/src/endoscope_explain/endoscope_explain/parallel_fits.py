@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.fit import Fit, JointModel
+from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.parallel import parallel_map
 
 Array = NDArray[np.float64]

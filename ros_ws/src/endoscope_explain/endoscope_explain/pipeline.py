@@ -13,7 +13,7 @@ from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import ExplainedCase, NextExperiment, Place
 from endoscope_explain.combine import combined_effects, combined_verdict, improved_plant
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.free_parameters import BAND
+from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.given_physics import GivenJoints
 from endoscope_explain.isolated_samples import with_isolated_marked
 from endoscope_explain.ladder import ladders

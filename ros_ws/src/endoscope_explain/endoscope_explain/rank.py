@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.fit import Fit, JointModel, bounded_step, fit, jacobian
+from endoscope_explain.fit.model import Fit, JointModel, fit, glance, jacobian
 from endoscope_explain.onset_scan import redated
 from endoscope_explain.screen import Promise, with_effect
 
@@ -68,35 +68,8 @@ def look(
     )
     columns = list(range(len(anchor.theta), len(theta)))
     derivative = np.hstack([anchor.jacobian, jacobian(model, theta, residuals, columns)])
-    theta, cost = _quasi_newton(model, theta, residuals, derivative, steps)
-    return Look((*effects, promise.effect_id), model, theta, cost)
-
-
-def _quasi_newton(
-    model: JointModel, theta: Array, residuals: Array, derivative: Array, steps: int
-) -> tuple[Array, float]:
-    low, high = model.bounds()
-    weight = model.prior_weight()
-
-    cost = model.cost(residuals, theta)
-    damping = 1e-3
-    for _ in range(steps):
-        normal = derivative.T @ derivative + np.diag(weight**2)
-        gradient = derivative.T @ residuals + weight * model.prior(theta)
-        scale = np.maximum(np.diag(normal), 1e-9)
-        step = bounded_step(normal + damping * np.diag(scale), gradient, theta, low, high)
-        length = float(step @ step)
-        if length < 1e-12:
-            break
-        trial = model.residuals(theta + step)
-        derivative += np.outer((trial - residuals - derivative @ step) / length, step)
-        trial_cost = model.cost(trial, theta + step)
-        if trial_cost < cost:
-            theta, residuals, cost = theta + step, trial, trial_cost
-            damping = max(damping / 5.0, 1e-6)
-        else:
-            damping *= 20.0
-    return theta, cost
+    found = glance(model, theta, derivative, steps)
+    return Look((*effects, promise.effect_id), model, found.theta, found.cost)
 
 
 def polish(candidate: Look, iterations: int = 10) -> Fit:

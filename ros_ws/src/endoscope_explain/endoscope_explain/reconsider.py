@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from endoscope_explain.compose import Composition, grow
-from endoscope_explain.fit import Fit, fit, without_effect
-from endoscope_explain.score import score
-from endoscope_explain.whiteness import is_noise
+from endoscope_explain.fit.model import Fit, fit, without_effect
+from endoscope_explain.fit.score import score
+from endoscope_explain.fit.whiteness import is_noise
 
 REPLACED_POLISHED = 2
 ALONE_STEPS = 6

@@ -13,7 +13,7 @@ import numpy as np
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition, polished
-from endoscope_explain.fit import Fit, JointModel
+from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.rank import Look
 from endoscope_explain.screen import promises, unexplained, with_effect

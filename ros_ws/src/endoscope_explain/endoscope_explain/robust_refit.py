@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.fit import Fit, fit
+from endoscope_explain.fit.model import Fit, fit
 
 Array = NDArray[np.float64]
 

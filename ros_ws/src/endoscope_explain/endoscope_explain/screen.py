@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.fit import Fit, JointModel
-from endoscope_explain.free_parameters import effect_parameters, with_free_reference
+from endoscope_explain.fit.free_parameters import effect_parameters, with_free_reference
+from endoscope_explain.fit.model import Fit, JointModel
 
 Array = NDArray[np.float64]
 

@@ -11,15 +11,15 @@ from endoscope_explain.compose import (
     grow,
     searchable_effects,
 )
-from endoscope_explain.fit import Fit
+from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.score import NEARLY_NOISE, score
+from endoscope_explain.fit.whiteness import is_noise, slips
 from endoscope_explain.many_starts import from_many_starts
 from endoscope_explain.parallel_fits import parallel_fits
 from endoscope_explain.reconsider import reconsidered
 from endoscope_explain.refit_from_description import from_description, promised_by_description
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.robust_refit import robustly_refitted
-from endoscope_explain.score import NEARLY_NOISE, score
-from endoscope_explain.whiteness import is_noise, slips
 from endoscope_explain.whole_numbers import with_counted_numbers
 
 SINGLES_POLISHED = 6

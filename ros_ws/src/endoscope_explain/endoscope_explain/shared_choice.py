@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import searchable_effects
-from endoscope_explain.fit import Fit, JointModel
+from endoscope_explain.fit.model import Fit, JointModel
+from endoscope_explain.fit.pooled import fit_together, with_common_numbers
+from endoscope_explain.fit.score import score
+from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.glance import Glance, glance
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.rank import polish
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
-from endoscope_explain.score import score
 from endoscope_explain.screen import Promise, promises, unexplained
-from endoscope_explain.shared_fit import fit_together, with_common_numbers
-from endoscope_explain.whiteness import is_noise
 
 Array = NDArray[np.float64]
 Anchors = tuple[Fit, ...]

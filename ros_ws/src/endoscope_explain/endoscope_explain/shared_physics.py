@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.anchoring import anchored
+from endoscope_explain.fit.pooled import told_alone
 from endoscope_explain.given_physics import GivenJoints, GivenPhysics, without_recording
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.observation import observe
@@ -21,7 +22,6 @@ from endoscope_explain.shared_choice import (
     settled_together,
     with_one_more,
 )
-from endoscope_explain.shared_fit import told_alone
 
 BEAM = 3
 """Choices of effects that are gone on with."""

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition
-from endoscope_explain.fit import Fit, fit
+from endoscope_explain.fit.model import Fit, fit
+from endoscope_explain.fit.score import score
 from endoscope_explain.parallel_fits import parallel_fits
-from endoscope_explain.score import score
 
 STRIDES = (2, 1)
 ITERATIONS = 8

@@ -6,7 +6,7 @@ import pytest
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.explanation import Estimate, NamedEffect
-from endoscope_explain.free_parameters import FRICTION_PROFILE_NAMES
+from endoscope_explain.fit.free_parameters import FRICTION_PROFILE_NAMES
 from endoscope_explain.latent_library import NODES
 from endoscope_explain.locate.chain_cut import cut_at_motor
 from endoscope_explain.locate.locating import STAGE_OF_NODE, STAGE_OF_PARAMETER, locate_effects

@@ -7,10 +7,10 @@ import pytest
 
 from endoscope_core.physics import load_plant
 from endoscope_explain.anchoring import anchored
-from endoscope_explain.free_parameters import BAND, FORM_SPREAD
+from endoscope_explain.fit.free_parameters import BAND, FORM_SPREAD
+from endoscope_explain.fit.whiteness import worst_against_raw_noise
 from endoscope_explain.observation import observe
 from endoscope_explain.recording import recording_from_bag
-from endoscope_explain.whiteness import worst_against_raw_noise
 
 SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))
 FOLDER = SHARED / 'cases' / 'sheath'

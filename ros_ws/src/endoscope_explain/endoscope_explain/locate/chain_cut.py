@@ -8,7 +8,7 @@ from scipy.signal import savgol_filter
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import IN_MOTOR
-from endoscope_explain.evaluate import simulate_joint
+from endoscope_explain.fit.simulated_joint import simulate_joint
 from endoscope_explain.observation import TICK, JointObservation, observe
 from endoscope_explain.predicted_signals import packed_rig, reading_lead, simulate_rig
 from endoscope_explain.recording import Recording

@@ -8,7 +8,7 @@ from endoscope_explain.audit import AuditReport, Finding
 from endoscope_explain.case import Place
 from endoscope_explain.combine import changed_parameters
 from endoscope_explain.explanation import Explanation, NamedEffect
-from endoscope_explain.free_parameters import FRICTION_PROFILE_NAMES
+from endoscope_explain.fit.free_parameters import FRICTION_PROFILE_NAMES
 from endoscope_explain.locate.band import band_hz
 from endoscope_explain.locate.conditions import conditions, drive
 from endoscope_explain.locate.excess import SignalExcess, excess_between, shares

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.evaluate import joint_of, packed_joint
-from endoscope_explain.fit import Fit, JointModel, fit
-from endoscope_explain.free_parameters import LEAD, effect_parameters, nominal_parameters
+from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
+from endoscope_explain.fit.model import Fit, JointModel, fit
+from endoscope_explain.fit.simulated_joint import joint_of, packed_joint
 from endoscope_explain.observation import JointObservation, observe
 from endoscope_explain.recording import Recording
 

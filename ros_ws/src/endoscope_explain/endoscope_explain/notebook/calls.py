@@ -12,7 +12,7 @@ from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription, load_plant
-from endoscope_explain.free_parameters import BAND
+from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.many_bags import explained_case
 from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.notebook.signals import Signals, signals_of_bag

@@ -7,10 +7,10 @@ import pytest
 
 from endoscope_explain.compose import Composition, nominal_model
 from endoscope_explain.decision import Decision, decide, with_devices_agreed
-from endoscope_explain.evaluate import packed_joint
-from endoscope_explain.fit import Fit
+from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.score import score
+from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observation import observe
-from endoscope_explain.score import score
 from endoscope_explain.search import JointSearch
 
 

@@ -8,14 +8,14 @@ import pytest
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition, nominal_anchors, nominal_model
-from endoscope_explain.evaluate import packed_joint
-from endoscope_explain.fit import fit, jacobian
+from endoscope_explain.fit.model import fit, jacobian
+from endoscope_explain.fit.score import score
+from endoscope_explain.fit.simulated_joint import packed_joint
+from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.observation import observe
 from endoscope_explain.onset_scan import redated
 from endoscope_explain.refit_from_description import from_description, promised_by_description
-from endoscope_explain.score import score
 from endoscope_explain.screen import promises, unexplained, with_effect
-from endoscope_explain.whiteness import is_noise
 
 
 def anchors(one_joint, effect_id, parameters, *others):

@@ -3,9 +3,9 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec
 from endoscope_explain.compose import nominal_anchors
-from endoscope_explain.evaluate import packed_joint
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
+from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.latent import unknown_term
 from endoscope_explain.observation import observe
 

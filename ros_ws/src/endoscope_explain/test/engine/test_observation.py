@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import JointParameters, PlantDescription
-from endoscope_explain.evaluate import packed_joint, residuals, simulate_joint
+from endoscope_explain.fit.simulated_joint import packed_joint, residuals, simulate_joint
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.observation import observe
 from endoscope_explain.predicted_signals import reading_lead, simulate_rig

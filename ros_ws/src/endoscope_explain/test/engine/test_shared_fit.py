@@ -8,10 +8,10 @@ import pytest
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.anchoring import anchored
-from endoscope_explain.fit import fit
+from endoscope_explain.fit.model import fit
+from endoscope_explain.fit.pooled import SPREAD, fit_together, told_alone, with_common_numbers
 from endoscope_explain.observation import observe
 from endoscope_explain.screen import with_effect
-from endoscope_explain.shared_fit import SPREAD, fit_together, told_alone, with_common_numbers
 
 GAIN = 0.9
 STIFFNESS = 0.005

@@ -7,7 +7,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.anchoring import anchored
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.fit import fit
+from endoscope_explain.fit.model import fit
 from endoscope_explain.given_physics import without_recording
 from endoscope_explain.observation import observe
 from endoscope_explain.screen import with_effect

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.fit import Fit
+from endoscope_explain.fit.model import Fit
 
 Array = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.explanation import Estimate, NominalEstimate
-from endoscope_explain.fit import Fit
-from endoscope_explain.free_parameters import BAND, FITTED_NOMINAL, FORM_SPREAD
-from endoscope_explain.whiteness import is_noise
+from endoscope_explain.fit.free_parameters import BAND, FITTED_NOMINAL, FORM_SPREAD
+from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.whiteness import is_noise
 
 Array = NDArray[np.float64]
 

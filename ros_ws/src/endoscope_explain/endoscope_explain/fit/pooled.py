@@ -24,8 +24,9 @@ from endoscope_core.physics.layout import (
     PRETENSION_PROFILE,
     PROFILE_TERMS,
 )
-from endoscope_explain.fit import STEP, Fit, JointModel, bounded_step, central_jacobian
-from endoscope_explain.free_parameters import LEAD, FreeParameter
+from endoscope_explain.fit.free_parameters import LEAD, FreeParameter
+from endoscope_explain.fit.model import Fit, JointModel, central_jacobian
+from endoscope_explain.fit.solver import STEP, Effort, Renewal, minimise
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -51,28 +52,9 @@ _OF_A_SHAPE = frozenset(
 )
 
 
-@dataclass(frozen=True)
-class _Effort:
-    """How long a fit goes on.
-
-    Attributes
-    ----------
-    iterations : int
-    tolerance : float
-        Least share by which a step lowers the cost.
-    steps : tuple of float
-        Difference steps, one after the other: the misfit is rough on a small scale, and a longer
-        step looks over that.
-    """
-
-    iterations: int
-    tolerance: float
-    steps: tuple[float, ...]
-
-
-ROUGH = _Effort(12, 1e-3, (10.0 * STEP,))
-ON_THE_WAY = _Effort(20, 1e-3, (STEP, 10.0 * STEP))
-THOROUGH = _Effort(30, 1e-4, (STEP, 10.0 * STEP, 60.0 * STEP))
+ROUGH = Effort(12, 1e-3, (10.0 * STEP,), Renewal.ALWAYS)
+ON_THE_WAY = Effort(20, 1e-3, (STEP, 10.0 * STEP), Renewal.ALWAYS)
+THOROUGH = Effort(30, 1e-4, (STEP, 10.0 * STEP, 60.0 * STEP), Renewal.ALWAYS)
 
 
 @dataclass(frozen=True)
@@ -124,11 +106,9 @@ def fit_together(
         whole[place] = np.median(np.concatenate(found))
     whole = np.clip(whole, layout.low, layout.high)
     if rough:
-        whole = _descend(models, layout, whole, SPREAD, ROUGH)
-    else:
-        whole = _descend(models, layout, whole, FIRST_SPREAD, ON_THE_WAY)
-        whole = _descend(models, layout, whole, SPREAD, THOROUGH)
-    return _fits(models, layout, whole, STEP)
+        return _together(models, layout, whole, SPREAD, ROUGH)
+    whole = _whole(_together(models, layout, whole, FIRST_SPREAD, ON_THE_WAY), layout)
+    return _together(models, layout, whole, SPREAD, THOROUGH)
 
 
 def with_common_numbers(fits: Sequence[Fit]) -> list[Array]:
@@ -169,10 +149,14 @@ def told_alone(fits: Sequence[Fit]) -> list[Fit]:
 
 def _laid_out(fits: Sequence[Fit]) -> tuple[_Layout, Array]:
     layout = _layout([f.model for f in fits])
+    return layout, _whole(fits, layout)
+
+
+def _whole(fits: Sequence[Fit], layout: _Layout) -> Array:
     whole = np.zeros(len(layout.low))
     for found, columns in zip(fits, layout.columns, strict=True):
         whole[columns] = found.theta
-    return layout, whole
+    return whole
 
 
 def _drawn_to(item: FreeParameter, mean: float | None) -> FreeParameter:
@@ -218,73 +202,64 @@ def _layout(models: Sequence[JointModel]) -> _Layout:
     )
 
 
-def _descend(
-    models: Sequence[JointModel],
-    layout: _Layout,
-    whole: Array,
-    spread: float,
-    effort: _Effort,
-) -> Array:
-    """Levenberg-Marquardt on all coordinates; a longer difference step where it does not go on."""
+@dataclass(frozen=True)
+class _Together:
+    """All recordings as one objective; residuals and derivatives in a list, one each."""
 
-    def cost_of(at: Array) -> float:
-        cost = 0.0
-        for model, columns in zip(models, layout.columns, strict=True):
-            cost += model.cost(model.residuals(at[columns]), at[columns])
-        for pool in layout.pools:
-            cost += 0.5 * float(np.sum((at[pool] - np.mean(at[pool])) ** 2)) / spread**2
-        return cost
+    models: Sequence[JointModel]
+    layout: _Layout
+    spread: float
 
-    cost = cost_of(whole)
-    damping, steps = 1e-4, effort.steps
-    for _ in range(effort.iterations):
-        fits = _fits(models, layout, whole, steps[0])
-        normal, gradient = _normal_equations(fits, layout, whole, spread)
-        scale = np.maximum(np.diag(normal), 1e-9)
-        before = cost
-        damping = min(damping, 1e-2)
-        for _ in range(7):
-            step = bounded_step(
-                normal + damping * np.diag(scale), gradient, whole, layout.low, layout.high
-            )
-            trial = whole + step
-            trial_cost = cost_of(trial)
-            if trial_cost < cost:
-                whole, cost = trial, trial_cost
-                damping = max(damping / 10.0, 1e-7)
-                break
-            damping = max(damping * 10.0, 1e-3)
-        if before - cost < effort.tolerance * before:
-            steps = steps[1:]
-            if not steps:
-                break
-    return whole
+    def bounds(self) -> tuple[Array, Array]:
+        return self.layout.low, self.layout.high
+
+    def evaluate(self, theta: Array) -> tuple[list[Array], float]:
+        residuals, cost = [], 0.0
+        for model, columns in zip(self.models, self.layout.columns, strict=True):
+            residuals.append(model.residuals(theta[columns]))
+            cost += model.cost(residuals[-1], theta[columns])
+        for pool in self.layout.pools:
+            cost += 0.5 * float(np.sum((theta[pool] - np.mean(theta[pool])) ** 2)) / self.spread**2
+        return residuals, cost
+
+    def derivative(self, theta: Array, residuals: list[Array], stride: float) -> list[Array]:
+        return [
+            central_jacobian(model, theta[columns], stride)
+            for model, columns in zip(self.models, self.layout.columns, strict=True)
+        ]
+
+    def normal_equations(
+        self, theta: Array, residuals: list[Array], derivative: list[Array]
+    ) -> tuple[Array, Array]:
+        normal = np.zeros((len(theta), len(theta)))
+        gradient = np.zeros(len(theta))
+        for model, columns, left, slope in zip(
+            self.models, self.layout.columns, residuals, derivative, strict=True
+        ):
+            weight = model.prior_weight()
+            normal[np.ix_(columns, columns)] += slope.T @ slope + np.diag(weight**2)
+            gradient[columns] += slope.T @ left + weight * model.prior(theta[columns])
+        for pool in self.layout.pools:
+            together = (np.eye(len(pool)) - 1.0 / len(pool)) / self.spread**2
+            normal[np.ix_(pool, pool)] += together
+            gradient[pool] += together @ theta[pool]
+        return normal, gradient
+
+    def updated(
+        self, derivative: list[Array], step: Array, before: list[Array], after: list[Array]
+    ) -> list[Array]:
+        raise NotImplementedError('a pooled fit renews its derivatives')
 
 
-def _fits(models: Sequence[JointModel], layout: _Layout, whole: Array, step: float) -> list[Fit]:
-    """Each recording at its part of the coordinates, with its derivative by differences."""
+def _together(
+    models: Sequence[JointModel], layout: _Layout, start: Array, spread: float, effort: Effort
+) -> list[Fit]:
+    found = minimise(_Together(models, layout, spread), start, effort)
     fits = []
-    for model, columns in zip(models, layout.columns, strict=True):
-        theta = whole[columns]
-        residuals = model.residuals(theta)
-        derivative = central_jacobian(model, theta, step)
-        fits.append(Fit(model, theta, residuals, derivative, model.cost(residuals, theta)))
+    for model, columns, residuals, derivative in zip(
+        models, layout.columns, found.residuals, found.derivative, strict=True
+    ):
+        theta = found.theta[columns]
+        cost = model.cost(residuals, theta)
+        fits.append(Fit(model, theta, residuals, derivative, cost))
     return fits
-
-
-def _normal_equations(
-    fits: Sequence[Fit], layout: _Layout, whole: Array, spread: float
-) -> tuple[Array, Array]:
-    normal = np.zeros((len(whole), len(whole)))
-    gradient = np.zeros(len(whole))
-    for found, columns in zip(fits, layout.columns, strict=True):
-        weight = found.model.prior_weight()
-        derivative = found.jacobian
-        normal[np.ix_(columns, columns)] += derivative.T @ derivative + np.diag(weight**2)
-        gradient[columns] += derivative.T @ found.residuals
-        gradient[columns] += weight * found.model.prior(found.theta)
-    for pool in layout.pools:
-        together = (np.eye(len(pool)) - 1.0 / len(pool)) / spread**2
-        normal[np.ix_(pool, pool)] += together
-        gradient[pool] += together @ whole[pool]
-    return normal, gradient

@@ -1,4 +1,4 @@
-"""Output-error least squares of one joint: Levenberg-Marquardt with bounds and priors."""
+"""Output-error least squares of one joint, with bounds and priors."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -8,24 +8,18 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.effect import Symptom
 from endoscope_core.physics.effects import CATALOGUE, showing
-from endoscope_explain.evaluate import residuals, simulate_joint
-from endoscope_explain.free_parameters import LEAD, FreeParameter
+from endoscope_explain.fit.free_parameters import LEAD, FreeParameter
+from endoscope_explain.fit.simulated_joint import residuals, simulate_joint
+from endoscope_explain.fit.solver import STEP, Effort, Renewal, minimise
 from endoscope_explain.observation import JointObservation
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 CLOCK_RATE = showing(Symptom.CLOCK_RATE)
-STEP = 5.0e-4
-"""Difference step of a coordinate: a motor that stalls leaves a valley of the misfit so bent that
-one of 1 % ends a fit at its wall."""
 WIDE_STEP = 0.1
 """With sticking and slipping, the times of the slips jump with the parameters, and so do the
 residuals: a wide difference looks over the jumps."""
-REACH = 0.7
-"""Largest step of a coordinate: further away the derivative says little."""
-SLOW = 0.2
-"""An approximate derivative is renewed once a step lowers the cost by less than this share."""
 
 
 @dataclass(frozen=True)
@@ -185,30 +179,6 @@ def central_jacobian(model: JointModel, theta: Array, step: float) -> Array:
     return result
 
 
-def bounded_step(hessian: Array, gradient: Array, theta: Array, low: Array, high: Array) -> Array:
-    """Newton step within bounds and `REACH`: coordinates that hit one are fixed, one by one."""
-    low, high = np.maximum(low, theta - REACH), np.minimum(high, theta + REACH)
-    free = np.ones(len(theta), dtype=bool)
-    step = np.zeros(len(theta))
-    for _ in range(len(theta) + 1):
-        step[:] = 0.0
-        fixed = ~free
-        step[fixed] = np.where(gradient[fixed] > 0, low[fixed], high[fixed]) - theta[fixed]
-        rhs = -gradient[free] - hessian[np.ix_(free, fixed)] @ step[fixed]
-        step[free] = np.linalg.solve(hessian[np.ix_(free, free)], rhs)
-        new = theta + step
-        out = free & ((new < low - 1e-12) | (new > high + 1e-12))
-        if not out.any():
-            break
-        worst = np.argmax(np.where(out, np.maximum(low - new, new - high), -1.0))
-        gradient = gradient.copy()
-        gradient[worst] = 1.0 if new[worst] < low[worst] else -1.0
-        free[worst] = False
-        if not free.any():
-            break
-    return np.clip(theta + step, low, high) - theta
-
-
 def fit(
     model: JointModel,
     start: Array,
@@ -237,48 +207,59 @@ def fit(
     -------
     Fit
     """
-    weight = np.ones(model.observation.size) if weight is None else weight
-    low, high = model.bounds()
-    theta = np.clip(start, low, high)
-    prior_weight = model.prior_weight()
-    current = model.residuals(theta)
+    objective = _OneJoint(model, weight)
+    found = minimise(objective, start, Effort(iterations, tolerance), known_jacobian)
+    return Fit(model, found.theta, found.residuals, found.derivative, found.cost)
 
-    def cost_of(values: Array, at: Array) -> float:
-        return 0.5 * float(np.sum((weight * values) ** 2) + np.sum(model.prior(at) ** 2))
 
-    cost = cost_of(current, theta)
-    damping = 1e-4
-    derivative = (
-        jacobian(model, theta, current) if known_jacobian is None else known_jacobian.copy()
-    )
-    exact = known_jacobian is None
-    for _ in range(iterations):
-        weighted = derivative * weight[:, None]
-        gradient = weighted.T @ (weight * current) + prior_weight * model.prior(theta)
-        normal = weighted.T @ weighted + np.diag(prior_weight**2)
-        scale = np.maximum(np.diag(normal), 1e-9)
-        before, accepted = cost, False
-        for _ in range(6 if exact else 2):
-            step = bounded_step(normal + damping * np.diag(scale), gradient, theta, low, high)
-            length = float(step @ step)
-            if length < 1e-14:
-                break
-            trial = model.residuals(theta + step)
-            trial_cost = cost_of(trial, theta + step)
-            if trial_cost < cost:
-                # Broyden's rank-one update saves the simulations of a new derivative.
-                derivative += np.outer((trial - current - derivative @ step) / length, step)
-                theta, current, cost = theta + step, trial, trial_cost
-                damping = max(damping / 10.0, 1e-7)
-                accepted = True
-                break
-            damping = max(damping * 10.0, 1e-3)
-        gained = before - cost
-        if exact and (not accepted or gained < tolerance * before):
-            break
-        exact = gained < SLOW * before
-        if exact:
-            derivative = jacobian(model, theta, current)
-    if not exact:
-        derivative = jacobian(model, theta, current)
-    return Fit(model, theta, current, derivative, cost)
+def glance(model: JointModel, start: Array, known_jacobian: Array, steps: int) -> Fit:
+    """Fit by few simulations: a derivative that is known near `start` is updated, never renewed.
+
+    Parameters
+    ----------
+    model : JointModel
+    start : array (n,)
+    known_jacobian : array (size, n)
+    steps : int
+        Simulations, at most.
+
+    Returns
+    -------
+    Fit
+    """
+    effort = Effort(steps, renewal=Renewal.NEVER)
+    found = minimise(_OneJoint(model), start, effort, known_jacobian)
+    return Fit(model, found.theta, found.residuals, found.derivative, found.cost)
+
+
+@dataclass(frozen=True)
+class _OneJoint:
+    model: JointModel
+    weight: Array | None = None
+
+    def bounds(self) -> tuple[Array, Array]:
+        return self.model.bounds()
+
+    def evaluate(self, theta: Array) -> tuple[Array, float]:
+        residuals = self.model.residuals(theta)
+        return residuals, self.model.cost(self._weighted(residuals), theta)
+
+    def derivative(self, theta: Array, residuals: Array, stride: float) -> Array:
+        return jacobian(self.model, theta, residuals)
+
+    def normal_equations(
+        self, theta: Array, residuals: Array, derivative: Array
+    ) -> tuple[Array, Array]:
+        weighted = derivative if self.weight is None else derivative * self.weight[:, None]
+        prior_weight = self.model.prior_weight()
+        return (
+            weighted.T @ weighted + np.diag(prior_weight**2),
+            weighted.T @ self._weighted(residuals) + prior_weight * self.model.prior(theta),
+        )
+
+    def updated(self, derivative: Array, step: Array, before: Array, after: Array) -> Array:
+        missed = after - before - derivative @ step
+        return derivative + np.outer(missed / float(step @ step), step)
+
+    def _weighted(self, residuals: Array) -> Array:
+        return residuals if self.weight is None else self.weight * residuals

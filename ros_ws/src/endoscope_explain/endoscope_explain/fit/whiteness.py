@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from endoscope_explain.fit import Fit
+from endoscope_explain.fit.model import Fit
 from endoscope_explain.observation import JointObservation
 
 BLOCK = 50

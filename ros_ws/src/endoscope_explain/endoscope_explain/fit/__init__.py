@@ -1,0 +1,1 @@
+"""Fitting a simulated joint, or several recordings of one, to what was recorded."""

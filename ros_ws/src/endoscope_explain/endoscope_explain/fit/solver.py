@@ -1,0 +1,180 @@
+"""Levenberg-Marquardt within bounds: the one optimiser of all fits.
+
+Steps are Newton's with damping (Marquardt, J. SIAM 11(2), 1963), cut at bounds and at the distance
+over which a derivative says anything. Between exact derivatives, which cost a simulation for every
+coordinate, Broyden's rank-one update follows the steps (Broyden, Math. Comp. 19, 1965).
+"""
+
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+STEP = 5.0e-4
+"""Difference step of a coordinate: a motor that stalls leaves a valley of the misfit so bent that
+one of 1 % ends a fit at its wall."""
+REACH = 0.7
+"""Largest step of a coordinate: further away the derivative says little."""
+SLOW = 0.2
+"""An approximate derivative is renewed once a step lowers the cost by less than this share."""
+TRIES, TRIES_BY_ESTIMATE = 6, 2
+"""How often a step that does not lower the cost is shortened, by the quality of the derivative."""
+_FIRST_DAMPING, _LEAST_DAMPING, _RESTARTED_DAMPING = 1e-4, 1e-7, 1e-3
+_LARGEST_AT_FIRST = 1e-2
+_NO_STEP = 1e-14
+
+
+class Renewal(Enum):
+    """When the derivative is worked out anew."""
+
+    NEVER = auto()
+    WHEN_SLOW = auto()
+    ALWAYS = auto()
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long a fit goes on.
+
+    Attributes
+    ----------
+    iterations : int
+        Largest number of steps.
+    tolerance : float
+        Stop when a step lowers the cost by less than this share.
+    strides : tuple of float
+        Difference steps, each used until it leads no further: the misfit is rough on a small scale,
+        and a longer step looks over that.
+    renewal : Renewal
+    """
+
+    iterations: int = 8
+    tolerance: float = 1e-3
+    strides: tuple[float, ...] = (STEP,)
+    renewal: Renewal = Renewal.WHEN_SLOW
+
+
+class Objective[R, D](Protocol):
+    """Half a sum of squares over coordinates, which may have priors among them.
+
+    `R` are its residuals, `D` their derivative, in whatever form suits it.
+    """
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest coordinates (n,)."""
+
+    def evaluate(self, theta: Array) -> tuple[R, float]:
+        """Residuals and cost at the coordinates (n,)."""
+
+    def derivative(self, theta: Array, residuals: R, stride: float) -> D:
+        """Difference quotients of the residuals."""
+
+    def normal_equations(self, theta: Array, residuals: R, derivative: D) -> tuple[Array, Array]:
+        """Matrix (n, n) and gradient (n,) of the cost."""
+
+    def updated(self, derivative: D, step: Array, before: R, after: R) -> D:
+        """The derivative after Broyden's update for a step (n,); not asked for by `ALWAYS`."""
+
+
+@dataclass(frozen=True)
+class Minimum[R, D]:
+    """Where a fit ended.
+
+    Attributes
+    ----------
+    theta : array (n,)
+    residuals
+    derivative
+        At `theta`; near it where it is never renewed.
+    cost : float
+    """
+
+    theta: Array
+    residuals: R
+    derivative: D
+    cost: float
+
+
+def minimise[R, D](
+    objective: Objective[R, D], start: Array, effort: Effort, known: D | None = None
+) -> Minimum[R, D]:
+    """Go down from `start`.
+
+    Parameters
+    ----------
+    objective : Objective
+    start : array (n,)
+    effort : Effort
+    known : optional
+        A derivative near `start`, used for the first step.
+
+    Returns
+    -------
+    Minimum
+    """
+    low, high = objective.bounds()
+    theta = np.clip(start, low, high)
+    residuals, cost = objective.evaluate(theta)
+    strides, renewal = effort.strides, effort.renewal
+    exact = known is None
+    derivative = objective.derivative(theta, residuals, strides[0]) if known is None else known
+    damping = _FIRST_DAMPING
+    for _ in range(effort.iterations):
+        damping = min(damping, _LARGEST_AT_FIRST) if exact else damping
+        before, accepted = cost, False
+        for _ in range(1 if renewal is Renewal.NEVER else TRIES if exact else TRIES_BY_ESTIMATE):
+            normal, gradient = objective.normal_equations(theta, residuals, derivative)
+            damped = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-9))
+            step = bounded_step(damped, gradient, theta, low, high)
+            if float(step @ step) < _NO_STEP:
+                break
+            trial, trial_cost = objective.evaluate(theta + step)
+            accepted = trial_cost < cost
+            if renewal is Renewal.NEVER or (accepted and renewal is Renewal.WHEN_SLOW):
+                derivative = objective.updated(derivative, step, residuals, trial)
+            if accepted:
+                theta, residuals, cost = theta + step, trial, trial_cost
+                damping = max(damping / 10.0, _LEAST_DAMPING)
+                break
+            damping = max(damping * 10.0, _RESTARTED_DAMPING)
+        if renewal is Renewal.NEVER:
+            continue
+        gained = before - cost
+        if exact and (not accepted or gained < effort.tolerance * before):
+            strides = strides[1:]
+            if not strides:
+                break
+        exact = renewal is Renewal.ALWAYS or gained < SLOW * before
+        if exact:
+            derivative = objective.derivative(theta, residuals, strides[0])
+    if not exact and renewal is not Renewal.NEVER:
+        derivative = objective.derivative(theta, residuals, strides[0])
+    return Minimum(theta, residuals, derivative, cost)
+
+
+def bounded_step(hessian: Array, gradient: Array, theta: Array, low: Array, high: Array) -> Array:
+    """Newton step within bounds and `REACH`: coordinates that hit one are fixed, one by one."""
+    low, high = np.maximum(low, theta - REACH), np.minimum(high, theta + REACH)
+    free = np.ones(len(theta), dtype=bool)
+    step = np.zeros(len(theta))
+    for _ in range(len(theta) + 1):
+        step[:] = 0.0
+        fixed = ~free
+        step[fixed] = np.where(gradient[fixed] > 0, low[fixed], high[fixed]) - theta[fixed]
+        rhs = -gradient[free] - hessian[np.ix_(free, fixed)] @ step[fixed]
+        step[free] = np.linalg.solve(hessian[np.ix_(free, free)], rhs)
+        new = theta + step
+        out = free & ((new < low - 1e-12) | (new > high + 1e-12))
+        if not out.any():
+            break
+        worst = np.argmax(np.where(out, np.maximum(low - new, new - high), -1.0))
+        gradient = gradient.copy()
+        gradient[worst] = 1.0 if new[worst] < low[worst] else -1.0
+        free[worst] = False
+        if not free.any():
+            break
+    return np.clip(theta + step, low, high) - theta
