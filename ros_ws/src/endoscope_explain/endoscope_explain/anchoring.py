@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import OUT_JOINT
-from endoscope_explain.compose import nominal_anchors, nominal_model
+from endoscope_explain.compose import nominal_anchors
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.simulated_joint import packed_joint, simulate_joint
@@ -62,20 +62,7 @@ def all_anchors(
     band: float = BAND,
 ) -> list[tuple[Fit, Fit]]:
     """Refit the nominal plant of every joint, and let the joints see each other's angle."""
-
-    def numbers(index: int) -> tuple[tuple[Array, Array, Array, float], ...]:
-        observation = observations[index]
-        plant = packed[observation.joint]
-        fits = nominal_anchors(observation, *plant, band)
-        return tuple((f.theta, f.residuals, f.jacobian, f.cost) for f in fits)
-
-    anchors = []
-    for observation, found in zip(
-        observations, parallel_map(numbers, range(len(observations)), jobs), strict=True
-    ):
-        plant = packed[observation.joint]
-        model = nominal_model(observation, *plant, band)
-        anchors.append((Fit(model, *found[0]), Fit(model, *found[1])))
+    anchors = parallel_map(lambda o: nominal_anchors(o, *packed[o.joint], band), observations, jobs)
     couple(observations, tuple(simulated_bending(fitted) for fitted, _ in anchors))
     return anchors
 

@@ -11,11 +11,9 @@ from endoscope_explain.fit.free_parameters import BAND, nominal_parameters
 from endoscope_explain.fit.model import Fit, JointModel, fit, jacobian
 from endoscope_explain.fit.score import FLOOR_PER_PARAMETER, score
 from endoscope_explain.fit.whiteness import is_noise
-from endoscope_explain.glance import Glance, glance
 from endoscope_explain.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.parallel_fits import parallel_fits
-from endoscope_explain.rank import Look, polish
+from endoscope_explain.rank import Look, look, polish
 from endoscope_explain.screen import Promise, promises, unexplained
 
 Array = NDArray[np.float64]
@@ -190,20 +188,19 @@ def _screened(
 def _looks(
     parents: Sequence[Parent], chosen: Sequence[tuple[int, Promise]], jobs: int
 ) -> list[Look]:
-    def glanced(task: tuple[int, Promise]) -> Glance:
+    def looked(task: tuple[int, Promise]) -> Look:
         parent, anchors = parents[task[0]]
-        return glance(anchors, parent.effects, task[1])
+        return look(anchors, parent.effects, task[1])
 
     best: dict[frozenset[str], Look] = {}
-    for (index, _), item in zip(chosen, parallel_map(glanced, chosen, jobs), strict=True):
-        parent, anchors = parents[index]
-        key = frozenset((*parent.effects, item.effect_id))
+    for item in parallel_map(looked, chosen, jobs):
+        key = frozenset(item.effects)
         if key not in best or item.cost < best[key].cost:
-            best[key] = item.look(anchors, parent.effects)
+            best[key] = item
     return sorted(best.values(), key=lambda item: item.cost)
 
 
 def polished(looks: Sequence[Look], jobs: int) -> list[Composition]:
     """Full fits of what was looked at, in the same order, with `jobs` tasks side by side."""
-    fits = parallel_fits(lambda i: polish(looks[i]), [item.model for item in looks], jobs)
+    fits = parallel_map(polish, looks, jobs)
     return [Composition(item.effects, f, score(f)) for item, f in zip(looks, fits, strict=True)]

@@ -10,7 +10,7 @@ from endoscope_explain.compose import Composition
 from endoscope_explain.fit.free_parameters import FreeParameter
 from endoscope_explain.fit.model import Fit, JointModel, fit, without_effect
 from endoscope_explain.fit.score import score
-from endoscope_explain.parallel_fits import parallel_fits
+from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search import JointSearch
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ def explained_by(anchors: tuple[Fit, Fit], given: GivenPhysics, jobs: int) -> Jo
     found = settled(model, given.theta)
     whole = Composition(given.effects, found, score(found))
     lesser = [without_effect(found, effect_id) for effect_id in given.effects]
-    fits = parallel_fits(lambda i: fit(*lesser[i]), [model for model, _ in lesser], jobs)
+    fits = parallel_map(lambda less: fit(*less), lesser, jobs)
     level = [
         Composition(tuple(e for e in given.effects if e != effect_id), f, score(f))
         for effect_id, f in zip(given.effects, fits, strict=True)

@@ -17,23 +17,32 @@ GAP_S = 0.2
 REFIT_STEPS = 2
 
 
+def judged_at(time: Array) -> Mask:
+    """Tell which samples (N,) are held out, by their time in s from the first command.
+
+    All are where there is no whole held-out block.
+    """
+    inside = np.mod(time, BLOCK_S * EVERY) >= BLOCK_S * (EVERY - 1)
+    return inside if inside.any() else np.ones_like(inside)
+
+
+def fitted_at(time: Array) -> Mask:
+    """Tell which samples (N,) may be fitted or trained on: those far from a held-out block."""
+    phase = np.mod(time, BLOCK_S * EVERY)
+    return np.asarray((phase >= GAP_S) & (phase < BLOCK_S * (EVERY - 1) - GAP_S))
+
+
 def held_out_masks(observation: JointObservation) -> tuple[Mask, Mask]:
     """Samples to judge on and samples to fit on, over all channels in a row (size,) each."""
     time = np.concatenate([channel.time for channel in observation.channels])
-    phase = np.mod(time, BLOCK_S * EVERY)
-    judged = phase >= BLOCK_S * (EVERY - 1)
-    near = judged | (phase >= BLOCK_S * (EVERY - 1) - GAP_S) | (phase < GAP_S)
-    return judged, ~near
+    return judged_at(time), fitted_at(time)
 
 
 def held_out_fit(final: Fit) -> dict[str, ChannelFit]:
-    """Refit without the held-out blocks and return the fit of every signal on them.
-
-    A recording without a whole held-out block is judged on all its samples.
-    """
+    """Refit without the held-out blocks and return the fit of every signal on them."""
     judged, used = held_out_masks(final.model.observation)
-    if not judged.any():
-        return on_samples(final.model.observation, final.residuals, np.ones_like(judged))
+    if judged.all():
+        return on_samples(final.model.observation, final.residuals, judged)
     again = fit(
         final.model,
         final.theta,

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.black_box.held_out_times import judged, trained_on
 from endoscope_explain.black_box.rungs import Exam, black_box_rungs
 from endoscope_explain.case import Ladder
 from endoscope_explain.explanation import ChannelFit, Explanation
+from endoscope_explain.held_out import fitted_at, judged_at
 from endoscope_explain.predicted_signals import rung, view
 from endoscope_explain.recording import Recording
 
@@ -58,10 +58,10 @@ def ladders(
     if black_boxes:
         recorded = view(recording, plants)
         blocks = Exam(
-            lambda t: trained_on(t - recorded.begin),
+            lambda t: fitted_at(t - recorded.begin),
             recording,
             recorded,
-            lambda t: judged(t - recorded.begin),
+            lambda t: judged_at(t - recorded.begin),
         )
         exams = [blocks]
         if validation is not None and seen is not None:

@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 from endoscope_explain.compose import Composition
-from endoscope_explain.fit.model import Fit, fit
+from endoscope_explain.fit.model import Fit, JointModel, fit
 from endoscope_explain.fit.score import score
-from endoscope_explain.parallel_fits import parallel_fits
+from endoscope_explain.parallel import parallel_map
 from endoscope_explain.screen import starting_points, with_effect
 
 ITERATIONS = 12
@@ -38,21 +38,20 @@ def from_many_starts(composition: Composition, anchor: Fit, jobs: int) -> Compos
     (effect_id,) = composition.effects
     models = [with_effect(anchor.model, effect_id, start) for start in starting_points(effect_id)]
 
-    def fitted(index: int) -> Fit:
-        model = models[index]
+    def fitted(model: JointModel) -> Fit:
         return fit(model, model.begun_at(anchor.theta), iterations=ITERATIONS)
 
-    found = [composition.fit, *parallel_fits(fitted, models, jobs)]
+    found = [composition.fit, *parallel_map(fitted, models, jobs)]
     best = sorted(found, key=score)[:REFINED]
 
-    def refined(index: int) -> Fit:
-        narrowed = best[index]
+    def refined(found: Fit) -> Fit:
+        narrowed = found
         for width in WIDTHS:
             model = replace(narrowed.model, wide_step=width)
             other = fit(model, narrowed.theta, iterations=ITERATIONS)
             narrowed = other if other.cost < narrowed.cost else narrowed
-        return narrowed
+        return replace(narrowed, model=found.model)
 
-    found += parallel_fits(refined, [item.model for item in best], jobs)
+    found += parallel_map(refined, best, jobs)
     chosen = min(found, key=score)
     return Composition(composition.effects, chosen, score(chosen))

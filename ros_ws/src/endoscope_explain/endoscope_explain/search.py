@@ -15,7 +15,7 @@ from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.score import NEARLY_NOISE, score
 from endoscope_explain.fit.whiteness import is_noise, slips
 from endoscope_explain.many_starts import from_many_starts
-from endoscope_explain.parallel_fits import parallel_fits
+from endoscope_explain.parallel import parallel_map
 from endoscope_explain.reconsider import reconsidered
 from endoscope_explain.refit_from_description import from_description, promised_by_description
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
@@ -154,9 +154,7 @@ def _grown_robustly(
     parents: Sequence[Parent], effects: Sequence[str], jobs: int
 ) -> list[Composition]:
     """Add to what the parents say of the larger part of the motion."""
-    fits = parallel_fits(
-        lambda i: robustly_refitted(parents[i][0].fit), [c.fit.model for c, _ in parents], jobs
-    )
+    fits = parallel_map(lambda parent: robustly_refitted(parent[0].fit), parents, jobs)
     robust = [(c, (found,)) for (c, _), found in zip(parents, fits, strict=True)]
     return grow(robust, effects, jobs, PAIRS_POLISHED)
 

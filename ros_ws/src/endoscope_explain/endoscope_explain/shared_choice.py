@@ -16,9 +16,8 @@ from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.score import score
 from endoscope_explain.fit.whiteness import is_noise
-from endoscope_explain.glance import Glance, glance
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.rank import polish
+from endoscope_explain.rank import Look, look, polish
 from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
 from endoscope_explain.screen import Promise, promises, unexplained
 
@@ -82,12 +81,12 @@ def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
     list of SharedChoice
         Best first.
     """
-    glances = _glances(choice, jobs)
+    looks = _looks(choice, jobs)
     variants: dict[str, Variant] = {}
-    for variant in sorted(glances, key=lambda v: _logarithm_of_costs(choice, glances[v])):
+    for variant in sorted(looks, key=lambda v: _logarithm_of_costs(choice, looks[v])):
         variants.setdefault(variant[0], variant)
     promising = list(variants.values())[: POLISHED if choice.effects else POLISHED_FIRST]
-    begun = [_begun(choice, variant[0], glances[variant]) for variant in promising]
+    begun = [_begun(choice, variant[0], looks[variant]) for variant in promising]
     fitted = _side_by_side(begun, jobs, rough=True)
     return sorted(
         (
@@ -98,7 +97,7 @@ def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
     )
 
 
-def _glances(choice: SharedChoice, jobs: int) -> dict[Variant, list[Glance | None]]:
+def _looks(choice: SharedChoice, jobs: int) -> dict[Variant, list[Look | None]]:
     """The best cheap fit of each promising variant of an effect, for each recording."""
     recordings = choice.recordings
     repeated = all(motion_repeats(anchors[0].model.observation) for anchors in recordings)
@@ -110,24 +109,24 @@ def _glances(choice: SharedChoice, jobs: int) -> dict[Variant, list[Glance | Non
     ]
     left = [unexplained(anchors[0]) for anchors in recordings]
 
-    def glanced(task: tuple[str, int]) -> dict[Variant, Glance]:
+    def looked(task: tuple[str, int]) -> dict[Variant, Look]:
         effect_id, n = task
         starts: dict[Variant, list[Promise]] = {}
         for promise in promises(left[n], effect_id):
             starts.setdefault(_variant(promise), []).append(promise)
         return {
             variant: min(
-                (glance(recordings[n], choice.effects, start) for start in own[:STARTS]),
+                (look(recordings[n], choice.effects, start) for start in own[:STARTS]),
                 key=lambda item: item.cost,
             )
             for variant, own in starts.items()
         }
 
-    glances: dict[Variant, list[Glance | None]] = {}
-    for (_, n), found in zip(tasks, parallel_map(glanced, tasks, jobs), strict=True):
+    looks: dict[Variant, list[Look | None]] = {}
+    for (_, n), found in zip(tasks, parallel_map(looked, tasks, jobs), strict=True):
         for variant, item in found.items():
-            glances.setdefault(variant, [None] * len(recordings))[n] = item
-    return glances
+            looks.setdefault(variant, [None] * len(recordings))[n] = item
+    return looks
 
 
 def _variant(promise: Promise) -> Variant:
@@ -135,21 +134,21 @@ def _variant(promise: Promise) -> Variant:
     return promise.effect_id, tuple(promise.start[p.name] for p in parameters if p.choices)
 
 
-def _logarithm_of_costs(choice: SharedChoice, glances: list[Glance | None]) -> float:
+def _logarithm_of_costs(choice: SharedChoice, looks: list[Look | None]) -> float:
     return sum(
         math.log(anchors[0].cost if item is None else min(item.cost, anchors[0].cost))
-        for anchors, item in zip(choice.recordings, glances, strict=True)
+        for anchors, item in zip(choice.recordings, looks, strict=True)
     )
 
 
-def _begun(choice: SharedChoice, effect_id: str, glances: list[Glance | None]) -> Begun:
+def _begun(choice: SharedChoice, effect_id: str, looks: list[Look | None]) -> Begun:
     """Models of all recordings with one more effect, and where their fit begins.
 
     A recording that has no use for the effect stays without it.
     """
     models, starts = [], []
-    for anchors, item in zip(choice.recordings, glances, strict=True):
-        found = anchors[0] if item is None else polish(item.look(anchors, choice.effects))
+    for anchors, item in zip(choice.recordings, looks, strict=True):
+        found = anchors[0] if item is None else polish(item)
         models.append(found.model)
         starts.append(found.theta)
     return models, starts
@@ -187,13 +186,5 @@ def settled_together(choices: Sequence[SharedChoice], jobs: int) -> list[SharedC
 
 
 def _side_by_side(begun: Sequence[Begun], jobs: int, *, rough: bool) -> list[tuple[Anchors, ...]]:
-    """Fits of each task; only their numbers travel between processes, not the recordings."""
-
-    def numbers(task: Begun) -> list[tuple[Array, Array, Array, float]]:
-        fits = fit_together(*task, rough=rough)
-        return [(f.theta, f.residuals, f.jacobian, f.cost) for f in fits]
-
-    return [
-        tuple((Fit(model, *n),) for model, n in zip(models, found, strict=True))
-        for (models, _), found in zip(begun, parallel_map(numbers, begun, jobs), strict=True)
-    ]
+    found = parallel_map(lambda task: fit_together(*task, rough=rough), begun, jobs)
+    return [tuple((f,) for f in fits) for fits in found]

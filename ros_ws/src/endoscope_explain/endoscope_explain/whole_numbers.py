@@ -6,7 +6,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition
 from endoscope_explain.fit.model import Fit, fit
 from endoscope_explain.fit.score import score
-from endoscope_explain.parallel_fits import parallel_fits
+from endoscope_explain.parallel import parallel_map
 
 STRIDES = (2, 1)
 ITERATIONS = 8
@@ -64,6 +64,4 @@ def _fits(origin: Fit, place: int, numbers: list[int], jobs: int) -> list[Fit]:
         base = origin.model.base.copy()
         base[place] = number
         models.append(replace(origin.model, base=base))
-    return parallel_fits(
-        lambda i: fit(models[i], origin.theta, iterations=ITERATIONS), models, jobs
-    )
+    return parallel_map(lambda m: fit(m, origin.theta, iterations=ITERATIONS), models, jobs)

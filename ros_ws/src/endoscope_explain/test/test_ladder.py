@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from endoscope_explain.black_box.features import PLAY_WIDTHS, motion_features
-from endoscope_explain.black_box.held_out_times import judged, trained_on
 from endoscope_explain.black_box.regressors import GaussianProcess, NeuralNetwork, training
+from endoscope_explain.held_out import fitted_at, judged_at
 from endoscope_explain.ladder import ladders
 
 
@@ -26,11 +26,11 @@ def test_features_remember_where_the_motion_came_from():
     assert down[2] - up[2] == pytest.approx(PLAY_WIDTHS[0], abs=1e-6)
 
 
-def test_what_is_judged_was_not_trained_on():
+def test_what_is_judged_was_not_fitted_at():
     time = 0.01 * np.arange(4000)
-    assert not (judged(time) & trained_on(time)).any()
-    assert judged(time).mean() == pytest.approx(0.25)
-    gaps = np.abs(time[judged(time)][:, None] - time[trained_on(time)][None, ::7])
+    assert not (judged_at(time) & fitted_at(time)).any()
+    assert judged_at(time).mean() == pytest.approx(0.25)
+    gaps = np.abs(time[judged_at(time)][:, None] - time[fitted_at(time)][None, ::7])
     assert gaps.min() > 0.15
 
 
