@@ -22,7 +22,7 @@ HEAVY_MODULES = {'torch', 'rclpy', 'numba', 'scipy', 'matplotlib', 'sklearn', 'd
 def _parser_running(action: Callable[[argparse.Namespace], int]) -> Callable[[], OneLineParser]:
     def build() -> OneLineParser:
         parser = OneLineParser(prog='endoscope')
-        parser.set_defaults(run_command=action)
+        parser.set_defaults(run_command=action, log_level=None)
         return parser
 
     return build
@@ -129,7 +129,7 @@ def test_closed_pipe_is_no_traceback(tmp_path: Path) -> None:
         "        print('line')\n"
         '    return 0\n'
         "parser = OneLineParser(prog='endoscope')\n"
-        'parser.set_defaults(run_command=run)\n'
+        'parser.set_defaults(run_command=run, log_level=None)\n'
         'cli.build_parser = lambda: parser\n'
         'sys.exit(cli.main([]))\n',
     )
