@@ -28,7 +28,7 @@ def _parser_running(action: Callable[[argparse.Namespace], int]) -> Callable[[],
     return build
 
 
-@pytest.mark.parametrize('argv', [[], ['no-such-command'], ['bench'], ['bench', 'no-such-bench']])
+@pytest.mark.parametrize('argv', [[], ['no-such-command'], ['bag'], ['bag', 'no-such-look']])
 def test_wrong_usage_is_one_line_and_exit_2(
     argv: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
