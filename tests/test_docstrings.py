@@ -105,6 +105,7 @@ def test_public_names_are_documented(module: Path) -> None:
 def test_the_walk_finds_the_packages() -> None:
     assert {path.relative_to(SOURCES).parts[0] for path in MODULES} == {
         'endoscope_bags',
+        'endoscope_benchmarks',
         'endoscope_bringup',
         'endoscope_core',
         'endoscope_devices',

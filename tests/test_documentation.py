@@ -13,6 +13,7 @@ import yaml
 from doc_pages import LANGUAGES, NOT_RUN, PAGES, ROOT, WORKSPACE, blocks, prose, run_page
 
 from endoscope_bringup.commands import COMMANDS
+from endoscope_bringup.other_packages import commands_of_other_packages
 from endoscope_core.physics import JointParameters, SensorParameters
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_nodes import program
@@ -20,6 +21,7 @@ from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.parameters import described
 from endoscope_nodes.topics import SERVICES, TOPICS
 
+ENDOSCOPE = {*COMMANDS, *commands_of_other_packages()}
 TUTORIAL = WORKSPACE / 'doc/tutorial.md'
 
 each_page = pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -65,7 +67,7 @@ def test_blocks_say_what_they_are(page: Path) -> None:
 def test_commands_and_targets_are_there(page: Path) -> None:
     text = page.read_text(encoding='utf-8')
     named = set(re.findall(r'(?:`|\$ )endoscope ([a-z]+)', text))
-    assert named <= {name.rstrip('_') for name in COMMANDS}
+    assert named <= ENDOSCOPE
     makefile = (WORKSPACE / 'Makefile').read_text()
     targets = set(re.findall(r'^([a-z-]+):', makefile, flags=re.M))
     assert set(re.findall(r'make -C ros_ws ([a-z-]+)', text)) <= targets
@@ -73,7 +75,7 @@ def test_commands_and_targets_are_there(page: Path) -> None:
 
 def test_readme_names_every_command() -> None:
     named = re.findall(r'`endoscope ([a-z]+)', (ROOT / 'README.md').read_text())
-    assert {name.rstrip('_') for name in COMMANDS} <= set(named)
+    assert set(named) >= ENDOSCOPE
 
 
 @pytest.mark.parametrize(
@@ -117,7 +119,7 @@ def test_the_site_needs_no_network(site: Path) -> None:
 
 
 def test_reference_pages_have_everything(site: Path) -> None:
-    commands = [f'endoscope {name.rstrip("_")}' for name in COMMANDS]
+    commands = [f'endoscope {name}' for name in ENDOSCOPE]
     keys = [f.name for kind in (JointParameters, SensorParameters) for f in fields(kind)]
     assert _missing(site, 'commands', commands) == []
     assert _missing(site, 'nodes', program.NODES) == []

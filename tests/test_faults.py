@@ -7,9 +7,9 @@ from random import Random
 
 import pytest
 
-from endoscope_bringup.process_faults.process_faults import PROCESS_FAULTS, undergo
-from endoscope_bringup.process_faults.process_rig import ProcessRig
-from endoscope_bringup.process_faults.trace import STILL
+from endoscope_benchmarks.process_faults.process_faults import PROCESS_FAULTS, undergo
+from endoscope_benchmarks.process_faults.process_rig import ProcessRig
+from endoscope_benchmarks.process_faults.trace import STILL
 from endoscope_core.rig import load_rig
 
 RATE_HZ = 250

@@ -6,8 +6,8 @@ import pytest
 from private_domain import private_domain
 from std_srvs.srv import Trigger
 
-from endoscope_bringup.device_faults.motor_faults import MOTOR_FAULTS, undergo
-from endoscope_bringup.device_faults.motor_rig import MotorRig
+from endoscope_benchmarks.device_faults.motor_faults import MOTOR_FAULTS, undergo
+from endoscope_benchmarks.device_faults.motor_rig import MotorRig
 
 # The bench tries the others too.
 FAULTS = (

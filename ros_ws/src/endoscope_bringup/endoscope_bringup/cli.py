@@ -10,6 +10,7 @@ from types import FrameType
 from typing import Any
 
 from endoscope_bringup.commands import COMMANDS
+from endoscope_bringup.other_packages import COMES_WITH, commands_of_other_packages
 from endoscope_bringup.subcommands import OneLineParser, add_subcommands, run_chosen
 from endoscope_core.errors import EndoscopeError, printable
 
@@ -34,9 +35,23 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+class _Program(OneLineParser):
+    """Says of a command whose package is not installed which package that is."""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        missing = action.dest == 'command' and value not in (action.choices or ())
+        if missing and value in COMES_WITH:
+            raise argparse.ArgumentError(
+                None,
+                f'{value} comes with the package {COMES_WITH[value]}, which is not installed here: '
+                '`make -C ros_ws setup` installs it',
+            )
+        super()._check_value(action, value)
+
+
 def build_parser() -> OneLineParser:
     """Return the parser of `endoscope` with all subcommands."""
-    parser = OneLineParser(
+    parser = _Program(
         prog='endoscope',
         description='Compensation of hysteresis in a flexible endoscope, on ROS 2 Jazzy.',
     )
@@ -46,7 +61,8 @@ def build_parser() -> OneLineParser:
         choices=LEVELS,
         help='the least that the nodes and libraries of this command say to the log (info)',
     )
-    add_subcommands(parser, 'endoscope_bringup.commands', COMMANDS, dest='command')
+    own = [f'endoscope_bringup.commands.{name}' for name in COMMANDS]
+    add_subcommands(parser, [*own, *commands_of_other_packages().values()], dest='command')
     return parser
 
 

@@ -17,26 +17,22 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f'{self.prog}: {one_line} (see {self.prog} --help)\n')
 
 
-def add_subcommands(
-    parser: argparse.ArgumentParser, package: str, names: Iterable[str], *, dest: str
-) -> None:
+def add_subcommands(parser: argparse.ArgumentParser, modules: Iterable[str], *, dest: str) -> None:
     """Add one subparser to `parser` for each module.
 
     Parameters
     ----------
     parser
         The parser whose first positional argument shall choose the subcommand.
-    package
-        Package that holds the modules, for example ``'endoscope_bringup.commands'``.
-    names
-        Names of the modules, in the order of the help. A trailing underscore (for names that are
-        taken in Python) does not show on the command line.
+    modules
+        Their full names, for example ``'endoscope_bringup.commands.demo'``, in the order of the
+        help.
     dest
         Attribute of the parsed arguments that will hold the choice; see `run_chosen`.
     """
     subparsers = parser.add_subparsers(dest=dest, metavar=dest.upper(), required=True)
-    for name in names:
-        module = importlib.import_module(f'{package}.{name}')
+    for name in modules:
+        module = importlib.import_module(name)
         known = set(subparsers.choices)
         module.add_parser(subparsers)
         for added in set(subparsers.choices) - known:

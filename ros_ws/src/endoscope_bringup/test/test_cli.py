@@ -22,13 +22,13 @@ HEAVY_MODULES = {'torch', 'rclpy', 'numba', 'scipy', 'matplotlib', 'sklearn', 'd
 def _parser_running(action: Callable[[argparse.Namespace], int]) -> Callable[[], OneLineParser]:
     def build() -> OneLineParser:
         parser = OneLineParser(prog='endoscope')
-        parser.set_defaults(run_command=action)
+        parser.set_defaults(run_command=action, log_level=None)
         return parser
 
     return build
 
 
-@pytest.mark.parametrize('argv', [[], ['no-such-command'], ['bench'], ['bench', 'no-such-bench']])
+@pytest.mark.parametrize('argv', [[], ['no-such-command'], ['bag'], ['bag', 'no-such-look']])
 def test_wrong_usage_is_one_line_and_exit_2(
     argv: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -129,7 +129,7 @@ def test_closed_pipe_is_no_traceback(tmp_path: Path) -> None:
         "        print('line')\n"
         '    return 0\n'
         "parser = OneLineParser(prog='endoscope')\n"
-        'parser.set_defaults(run_command=run)\n'
+        'parser.set_defaults(run_command=run, log_level=None)\n'
         'cli.build_parser = lambda: parser\n'
         'sys.exit(cli.main([]))\n',
     )

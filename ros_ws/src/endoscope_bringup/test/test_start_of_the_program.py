@@ -1,12 +1,16 @@
 """Help, version and completion cost next to nothing: nothing heavy is loaded for them."""
 
+import importlib.metadata
+import os
 import re
 import subprocess
 import sys
 
 import pytest
 
+from endoscope_bringup import cli
 from endoscope_bringup.commands import COMMANDS
+from endoscope_bringup.other_packages import GROUP, commands_of_other_packages
 
 HEAVY = ('numpy', 'scipy', 'numba', 'rclpy', 'matplotlib', 'mcap', 'sklearn')
 CODE = """
@@ -19,16 +23,50 @@ finally:
 """
 
 
-def start(*words):
+# A module of a command, and what tells Python of it.
+BREW = """
+def add_parser(subparsers):
+    subparsers.add_parser('brew', help='make tea').add_argument('sort')
+def run(args):
+    import brewed
+    print(args.sort, brewed.WORD)
+    return 0
+"""
+
+ENTRY_POINTS = f"""
+[console_scripts]
+brew = kitchen:main
+
+[{GROUP}]
+brew = kitchen_brew
+
+[other]
+a = b
+"""
+
+
+def start(*words, path=''):
     return subprocess.run(
         [sys.executable, '-c', CODE.format(heavy=HEAVY), *words],
         capture_output=True,
         text=True,
         check=False,
+        env={**os.environ, 'PYTHONPATH': f'{path}{os.pathsep}{os.environ.get("PYTHONPATH", "")}'},
     )
 
 
-@pytest.mark.parametrize('command', [*COMMANDS, ''])
+@pytest.fixture
+def kitchen(tmp_path):
+    """An installed package with a command."""
+    (tmp_path / 'kitchen_brew.py').write_text(BREW)
+    (tmp_path / 'brewed.py').write_text("WORD = 'tea'")
+    (tmp_path / 'kitchen-1.0.dist-info').mkdir()
+    (tmp_path / 'kitchen-1.0.dist-info/METADATA').write_text('Name: kitchen\nVersion: 1.0\n')
+    (tmp_path / 'kitchen-1.0.dist-info/entry_points.txt').write_text(ENTRY_POINTS)
+    return tmp_path
+
+
+@pytest.mark.parametrize('command', [*COMMANDS, *commands_of_other_packages(), ''])
 def test_help_loads_nothing_heavy(command):
     name = command.rstrip('_').replace('_', '-')
     shown = start(*([name] if name else []), '--help')
@@ -41,6 +79,32 @@ def test_the_version_is_that_of_the_package():
     shown = start('--version')
     assert re.fullmatch(r'endoscope \d+\.\d+\.\d+\n', shown.stdout)
     assert shown.stderr == 'loaded:\n'
+
+
+def test_a_package_that_is_installed_adds_its_command(kitchen):
+    shown = start('--help', path=kitchen)
+    assert 'make tea' in shown.stdout
+    assert shown.stderr == 'loaded:\n'
+    assert start('brew', 'green', path=kitchen).stdout == 'green tea\n'
+    assert 'brew' not in start('--help').stdout
+
+
+def test_commands_are_those_that_python_finds(kitchen, monkeypatch):
+    monkeypatch.syspath_prepend(kitchen)
+    entries = importlib.metadata.entry_points(group=GROUP)
+    assert commands_of_other_packages() == {entry.name: entry.value for entry in entries}
+    assert commands_of_other_packages()['brew'] == 'kitchen_brew'
+
+
+def test_without_the_benchmarks_there_is_no_bench_and_one_line_says_so(monkeypatch, capsys):
+    monkeypatch.setattr(cli, 'commands_of_other_packages', dict)
+    with pytest.raises(SystemExit) as stop:
+        cli.main(['bench', 'graph', '--seconds', '3'])
+    assert stop.value.code == 2
+    said = capsys.readouterr().err
+    assert 'endoscope_benchmarks' in said
+    assert said.count('\n') == 1
+    assert 'bench' not in cli.build_parser().format_help()
 
 
 @pytest.mark.parametrize('shell', ['bash', 'zsh', 'tcsh'])

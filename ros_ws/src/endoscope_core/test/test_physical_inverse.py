@@ -19,8 +19,6 @@ from endoscope_core.control import (
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.signals import non_periodic_signal, periodic_signal
-from endoscope_core.trials.never_seen_tube import within_reach
-from endoscope_core.trials.tracking_trial import run_tracking_trial
 
 LIMITS = shipped_limits()
 JOINT = JointParameters()
@@ -48,7 +46,9 @@ def simulated(joint, command):
 @pytest.mark.parametrize('exponent', [0.5, 0.9, 1.4])
 def test_a_plant_that_is_known_is_followed(exponent, signal):
     joint = replace(JOINT, capstan_exponent=exponent)
-    signal = within_reach(signal, plant(joint))
+    reached = reach(joint)
+    most = np.max(np.abs(signal(np.arange(0.0, signal.duration, 0.01))[0]))
+    signal = signal.scaled(min(1.0, 0.8 * min(-reached.low, reached.high) / most))
     time = np.arange(0.0, signal.steady[1], TICK)
     angle, velocity = signal(time)
     steady = time >= signal.steady[0]
@@ -130,19 +130,6 @@ def test_modes_change_while_it_moves_without_a_jump():
     for when in (1000, 2500, 4000):
         # The law's own motion, and once what overcomes the joint's damping.
         assert np.max(steps[when - 3 : when + 3]) < 0.006
-
-
-def test_the_whole_chain_follows_with_a_plant_that_is_ten_percent_off():
-    signal = within_reach(NON_PERIODIC, plant(JOINT))
-    none = run_tracking_trial(plant(JOINT), signal, FeedforwardLaw(), False, 0).rmse
-    left = []
-    for exponent in (0.81, 0.9, 0.99):
-        law = FeedforwardLaw(
-            'physical', (PhysicalParameters(replace(JOINT, capstan_exponent=exponent)),)
-        )
-        left.append(run_tracking_trial(plant(JOINT), signal, law, False, 0).rmse / none)
-    assert left[1] < 0.02
-    assert max(left) < 0.15
 
 
 def test_limits_out_of_range_are_refused():

@@ -10,8 +10,8 @@ from physics_rig import ACTING, NOMINAL, hand, run
 
 from endoscope_core import physics
 from endoscope_core.physics import layout as L
-from endoscope_core.physics.effect import Stage
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effect import Stage, Symptom
+from endoscope_core.physics.effects import CATALOGUE, showing
 from endoscope_core.physics.hooks import LINKS, ON_SAMPLES
 
 TICKS, TICK = 5000, 1e-3
@@ -151,3 +151,8 @@ def test_no_effect_is_named_outside_its_own_folder():
 
 def test_nominal_keys_are_those_of_the_rig():
     assert set(NOMINAL) == set(L.NOMINAL_KEYS)
+
+
+@pytest.mark.parametrize('symptom', Symptom)
+def test_a_symptom_is_of_one_effect(symptom):
+    assert [e for e in CATALOGUE.values() if e.traits.symptom is symptom] == [showing(symptom)]

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,58 +15,12 @@ from endoscope_core.control import (
     shipped_limits,
 )
 from endoscope_core.control.internal_model import InternalModel
-from endoscope_core.control.plant_learning import LEARNT
-from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
+from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import TICK, PlantSimulator
-from endoscope_core.signals import non_periodic_signal, periodic_signal
-from endoscope_core.trials.tracking_trial import run_tracking_trial
 
 LIMITS = shipped_limits()
 JOINT = JointParameters()
-
-
-def off(signs, by=0.1):
-    changes = {
-        name: getattr(JOINT, name) * (1.0 + by * sign)
-        for name, sign in zip(LEARNT, signs, strict=True)
-    }
-    return PhysicalParameters(replace(JOINT, **changes))
-
-
-@pytest.mark.parametrize(
-    'signs', [(1, 1, 1, 1, 1, 1), (-1, 1, 1, -1, 1, -1), (1, -1, 1, -1, -1, 1), (-1,) * 6]
-)
-def test_a_plant_that_is_ten_percent_off_is_learnt_within_a_cycle(signs):
-    plant = PlantDescription(joints={'bend_x': JOINT})
-    signal = non_periodic_signal(14.0).scaled(0.8)
-    none = run_tracking_trial(plant, signal, FeedforwardLaw(), False, 0)
-    law = FeedforwardLaw('adaptive_physical', (off(signs),))
-    learnt = run_tracking_trial(plant, signal, law, True, 0)
-    late = none.time >= 7.0
-
-    def rms(trial):
-        return np.sqrt(np.mean((trial.bending[:, 0] - trial.desired)[late] ** 2))
-
-    assert rms(learnt) < 0.06 * rms(none)
-
-
-def test_a_tube_that_is_bent_almost_twice_as_much_as_thought_is_learnt_within_a_cycle():
-    straight = PhysicalParameters(replace(JOINT, capstan_exponent=0.6))
-    bent = replace(JOINT, capstan_exponent=1.1)
-    signal = periodic_signal(4.0 + 4.2 * np.pi).scaled(0.6)
-    plant = PlantDescription(joints={'bend_x': bent})
-    none = run_tracking_trial(plant, signal, FeedforwardLaw(), False, 0)
-    fixed = run_tracking_trial(plant, signal, FeedforwardLaw('physical', (straight,)), False, 0)
-    law = FeedforwardLaw('adaptive_physical', (straight,))
-    learnt = run_tracking_trial(plant, signal, law, True, 0)
-    late = none.time >= 4.0 + 2.0 * np.pi
-
-    def rms(trial):
-        return np.sqrt(np.mean((trial.bending[:, 0] - trial.desired)[late] ** 2))
-
-    assert rms(fixed) > 0.2 * rms(none)
-    assert rms(learnt) < 0.04 * rms(none)
 
 
 @given(st.lists(st.floats(-30.0, 30.0), min_size=1, max_size=80))
@@ -119,18 +72,6 @@ def test_measurements_at_rest_and_the_first_after_a_silence_move_nothing():
         given_out.append(feedforward.step(*rest)[0])
         feedforward.measure(0.0, [model.angle + 0.1])
     assert np.ptp(given_out[1000:]) < 1e-9
-
-
-def test_physics_that_the_model_lacks_does_not_lead_the_learning_astray():
-    heavy = PlantDescription(
-        joints={'bend_x': JOINT},
-        effects=(EffectSpec('gravity', 'bend_x', {'moment_nm': 0.001}),),
-    )
-    signal = periodic_signal(3.2 * np.pi).scaled(0.8)
-    known = (PhysicalParameters(JOINT),)
-    fixed = run_tracking_trial(heavy, signal, FeedforwardLaw('physical', known), False, 0)
-    learnt = run_tracking_trial(heavy, signal, FeedforwardLaw('adaptive_physical', known), True, 0)
-    assert learnt.rmse < fixed.rmse
 
 
 def test_a_reading_that_is_late_teaches_what_it_says_of_its_own_time():

@@ -5,23 +5,11 @@ import pytest
 import safetensors.numpy
 
 from endoscope_core.classifier.inference import ClassifierError, TensionClassifier
-from endoscope_core.dataset import record_calibration
-from endoscope_core.trials.never_seen_tube import never_seen_tube
 
 
 @pytest.fixture(scope='module')
 def classifier():
     return TensionClassifier.load_default()
-
-
-@pytest.mark.parametrize('class_deg', [40, 70, 100])
-def test_it_names_the_class_of_a_tube_it_has_not_seen(classifier, class_deg):
-    tube = never_seen_tube(0, class_deg, class_deg)
-    result = classifier.classify(record_calibration(tube.plant, seed=5).tension)
-    assert result.class_deg == class_deg
-    assert result.probability == max(result.probabilities.values())
-    assert sum(result.probabilities.values()) == pytest.approx(1.0)
-    assert np.rad2deg(result.expected_size) == pytest.approx(class_deg, abs=15.0)
 
 
 @pytest.mark.parametrize('tension', [np.zeros((8999, 4)), np.zeros((9000, 2)), np.zeros((4, 9000))])

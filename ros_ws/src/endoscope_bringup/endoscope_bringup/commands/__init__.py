@@ -2,7 +2,7 @@
 
 A module offers ``add_parser(subparsers)``, which adds one parser, and ``run(args) -> int``, which
 gives the exit status. It imports nothing heavy at module level: every start of `endoscope` imports
-all of them.
+all of them. Commands of other packages come after these, see `endoscope_bringup.other_packages`.
 """
 
 COMMANDS: tuple[str, ...] = (
@@ -22,6 +22,5 @@ COMMANDS: tuple[str, ...] = (
     'identify',
     'effects',
     'doctor',
-    'bench',
     'completion',
 )

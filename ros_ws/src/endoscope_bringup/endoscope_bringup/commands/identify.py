@@ -33,7 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'set, and the feed-forward that goes with it. Prints JSON, or writes it to FILE. '
         'With `family FOLDER`: identifies the rig from recordings of all its tubes (text files '
         '0.txt, 60.txt, ... named by the bend in deg), fitted to the first cycle of each and '
-        'judged on the second, beside what other models leave.',
+        'judged on the second, beside friction lumped at the ends.',
     )
     parser.add_argument(
         'source',
@@ -104,14 +104,14 @@ def _of_tubes(args: argparse.Namespace) -> int:
     from endoscope_bringup.learning.family_of_recordings import drawn, identified, table
     from endoscope_core.atomic_output import atomic_file
     from endoscope_core.errors import EndoscopeError
-    from endoscope_core.trials.real_recordings import tube_recordings
+    from endoscope_core.identification.tube_files import tube_recordings
 
     if args.source != Path('family') or args.model is not None or args.table is not None:
         raise EndoscopeError('a second place is taken by `identify family FOLDER` alone, no model')
     recordings = tube_recordings(args.folder)
     options = '' if args.output is None else f' --output {args.output.name}'
     command = f'endoscope identify family {args.folder.name}{options} --seed {args.seed}'
-    found = identified(recordings, args.folder, args.seed, command, _report)
+    found = identified(recordings, args.seed, command, _report)
     print(table(recordings, found))
     if args.output is not None:
         found.family.save(args.output)

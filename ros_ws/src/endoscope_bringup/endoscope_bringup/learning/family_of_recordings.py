@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,15 +18,13 @@ from endoscope_core.identification.family_fit import (
     read,
 )
 from endoscope_core.physics.family import TubeFamily
-from endoscope_core.trials.real_recordings import models_on_real_recordings, real_recordings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MODELS = ('bouc_wen', 'asymmetric_bouc_wen', 'prandtl_ishlinskii')
 LEFT = """\
 left, rms: angle in deg, tensions of both wires in N; first cycle (fitted) | second (judged)
-tube   family                            friction lumped at the ends       """
+tube   family                            friction lumped at the ends"""
 BESIDE = """\
 
 simulated/recorded: loop width, RMSE to the command, range of the angle in deg; extremes of tension
@@ -45,37 +42,29 @@ _RAD = np.pi / 180.0
 
 @dataclass(frozen=True)
 class IdentifiedFamily:
-    """A family, the lumped plant fitted likewise, and models of the angle alone.
+    """A family, and the lumped plant fitted likewise.
 
     Attributes
     ----------
     family, lumped : TubeFamily
-    models : mapping of str to mapping of int to (float, float)
-        RMSE in rad on both cycles by model and bend in deg; each fitted to each tube alone.
     """
 
     family: TubeFamily
     lumped: TubeFamily
-    models: Mapping[str, Mapping[int, tuple[float, float]]]
 
 
 def identified(
     recordings: Sequence[TubeRecording],
-    folder: Path,
     seed: int,
     command: str,
     say: Callable[[str], None],
 ) -> IdentifiedFamily:
-    """Fit family, lumped plant and models to the first cycles."""
+    """Fit family and lumped plant to the first cycles."""
     first = [recording.until(recording.cycles[1]) for recording in recordings]
     say(f'{len(first)} tubes: the family')
     family = fit_family(first, seed=seed)
     say('friction lumped at the ends')
     lumped = fit_family(first, friction_profile=LUMPED, seed=seed)
-    models = {}
-    for model in MODELS:
-        say(model)
-        models[model] = models_on_real_recordings(real_recordings(folder), model, seed)
     left: dict[str, Any] = {
         f'{_bend(recording)} deg': [
             [round(misfits.angle / _RAD, 2), *np.round(misfits.tension, 2).tolist()]
@@ -90,12 +79,12 @@ def identified(
         'fitted_on': 'first cycle of every tube, all together',
         'left (deg and N of both wires, rms; first cycle, second cycle)': left,
     }
-    return IdentifiedFamily(replace(family, provenance=provenance), lumped, models)
+    return IdentifiedFamily(replace(family, provenance=provenance), lumped)
 
 
 def table(recordings: Sequence[TubeRecording], found: IdentifiedFamily) -> str:
     """What is left of each tube, and its figures simulated beside recorded."""
-    lines = [LEFT + '  '.join(MODELS)]
+    lines = [LEFT]
     for recording in recordings:
         plants = []
         for family in (found.family, found.lumped):
@@ -105,11 +94,7 @@ def table(recordings: Sequence[TubeRecording], found: IdentifiedFamily) -> str:
                     f'{m.angle / _RAD:4.2f} {m.tension[0]:.2f} {m.tension[1]:.2f}' for m in cycles
                 )
             )
-        models = '  '.join(
-            ' | '.join(f'{each / _RAD:.2f}' for each in found.models[model][_bend(recording)])
-            for model in MODELS
-        )
-        lines.append(f'{_bend(recording):4d}   {"     ".join(plants)}     {models}')
+        lines.append(f'{_bend(recording):4d}   {"     ".join(plants)}')
     lines.append(BESIDE)
     for recording in recordings:
         angle, tension = read(found.family, recording.bend, recording.desired, recording.tick)

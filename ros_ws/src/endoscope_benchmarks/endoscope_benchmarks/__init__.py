@@ -1,0 +1,1 @@
+"""Measures the figures of the documentation: `endoscope bench`. No other package imports it."""

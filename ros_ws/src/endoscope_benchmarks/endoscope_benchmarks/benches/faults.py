@@ -1,0 +1,124 @@
+"""`endoscope bench faults`: what the slave does when nodes die, stall or are spoken over."""
+
+import argparse
+import os
+import platform
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from random import Random
+from typing import TYPE_CHECKING
+
+from endoscope_bringup.seed_argument import seed
+
+if TYPE_CHECKING:
+    from endoscope_benchmarks.process_faults.process_faults import Outcome
+
+_HEADING = (
+    '| fault | N | state before the next enable | to standstill [ms] median, largest '
+    '| largest step of motor/servo_jp [mrad], share of its bound | largest step of a shaft [mrad] '
+    '| largest speed of a shaft [rad/s] | largest motion without enable [mrad] '
+    '| enable to motion [s] median, largest | recording | load |\n'
+    '|---|---|---|---|---|---|---|---|---|---|---|'
+)
+# A step is bounded but for rounding.
+_SHARE = 1.001
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `faults`."""
+    parser = subparsers.add_parser(
+        'faults',
+        help='what the slave does when nodes die, stall or are spoken over',
+        description='Runs the graph on the simulated slave, each node a process, breaks one thing '
+        'after the other at random instants of the motion, enables anew, and prints a table. Exits '
+        '1 where the slave moved without an enable, a step was beyond the bound of the shaper, or '
+        'an enable did not work.',
+    )
+    parser.add_argument(
+        '--repetitions', type=int, default=100, help='of each fault (default: %(default)s)'
+    )
+    parser.add_argument('--rate', type=int, default=500, help='beats/s (default: %(default)s)')
+    parser.add_argument('--composed', action='store_true', help='all nodes in one process')
+    parser.add_argument('--seed', type=seed, default=1, help='of all chance (default: 1)')
+    parser.add_argument('--only', nargs='+', metavar='FAULT', help='faults to try (default: all)')
+    parser.add_argument('--log', type=Path, help='file for a line on each repetition')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a row for each fault; return 1 if something moved that was not asked to."""
+    from endoscope_benchmarks.process_faults.process_faults import (
+        COMPOSED_FAULTS,
+        PROCESS_FAULTS,
+        undergo,
+    )
+    from endoscope_benchmarks.process_faults.process_rig import ProcessRig
+    from endoscope_core.errors import EndoscopeError
+
+    faults = COMPOSED_FAULTS if args.composed else PROCESS_FAULTS
+    for name in args.only or ():
+        if name not in faults:
+            raise EndoscopeError(f"no fault '{name}'; known are {', '.join(faults)}")
+    print(
+        f'{"one process" if args.composed else "a process for each node"}, {args.rate} Hz, seed '
+        f'{args.seed}, {time.strftime("%Y-%m-%d")}, {os.cpu_count()} cores, '
+        f'{platform.processor() or platform.machine()}\n\n{_HEADING}',
+        flush=True,
+    )
+    wrong = 0
+    random = Random(args.seed)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        ProcessRig(args.rate, args.composed, Path(folder), random) as rig,
+    ):
+        for name in args.only or faults:
+            outcomes, loads = [], []
+            for k in range(args.repetitions):
+                outcomes.append(undergo(faults[name], rig))
+                loads.append(os.getloadavg()[0])
+                if args.log:
+                    with args.log.open('a', encoding='utf-8') as log:
+                        log.write(f'{name} {k}: {outcomes[-1]} load {loads[-1]:.1f}\n')
+            print(_row(name, outcomes, loads), flush=True)
+            wrong += sum(map(_is_wrong, outcomes))
+    return 1 if wrong else 0
+
+
+def _is_wrong(outcome: 'Outcome') -> bool:
+    from endoscope_benchmarks.process_faults.trace import STILL
+
+    return outcome.unasked > STILL or outcome.goal_share > _SHARE or outcome.enabled_s is None
+
+
+def _row(name: str, outcomes: Sequence['Outcome'], loads: Sequence[float]) -> str:
+    states = Counter(outcome.state for outcome in outcomes)
+    ended = sum(len(outcome.before) for outcome in outcomes)
+    still = [o.still_s * 1e3 for o in outcomes if o.still_s is not None]
+    enabled = [o.enabled_s for o in outcomes if o.enabled_s is not None]
+    never = len(outcomes) - len(enabled)
+    missing = max(0.0, *(o.bag for o in outcomes))
+    lost = sum(max(0.0, -o.bag) for o in outcomes)
+    step = max(o.goal_step for o in outcomes)
+    columns = (
+        name,
+        f'{len(outcomes)}',
+        ', '.join(f'{state} {n}' for state, n in states.most_common())
+        + (f'; ended before by itself {ended}' if ended else ''),
+        _middle_and_most(still, '.0f'),
+        f'{1e3 * step:.1f}, {max(o.goal_share for o in outcomes):.2f}',
+        f'{1e3 * max(o.shaft_step for o in outcomes):.1f}',
+        f'{max(o.shaft_speed for o in outcomes):.2f}',
+        f'{1e3 * max(o.unasked for o in outcomes):.1f}',
+        _middle_and_most(enabled, '.1f') + (f'; {never} never' if never else ''),
+        f'complete to {missing:.2f} s before' if missing else f'{lost:.0f} lost',
+        f'{min(loads):.0f} to {max(loads):.0f}',
+    )
+    return f'| {" | ".join(columns)} |'
+
+
+def _middle_and_most(values: Sequence[float], form: str) -> str:
+    if not values:
+        return '-'
+    return f'{sorted(values)[len(values) // 2]:{form}}, {max(values):{form}}'

@@ -1,0 +1,44 @@
+"""`endoscope bench motor_faults`: what the slave does when motors or console fail, and how fast."""
+
+import argparse
+import re
+import tempfile
+from pathlib import Path
+
+_HEADING = (
+    '| fault | state | to FAULT [ms] | to standstill [ms] | longest gap of motor/measured_js '
+    '[ms] | largest error in the bag [mrad] | FAULT in the bag | cause |\n'
+    '|---|---|---|---|---|---|---|---|'
+)
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `motor_faults`."""
+    parser = subparsers.add_parser(
+        'motor_faults',
+        help='what the slave does when motors or console fail, and how fast',
+        description='Runs console, compensator, motor driver, supervisor and recorder on emulated '
+        'servos, breaks one thing after the other in motion, and prints a table. Exits 1 '
+        'where the slave does not end as it must.',
+    )
+    parser.add_argument('--only', nargs='+', metavar='FAULT', help='faults to try (default: all)')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a row for each fault; return 1 if one ended otherwise than it must."""
+    from endoscope_benchmarks.device_faults.motor_faults import MOTOR_FAULTS, undergo
+    from endoscope_core.errors import EndoscopeError
+
+    unknown = [name for name in args.only or () if name not in MOTOR_FAULTS]
+    if unknown:
+        raise EndoscopeError(f"no fault '{unknown[0]}'; known are {', '.join(MOTOR_FAULTS)}")
+    wrong = 0
+    print(_HEADING)
+    for name in args.only or MOTOR_FAULTS:
+        fault = MOTOR_FAULTS[name]
+        with tempfile.TemporaryDirectory() as folder:
+            outcome = undergo(fault, Path(folder))
+        print(outcome, flush=True)
+        ended = outcome.state == fault.ends_in and bool(re.search(fault.cause, outcome.cause))
+        wrong += not ended or (fault.stops and outcome.stopped_s is None)
+    return 1 if wrong else 0

@@ -1,0 +1,143 @@
+"""Table 3 of the first paper: classes and sizes from tensions, on tubes held out."""
+
+import math
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from endoscope_benchmarks.benches.inference_time import inference_time
+from endoscope_benchmarks.benches.papers_tables.row import PapersBench, Row
+
+if TYPE_CHECKING:
+    from endoscope_core.classifier.grouped_folds import CrossValidation
+    from endoscope_core.classifier.size_classifier import SizeClassifier
+    from endoscope_core.dataset import CalibrationDataset
+
+TITLE = 'First paper, table 3: class and backlash size from wire tensions'
+
+_THEIRS = {
+    'mlp': ('MLP', '80'),
+    'recurrence_plot_cnn': ('RP + CNN', '92'),
+    'cnn': ('1D-CNN', '98.47'),
+}
+_UNSEEN_OF_EACH = 40
+_UNUSUAL_OF_EACH = 6
+_TRAINING_LIMIT_S = 120.0
+_INFERENCE_LIMIT_S = 0.010
+
+
+def rows(settings: PapersBench) -> list[Row]:
+    """Train on a data set of the bench's seed; judge its folds and tubes outside it."""
+    from endoscope_core.classifier.training import NETWORKS, cross_validate, use_one_thread
+    from endoscope_core.dataset import make_dataset
+    from endoscope_core.signals import BRIEF
+
+    use_one_thread()
+    settings.report('simulating 210 calibrations by the sinusoid')
+    dataset = make_dataset(settings.seed)
+    found = []
+    for kind in NETWORKS:
+        name, theirs = _THEIRS[kind]
+        settings.report(f'cross-validating {name}')
+        validation = cross_validate(dataset, settings.seed, kind=kind)
+        found.append(_accuracy_row(f'{name}, accuracy [%]', theirs, validation))
+    found += _ours('sinusoid of 9 s', dataset, settings)
+    settings.report('simulating 210 calibrations by the brief motion')
+    brief = make_dataset(settings.seed, motion=BRIEF)
+    found += _ours('brief motion of 3 s', brief, settings)
+    return found
+
+
+def _ours(name: str, dataset: 'CalibrationDataset', settings: PapersBench) -> list[Row]:
+    from endoscope_core.classifier.size_training import (
+        train_size_classifier,
+        validated_size_classifier,
+    )
+
+    settings.report(f'ours, {name}')
+    _, validation = validated_size_classifier(dataset, settings.seed)
+    start = time.perf_counter()
+    classifier = train_size_classifier(dataset, settings.seed)
+    training = time.perf_counter() - start
+    accuracy = _accuracy_row(f'ours, {name}: accuracy [%]', '98.47', validation.classes, 99.0)
+    held_out = [
+        accuracy,
+        Row(
+            'size, folds held out: rms error [deg]',
+            np.rad2deg(validation.rmse).tolist(),
+            at_most=2.0,
+        ),
+        Row(
+            'size, folds held out: in their 90 % interval [%]',
+            [100.0 * share for share in validation.coverage],
+            at_least=85.0,
+            at_most=95.0,
+            digits=1,
+        ),
+    ]
+    times = [
+        Row(
+            'training of 210 recordings, share of 2 minutes',
+            [training / _TRAINING_LIMIT_S],
+            at_most=1.0,
+        ),
+        Row(
+            'inference, share of 10 ms',
+            [inference_time(classifier) / _INFERENCE_LIMIT_S],
+            at_most=1.0,
+        ),
+    ]
+    return [*held_out, *_outside(classifier, settings), *times]
+
+
+def _outside(classifier: 'SizeClassifier', settings: PapersBench) -> list[Row]:
+    """Tubes of any size and unusual tensions, in as many groups as the bench has tubes."""
+    from endoscope_benchmarks.trials.classifier_trial import judge_unseen_tubes, refused_of_kind
+    from endoscope_benchmarks.trials.unusual_recordings import UNUSUAL
+
+    groups = settings.tubes
+    trials = judge_unseen_tubes(classifier, settings.seed, _UNSEEN_OF_EACH * groups)
+    rmse, coverage, refused = [], [], []
+    for k in range(groups):
+        group = trials[k::groups]
+        judged = [(t.size, t.result) for t in group if t.result is not None]
+        errors = [result.expected_size - size for size, result in judged]
+        inside = [result.holds(size) for size, result in judged]
+        rmse.append(math.degrees(float(np.sqrt(np.mean(np.square(errors))))))
+        coverage.append(100.0 * float(np.mean(inside)))
+        refused.append(100.0 * (1.0 - len(judged) / len(group)))
+    found = [
+        Row('size, tubes of any size: rms error [deg]', rmse, at_most=2.0),
+        Row(
+            'size, tubes of any size: in their 90 % interval [%]',
+            coverage,
+            at_least=85.0,
+            at_most=95.0,
+            digits=1,
+        ),
+        Row('refused, tubes of any size [%]', refused, digits=1),
+    ]
+    for kind in UNUSUAL:
+        shares = np.array_split(
+            refused_of_kind(classifier, kind, settings.seed, _UNUSUAL_OF_EACH * groups), groups
+        )
+        found.append(
+            Row(f'refused, {kind} [%]', [100.0 * float(np.mean(s)) for s in shares], digits=1)
+        )
+    return found
+
+
+def _accuracy_row(
+    name: str, theirs: str, validation: 'CrossValidation', aim: float | None = None
+) -> Row:
+    from endoscope_core.dataset import CLASSES_DEG
+
+    shares = [100.0 * share for share in validation.accuracy]
+    confused = '; '.join(
+        f'{CLASSES_DEG[i]} taken for {CLASSES_DEG[j]} deg: {count}'
+        for i, line in enumerate(validation.confusion.tolist())
+        for j, count in enumerate(line)
+        if i != j and count
+    )
+    return Row(name, shares, theirs, at_least=aim, note=f'{name}: {confused or "none confused"}')

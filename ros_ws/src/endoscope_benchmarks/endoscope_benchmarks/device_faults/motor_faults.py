@@ -1,0 +1,216 @@
+"""The faults of motors and console, and what the slave makes of each."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rclpy.parameter import Parameter
+
+from endoscope_bags import open_bag
+from endoscope_benchmarks.device_faults.motor_rig import MotorRig
+from endoscope_nodes.supervisor_node import SupervisorNode
+
+AFTERMATH_S = 2.0
+
+
+@dataclass(frozen=True)
+class MotorFault:
+    """Something that goes wrong in motion.
+
+    Attributes
+    ----------
+    what
+        In words.
+    inject
+        Makes it happen.
+    ends_in
+        Operating state that follows; ``ENABLED`` for a fault that motion survives or that only
+        ends it.
+    stops
+        Whether the shafts stand still afterwards.
+    cause
+        Pattern of words that the cause of the FAULT must hold.
+    apart
+        Nodes that must be processes of their own.
+    """
+
+    what: str
+    inject: Callable[[MotorRig], object]
+    ends_in: str = 'FAULT'
+    stops: bool = True
+    cause: str = ''
+    apart: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class FaultOutcome:
+    """What followed a fault.
+
+    Attributes
+    ----------
+    what
+        The fault.
+    state
+        Operating state at the end.
+    cause
+        Of the FAULT; empty without one.
+    fault_s, stopped_s
+        Seconds from the fault to FAULT and to the shafts' standing still; None if they never did.
+    longest_gap_s
+        Longest silence of `motor/measured_js` in the bag after the fault.
+    faults_in_bag
+        FAULT messages in the bag after the fault.
+    largest_error
+        Largest difference in rad between a reading in the bag and where the servo was at its stamp.
+    """
+
+    what: str
+    state: str
+    cause: str
+    fault_s: float | None
+    stopped_s: float | None
+    longest_gap_s: float
+    faults_in_bag: int
+    largest_error: float
+
+    def __str__(self) -> str:
+        def ms(seconds: float | None) -> str:
+            return '-' if seconds is None else f'{seconds * 1e3:.0f}'
+
+        return (
+            f'| {self.what} | {self.state} | {ms(self.fault_s)} | {ms(self.stopped_s)} '
+            f'| {ms(self.longest_gap_s)} | {self.largest_error * 1e3:.1f} | {self.faults_in_bag} '
+            f'| {self.cause} |'
+        )
+
+
+def _set(action: str, *arguments: float) -> Callable[[MotorRig], object]:
+    return lambda rig: rig.emulator.do(action, *arguments)
+
+
+def _late(rig: MotorRig) -> None:
+    rig.emulator.do('delay_s', 0.006)
+    rig.emulator.do('delayed', 4)
+
+
+def _disturb(rig: MotorRig) -> None:
+    rig.emulator.do('damage_rate', 0.01)
+    rig.emulator.do('repeated', 400)
+    _late(rig)
+
+
+def _overpull(rig: MotorRig) -> None:
+    rig.tension = 80.0
+
+
+def _stop_weighing(rig: MotorRig) -> None:
+    rig.weighing = False
+
+
+def _let_go(rig: MotorRig) -> None:
+    rig.node('console').set_parameters([Parameter('source', value='none')])
+
+
+MOTOR_FAULTS: dict[str, MotorFault] = {
+    'servo cable out': MotorFault(
+        'cable of a servo pulled out', _set('silence', 1), cause='servo 1 does not answer'
+    ),
+    'adapter out': MotorFault(
+        'USB adapter pulled out', _set('hang_up'), cause='the adapter is gone'
+    ),
+    'flipped bits': MotorFault(
+        'bits flipped in 1 % of packets', _set('damage_rate', 0.01), 'ENABLED', stops=False
+    ),
+    'late': MotorFault('4 answers late by 6 ms', _late, 'ENABLED', stops=False),
+    'twice': MotorFault('400 answers sent twice', _set('repeated', 400), 'ENABLED', stops=False),
+    'disturbed': MotorFault('the three at once', _disturb, 'ENABLED', stops=False),
+    'overload': MotorFault('a servo shuts down', _set('overload', 1), cause='overload'),
+    'brown-out': MotorFault('supply falls to 9 V', _set('supply', 1, 9.0), cause='input voltage'),
+    'restart': MotorFault('a servo restarts', _set('restart', 2), cause='servo 2'),
+    'node hangs': MotorFault(
+        'executor of the nodes hangs for 0.5 s',
+        lambda rig: rig.block(0.5),
+    ),
+    'over-tension': MotorFault('a wire at 80 N', _overpull, cause='over the ceiling'),
+    'load cells silent': MotorFault('load cells fall silent', _stop_weighing, cause='silent'),
+    'clutch released': MotorFault('operator lets go of the clutch', _let_go, 'ENABLED'),
+    'console killed': MotorFault(
+        'console killed (SIGKILL)',
+        lambda rig: rig.kill('console'),
+        cause='slave/servo_jp ended while the clutch was held',
+        apart=('console',),
+    ),
+    'motor driver killed': MotorFault(
+        'motor driver killed (SIGKILL)',
+        lambda rig: rig.kill('motor_driver'),
+        # Whoever misses it first says so.
+        cause='motor/measured_js has been silent|no measured position',
+        apart=('motor_driver',),
+    ),
+}
+
+
+def undergo(
+    fault: MotorFault,
+    folder: Path,
+    aftermath: float = AFTERMATH_S,
+    patience: float | None = None,
+    domain: int | None = None,
+) -> FaultOutcome:
+    """Make a fault happen in motion, and look at what follows.
+
+    Parameters
+    ----------
+    fault
+        Which.
+    folder
+        For the bag.
+    aftermath
+        How long to look at least, in s.
+    patience
+        Silence of the servos in s that is a fault, instead of the usual.
+    domain
+        ROS domain; by default one that goes with the process.
+    """
+    with MotorRig(folder, fault.apart, patience, domain) as rig:
+        rig.enable_and_move()
+        began, began_ns = time.monotonic(), time.time_ns()
+        fault.inject(rig)
+        if fault.ends_in == 'FAULT':
+            rig.wait(lambda: rig.state == 'FAULT')
+        rig.wait(lambda: time.monotonic() > began + aftermath)
+        if fault.stops:
+            rig.wait(lambda: rig.stopped_after(began) is not None)
+        stopped_s = rig.stopped_after(began)
+        state = rig.state
+        fault_s = next((t - began for t, s in rig.states if s == 'FAULT' and t >= began), None)
+        supervisor = rig.node('supervisor')
+        cause = supervisor.machine.cause if isinstance(supervisor, SupervisorNode) else ''
+        traces = [np.array(rig.emulator.do('trace', device, 0.0)) for device in (1, 2)]
+        to_stamps = time.time() - time.monotonic()
+        bag = rig.bag
+    recording = open_bag(bag)
+    measured = recording.joint_state('motor/measured_js')
+    stamps = measured.stamp_ns
+    after = np.append(stamps[stamps >= began_ns], recording.end_ns)
+    gaps = np.diff(np.concatenate([stamps[stamps < began_ns][-1:], after]))
+    topic = recording.find('slave/operating_state')
+    states = [m.data for raw, m in recording.decoded(topic) if raw.log_ns >= began_ns]
+    positions = np.array(measured.position).T
+    errors = [
+        np.abs(position + math.pi - np.interp(stamps * 1e-9, trace[:, 0] + to_stamps, trace[:, 1]))
+        for position, trace in zip(positions, traces, strict=True)
+    ]
+    return FaultOutcome(
+        fault.what,
+        state,
+        cause,
+        fault_s,
+        stopped_s,
+        float(gaps.max()) * 1e-9,
+        states.count('FAULT'),
+        float(np.max(errors)),
+    )

@@ -1,0 +1,205 @@
+"""Spoiled texts: descriptions in YAML, tables and command files."""
+
+import math
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from numpy.random import Generator
+
+from endoscope_bags import BagWriter, open_bag
+from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.information import bag_information
+from endoscope_bags.message_types import JOINT_STATE
+from endoscope_bags.table_mapping import load_table_mapping
+from endoscope_bags.text_table import convert_table
+from endoscope_benchmarks.hostile_files.spoiling import spoiled_table, spoiled_yaml
+from endoscope_core.physics import (
+    EffectSpec,
+    JointParameters,
+    PlantDescription,
+    load_plant,
+    save_plant,
+)
+from endoscope_core.physics.plant_file import REACH
+from endoscope_core.signals.command_file import read_command_file, write_command_file
+from endoscope_devices.load_cells.calibration_file import load_calibration
+
+_WIRES = ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg')
+_CELLS = """\
+transmitter:
+  unit: 1
+  registers: input
+  rate: 200.0
+  serial: {baud: 115200, parity: none, stop_bits: 1}
+wires:
+  wire_x_pos: {register: 0, type: int32, newton_per_count: 0.001, sign: 1, zero: 120}
+  wire_x_neg: {register: 2, type: int32, newton_per_count: 0.001}
+  wire_y_pos: {register: 4, type: int32, newton_per_count: 0.001}
+  wire_y_neg: {register: 6, type: int32, newton_per_count: 0.001}
+faults:
+  broken_below: -200000
+  broken_above: 200000
+  saturated_below: -20000
+  saturated_above: 150000
+tare: {noise: 0.1, drift: 0.05, largest: 2.0, shaft_speed: 0.02}
+"""
+_MAPPING = """\
+time: {column: 1, unit: s}
+delimiter: ','
+header_lines: 1
+namespace: /rig
+start_s: 0.5
+topics:
+  slave/servo_jp:
+    position: {bend_x: {column: 2, unit: deg}}
+  wires/measured_js:
+    effort: {wire_x_pos: {column: 3, unit: N}, wire_x_neg: {column: 4, unit: N, scale: 2.0}}
+"""
+
+
+class MetadataCase:
+    """The `metadata.yaml` of a sound recording."""
+
+    name = 'metadata.yaml'
+
+    def __init__(self, folder: Path) -> None:
+        self._bag = folder / 'bag'
+        with BagWriter(self._bag) as writer:
+            for k in range(20):
+                data = encode_joint_state(['bend_x'], k, position=[float(k)])
+                writer.write_raw('/rig/slave/servo_jp', JOINT_STATE, data, k)
+        self._path = self._bag / 'metadata.yaml'
+        self._text = self._path.read_text()
+
+    def spoil(self, rng: Generator) -> None:
+        """Write a case."""
+        self._path.write_bytes(spoiled_yaml(self._text, rng))
+
+    def read(self) -> bool:
+        """Look into the recording, whose messages are what they were."""
+        recording = open_bag(self._bag)
+        str(bag_information(recording)).encode()
+        position = recording.joint_state('slave/servo_jp').require('position')
+        return bool((position[:, 0] == np.arange(20)).all())
+
+
+class PlantCase:
+    """A plant.yaml."""
+
+    name = 'plant.yaml'
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / 'plant.yaml'
+        gravity = EffectSpec('gravity', 'bend_x', {'moment_nm': 0.01})
+        joint = JointParameters(friction_profile=(0.3, -0.1))
+        save_plant(PlantDescription({'bend_x': joint}, effects=(gravity,)), self._path)
+        self._text = self._path.read_text()
+
+    def spoil(self, rng: Generator) -> None:
+        """Write a case."""
+        self._path.write_bytes(spoiled_yaml(self._text, rng))
+
+    def read(self) -> bool:
+        """Read it; every parameter has to be one that an instrument can have."""
+        plant = load_plant(self._path)
+        sets = [asdict(joint) for joint in plant.joints.values()] + [asdict(plant.sensors)]
+        return all(
+            REACH[key][0] <= number <= REACH[key][1]
+            for parameters in sets
+            for key, value in parameters.items()
+            for number in np.atleast_1d(value)
+        )
+
+
+class CellsCase:
+    """A calibration of load cells."""
+
+    name = 'cells.yaml'
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / 'cells.yaml'
+
+    def spoil(self, rng: Generator) -> None:
+        """Write a case."""
+        self._path.write_bytes(spoiled_yaml(_CELLS, rng))
+
+    def read(self) -> bool:
+        """Read it; counts have to become finite tensions."""
+        cells = load_calibration(self._path, _WIRES).wires.values()
+        return all(math.isfinite(cell.tension(1e5)) for cell in cells)
+
+
+class MappingCase:
+    """The mapping of a text table."""
+
+    name = 'mapping.yaml'
+
+    def __init__(self, folder: Path) -> None:
+        self._path, self._table = folder / 'mapping.yaml', folder / 'sound.csv'
+        self._out = folder / 'converted'
+        self._table.write_text(_table_text())
+
+    def spoil(self, rng: Generator) -> None:
+        """Write a case."""
+        self._path.write_bytes(spoiled_yaml(_MAPPING, rng))
+
+    def read(self) -> bool:
+        """Convert a sound table by it."""
+        return _convert(self._table, self._path, self._out)
+
+
+class TableCase:
+    """A text table for `endoscope convert`."""
+
+    name = 'text table'
+
+    def __init__(self, folder: Path) -> None:
+        self._path, self._mapping = folder / 'table.csv', folder / 'sound.yaml'
+        self._out = folder / 'converted'
+        self._mapping.write_text(_MAPPING)
+
+    def spoil(self, rng: Generator) -> None:
+        """Write a case."""
+        self._path.write_bytes(spoiled_table(_table_text(), rng, ','))
+
+    def read(self) -> bool:
+        """Convert it."""
+        return _convert(self._path, self._mapping, self._out)
+
+
+class CommandCase:
+    """A command file."""
+
+    name = 'command CSV'
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / 'commands.csv'
+        time = np.arange(0.0, 1.0, 0.01)
+        write_command_file(self._path, time, np.sin(np.stack([time, 2.0 * time], axis=1)))
+        self._text = self._path.read_text()
+
+    def spoil(self, rng: Generator) -> None:
+        """Write a case."""
+        self._path.write_bytes(spoiled_table(self._text, rng, ','))
+
+    def read(self) -> bool:
+        """Read it; time has to increase and angles to be finite."""
+        table = read_command_file(self._path)
+        increases = bool((table.time[1:] > table.time[:-1]).all())
+        return increases and bool(np.isfinite(table.angle).all())
+
+
+def _table_text() -> str:
+    rows = [f'{k * 0.01:.3f},{math.sin(k):.4f},{5 + k % 3},{5 - k % 3}' for k in range(50)]
+    return '\n'.join(['time,bend,pos,neg', *rows]) + '\n'
+
+
+def _convert(table: Path, mapping: Path, out: Path) -> bool:
+    try:
+        converted = convert_table(table, load_table_mapping(mapping), out)
+        recording = open_bag(out)
+        return recording.message_count == converted.messages
+    finally:
+        shutil.rmtree(out, ignore_errors=True)

@@ -1,0 +1,206 @@
+"""Models on recordings of a real flexible endoscope, where they are at hand.
+
+The recordings (sine of 60 deg in five tubes, about two cycles) do not come with this project. They
+are looked for in ``data/kaist`` of the folder that ENDOSCOPE_SHARED names.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_benchmarks.trials.tension_loop import tension_loop_width
+from endoscope_core.hysteresis.inverse import HysteresisParameters
+from endoscope_core.identification import (
+    ModelFit,
+    TableEntry,
+    UpdatedTable,
+    UpdatedTableError,
+    closed_cycle,
+    fit_model,
+)
+from endoscope_core.identification.tube_files import (
+    ACTUAL,
+    CYCLE_S,
+    DESIRED,
+    NEGATIVE,
+    PHASE,
+    POSITIVE,
+)
+from endoscope_core.metrics import width_at_mid_height
+
+Array = NDArray[np.float64]
+
+_SETTLED = (0.5 * np.pi, 2.5 * np.pi)
+
+
+@dataclass(frozen=True)
+class RealRecording:
+    """One tube, N samples.
+
+    Parameters
+    ----------
+    bend : int
+        Of the tube, deg.
+    phase : ndarray, shape (N,)
+        rad, which at 0.159 Hz is s.
+    desired, actual : ndarray, shape (N,)
+        rad.
+    tension : ndarray, shape (N, 2)
+        N.
+    """
+
+    bend: int
+    phase: Array
+    desired: Array
+    actual: Array
+    tension: Array
+
+    def within(self, begin: float, end: float) -> slice:
+        """Samples between two phases in rad."""
+        first, last = np.searchsorted(self.phase, (begin, end))
+        return slice(int(first), int(last))
+
+    @property
+    def backlash_size(self) -> float:
+        """Width in rad of the settled loop."""
+        loop = self.within(*_SETTLED)
+        return width_at_mid_height(self.desired[loop], self.actual[loop])
+
+    @property
+    def tension_width(self) -> float:
+        """Width of the settled loop of the tensions; knows nothing of the actual angle."""
+        loop = self.within(*_SETTLED)
+        tension = self.tension[loop]
+        return float(
+            tension_loop_width(np.rad2deg(self.desired[loop]), tension[:, 0], tension[:, 1])
+        )
+
+
+def recordings_folder() -> Path | None:
+    """Where the recordings lie, None if they do not."""
+    shared = os.environ.get('ENDOSCOPE_SHARED')
+    folder = Path(shared or Path(__file__).parents[6] / 'shared') / 'data' / 'kaist'
+    return folder if folder.is_dir() else None
+
+
+def real_recordings(folder: Path | None = None) -> list[RealRecording]:
+    """All recordings, sorted by the bend of the tube; none where they are not at hand."""
+    folder = folder or recordings_folder()
+    if folder is None:
+        return []
+    found = []
+    # The tubes are named by their bend; other files of the folder are recordings of another form.
+    for path in folder.glob('[0-9]*.txt'):
+        table = np.loadtxt(path, delimiter=',')
+        # Rows repeat each reading of a slower clock.
+        table = table[np.diff(table[:, PHASE], prepend=-1.0) != 0.0]
+        found.append(
+            RealRecording(
+                int(path.stem),
+                table[:, PHASE],
+                np.deg2rad(table[:, DESIRED]),
+                np.deg2rad(table[:, ACTUAL]),
+                table[:, [POSITIVE, NEGATIVE]],
+            )
+        )
+    return sorted(found, key=lambda recording: recording.bend)
+
+
+def fit_first_cycle(recording: RealRecording, model: str, seed: int) -> ModelFit:
+    """A model of the first cycle."""
+    first = recording.within(0.0, CYCLE_S)
+    return fit_model([closed_cycle(recording.desired[first], recording.actual[first])], seed, model)
+
+
+def models_on_real_recordings(
+    recordings: Sequence[RealRecording], model: str, seed: int
+) -> dict[int, tuple[float, float]]:
+    """RMSE in rad on the first cycle, which was fitted, and on the second, by the tube's bend."""
+    found = {}
+    for recording in recordings:
+        error = fit_first_cycle(recording, model, seed).predict(recording.desired)
+        error = error - recording.actual
+        first = recording.within(0.0, CYCLE_S)
+        second = recording.within(CYCLE_S, 2.0 * CYCLE_S)
+        found[recording.bend] = tuple(
+            float(np.sqrt(np.mean(error[part] ** 2))) for part in (first, second)
+        )
+    return {bend: (pair[0], pair[1]) for bend, pair in found.items()}
+
+
+@dataclass(frozen=True)
+class LeftOneOut:
+    """A tube whose parameters come from the others.
+
+    Parameters
+    ----------
+    bend : int
+        Of the tube left out, deg.
+    left : float or None
+        rad rms by which the model at the predicted size misses the actual angle: what its inverse
+        as feed-forward would leave. None where the table does not reach.
+    uncompensated : float
+        rad rms, actual less desired angle.
+    size_error : float
+        rad, predicted less true backlash size.
+    """
+
+    bend: int
+    left: float | None
+    uncompensated: float
+    size_error: float
+
+
+def left_one_out(recordings: Sequence[RealRecording], model: str, seed: int) -> list[LeftOneOut]:
+    """Leave each tube out, predict its size from its tension and its parameters from a table.
+
+    The table holds the other tubes; size over tension is a straight line through them.
+    """
+    fits: Mapping[int, HysteresisParameters] = {
+        recording.bend: fit_first_cycle(recording, model, seed).parameters
+        for recording in recordings
+    }
+    found = []
+    for left_out in recordings:
+        others = [recording for recording in recordings if recording is not left_out]
+        widths = [recording.tension_width for recording in others]
+        sizes = [recording.backlash_size for recording in others]
+        slope, intercept = np.polyfit(widths, sizes, 1)
+        size = float(slope * left_out.tension_width + intercept)
+        table = UpdatedTable.of(
+            model,
+            [TableEntry(s, fits[r.bend], str(r.bend)) for r, s in zip(others, sizes, strict=True)],
+        )
+        settled = left_out.within(_SETTLED[0], 2.0 * CYCLE_S)
+        error = left_out.actual[settled] - left_out.desired[settled]
+        left: float | None
+        try:
+            parameters = table.parameters_for(size)
+        except UpdatedTableError:
+            left = None
+        else:
+            # The tubes' offsets are their own; a straight tube's zero is set by hand.
+            modelled = ModelFit(_hysteresis(parameters), 0.0, 0, model).predict(left_out.desired)
+            misfit = (modelled - left_out.actual)[settled]
+            left = float(np.sqrt(np.mean(misfit**2)))
+        found.append(
+            LeftOneOut(
+                left_out.bend,
+                left,
+                float(np.sqrt(np.mean(error**2))),
+                size - left_out.backlash_size,
+            )
+        )
+    return found
+
+
+def _hysteresis(parameters: object) -> HysteresisParameters:
+    if not isinstance(parameters, HysteresisParameters):
+        raise UpdatedTableError(f'{type(parameters).__name__} is no hysteresis model')
+    return parameters

@@ -1,0 +1,32 @@
+"""`endoscope bench`, as the program finds it in an installed package."""
+
+import importlib.metadata
+
+import pytest
+
+from endoscope_benchmarks.benches import BENCHES
+from endoscope_bringup.cli import main
+from endoscope_bringup.other_packages import GROUP
+
+
+def test_the_package_brings_the_command():
+    entries = importlib.metadata.distribution('endoscope_benchmarks').entry_points
+    [command] = entries.select(group=GROUP)
+    assert command.name == 'bench'
+    assert callable(command.load().run)
+
+
+@pytest.mark.parametrize('words', [[], ['no-such-bench']])
+def test_wrong_usage_is_one_line_and_exit_2(words, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(['bench', *words])
+    assert stop.value.code == 2
+    assert capsys.readouterr().err.count('\n') == 1
+
+
+@pytest.mark.parametrize('name', BENCHES)
+def test_every_bench_has_help(name, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(['bench', name, '--help'])
+    assert stop.value.code == 0
+    assert f'usage: endoscope bench {name}' in capsys.readouterr().out

@@ -1,0 +1,39 @@
+import numpy as np
+import pytest
+
+from endoscope_benchmarks.trials.real_recordings import (
+    left_one_out,
+    models_on_real_recordings,
+    real_recordings,
+)
+from endoscope_core.hysteresis.inverse import MODELS
+
+RECORDINGS = real_recordings()
+pytestmark = pytest.mark.skipif(
+    not RECORDINGS,
+    reason='no real recordings on this machine: set ENDOSCOPE_SHARED to the folder that has them',
+)
+
+
+@pytest.mark.parametrize(
+    ('model', 'at_most_deg'), [('play', 1.34), ('bouc_wen', 1.02), ('prandtl_ishlinskii', 1.01)]
+)
+def test_the_straight_tube_is_modelled_as_well_as_is_known_to_be_possible(model, at_most_deg):
+    straight = [recording for recording in RECORDINGS if recording.bend == 0]
+    _, second = models_on_real_recordings(straight, model, 0)[0]
+    assert np.rad2deg(second) <= at_most_deg
+
+
+def test_every_model_explains_most_of_the_second_cycle_of_the_most_bent_tube():
+    for model in MODELS:
+        for bend, (_, second) in models_on_real_recordings(RECORDINGS[-1:], model, 0).items():
+            assert np.rad2deg(second) < 3.0, (model, bend)
+
+
+def test_a_tube_left_out_is_followed_by_the_table_of_the_others():
+    outcomes = left_one_out(RECORDINGS, 'play', 0)
+    assert len(outcomes) == len(RECORDINGS)
+    known = [outcome for outcome in outcomes if outcome.left is not None]
+    assert known
+    for outcome in known:
+        assert outcome.left < 0.5 * outcome.uncompensated

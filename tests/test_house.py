@@ -1,0 +1,73 @@
+"""Who may import whom, and who may know an effect by name."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from endoscope_core.physics.effects import CATALOGUE
+
+SOURCES = Path(__file__).parents[1] / 'ros_ws' / 'src'
+HOUSE: list[tuple[str, set[str]]] = [
+    ('core', set()),
+    ('bags', {'core'}),
+    ('devices', {'core'}),
+    ('explain', {'core', 'bags'}),
+    ('nodes', {'core', 'bags', 'devices'}),
+    ('bringup', {'core', 'bags', 'devices', 'explain', 'nodes'}),
+    ('benchmarks', {'core', 'bags', 'devices', 'explain', 'nodes', 'bringup'}),
+]
+"""Packages in their order, each with those before it that it and its tests may import."""
+
+
+def _trees(folder: Path) -> Iterator[tuple[Path, ast.Module]]:
+    for path in sorted(folder.rglob('*.py')):
+        yield path.relative_to(SOURCES), ast.parse(path.read_text(encoding='utf-8'))
+
+
+def _imported(tree: ast.Module) -> Iterator[str]:
+    """Yield the packages of the house that a file imports, wherever in the file it does."""
+    for node in ast.walk(tree):
+        modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            modules = [node.module]
+        for module in modules:
+            if module.startswith('endoscope_'):
+                yield module.split('.')[0].removeprefix('endoscope_')
+
+
+def _words(tree: ast.Module) -> Iterator[str]:
+    """Yield strings and names: of variables, attributes, arguments, functions and modules."""
+    for node in ast.walk(tree):
+        for field in ('value', 'id', 'attr', 'arg', 'name', 'module'):
+            word = getattr(node, field, None)
+            if isinstance(word, str):
+                yield from (word, word.split('.')[-1])
+
+
+def test_the_house_has_these_packages() -> None:
+    assert {path.parent.name for path in SOURCES.glob('*/package.xml')} == {
+        f'endoscope_{name}' for name, _ in HOUSE
+    }
+    for k, (name, before) in enumerate(HOUSE):
+        assert before <= {earlier for earlier, _ in HOUSE[:k]}, name
+
+
+@pytest.mark.parametrize(('name', 'before'), HOUSE, ids=[name for name, _ in HOUSE])
+def test_a_package_imports_only_packages_before_it(name: str, before: set[str]) -> None:
+    found = {
+        str(path): beyond
+        for path, tree in _trees(SOURCES / f'endoscope_{name}')
+        if (beyond := set(_imported(tree)) - before - {name})
+    }
+    assert found == {}
+
+
+def test_the_engine_names_no_effect() -> None:
+    found = {
+        str(path): named
+        for path, tree in _trees(SOURCES / 'endoscope_explain' / 'endoscope_explain')
+        if (named := CATALOGUE.keys() & set(_words(tree)))
+    }
+    assert found == {}, 'what the engine must know of an effect, the effect says by its traits'
