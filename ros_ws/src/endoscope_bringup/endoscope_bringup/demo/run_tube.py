@@ -115,6 +115,8 @@ class _GraphSession:
             overrides={
                 'motor_driver': {'plant_file': str(plant_file), 'seed': seed},
                 'recorder': {'bag': str(bag)},
+                # What feed-forward alone does is shown.
+                'controller': {'active': False},
                 # Identifying a plant compiles on a machine's first run, in one tick.
                 'conductor': {'timeout': PATIENCE_OF_TIME_S},
             },
