@@ -7,6 +7,7 @@ import numpy as np
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.compose import Composition
+from endoscope_explain.fit.intervals import may_be_absent
 from endoscope_explain.fit.score import NEARLY_NOISE, PARAMETER_PRICE
 from endoscope_explain.fit.whiteness import is_noise, slips, worst_against_raw_noise
 from endoscope_explain.search import JointSearch
@@ -80,6 +81,7 @@ def decide(search: JointSearch) -> Decision:
         and (nominal.score - chosen.score < BARELY * above)
     ):
         chosen = nominal
+    chosen = _without_absent(search, chosen)
     if search.beyond is not None and _does_as_much(search.beyond, chosen):
         chosen = search.beyond
     left = chosen.above_noise()
@@ -113,6 +115,17 @@ def decide(search: JointSearch) -> Decision:
         reach = RIVAL if measure is _likelihood else max(RIVAL, RIVAL_SHARE * margins[effect_id])
         alternatives[effect_id] = tuple(name for gap, name in rivals if gap < reach)
     return Decision(chosen, adequate, explained, alternatives, margins, gaps)
+
+
+def _without_absent(search: JointSearch, chosen: Composition) -> Composition:
+    """What is left of a composition without effects whose strength may as well be nothing."""
+    for effect_id in chosen.effects:
+        if may_be_absent(chosen.fit, CATALOGUE[effect_id]):
+            rest = frozenset(chosen.effects) - {effect_id}
+            fewer = [c for c in search.tried() if frozenset(c.effects) == rest]
+            best = min(fewer, key=lambda c: c.score, default=search.nominal)
+            return _without_absent(search, best)
+    return chosen
 
 
 def with_devices_agreed(

@@ -6,11 +6,13 @@ Newey and West, Econometrica 55, 1987). Where nothing but noise is left, it is t
 information's; an error of form widens it by what it does to the gradient.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.physics.effect import Effect
 from endoscope_explain.explanation import Estimate, NominalEstimate
 from endoscope_explain.fit.free_parameters import BAND, FITTED_NOMINAL, FORM_SPREAD
 from endoscope_explain.fit.model import Fit
@@ -88,6 +90,20 @@ def intervals(fit: Fit) -> Intervals:
         np.array([item.value(t) for item, t in zip(free, fit.theta - reach, strict=True)]),
         np.array([item.value(t) for item, t in zip(free, fit.theta + reach, strict=True)]),
     )
+
+
+def may_be_absent(fit: Fit, effect: Effect) -> bool:
+    """Whether the intervals of all strengths of an effect hold the value at which it vanishes."""
+    off = {
+        index: parameter.off
+        for index, parameter in zip(effect.places, effect.parameters, strict=True)
+        if math.isfinite(parameter.off)
+    }
+    strengths = [k for k, item in enumerate(fit.model.free) if item.index in off]
+    if not strengths:
+        return False
+    found = intervals(fit)
+    return all(found.low[k] <= off[found.indices[k]] <= found.high[k] for k in strengths)
 
 
 def nominal_estimates(

@@ -1,16 +1,21 @@
 """What is said of a joint's compositions, and of two joints that one tracker reads."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from endoscope_explain.compose import Composition, nominal_model
+from endoscope_core.physics.description import EffectSpec
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.compose import Composition, nominal_anchors, nominal_model
 from endoscope_explain.decision import Decision, decide, with_devices_agreed
-from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.intervals import may_be_absent
+from endoscope_explain.fit.model import Fit, fit
 from endoscope_explain.fit.score import score
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observation import observe
+from endoscope_explain.screen import with_effect
 from endoscope_explain.search import JointSearch
 
 
@@ -106,3 +111,21 @@ def test_an_effect_that_does_more_than_numbers_beyond_their_band_is_named(leavin
     decision = decide(JointSearch(nominal, ((creeping,),), leaving((), 1.9, 1.9)))
     assert decision.chosen.effects == ('wire_creep',)
     assert decision.adequate
+
+
+def test_an_effect_whose_strength_may_be_nothing_is_not_named(one_joint):
+    """A gap is added to what a rig without one left, and to what a rig with one left."""
+    gap = CATALOGUE['joint_backlash']
+    plant = one_joint.rig()
+    concealed = EffectSpec('joint_backlash', 'bend_x', {'gap_rad': 0.06})
+    named = []
+    for true in (plant, one_joint.rig(concealed)):
+        (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
+        refitted, _ = nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+        model = with_effect(refitted.model, gap.id, {'gap_rad': 0.02})
+        found = fit(model, model.begun_at(refitted.theta), iterations=20)
+        named.append(not may_be_absent(found, gap))
+        nominal = Composition((), replace(refitted, residuals=refitted.residuals + 20.0), 1e4)
+        search = JointSearch(nominal, ((Composition((gap.id,), found, score(found)),),))
+        assert decide(search).chosen.effects == ((gap.id,) if named[-1] else ())
+    assert named == [False, True]
