@@ -118,11 +118,11 @@ def _heading(definition: 'Effect') -> list[str]:
 def _told_of_place(place: 'Place') -> str:
     argument, unit = place.argument, '' if place.unit == '-' else f' {place.unit}'
     f = f'f({argument.symbol})'
+    reach = f'{argument.low:g} to {argument.high:g} {argument.unit}'
     return '\n'.join(
         [
             *_heading(place),
-            f'  {argument.symbol:18} {argument.low:g} to {argument.high:g} {argument.unit} where '
-            'no range is given',
+            f'  {argument.symbol:18} {reach} where no range is given',
             f'  {f:18} within +-{place.largest:g}{unit}',
         ]
     )

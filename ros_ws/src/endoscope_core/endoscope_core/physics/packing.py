@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endoscope_core.compiled import Array, Flags
 from endoscope_core.errors import nearest
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.effect import UnknownEffectError
@@ -21,9 +21,6 @@ from endoscope_core.physics.layout import (
     SHEATH_ROWS,
     SLOTS,
 )
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_] | NDArray[np.int8]
 
 
 def effect_values(spec: EffectSpec) -> Array:
