@@ -15,6 +15,7 @@ from endoscope_explain.explanation import (
     ChannelFit,
     NamedEffect,
     NominalEstimate,
+    UnknownTerm,
     Verdict,
 )
 from endoscope_explain.fit.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
@@ -150,24 +151,37 @@ def plant_of(
     return replace(plant, joints=joints, effects=tuple(specs))
 
 
+def with_term(plant: PlantDescription, unknown: UnknownTerm | None) -> PlantDescription:
+    """The plant with a function that no effect of the catalogue is."""
+    if unknown is None:
+        return plant
+    return replace(plant, terms=(*plant.terms, unknown.term()))
+
+
 def refitted(tried: JointSearch, decision: Decision) -> Composition:
     """The nominal plant of a joint: beyond its band where that is all that was chosen."""
     return tried.nominal if decision.chosen.effects else decision.chosen
 
 
 def ladder(
-    anchors: list[tuple[Fit, Fit]], searches: list[JointSearch], decisions: list[Decision]
+    anchors: list[tuple[Fit, Fit]],
+    searches: list[JointSearch],
+    decisions: list[Decision],
+    final: list[Fit],
 ) -> dict[str, dict[str, ChannelFit]]:
     """Misfit of the plant as described, refitted and augmented, on held-out blocks."""
     rungs: dict[str, dict[str, ChannelFit]] = {'nominal': {}, 'refitted': {}, 'augmented': {}}
-    for (_, described), tried, decision in zip(anchors, searches, decisions, strict=True):
+    for (_, described), tried, decision, last in zip(
+        anchors, searches, decisions, final, strict=True
+    ):
         observation = described.model.observation
         judged, _ = held_out_masks(observation)
         rungs['nominal'] |= on_samples(observation, described.residuals, judged)
-        rungs['refitted'] |= held_out_fit(refitted(tried, decision).fit)
+        before = refitted(tried, decision).fit
+        rungs['refitted'] |= held_out_fit(before)
         rungs['augmented'] |= (
-            held_out_fit(decision.chosen.fit)
-            if decision.chosen.effects
+            held_out_fit(last)
+            if last is not before
             else {s.signal: rungs['refitted'][s.signal] for s in observation.channels}
         )
     return rungs

@@ -16,15 +16,16 @@ from endoscope_explain.conclusions import (
     plant_of,
     refitted,
     verdict_of,
+    with_term,
 )
 from endoscope_explain.decision import Decision, decide, with_devices_agreed
 from endoscope_explain.explanation import Explanation, Verdict
+from endoscope_explain.families.unknown_physics import unknown_physics
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.intervals import nominal_estimates
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.given_physics import GivenJoints, explained_by
 from endoscope_explain.held_noise import with_held_noise
-from endoscope_explain.latent import unknown_term
 from endoscope_explain.observation import JointObservation, couple, observe
 from endoscope_explain.recording import Recording
 from endoscope_explain.search import MOST_EFFECTS, JointSearch, search
@@ -117,11 +118,13 @@ def explain_recording(
         searches[joint] = searched(joint)
         decisions[joint] = decide(searches[joint])
     decisions = with_devices_agreed(searches, decisions)
-    unknown = None
+    unknown, final = None, [d.chosen.fit for d in decisions]
     worst = _worst(decisions)
     if worst is not None:
         tell(f'looking for physics outside the catalogue on {observations[worst].joint}')
-        unknown = unknown_term(decisions[worst].chosen.fit, jobs, _siblings(searches[worst]))
+        found = unknown_physics(final[worst], jobs, _siblings(searches[worst]))
+        if found is not None:
+            unknown, final[worst] = found
     tell('judging on held-out blocks')
     pairs = tuple(zip(observations, decisions, strict=True))
     effects = named(observations, decisions)
@@ -138,8 +141,8 @@ def explain_recording(
             [refitted(s, d).fit for s, d in zip(searches, decisions, strict=True)],
             [() for _ in searches],
         ),
-        plant_of(well, [d.chosen.fit for d in decisions], [d.chosen.effects for d in decisions]),
-        ladder(anchors, searches, decisions),
+        with_term(plant_of(well, final, [d.chosen.effects for d in decisions]), unknown),
+        ladder(anchors, searches, decisions, final),
         candidates(observations, searches),
         unknown,
         all(d.adequate for d in decisions),

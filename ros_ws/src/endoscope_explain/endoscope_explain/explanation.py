@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.description import PlantDescription, TermSpec
 
 Array = NDArray[np.float64]
 
@@ -139,40 +139,64 @@ class Candidate:
 
 @dataclass(frozen=True)
 class UnknownTerm:
-    """A term that the catalogue does not have, put back into the simulator.
+    """A function of one state that the catalogue does not have, fitted in the simulator.
 
     Attributes
     ----------
-    joint, node : str
-        Where it acts; the node is one of `latent_library.NODES`.
+    joint : str
+        Where it acts.
+    place : str
+        Name in the table of places.
+    what : str
+        What it is a function of, and what it does, in words.
+    stage : str
+        Part of the chain.
     unit : str
-        Unit of the term.
+        Of the function; '-' where it is the logarithm of a factor.
+    symbol, argument : str
+        The state that it depends on: in the formula, and in words with its unit.
+    nodes, values, deviation : array (N,)
+        The state, the function and its standard deviation.
     expression : str
-        Formula in the states named in `states`.
-    states : mapping of str to str
-        Meaning and unit of each state in the formula.
-    coefficients : tuple of Estimate
+        The formula that comes nearest.
+    formula : array (N,)
+        Its values.
+    formula_share : float
+        Share of what the function does that the formula does.
+    formula_is_as_good : bool
+        Whether the recording does not tell it from the function.
     explained : float
-        Share of the excess misfit that the term removes after it was refitted in the simulator.
-    time, push : array (N,)
-        The latent term as estimated without any formula, for plots.
-    formula_push : array (N,)
-        The formula's value along the fitted simulation.
+        Share of the excess misfit that the function removes.
+    rivals : tuple of str
+        Other places whose function has more than half of its gain, best first.
     siblings : tuple of str
         Nearest effects of the catalogue, nearest first.
     """
 
     joint: str
-    node: str
+    place: str
+    what: str
+    stage: str
     unit: str
+    symbol: str
+    argument: str
+    nodes: Array
+    values: Array
+    deviation: Array
     expression: str
-    states: Mapping[str, str]
-    coefficients: tuple[Estimate, ...]
+    formula: Array
+    formula_share: float
+    formula_is_as_good: bool
     explained: float
-    time: Array
-    push: Array
-    formula_push: Array
+    rivals: tuple[str, ...] = ()
     siblings: tuple[str, ...] = ()
+
+    def term(self) -> TermSpec:
+        """As a plant has it: the formula where it is as good, else the function's values."""
+        ends = float(self.nodes[0]), float(self.nodes[-1])
+        if self.formula_is_as_good:
+            return TermSpec(self.joint, self.place, self.expression, range=ends)
+        return TermSpec(self.joint, self.place, values=tuple(self.values.tolist()), range=ends)
 
 
 @dataclass(frozen=True)

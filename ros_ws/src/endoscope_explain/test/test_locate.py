@@ -7,9 +7,8 @@ from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.explanation import Estimate, NamedEffect
 from endoscope_explain.fit.free_parameters import FRICTION_PROFILE_NAMES
-from endoscope_explain.latent_library import NODES
 from endoscope_explain.locate.chain_cut import cut_at_motor
-from endoscope_explain.locate.locating import STAGE_OF_NODE, STAGE_OF_PARAMETER, locate_effects
+from endoscope_explain.locate.locating import STAGE_OF_PARAMETER, locate_effects
 from endoscope_explain.locate.regime import information
 
 PLANT = PlantDescription()
@@ -36,11 +35,6 @@ def test_a_wrong_cell_shows_in_its_own_wire_alone(record):
     place = located(record, 'load_cell_gain', gain=1.2, wire=1.0)
     assert place.signals == ('wires/measured_js:wire_x_neg',)
     assert place.stage == 'sensing'
-
-
-def test_every_node_of_an_unknown_term_has_a_stage():
-    assert set(STAGE_OF_NODE) == set(NODES)
-    assert STAGE_OF_NODE['reading'] == 'sensing'
 
 
 def test_a_stop_shows_beyond_its_angle(record):

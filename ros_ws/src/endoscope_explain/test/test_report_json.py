@@ -118,15 +118,21 @@ def test_a_number_that_is_not_finite_is_refused(stribeck_case):
 def test_unknown_physics_carries_its_formula(stribeck_case):
     term = UnknownTerm(
         'bend_x',
-        'moment',
+        'load_of_angle',
+        "Moment on the joint, a function of the joint's angle",
+        'joint',
         'N m',
-        'a exp(-((q - b) / c)**2)',
-        {'q': 'angle, rad'},
-        (Estimate(0.01, 0.009, 0.011, 'N m'),),
+        'q',
+        "the joint's angle, rad",
+        np.linspace(-1.0, 1.0, 41),
+        np.linspace(-1.0, 1.0, 41) ** 2,
+        np.full(41, 0.05),
+        '0.98*q**2',
+        0.98 * np.linspace(-1.0, 1.0, 41) ** 2,
+        0.99,
+        True,
         0.9,
-        None,
-        None,
-        None,
+        ('tracker_of_angle',),
         ('gravity',),
     )
     explanation = dataclasses.replace(
@@ -138,6 +144,8 @@ def test_unknown_physics_carries_its_formula(stribeck_case):
     report = report_mapping(case)
     check_report(report)
     assert report['symbolic']['expression'] == term.expression
+    assert report['symbolic']['place'] == 'load_of_angle'
+    assert len(report['symbolic']['function']['value']) == 41
     assert report['symbolic']['siblings'] == ['gravity']
 
 

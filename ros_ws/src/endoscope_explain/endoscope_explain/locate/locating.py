@@ -35,13 +35,6 @@ STAGE_OF_PARAMETER = {
     'motor_damping_ratio': 'actuator',
 }
 
-STAGE_OF_NODE = {
-    'command': 'actuator',
-    'stretch': 'transmission',
-    'moment': 'joint',
-    'reading': 'sensing',
-}
-
 
 def locate_effects(
     recording: Recording, plant: PlantDescription, effects: Sequence[NamedEffect]
@@ -90,7 +83,7 @@ def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place
     recorded = view(recording, {'refitted': explanation.refitted})
     found = excess_between(list(recorded.signals.values()), 'refitted', None)
     joint = term.joint if term is not None else found[0].view.joint
-    stage = STAGE_OF_NODE[term.node] if term is not None else 'joint'
+    stage = term.stage if term is not None else 'joint'
     return [place(recording, found, stage, joint)]
 
 

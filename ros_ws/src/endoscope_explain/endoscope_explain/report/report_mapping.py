@@ -136,10 +136,19 @@ def _symbolic(term: UnknownTerm | None) -> dict[str, Any] | None:
     return {
         'expression': term.expression,
         'joint': term.joint,
-        'node': term.node,
+        'place': term.place,
+        'stage': term.stage,
+        'physics': term.what,
         'unit': term.unit,
-        'states': dict(term.states),
-        'coefficients': [_estimate(c, f'coefficient {i}') for i, c in enumerate(term.coefficients)],
+        'states': {term.symbol: term.argument},
+        'share_of_formula': _finite(term.formula_share, 'share of the formula'),
+        'formula_is_as_good': term.formula_is_as_good,
+        'function': {
+            term.symbol: [_finite(x, 'argument') for x in term.nodes],
+            'value': [_finite(x, 'function') for x in term.values],
+            'deviation': [_finite(x, 'deviation') for x in term.deviation],
+        },
+        'rivals': list(term.rivals),
         'explained': _finite(term.explained, 'explained'),
         'siblings': list(term.siblings),
     }

@@ -72,13 +72,13 @@ def _unknown(case: ExplainedCase, better: str) -> str:
     if term.explained < LEAST_EXPLAINED:
         return (
             f'A significant mismatch of {term.joint} remains that neither an effect of the '
-            f'catalogue nor any formula of the states that was tried explains; {better}.'
+            f'catalogue nor a function of one state explains; {better}.'
         )
+    what = f'{term.what[0].lower()}{term.what[1:]}'
     siblings = f', nearest to {" and ".join(term.siblings[:2])}' if term.siblings else ''
     return (
-        f'No effect of the catalogue explains what acts on the {term.node} of {term.joint}; '
-        f'{term.expression} ({term.unit}) accounts for {100 * term.explained:.0f} % of it'
-        f'{siblings}.'
+        f'No effect of the catalogue explains the mismatch of {term.joint}; {what} accounts for '
+        f'{100 * term.explained:.0f} % of it{siblings}; {better}.'
     )
 
 

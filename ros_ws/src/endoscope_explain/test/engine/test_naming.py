@@ -1,12 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from endoscope_core.physics.description import EffectSpec
+from endoscope_core.physics.description import EffectSpec, TermSpec
+from endoscope_core.physics.functions import describe_place
+from endoscope_core.physics.functions.expression import evaluate
 from endoscope_explain.compose import nominal_anchors
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.fit.simulated_joint import packed_joint
-from endoscope_explain.latent import unknown_term
+from endoscope_explain.families.unknown_physics import unknown_physics
+from endoscope_explain.fit.simulated_joint import joint_of, packed_joint
 from endoscope_explain.observation import observe
 
 OTHER = {'wire_stiffness': 3300.0, 'capstan_exponent': 0.83, 'joint_friction': 8.2e-4}
@@ -74,34 +78,42 @@ def test_the_effect_that_was_left_out_is_named(effect_id, parameters, verdict, o
     assert worst < 1.3 < max(fit.ratio for fit in explanation.fit['refitted'].values())
 
 
-def test_physics_outside_the_catalogue_is_given_as_a_formula(monkeypatch, one_joint):
-    from endoscope_core.physics import simulator
-    from endoscope_core.physics.layout import IN_PUSH_MOMENT, OUT_JOINT
-
-    command = one_joint.motion(8.0)
-    nominal = one_joint.record(one_joint.rig(), command)
-    bump_at = 0.1
-    run = simulator.run_joints
-
-    def with_bump(states, histories, sheaths, p, on, inputs, *rest):
-        run(states.copy(), histories.copy(), sheaths.copy(), p, on, inputs, *rest)
-        for _ in range(4):
-            angle = rest[-1][0, :, OUT_JOINT]
-            inputs[0, :, IN_PUSH_MOMENT] = 1.5e-3 * np.exp(-(((angle - bump_at) / 0.04) ** 2))
-            run(states.copy(), histories.copy(), sheaths.copy(), p, on, inputs, *rest)
-
-    monkeypatch.setattr(simulator, 'run_joints', with_bump)
-    recording = one_joint.record(one_joint.rig(), command)
-    monkeypatch.undo()
-    assert np.abs(recording.bending.values - nominal.bending.values).max() > 0.05
-    (observation,) = observe(recording, one_joint.rig())
-    refitted, _ = nominal_anchors(observation, *packed_joint(one_joint.rig(), 'bend_x'))
-    unknown = unknown_term(refitted, 1, ('contact',))
-    assert unknown is not None
-    assert unknown.node == 'moment'
-    assert 'q' in unknown.states
-    assert unknown.explained > 0.4
+@pytest.mark.parametrize(
+    ('place', 'law', 'loudest'),
+    [
+        ('load_of_angle', '0.0015*exp(-((q - 0.1)/0.1)**2)', 0.15),
+        ('stiffness_of_tension', '0.3*tanh((T - 6)/3)', 0.05),
+    ],
+)
+def test_physics_outside_the_catalogue_is_a_function_at_its_place(place, law, loudest, one_joint):
+    concealed = TermSpec('bend_x', place, law)
+    true = replace(one_joint.rig(**OTHER), terms=(concealed,))
+    plant = one_joint.rig()
+    (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
+    refitted, _ = nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+    unknown, found = unknown_physics(refitted, 2, ('contact',))
+    assert unknown.place == place
+    assert unknown.explained > 0.95
     assert unknown.siblings == ('contact',)
+    inner = slice(len(unknown.nodes) // 8, -len(unknown.nodes) // 8)
+    nodes = unknown.nodes[inner]
+    expected = evaluate(law, unknown.symbol, nodes)
+    off = unknown.values[inner] - expected
+    assert np.abs(off - off.mean()).max() < loudest * np.ptp(expected)
+    packed, _ = found.model.packed(found.theta)
+    described = replace(plant, joints={'bend_x': joint_of(packed)}, terms=(unknown.term(),))
+    again, _ = packed_joint(described, 'bend_x')
+    first = describe_place(place).first_parameter
+    span = np.ptp(unknown.values)
+    assert again[first : first + 43] == pytest.approx(packed[first : first + 43], abs=0.1 * span)
+
+
+def test_nothing_is_a_function_of_nothing(one_joint):
+    plant = one_joint.rig()
+    recording = one_joint.record(one_joint.rig(**OTHER), one_joint.motion(6.0))
+    (observation,) = observe(recording, plant)
+    refitted, _ = nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+    assert unknown_physics(refitted, 2, ()) is None
 
 
 def test_what_was_there_in_health_is_not_explained_again(one_joint):

@@ -28,15 +28,19 @@ def experiment_figure(experiment: NextExperiment) -> str:
 
 
 def unknown_figure(term: UnknownTerm) -> str:
-    """Plot the latent term as estimated, and the formula found for it."""
+    """Plot the missing function with its 90 % band, and the formula that comes nearest."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 2.2), layout='constrained')
+        figure = Figure(figsize=(9.6, 2.6), layout='constrained')
         axis = figure.subplots()
-        time, push, formula = thinned(term.time, term.push, term.formula_push)
-        axis.plot(time, push, color=INK, lw=1.6, label='estimated without a formula')
-        axis.plot(time, formula, color=RUNG_COLOUR['augmented'], lw=1.0, label='formula')
-        axis.set_xlabel('time (s)')
-        axis.set_ylabel(term.unit)
-        axis.set_title(f'What acts on {term.joint} ({term.node}) and is in no simulation')
-        axis.legend(loc='upper right', ncols=2, fontsize=8)
+        band = 1.645 * term.deviation
+        axis.fill_between(
+            term.nodes, term.values - band, term.values + band, color=INK, alpha=0.15, lw=0.0
+        )
+        axis.plot(term.nodes, term.values, color=INK, lw=1.6, label='function, with 90 % band')
+        colour = RUNG_COLOUR['augmented']
+        axis.plot(term.nodes, term.formula, color=colour, lw=1.0, label='formula')
+        axis.set_xlabel(term.argument)
+        axis.set_ylabel('logarithm of the factor' if term.unit == '-' else term.unit)
+        axis.set_title(f'What is in no simulation of {term.joint}: {term.place}')
+        axis.legend(loc='best', ncols=2, fontsize=8)
         return svg(figure)

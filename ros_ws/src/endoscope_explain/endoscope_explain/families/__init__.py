@@ -1,0 +1,1 @@
+"""Missing physics as a smooth function of one state at a place of the chain, where no name fits."""

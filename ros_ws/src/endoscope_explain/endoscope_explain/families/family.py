@@ -1,0 +1,120 @@
+"""A family of functions of one state: a Gaussian process on the states that a recording visits.
+
+Seven Karhunen-Loeve coefficients of a Matern-5/2 process whose length is a quarter of the range
+(Rasmussen, Williams, Gaussian Processes for Machine Learning, MIT Press 2006, ch. 4.2), with a
+normal prior each: the evidence itself then pays for a flexible function.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.physics.functions.interpolation import NODES
+from endoscope_core.physics.functions.place import Place, Shape
+from endoscope_core.physics.layout import (
+    IN_COMMAND,
+    IN_OTHER_JOINT,
+    JOINT_RADIUS,
+    OUT_JOINT,
+    OUT_MOTOR,
+    OUT_MOTOR_SPEED,
+    OUT_TENSION_A,
+    OUT_TENSION_B,
+    PULLEY_RADIUS,
+)
+from endoscope_explain.observation import TICK, JointObservation
+
+Array = NDArray[np.float64]
+
+COEFFICIENTS = 7
+LENGTH = 0.25
+"""Of the process, as a share of the range."""
+LEAST_RANGE = 1e-6
+"""Share of a place's own range below which a state has not moved."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """Functions at a place.
+
+    Attributes
+    ----------
+    place : Place
+    low, high : float
+        Range of the argument.
+    basis : array (NODES, K)
+        Values at the nodes for coefficients that are normal, each with a variance of one.
+    """
+
+    place: Place
+    low: float
+    high: float
+    basis: Array
+
+    @property
+    def nodes(self) -> Array:
+        """The argument at the nodes (NODES,)."""
+        return np.linspace(self.low, self.high, NODES)
+
+    def scaled(self, amplitude: float) -> 'Family':
+        """The same functions, larger by a factor."""
+        return Family(self.place, self.low, self.high, amplitude * self.basis)
+
+
+def family_at(place: Place, visited: tuple[float, float]) -> Family | None:
+    """Functions of unit variance over the visited range; None where the state did not move."""
+    low, high = visited
+    if place.shape in (Shape.ODD, Shape.EVEN):
+        high = max(abs(low), abs(high))
+        low = -high
+    if high - low <= LEAST_RANGE * (place.argument.high - place.argument.low):
+        return None
+    side = np.linspace(0.0, 1.0, NODES)
+    covariance = _matern(side[:, None] - side[None, :])
+    if place.shape in (Shape.ODD, Shape.EVEN):
+        mirrored = _matern(side[:, None] - (1.0 - side[None, :]))
+        covariance += mirrored if place.shape is Shape.EVEN else -mirrored
+    sizes, vectors = np.linalg.eigh(covariance)
+    largest = np.argsort(sizes)[::-1][:COEFFICIENTS]
+    return Family(place, low, high, vectors[:, largest] * np.sqrt(sizes[largest]))
+
+
+def visited_ranges(
+    observation: JointObservation, parameters: Array, outputs: Array
+) -> dict[tuple[str, str], tuple[float, float]]:
+    """Range of each state along a simulation, by the symbol and unit of a place's argument.
+
+    Parameters
+    ----------
+    observation : JointObservation
+    parameters : array (parameters,)
+        Packed.
+    outputs : array (N, OUTPUTS)
+    """
+    angle, shaft = outputs[:, OUT_JOINT], outputs[:, OUT_MOTOR]
+    speed = np.gradient(angle, TICK)
+    shaft_speed = outputs[:, OUT_MOTOR_SPEED]
+    slid = 0.5 * np.abs(parameters[PULLEY_RADIUS] * shaft_speed + parameters[JOINT_RADIUS] * speed)
+    tensions = outputs[:, [OUT_TENSION_A, OUT_TENSION_B]]
+    command = observation.inputs[0, :, IN_COMMAND]
+    found = {
+        ('t', 's'): np.array([0.0, observation.duration]),
+        ('v', 'm/s'): np.array([0.0, np.quantile(slid, 0.99)]),
+        ('d', 'm'): np.array([0.0, TICK * float(np.sum(slid))]),
+        ('T', 'N'): tensions,
+        ('D', 'N'): tensions[:, 0] - tensions[:, 1],
+        ('q', 'rad'): angle,
+        ('q_other', 'rad'): observation.inputs[0, :, IN_OTHER_JOINT],
+        ('w', 'rad/s'): np.quantile(np.concatenate([speed, shaft_speed]), [0.005, 0.995]),
+        ('m', 'rad'): shaft,
+        ('u', 'rad'): command,
+        ('e', 'rad'): shaft - command,
+        ('s', 'm'): parameters[PULLEY_RADIUS] * np.concatenate([shaft, -shaft]),
+    }
+    return {key: (float(np.min(values)), float(np.max(values))) for key, values in found.items()}
+
+
+def _matern(distance: Array) -> Array:
+    scaled = np.sqrt(5.0) * np.abs(distance) / LENGTH
+    return np.asarray((1.0 + scaled + scaled**2 / 3.0) * np.exp(-scaled))

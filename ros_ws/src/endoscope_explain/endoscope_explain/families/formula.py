@@ -1,0 +1,126 @@
+"""The formula that comes nearest to a fitted function, in the metric of what the data say of it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from endoscope_core.physics.functions.expression import evaluate
+from endoscope_core.physics.functions.place import Shape
+from endoscope_explain.families.function_search import FunctionFit
+
+Array = NDArray[np.float64]
+
+AS_GOOD = 0.95
+"""Part of the function's posterior within which a formula is as good as the function."""
+_ANY = (
+    '{x}', '{x}**2', '{x} {x}**2', '{x} {x}**2 {x}**3', 'tanh(({x} - {c})/{s})',
+    'exp(-(({x} - {c})/{s})**2)', 'exp(-({x} - {low})/{s})', 'max(0, {x} - {c})',
+    'max(0, {c} - {x})', 'abs({x} - {c})', 'sin({x}/{s}) cos({x}/{s})',
+)  # fmt: skip
+_ODD = ('{x}', '{x} {x}**3', 'tanh({x}/{s})', 'sin({x}/{s})', '{x}*abs({x})')
+_EVEN = ('{x}**2', '{x}**2 {x}**4', 'abs({x})', 'exp(-({x}/{s})**2)', 'cos({x}/{s})')
+_FORMS = {Shape.ODD: _ODD, Shape.EVEN: _EVEN}
+_CENTRES = np.linspace(0.05, 0.95, 13)
+_WIDTHS = (0.03, 0.05, 0.08, 0.12, 0.2, 0.35, 0.6)
+"""Shares of the range."""
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A formula for a function.
+
+    Attributes
+    ----------
+    expression : str
+        Of the place's symbol.
+    values : array (NODES,)
+        At the family's nodes.
+    share : float
+        Of what the function does, so much does the formula.
+    as_good : bool
+        Whether the data do not tell it from the function.
+    """
+
+    expression: str
+    values: Array
+    share: float
+    as_good: bool
+
+
+def nearest_formula(found: FunctionFit) -> Formula:
+    """The formula that costs least: what it misses, and half a logarithm for each number in it.
+
+    Parameters
+    ----------
+    found : FunctionFit
+
+    Returns
+    -------
+    Formula
+    """
+    family = found.family
+    inverse = np.linalg.pinv(family.basis)
+    metric = np.linalg.inv(found.covariance)
+    root = np.linalg.cholesky(metric).T @ inverse
+    wanted = root @ found.values
+    whole = float(wanted @ wanted)
+    price = np.log(len(found.fit.residuals))
+    odd = family.place.shape is Shape.ODD
+    best: tuple[float, float, str, Array] | None = None
+    for terms, shapes in _candidates(found):
+        columns = [evaluate(term, family.place.argument.symbol, family.nodes) for term in terms]
+        design = np.stack(columns if odd else [np.ones_like(family.nodes), *columns], axis=1)
+        factors, *_ = np.linalg.lstsq(root @ design, wanted, rcond=None)
+        values = design @ factors
+        missed = wanted - root @ values
+        loss = float(missed @ missed)
+        cost = loss + price * (len(factors) + shapes)
+        if best is None or cost < best[0]:
+            names = terms if odd else ('1', *terms)
+            best = cost, loss, _written(factors, names), values
+    assert best is not None
+    _, loss, expression, values = best
+    limit = float(chi2.ppf(AS_GOOD, len(wanted)))
+    return Formula(expression, values, max(0.0, 1.0 - loss / max(whole, 1e-300)), loss <= limit)
+
+
+def _candidates(found: FunctionFit) -> Iterator[tuple[tuple[str, ...], int]]:
+    """Terms of each formula with its shape's numbers written in, and how many those are."""
+    family = found.family
+    extent = family.high - family.low
+    for form in _FORMS.get(family.place.shape, _ANY):
+        centres = _CENTRES if '{c}' in form else (0.0,)
+        widths = _WIDTHS if '{s}' in form else (1.0,)
+        for centre in centres:
+            for width in widths:
+                text = form.format(
+                    x=family.place.argument.symbol,
+                    c=f'{family.low + centre * extent:.4g}',
+                    s=f'{width * extent:.4g}',
+                    low=f'{family.low:.4g}',
+                )
+                terms = tuple(text.replace(' - ', '~').split(' '))
+                terms = tuple(term.replace('~', ' - ') for term in _joined(terms))
+                yield terms, int('{c}' in form) + int('{s}' in form)
+
+
+def _joined(parts: tuple[str, ...]) -> tuple[str, ...]:
+    """Terms whose parentheses close: a comma within one is followed by a space."""
+    terms: list[str] = []
+    for part in parts:
+        if terms and terms[-1].count('(') > terms[-1].count(')'):
+            terms[-1] += f' {part}'
+        else:
+            terms.append(part)
+    return tuple(terms)
+
+
+def _written(factors: Array, names: tuple[str, ...]) -> str:
+    parts = [
+        f'{factor:.5g}' if name == '1' else f'{factor:.5g}*{name}'
+        for factor, name in zip(factors, names, strict=True)
+    ]
+    return ' + '.join(parts).replace('+ -', '- ')
