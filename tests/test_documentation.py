@@ -15,6 +15,7 @@ from doc_pages import LANGUAGES, NOT_RUN, PAGES, ROOT, WORKSPACE, blocks, prose,
 from endoscope_bringup.commands import COMMANDS
 from endoscope_core.physics import JointParameters, SensorParameters
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_nodes import program
 from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.parameters import described
@@ -124,7 +125,7 @@ def test_reference_pages_have_everything(site: Path) -> None:
     assert _missing(site, 'topics', [entry.name for entry in (*TOPICS, *SERVICES)]) == []
     assert _missing(site, 'topics', [topic.content.replace('`', '') for topic in TOPICS]) == []
     assert _missing(site, 'parameters', _what_parameters_do()) == []
-    assert _missing(site, 'effects', CATALOGUE) == []
+    assert _missing(site, 'effects', (*CATALOGUE, *FUNCTIONS)) == []
     assert _missing(site, 'plant_file', keys) == []
     assert _missing(site, 'api_core', ('load_plant', 'simulate', 'PhysicalInverse')) == []
     assert _missing(site, 'api_bags', ('open_bag', 'BagWriter')) == []

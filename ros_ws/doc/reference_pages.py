@@ -16,6 +16,7 @@ from endoscope_bags.table_mapping import EXAMPLE
 from endoscope_bringup.cli import build_parser
 from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, SensorParameters
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.plant_file import REACH, plant_to_mapping
 from endoscope_nodes import program
 from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
@@ -249,6 +250,28 @@ class Effects(_Generated):
             )
 
 
+class Places(_Generated):
+    """The places for functions that the catalogue does not have."""
+
+    def lines(self) -> Iterator[str]:
+        """Yield a table of them."""
+        yield from _table(
+            ('place', 'stage', 'what it is', 'symbol', 'range', 'unit', 'within'),
+            [
+                (
+                    f'`{place.id}`',
+                    place.stage,
+                    place.physics if place.shape == 'any' else f'{place.physics} {place.shape}',
+                    f'`{place.argument.symbol}`',
+                    f'{_range(place.argument.low, place.argument.high)} {place.argument.unit}',
+                    place.unit,
+                    f'+-{_number(place.largest)}',
+                )
+                for place in FUNCTIONS.values()
+            ],
+        )
+
+
 class Modules(Directive):
     """The public names of a package, and of the modules of it that are named."""
 
@@ -288,6 +311,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         ('plant-keys', PlantKeys),
         ('mapping', Mapping),
         ('effects', Effects),
+        ('places', Places),
         ('modules', Modules),
     ):
         app.add_directive(f'endoscope-{name}', directive)

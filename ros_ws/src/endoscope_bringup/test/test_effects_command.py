@@ -5,14 +5,29 @@ import json
 from endoscope_bringup.cli import main
 from endoscope_core.physics import PlantDescription, load_plant
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.nominal_plant_file import MEANING
 from endoscope_core.physics.plant_file import REACH, plant_from_mapping
 
 
 def test_lists_every_effect(capsys):
     assert main(['effects']) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == list(CATALOGUE)
+    effects, heading, places = capsys.readouterr().out.partition('\nPlaces for an unknown_term')
+    assert [line.split()[0] for line in effects.splitlines()] == list(CATALOGUE)
+    assert heading
+    assert [line.split()[0] for line in places.splitlines()[1:]] == list(FUNCTIONS)
+
+
+def test_tells_of_a_place(capsys):
+    assert main(['effects', 'load_of_speed']) == 0
+    told = ' '.join(capsys.readouterr().out.split())
+    assert "f(w), odd, w = the joint's angular speed" in told
+    assert 'w -10 to 10 rad/s where no range is given' in told
+    assert 'f(w) within +-0.1 N m' in told
+    assert main(['effects', '--json', 'load_of_speed', 'gravity']) == 0
+    place, effect = json.loads(capsys.readouterr().out)
+    assert (place['shape'], place['symbol'], place['high']) == ('odd', 'w', 10.0)
+    assert effect['id'] == 'gravity'
 
 
 def test_tells_equation_source_and_parameters(capsys):

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from endoscope_core.compiled_cache import njit
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+Flags = NDArray[Any]
+"""Truth values of what is on; bytes where a plant has functions as well as effects."""
 
 _OPTIONS: dict[str, Any] = {'cache': True, 'error_model': 'numpy', 'nogil': True, '_nrt': False}
 compiled: Callable[[Callable[..., Any]], Callable[..., Any]] = njit(**_OPTIONS)

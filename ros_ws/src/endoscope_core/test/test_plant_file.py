@@ -10,10 +10,12 @@ from endoscope_core.physics import (
     PlantDescription,
     PlantFileError,
     SensorParameters,
+    TermSpec,
     load_plant,
     save_plant,
 )
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions.interpolation import NODES
 from endoscope_core.physics.plant_file import REACH
 
 
@@ -128,3 +130,80 @@ def test_every_parameter_has_a_reach_that_holds_its_nominal_value():
         low, high, _ = REACH[key]
         assert low <= value <= high
     assert set(REACH) == set(nominal)
+
+
+def test_unknown_terms_survive_the_round_trip(tmp_path):
+    plant = PlantDescription(
+        effects=(EffectSpec('joint_backlash', 'bend_x', {'gap_rad': 0.1}),),
+        terms=(
+            TermSpec('bend_y', 'exponent_of_speed', '0.3*exp(-v / 1e-3)  ', range=(0.0, 0.01)),
+            TermSpec('bend_y', 'load_of_angle', '1e-3*sin(q)'),
+            TermSpec('bend_x', 'load_of_angle', values=tuple(1e-5 * k for k in range(NODES))),
+        ),
+    )
+    save_plant(plant, tmp_path / 'plant.yaml')
+    assert load_plant(tmp_path / 'plant.yaml') == plant
+
+
+def entry(more):
+    return f'effects: [{{id: unknown_term, joint: bend_x, {more}}}]'
+
+
+@pytest.mark.parametrize(
+    ('more', 'message'),
+    [
+        ('place: load_of_angle, expression: q', 'has no stage'),
+        ('stage: joynt, place: load_of_angle', 'unknown stage joynt: did you mean joint?'),
+        ('stage: joint, expression: q', 'has no place: valid are end_way_of_angle'),
+        ('stage: joint, place: load_of_angel', 'did you mean load_of_angle?'),
+        ('stage: joint, place: pulley_of_shaft', 'a place of the stage actuator, not joint'),
+        ('stage: joint, place: load_of_angle, law: q', 'unknown key law in effects[0]'),
+        ('stage: joint, place: load_of_angle', 'give either an expression or values'),
+        ('stage: joint, place: load_of_angle, values: [1, 2]', '2 values: give 41'),
+        ('stage: joint, place: load_of_angle, values: [a]', "values[0] is 'a': give a number"),
+        ('stage: joint, place: load_of_angle, expression: q, range: [1, 1]', 'the lower first'),
+        ('stage: joint, place: load_of_angle, expression: q, range: 3', 'give [lowest, highest]'),
+        ('stage: joint, place: load_of_angle, expression: q, range: [-1, .inf]', 'two finite'),
+        ('stage: joint, place: load_of_angle, expression: 0.01*t', 'unknown name t: valid are q'),
+        ('stage: joint, place: load_of_angle, expression: 0.01*tnh(q)', 'did you mean tanh?'),
+        ('stage: joint, place: load_of_angle, expression: 0.01/q', 'no finite value at q = 0:'),
+        ('stage: joint, place: load_of_angle, expression: log(q)', 'no finite value at q = -2'),
+        ('stage: joint, place: load_of_angle, expression: 9**9**9', 'no finite value'),
+        ('stage: joint, place: load_of_angle, expression: "q +"', "'q +' is no formula"),
+        ('stage: joint, place: load_of_angle, expression: "q if q else 1"', 'is none of numbers'),
+        ('stage: joint, place: load_of_angle, expression: q.real', "'q.real' is none of"),
+        ('stage: joint, place: load_of_angle, expression: "exp(q, q)"', 'exp takes one argument'),
+        ('stage: joint, place: load_of_angle, expression: max(q)', 'two arguments or more'),
+        (f'stage: joint, place: load_of_angle, expression: {"-" * 60}q', 'write it shorter'),
+        (f'stage: joint, place: load_of_angle, expression: q{"+q" * 400}', 'give 400 at most'),
+        (
+            'stage: joint, place: load_of_angle, expression: q',
+            'reaches -2 N m: it must stay',
+        ),
+        ('stage: joint, place: load_of_angle, expression: 0.01*sin(300*q)', 'too fine for 41'),
+        ('stage: joint, place: load_of_speed, expression: 1e-5*w**2', 'is not odd: the place'),
+        ('stage: joint, place: load_of_speed_size, expression: 1e-5*w', 'is not even'),
+        ('stage: joint, place: load_periodic, expression: 1e-3*t', 'the range is the period'),
+        (
+            'stage: joint, place: load_of_speed, expression: 0, range: [0, 1]',
+            'give as much on both sides of zero',
+        ),
+        (
+            'stage: transmission, place: film_drag_of_speed, expression: -1000*v',
+            'it must not be negative',
+        ),
+    ],
+)
+def test_a_wrong_unknown_term_is_named_in_one_line(tmp_path, more, message):
+    with pytest.raises(PlantFileError) as caught:
+        load_plant(written(tmp_path, entry(more)))
+    assert message in str(caught.value)
+    assert '\n' not in str(caught.value)
+
+
+def test_a_place_has_one_function_and_a_joint_that_there_is(tmp_path):
+    term = '{id: unknown_term, joint: bend_x, stage: joint, place: load_of_angle, expression: 0}'
+    with pytest.raises(PlantFileError, match='given twice on joint bend_x'):
+        load_plant(written(tmp_path, f'effects: [{term}, {term}]'))
+    with pytest.raises(PlantFileError, match='unknown_term at load_of_angle is on joint bend_z'):
+        load_plant(written(tmp_path, f'effects: [{term.replace("bend_x", "bend_z")}]'))

@@ -27,7 +27,6 @@ from endoscope_explain.locate.locating import (
 from endoscope_explain.next_experiment.proposal import propose
 from endoscope_explain.recording import (
     Recording,
-    plant_of_joints,
     recording_from_bag,
     with_unrecorded,
 )
@@ -107,7 +106,7 @@ class Inputs:
     @property
     def plant(self) -> PlantDescription:
         """Return the plant as described, with the recorded joints only."""
-        return plant_of_joints(self.described, self.audit.recording.joints)
+        return self.described.of_joints(self.audit.recording.joints)
 
 
 class JointsDifferError(BagError):
@@ -135,7 +134,7 @@ def read_inputs(sources: Sources) -> Inputs:
         return recording_from_bag(path, plant, without=sources.without, namespace=sources.namespace)
 
     raw = read(sources.bag, sources.plant)
-    plant = plant_of_joints(sources.plant, raw.joints)
+    plant = sources.plant.of_joints(raw.joints)
 
     def second(path: Path | None) -> Recording | None:
         if path is None:

@@ -9,6 +9,7 @@ from endoscope_bringup.subcommands import add_json_option, print_json
 
 if TYPE_CHECKING:
     from endoscope_core.physics.effect import Effect, Parameter
+    from endoscope_core.physics.functions.place import Place
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -16,9 +17,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'effects',
         help='list the physics that a plant.yaml can add to the nominal plant',
-        description='Lists the catalogue, or tells equation, source and parameters of an effect.',
+        description='Lists the catalogue and the places for functions that it does not have, or '
+        'tells equation, source and parameters of an effect.',
     )
-    parser.add_argument('ids', nargs='*', metavar='ID', help='effects to tell all about')
+    parser.add_argument('ids', nargs='*', metavar='ID', help='effects and places to tell all about')
     parser.add_argument(
         '--plant',
         action='store_true',
@@ -31,23 +33,37 @@ def run(args: argparse.Namespace) -> int:
     """Print the catalogue, or the effects asked for; return 0."""
     from endoscope_core.errors import EndoscopeError
     from endoscope_core.physics.effects import CATALOGUE, UnknownEffectError, describe
+    from endoscope_core.physics.functions import FUNCTIONS
 
     if args.plant:
         if args.ids:
             raise EndoscopeError('--plant prints the nominal plant: it takes no effects')
         return _print_plant(args.json)
     try:
-        chosen = [describe(effect_id) for effect_id in args.ids]
+        chosen = [FUNCTIONS.get(each) or describe(each) for each in args.ids]
     except UnknownEffectError as error:
         raise EndoscopeError(str(error)) from error
     if args.json:
-        print_json([_as_json(each) for each in chosen or CATALOGUE.values()])
+        print_json(
+            [
+                _place_as_json(FUNCTIONS[each.id]) if each.id in FUNCTIONS else _as_json(each)
+                for each in chosen or CATALOGUE.values()
+            ]
+        )
         return 0
     if chosen:
-        print('\n\n'.join(_told(definition) for definition in chosen))
+        told = [
+            _told_of_place(FUNCTIONS[each.id]) if each.id in FUNCTIONS else _told(each)
+            for each in chosen
+        ]
+        print('\n\n'.join(told))
         return 0
     for definition in CATALOGUE.values():
         print(f'{definition.id:22} {definition.stage:13} {definition.physics}')
+    print('\nPlaces for an unknown_term, a formula or values of one state:')
+    for place in FUNCTIONS.values():
+        argument = place.argument
+        print(f'{place.id:27} {place.stage:13} {place.physics[:-1]} ({argument.symbol}).')
     return 0
 
 
@@ -61,6 +77,17 @@ def _print_plant(as_json: bool) -> int:
     else:
         print(nominal_plant_text(), end='')
     return 0
+
+
+def _place_as_json(place: 'Place') -> dict[str, object]:
+    argument = place.argument
+    return {
+        **{key: getattr(place, key) for key in ('id', 'stage', 'physics', 'equation', 'unit')},
+        **{key: getattr(place, key) for key in ('largest', 'shape', 'source')},
+        **{key: getattr(argument, key) for key in ('symbol', 'low', 'high')},
+        'argument': argument.words,
+        'argument_unit': argument.unit,
+    }
 
 
 def _as_json(definition: 'Effect') -> dict[str, object]:
@@ -78,10 +105,27 @@ def _as_json(definition: 'Effect') -> dict[str, object]:
 
 
 def _told(definition: 'Effect') -> str:
+    return '\n'.join([*_heading(definition), *(_parameter(p) for p in definition.parameters)])
+
+
+def _heading(definition: 'Effect') -> list[str]:
     lines = [f'{definition.id} ({definition.stage})']
     for text in (definition.physics, definition.equation, definition.source):
         lines += textwrap.wrap(text, 96, initial_indent='  ', subsequent_indent='    ')
-    return '\n'.join([*lines, *(_parameter(p) for p in definition.parameters)])
+    return lines
+
+
+def _told_of_place(place: 'Place') -> str:
+    argument, unit = place.argument, '' if place.unit == '-' else f' {place.unit}'
+    f = f'f({argument.symbol})'
+    reach = f'{argument.low:g} to {argument.high:g} {argument.unit}'
+    return '\n'.join(
+        [
+            *_heading(place),
+            f'  {argument.symbol:18} {reach} where no range is given',
+            f'  {f:18} within +-{place.largest:g}{unit}',
+        ]
+    )
 
 
 def _parameter(parameter: 'Parameter') -> str:

@@ -1,9 +1,13 @@
 """`endoscope simulate`: the plant's answer to the commands of a bag."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from endoscope_bringup.seed_argument import seed
+
+WORTH_SAYING = 0.02
+"""What a table may be off from its formula without a word, as a share of what that spans."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -43,9 +47,18 @@ def run(args: argparse.Namespace) -> int:
     """Simulate and write; return 0."""
     from endoscope_bags import open_bag
     from endoscope_core.physics import load_plant
+    from endoscope_core.physics.functions.term import tabulated
     from endoscope_explain.simulation.answer_bag import write_answer
 
     plant = load_plant(args.plant)
+    for term in plant.terms:
+        lost = tabulated(term).largest_error
+        if lost > WORTH_SAYING:
+            print(
+                f'unknown_term at {term.place} on {term.joint}: the table of its formula is off by '
+                f'up to {100.0 * lost:.0f} % of what it spans; a narrower range is finer',
+                file=sys.stderr,
+            )
     count = write_answer(plant, open_bag(args.commands), args.out, args.noise)
     print(f'{args.out}: {count} messages')
     return 0

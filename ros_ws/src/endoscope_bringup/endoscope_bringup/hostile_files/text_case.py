@@ -19,6 +19,7 @@ from endoscope_core.physics import (
     EffectSpec,
     JointParameters,
     PlantDescription,
+    TermSpec,
     load_plant,
     save_plant,
 )
@@ -94,7 +95,9 @@ class PlantCase:
         self._path = folder / 'plant.yaml'
         gravity = EffectSpec('gravity', 'bend_x', {'moment_nm': 0.01})
         joint = JointParameters(friction_profile=(0.3, -0.1))
-        save_plant(PlantDescription({'bend_x': joint}, effects=(gravity,)), self._path)
+        term = TermSpec('bend_x', 'load_of_angle', '0.01*tanh(q/0.5)', range=(-1.5, 1.5))
+        plant = PlantDescription({'bend_x': joint}, effects=(gravity,), terms=(term,))
+        save_plant(plant, self._path)
         self._text = self._path.read_text()
 
     def spoil(self, rng: Generator) -> None:

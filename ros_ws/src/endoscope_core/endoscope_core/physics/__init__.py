@@ -5,6 +5,7 @@ from endoscope_core.physics.description import (
     JointParameters,
     PlantDescription,
     SensorParameters,
+    TermSpec,
 )
 from endoscope_core.physics.plant_file import PlantFileError, load_plant, save_plant
 from endoscope_core.physics.recording import recording_faults
@@ -28,6 +29,7 @@ __all__ = [
     'RecordingFaults',
     'SensorModel',
     'SensorParameters',
+    'TermSpec',
     'load_plant',
     'recording_faults',
     'save_plant',

@@ -7,7 +7,7 @@ friction (Aerospace Corp. TOR-0158(3107-18)-1, 1968).
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from endoscope_core.physics.layout import PROFILE_TERMS
@@ -133,6 +133,32 @@ class EffectSpec:
     parameters: Mapping[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class TermSpec:
+    """A function of one state added to the nominal plant where the catalogue has no effect.
+
+    Attributes
+    ----------
+    joint : str
+        The joint it acts on.
+    place : str
+        Name in the table of places.
+    expression : str
+        Formula of the place's symbol, or nothing.
+    values : tuple of float
+        Instead of a formula: the function at equally spaced nodes over the range.
+    range : (float, float), optional
+        Of the argument; beyond it the function keeps its last value, or begins again. That of the
+        place if not given.
+    """
+
+    joint: str
+    place: str
+    expression: str = ''
+    values: tuple[float, ...] = ()
+    range: tuple[float, float] | None = None
+
+
 def nominal_joints() -> dict[str, JointParameters]:
     """Both joints of the nominal rig."""
     return {'bend_x': JointParameters(), 'bend_y': JointParameters()}
@@ -140,11 +166,25 @@ def nominal_joints() -> dict[str, JointParameters]:
 
 @dataclass(frozen=True)
 class PlantDescription:
-    """A whole rig: its joints in order, its sensors, and the physics added to the nominal plant."""
+    """A whole rig: its joints in order, its sensors, and the physics added to the nominal plant.
+
+    `effects` are of the catalogue, `terms` are functions where it has none.
+    """
 
     joints: Mapping[str, JointParameters] = field(default_factory=nominal_joints)
     sensors: SensorParameters = field(default_factory=SensorParameters)
     effects: tuple[EffectSpec, ...] = ()
+    terms: tuple[TermSpec, ...] = ()
+
+    def of_joints(self, names: Iterable[str]) -> 'PlantDescription':
+        """The plant with those of its joints only, in their order, and what was added to them."""
+        joints = {name: self.joints[name] for name in names}
+        return dataclasses.replace(
+            self,
+            joints=joints,
+            effects=tuple(spec for spec in self.effects if spec.joint in joints),
+            terms=tuple(term for term in self.terms if term.joint in joints),
+        )
 
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, in the order of every array of the simulator."""

@@ -120,7 +120,7 @@ class Traits:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect of the catalogue, which it enters as it is made.
+    """An effect of the catalogue, which it enters as it is made; a subclass has its own mapping.
 
     Attributes
     ----------
@@ -171,8 +171,12 @@ class Effect:
 _DEFINED: dict[str, Effect] = {}
 
 
-def in_order_of_chain() -> dict[str, Effect]:
-    """All effects defined so far by their ids, in the order of the chain."""
+def in_order_of_chain[Kind: Effect](kind: type[Kind]) -> dict[str, Kind]:
+    """All effects of exactly that class defined so far by their ids, in the order of the chain.
+
+    Those of one stage and order come as they were defined.
+    """
     stages = list(Stage)
-    ordered = sorted(_DEFINED.values(), key=lambda e: (stages.index(e.stage), e.order, e.id))
+    found = [effect for effect in _DEFINED.values() if type(effect) is kind]
+    ordered = sorted(found, key=lambda effect: (stages.index(effect.stage), effect.order))
     return {effect.id: effect for effect in ordered}

@@ -2,7 +2,8 @@
 
 Numba inlines functions that are called by their names, and compiles them once for all; functions in
 a tuple, or closures over them, cost up to twice the time and a compilation in every process. So the
-calls are written out as source, by the catalogue, into the folder that holds the compiled cache.
+calls are written out as source, by the catalogue and the table of places, into the folder that
+holds the compiled cache. The functions of all places are the same few compiled ones.
 """
 
 import importlib.util
@@ -11,17 +12,21 @@ from types import ModuleType
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.compiled_cache import SOURCES, cache_folder
-from endoscope_core.physics import effects
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_core.physics.functions.summation import MOST, ROWS
 from endoscope_core.physics.hooks import HOOKS, LINKS, Fold, Function, Hook
 
 _NAME = 'endoscope_folds'
+_SUM = 'endoscope_core.physics.functions.summation import sum_of_functions'
 
 
 def source() -> str:
     """Source of a module with one compiled function for each hook."""
     imports = ['import math', '', 'from endoscope_core.compiled import compiled']
+    imports.append(f'from {_SUM}')
     functions = []
-    order = {effect_id: i for i, effect_id in enumerate(effects.CATALOGUE)}
+    order = {effect_id: i for i, effect_id in enumerate((*CATALOGUE, *FUNCTIONS))}
     for hook in HOOKS:
         links = sorted(LINKS[hook.name], key=lambda link: order[link[0].id])
         names = []
@@ -30,6 +35,8 @@ def source() -> str:
             imports.append(f'from {function.__module__} import {function.__name__} as {name}')
             names.append((effect.flag, name))
         functions.append(_function(hook, names))
+        if any(places[0].hook is hook for _, places in ROWS):
+            functions.append(_functions(hook))
     return '\n'.join(imports) + '\n' + ''.join(functions)
 
 
@@ -65,6 +72,27 @@ def _function(hook: Hook, links: list[tuple[int, str]]) -> str:
     return '\n'.join(lines) + '\n'
 
 
+def _functions(hook: Hook) -> str:
+    """Source of a function that adds up those of a hook's places."""
+    lines = [f'\n\n@compiled\ndef {hook.name}_functions(on, {hook.arguments}):']
+    lines.append('    r0, r1 = 0.0, 0.0')
+    for number, places in ROWS:
+        if places[0].hook is not hook:
+            continue
+        arguments = [place.at for place in places] + ['0.0'] * (MOST - len(places))
+        given = f'on, p, {float(number)}, {float(len(places))}, {", ".join(arguments)}'
+        indent = '    '
+        if places[0].only:
+            lines.append(f'    if {places[0].only}:')
+            indent = '        '
+        lines.append(f'{indent}value, slope = sum_of_functions({given})')
+        lines.append(f'{indent}r0 += {places[0].sign or "1.0"} * value')
+        if places[0].by_step:
+            lines.append(f'{indent}r1 -= {places[0].by_step} * slope')
+    given = 'math.exp(r0)' if hook.fold is Fold.FACTORS else 'r0'
+    return '\n'.join([*lines, f'    return {given}' + (', r1' if hook.results == 2 else '')]) + '\n'
+
+
 def _module() -> ModuleType:
     path = cache_folder(SOURCES) / f'{_NAME}.py'
     text = source()
@@ -92,4 +120,14 @@ def folded(hook: Hook) -> Function:
 def acting(hook: Hook) -> Function:
     """Compiled function of the flags that tells whether any link of a hook is on."""
     function: Function = getattr(_MODULE, f'{hook.name}_acts')
+    return function
+
+
+def sum_of(hook: Hook) -> Function:
+    """Compiled function of what the functions at a hook's places give, with a fold's arguments.
+
+    It belongs behind `functions_act`. Of factors it is one, to be multiplied; else it is to be
+    added.
+    """
+    function: Function = getattr(_MODULE, f'{hook.name}_functions')
     return function

@@ -75,6 +75,8 @@ STIFFNESS = Hook('stiffness', Fold.FACTORS, 'p, x, tension')
 """Factor on a wire's tangent stiffness at a mean tension in N."""
 LENGTH = Hook('length', Fold.TERMS, 'p, x, wire, time')
 """What has been added to the length of wire 0 or 1 along the sheath, m."""
+JOINT_FRICTION = Hook('joint_friction', Fold.FACTORS, 'p, x')
+"""Factor on the joint's friction in the tick that begins."""
 END_LENGTH = Hook('end_length', Fold.TERMS, 'p, x, other')
 """What the other joint's angle in rad adds to the way of the positive wire at the joint, m; the
 negative one's is the opposite."""
@@ -103,6 +105,7 @@ HOOKS = (
     FILM_DRAG,
     STIFFNESS,
     LENGTH,
+    JOINT_FRICTION,
     END_LENGTH,
     LOAD,
     TIP_ANGLE,

@@ -8,7 +8,8 @@ import math
 
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics import hooks
-from endoscope_core.physics.folds import acting, folded
+from endoscope_core.physics.folds import acting, folded, sum_of
+from endoscope_core.physics.functions.acting import functions_act
 from endoscope_core.physics.layout import (
     ELEMENTS,
     END_WAY,
@@ -35,6 +36,11 @@ load = folded(hooks.LOAD)
 film_drag = folded(hooks.FILM_DRAG)
 end_length = folded(hooks.END_LENGTH)
 stiffness_factor, stiffness_varies = folded(hooks.STIFFNESS), acting(hooks.STIFFNESS)
+load_functions = sum_of(hooks.LOAD)
+film_functions = sum_of(hooks.FILM_DRAG)
+end_functions = sum_of(hooks.END_LENGTH)
+stiffness_functions = sum_of(hooks.STIFFNESS)
+friction_functions = sum_of(hooks.JOINT_FRICTION)
 
 _TRIES = 100
 _PRECISION = 1e-11
@@ -52,11 +58,26 @@ def stiffness_on_the_way(
     tension would leak away with every cycle.
     """
     stiffness = p[WIRE_STIFFNESS]
+    if functions_act(on):
+        return _stiffness_of_functions(x, wire, table, p, on, way)
     if not stiffness_varies(on):
         return stiffness
     tension = mean_tension(x, wire, table) - x[FLOOR]
     middle = tension + 0.5 * way * stiffness * stiffness_factor(on, p, x, tension)
     return stiffness * stiffness_factor(on, p, x, max(0.0, middle))
+
+
+@compiled
+def _stiffness_of_functions(
+    x: Array, wire: int, table: Array, p: Array, on: Flags, way: float
+) -> float:
+    stiffness = p[WIRE_STIFFNESS]
+    middle = tension = mean_tension(x, wire, table) - x[FLOOR]
+    factor = 1.0
+    for _ in range(2):
+        factor = stiffness_factor(on, p, x, middle) * stiffness_functions(on, p, x, middle)
+        middle = max(0.0, tension + 0.5 * way * stiffness * factor)
+    return stiffness * factor
 
 
 @compiled
@@ -74,17 +95,17 @@ def _presliding(p: Array, element: int) -> float:
 
 
 @compiled
-def _friction(x: Array, p: Array, step: float) -> tuple[float, float]:
-    """Friction in N m against a step of the joint, and its slope."""
+def _friction(x: Array, p: Array, most: float, step: float) -> tuple[float, float]:
+    """Friction in N m against a step of the joint, of `most` N m at most, and its slope."""
     if p[JOINT_PRESLIDING_SPREAD] == 0.0:
         slide, slope = _slide(x[JOINT_SLIDE], step, p[JOINT_PRESLIDING])
-        return p[JOINT_FRICTION] * slide, p[JOINT_FRICTION] * slope
+        return most * slide, most * slope
     total, steep = 0.0, 0.0
     for i in range(ELEMENTS):
         slide, slope = _slide(x[JOINT_SLIDE + i], step, _presliding(p, i))
         total += slide
         steep += slope
-    return p[JOINT_FRICTION] * total / ELEMENTS, p[JOINT_FRICTION] * steep / ELEMENTS
+    return most * total / ELEMENTS, most * steep / ELEMENTS
 
 
 @compiled
@@ -97,6 +118,7 @@ def _imbalance(
     stiff_a: float,
     stiff_b: float,
     film: float,
+    most: float,
     way: float,
     other: float,
     push: float,
@@ -109,7 +131,11 @@ def _imbalance(
     ta, sa, _, _, _, _ = moved(x, WIRE_A, table, JOINT_END, -stiff_a * r * step, x[FLOOR])
     tb, sb, _, _, _, _ = moved(x, WIRE_B, table, JOINT_END, stiff_b * r * step, x[FLOOR])
     moment, slope = load(on, p, x, angle, step, other, time, tick)
-    friction, steep = _friction(x, p, step)
+    if functions_act(on):
+        added, steep = load_functions(on, p, x, angle, step, other, time, tick)
+        moment += added
+        slope += steep
+    friction, steep = _friction(x, p, most, step)
     damping = (p[JOINT_DAMPING] + 0.5 * r * r * film) / tick
     moment += push + r * (ta - tb) - 0.5 * r * film * way / tick
     moment -= p[JOINT_STIFFNESS] * (angle - p[JOINT_REST_ANGLE]) + friction + damping * step
@@ -126,6 +152,7 @@ def _step(
     stiff_a: float,
     stiff_b: float,
     film: float,
+    most: float,
     way: float,
     other: float,
     push: float,
@@ -138,7 +165,7 @@ def _step(
     and pre-sliding soften it: from the last step Newton's method comes to the root from one side.
     """
     missing, slope = _imbalance(
-        x, table, p, on, 0.0, stiff_a, stiff_b, film, way, other, push, time, tick
+        x, table, p, on, 0.0, stiff_a, stiff_b, film, most, way, other, push, time, tick
     )
     if missing == 0.0:
         return 0.0
@@ -147,7 +174,7 @@ def _step(
     step = x[JOINT_STEP] if x[JOINT_STEP] * side > 0.0 else side * _FIRST_STEP
     for _ in range(_TRIES):
         missing, slope = _imbalance(
-            x, table, p, on, step, stiff_a, stiff_b, film, way, other, push, time, tick
+            x, table, p, on, step, stiff_a, stiff_b, film, most, way, other, push, time, tick
         )
         if missing * side <= 0.0:
             near = abs(step)
@@ -196,12 +223,18 @@ def bend(
     stiff_a = stiffness_on_the_way(x, WIRE_A, table, p, on, -ahead)
     stiff_b = stiffness_on_the_way(x, WIRE_B, table, p, on, ahead)
     shift = end_length(on, p, x, other)
+    if functions_act(on):
+        shift += end_functions(on, p, x, other)
     if shift != x[END_WAY]:
         move(x, WIRE_A, table, JOINT_END, stiff_a * (shift - x[END_WAY]), x[FLOOR])
         move(x, WIRE_B, table, JOINT_END, stiff_b * (x[END_WAY] - shift), x[FLOOR])
         x[END_WAY] = shift
     film = film_drag(on, p, x, abs(x[SLIDING_SPEED]))
-    step = _step(x, table, p, on, stiff_a, stiff_b, film, way, other, push, time, tick)
+    most = p[JOINT_FRICTION]
+    if functions_act(on):
+        film += film_functions(on, p, x, abs(x[SLIDING_SPEED]))
+        most *= friction_functions(on, p, x)
+    step = _step(x, table, p, on, stiff_a, stiff_b, film, most, way, other, push, time, tick)
     r = p[JOINT_RADIUS]
     if step != 0.0:
         move(x, WIRE_A, table, JOINT_END, -stiff_a * r * step, x[FLOOR])

@@ -9,7 +9,8 @@ import numpy as np
 
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics import hooks
-from endoscope_core.physics.folds import acting, folded
+from endoscope_core.physics.folds import acting, folded, sum_of
+from endoscope_core.physics.functions.acting import functions_act
 from endoscope_core.physics.joint import bend, stiffness_on_the_way
 from endoscope_core.physics.layout import (
     ANGLE_HISTORY,
@@ -31,10 +32,13 @@ from endoscope_core.physics.layout import (
     IN_PUSH_STRETCH,
     JOINT,
     JOINT_STEP,
+    MEAN_TENSION,
     MOTOR,
     MOTOR_BANDWIDTH,
     MOTOR_DAMPING_RATIO,
     MOTOR_SPEED,
+    NOW,
+    OTHER,
     OUT_BENDING,
     OUT_EFFORT,
     OUT_JOINT,
@@ -42,6 +46,7 @@ from endoscope_core.physics.layout import (
     OUT_MOTOR_SPEED,
     OUT_TENSION_A,
     OUT_TENSION_B,
+    PATH,
     PLACES,
     PRETENSION,
     PRETENSION_PROFILE,
@@ -52,6 +57,7 @@ from endoscope_core.physics.layout import (
     RISING_FACTOR,
     SLIDING_SPEED,
     SLOTS,
+    TENSION_DIFFERENCE,
     TICKS,
     TIP,
     TRANSITION,
@@ -93,6 +99,15 @@ effort_reading = folded(hooks.EFFORT)
 tracker_reading = folded(hooks.TRACKER)
 load_cell_reading = folded(hooks.LOAD_CELL)
 advance, something_follows = folded(hooks.ADVANCE), acting(hooks.ADVANCE)
+command_functions = sum_of(hooks.COMMAND)
+error_functions = sum_of(hooks.SERVO_ERROR)
+pulley_functions = sum_of(hooks.PULLEY_ANGLE)
+travel_functions = sum_of(hooks.TRAVEL_OF)
+exponent_functions = sum_of(hooks.EXPONENT)
+length_functions = sum_of(hooks.LENGTH)
+effort_functions = sum_of(hooks.EFFORT)
+tracker_functions = sum_of(hooks.TRACKER)
+load_cell_functions = sum_of(hooks.LOAD_CELL)
 
 _SHAFT_ANGLES = np.array(SLOTS.shaft_angles)
 _STEPS_TO_START = 64
@@ -127,7 +142,12 @@ def settle(
     history[COMMAND_HISTORY, :] = shaft
     _lay_out(sheath, p)
     x[FLOOR] = friction_floor(on, p, x)
-    _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, -0.5 * tick, tick))
+    # Friction that depends on the tension has to be known before the tension is.
+    x[MEAN_TENSION] = p[PRETENSION]
+    factor = exponent_factor(on, p, x, 0.0, -0.5 * tick, tick)
+    if functions_act(on):
+        factor *= exponent_functions(on, p, x, 0.0, -0.5 * tick, tick)
+    _shape(x, sheath, p, on, factor)
     table = sheath[:TABLE_ROWS]
     for wire in (WIRE_A, WIRE_B):
         for i in range(CELLS + 1):
@@ -135,18 +155,30 @@ def settle(
             x[wire + NODES + i] = start + x[FLOOR]
         relax(x, wire, table, sheath[WORK : WORK + 3])
     x[REST_TENSION] = mean_tension(x, WIRE_A, table) - x[FLOOR]
-    if length_varies(on):
-        _grow(x, table, p, on, 0.0, 0.0)
     steps = _STEPS_TO_START if shaft != 0.0 else 1
     for k in range(1, steps + 1):
+        if length_varies(on) or functions_act(on):
+            _grow(x, table, p, on, 0.0, 0.0)
         x[MOTOR] = shaft * k / steps
         _wind_up(x, table, p, on, x[MOTOR])
         bend(x, table, p, on, 0.0, 0.0, 0.0, -0.5 * _SETTLING_TICK, _SETTLING_TICK)
+        if functions_act(on):
+            _keep_up(x, table, 0.0)
     for wire in range(2):
         x[FILM + wire] = 0.0
     x[SLIDING_SPEED] = x[JOINT_STEP] = 0.0
     x[TIP] = x[JOINT]
     history[ANGLE_HISTORY, :] = x[TIP]
+
+
+@compiled
+def _keep_up(x: Array, table: Array, tick: float) -> None:
+    """Let the states follow that only functions depend on."""
+    load_a = mean_tension(x, WIRE_A, table) - x[FLOOR]
+    load_b = mean_tension(x, WIRE_B, table) - x[FLOOR]
+    x[MEAN_TENSION] = 0.5 * (load_a + load_b)
+    x[TENSION_DIFFERENCE] = load_a - load_b
+    x[PATH] += abs(x[SLIDING_SPEED]) * tick
 
 
 @compiled
@@ -193,6 +225,8 @@ def _change_friction(
     """Go over to the friction of this tick; where it holds less than before, the wires slip."""
     falling, _ = direction_factors(on, p, x)
     factor = exponent_factor(on, p, x, speed, time, tick)
+    if functions_act(on):
+        factor *= exponent_functions(on, p, x, speed, time, tick)
     before = x[FALLING_FACTOR] / falling
     if abs(factor - before) <= _SAME_FACTOR * before:
         return
@@ -217,6 +251,8 @@ def _grow(x: Array, table: Array, p: Array, on: Flags, push: float, time: float)
     for k in range(2):
         wire = WIRE_A if k == 0 else WIRE_B
         length = added_length(on, p, x, k, time) + (push if k == 0 else -push)
+        if functions_act(on):
+            length += length_functions(on, p, x, k, time)
         grown = length - x[EXTRA_LENGTH + k]
         if grown != 0.0:
             force = stiffness_on_the_way(x, wire, table, p, on, -grown) * grown
@@ -231,10 +267,21 @@ def _travels(x: Array, p: Array, on: Flags, pulley: float) -> tuple[float, float
 
 
 @compiled
+def _travels_with_functions(x: Array, p: Array, on: Flags) -> tuple[float, float]:
+    x[PULLEY] += pulley_functions(on, p, x, x[PULLEY])
+    travel_a, travel_b = _travels(x, p, on, x[PULLEY])
+    added_a = travel_functions(on, p, x, travel_a, 0)
+    return travel_a + added_a, travel_b + travel_functions(on, p, x, travel_b, 1)
+
+
+@compiled
 def _wind_up(x: Array, table: Array, p: Array, on: Flags, shaft: float) -> float:
     """Turn the shaft to an angle; returns by how much the positive wire has moved, m."""
     x[PULLEY] = pulley_angle(on, p, x, shaft)
-    travel_a, travel_b = _travels(x, p, on, x[PULLEY])
+    if functions_act(on):
+        travel_a, travel_b = _travels_with_functions(x, p, on)
+    else:
+        travel_a, travel_b = _travels(x, p, on, x[PULLEY])
     for k in range(2):
         wire = WIRE_A if k == 0 else WIRE_B
         travel = travel_a if k == 0 else travel_b
@@ -319,13 +366,18 @@ def advance_tick(
     table = sheath[:TABLE_ROWS]
     time = (x[TICKS] + 0.5) * tick
     other = inputs[IN_OTHER_JOINT]
+    x[NOW], x[OTHER] = time, other
     history[COMMAND_HISTORY, int(x[TICKS]) % HISTORY] = inputs[IN_COMMAND]
 
     if math.isnan(inputs[IN_MOTOR]):
         command = command_at_servo(on, p, x, inputs[IN_COMMAND], history, tick)
+        if functions_act(on):
+            command += command_functions(on, p, x, command, history, tick)
         command += inputs[IN_PUSH_COMMAND]
         from_error, kept = x[TRANSITION + 2], x[TRANSITION + 3]
         error = servo_error(on, p, x, x[MOTOR] - command, from_error, kept)
+        if functions_act(on):
+            error += error_functions(on, p, x, error, from_error, kept)
         target = x[MOTOR] - error
         speed = from_error * error + kept * x[MOTOR_SPEED]
         shaft = target + x[TRANSITION] * error + x[TRANSITION + 1] * x[MOTOR_SPEED]
@@ -338,10 +390,11 @@ def advance_tick(
         speed = (shaft - x[MOTOR]) / tick
     x[MOTOR], x[MOTOR_SPEED] = shaft, speed
 
-    if exponent_varies(on):
+    if exponent_varies(on) or functions_act(on):
         _change_friction(x, sheath, p, on, abs(x[WINDING_SPEED]), time, tick)
-    if length_varies(on) or inputs[IN_PUSH_STRETCH] != x[EXTRA_LENGTH]:
-        _grow(x, table, p, on, inputs[IN_PUSH_STRETCH], time)
+    push = inputs[IN_PUSH_STRETCH]
+    if length_varies(on) or functions_act(on) or push != x[EXTRA_LENGTH]:
+        _grow(x, table, p, on, push, time)
     way = _wind_up(x, table, p, on, shaft)
     x[WINDING_SPEED] = way / tick
     bend(x, table, p, on, way, other, inputs[IN_PUSH_MOMENT], time, tick)
@@ -351,6 +404,8 @@ def advance_tick(
         load_a = mean_tension(x, WIRE_A, table) - x[FLOOR]
         load_b = mean_tension(x, WIRE_B, table) - x[FLOOR]
         advance(on, p, x, load_a, load_b, time, tick)
+    if functions_act(on):
+        _keep_up(x, table, tick)
 
 
 @compiled
@@ -378,6 +433,12 @@ def read_sensors(
     out[OUT_TENSION_A] = load_cell_reading(on, p, x, ta, 0, tb, time)
     out[OUT_TENSION_B] = load_cell_reading(on, p, x, tb, 1, ta, time)
     out[OUT_BENDING] = tracker_reading(on, p, x, x[TIP], history, time, tick)
+    if functions_act(on):
+        a, b, angle = out[OUT_TENSION_A], out[OUT_TENSION_B], out[OUT_BENDING]
+        out[OUT_EFFORT] += effort_functions(on, p, x, out[OUT_EFFORT], x[MOTOR_SPEED])
+        out[OUT_TENSION_A] += load_cell_functions(on, p, x, a, 0, tb, time)
+        out[OUT_TENSION_B] += load_cell_functions(on, p, x, b, 1, ta, time)
+        out[OUT_BENDING] += tracker_functions(on, p, x, angle, history, time, tick)
     out[OUT_JOINT] = x[TIP]
 
 

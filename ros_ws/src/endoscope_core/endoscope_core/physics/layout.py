@@ -130,6 +130,16 @@ FILM = SLOTS.state_block(2)
 """Viscous drag on each wire, half of it at either end, N."""
 WIRE_A = SLOTS.state_block(wire_states(CELLS))
 WIRE_B = SLOTS.state_block(wire_states(CELLS))
+PATH = SLOTS.state_block()
+"""Distance that the wires have slid, m; as the next two, only where a place has a function."""
+MEAN_TENSION = SLOTS.state_block()
+"""Of both wires, N."""
+TENSION_DIFFERENCE = SLOTS.state_block()
+"""Mean tension of the positive wire less that of the negative one, N."""
+NOW = SLOTS.state_block()
+"""Time in the middle of the tick, s."""
+OTHER = SLOTS.state_block()
+"""The other joint's angle in the tick, rad."""
 
 # Rows of the arrays of a joint's sheath, (SHEATH_ROWS, CELLS + 1).
 # The table of shapes comes first.

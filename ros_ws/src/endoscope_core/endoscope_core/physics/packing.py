@@ -3,12 +3,15 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endoscope_core.compiled import Array, Flags
 from endoscope_core.errors import nearest
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.effect import UnknownEffectError
 from endoscope_core.physics.effects import CATALOGUE, describe
+from endoscope_core.physics.functions import FUNCTIONS, describe_place
+from endoscope_core.physics.functions.acting import FLAGS_OF_FUNCTIONS
+from endoscope_core.physics.functions.term import tabulated
 from endoscope_core.physics.kernel import settle
 from endoscope_core.physics.layout import (
     CELLS,
@@ -18,9 +21,6 @@ from endoscope_core.physics.layout import (
     SHEATH_ROWS,
     SLOTS,
 )
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 def effect_values(spec: EffectSpec) -> Array:
@@ -69,19 +69,19 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
     Returns
     -------
     parameters : array (J, parameters)
-    flags : array (J, flags) of bool
+    flags : array (J, flags) of bool, or of `FLAGS_OF_FUNCTIONS` where the plant has terms
 
     Raises
     ------
     UnknownEffectError, ValueError
-        If an effect is unknown, on an unknown joint, given twice, or out of bounds.
+        If an effect or place is unknown, on an unknown joint, given twice, or out of bounds.
     """
     names = plant.joint_names()
     parameters = np.zeros((len(names), SLOTS.parameters))
     flags = np.zeros((len(names), SLOTS.flags), dtype=np.bool_)
     for row, joint in zip(parameters, plant.joints.values(), strict=True):
         row[: FRICTION_PROFILE + len(joint.friction_profile)] = _nominal(joint)
-        for effect in CATALOGUE.values():
+        for effect in (*CATALOGUE.values(), *FUNCTIONS.values()):
             row[effect.places] = [parameter.typical for parameter in effect.parameters]
     for spec in plant.effects:
         if spec.joint not in names:
@@ -96,7 +96,18 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
         flags[j, definition.flag] = True
         first = definition.first_parameter
         parameters[j, first : first + len(values)] = values
-    return parameters, flags
+    for term in plant.terms:
+        if term.joint not in names:
+            raise UnknownEffectError(
+                f'unknown_term at {term.place} is on joint {term.joint}: '
+                f'{nearest(term.joint, names)}'
+            )
+        j, place = names.index(term.joint), describe_place(term.place)
+        if flags[j, place.flag]:
+            raise ValueError(f'unknown_term at {term.place} is given twice on joint {term.joint}')
+        flags[j, place.flag] = True
+        parameters[j, place.places] = tabulated(term).numbers
+    return parameters, flags.astype(FLAGS_OF_FUNCTIONS) if plant.terms else flags
 
 
 def _nominal(joint: JointParameters) -> list[float]:

@@ -15,12 +15,16 @@ from endoscope_core.physics.description import (
     JointParameters,
     PlantDescription,
     SensorParameters,
+    TermSpec,
 )
+from endoscope_core.physics.functions import FUNCTIONS, describe_place
 from endoscope_core.physics.layout import PROFILE_TERMS
 from endoscope_core.physics.packing import pack
 from endoscope_core.physics.recording import recording_faults
 from endoscope_core.strict_yaml import YamlError, load_yaml
 
+UNKNOWN_TERM = 'unknown_term'
+"""Id of what is added to the plant and is no effect of the catalogue."""
 JOINT_NAMES = ('bend_x', 'bend_y')
 
 REACH: Mapping[str, tuple[float, float, str]] = {
@@ -124,7 +128,13 @@ def plant_from_mapping(content: Any) -> PlantDescription:
     listed = sections.get('effects') or []
     if not isinstance(listed, list):
         raise ValueError('effects must be a list')
-    plant = PlantDescription(joints, sensors, tuple(_effect(i, e) for i, e in enumerate(listed)))
+    entries = [_entry(i, given) for i, given in enumerate(listed)]
+    plant = PlantDescription(
+        joints,
+        sensors,
+        tuple(entry for entry in entries if isinstance(entry, EffectSpec)),
+        tuple(entry for entry in entries if isinstance(entry, TermSpec)),
+    )
     pack(plant)
     recording_faults(plant)
     return plant
@@ -145,8 +155,22 @@ def plant_to_mapping(plant: PlantDescription) -> dict[str, Any]:
                 'parameters': {name: float(v) for name, v in spec.parameters.items()},
             }
             for spec in plant.effects
-        ],
+        ]
+        + [_term_mapping(term) for term in plant.terms],
     }
+
+
+def _term_mapping(term: TermSpec) -> dict[str, Any]:
+    stage = str(describe_place(term.place).stage)
+    mapping: dict[str, Any] = {'id': UNKNOWN_TERM, 'joint': term.joint, 'stage': stage}
+    mapping['place'] = term.place
+    if term.expression:
+        mapping['expression'] = term.expression
+    if term.values:
+        mapping['values'] = [float(value) for value in term.values]
+    if term.range is not None:
+        mapping['range'] = [float(end) for end in term.range]
+    return mapping
 
 
 def save_plant(plant: PlantDescription, path: str | Path) -> None:
@@ -217,16 +241,65 @@ def _number(value: Any, where: str) -> float:
     return float(value)
 
 
-def _effect(index: int, given: Any) -> EffectSpec:
+def _entry(index: int, given: Any) -> EffectSpec | TermSpec:
     where = f'effects[{index}]'
     section = _section(given, where)
+    if section.get('id') == UNKNOWN_TERM:
+        return _term(section, where)
     _check_keys(section, ('id', 'joint', 'parameters'), where)
-    for key in ('id', 'joint'):
-        if not isinstance(section.get(key), str):
-            raise ValueError(f'{where} has no {key}: give it as a name')
+    _check_names(section, ('id', 'joint'), where)
     parameters = _section(section.get('parameters'), f'{where}.parameters')
     return EffectSpec(
         section['id'],
         section['joint'],
         {key: _number(value, f'{where}.parameters.{key}') for key, value in parameters.items()},
     )
+
+
+def _check_names(section: Mapping[str, Any], keys: tuple[str, ...], where: str) -> None:
+    for key in keys:
+        if not isinstance(section.get(key), str):
+            raise ValueError(f'{where} has no {key}: give it as a name')
+
+
+def _term(section: Mapping[str, Any], where: str) -> TermSpec:
+    _check_keys(section, ('id', 'joint', 'stage', 'place', 'expression', 'values', 'range'), where)
+    _check_names(section, ('joint', 'stage'), where)
+    stages = {str(place.stage) for place in FUNCTIONS.values()}
+    if section['stage'] not in stages:
+        raise ValueError(
+            f'{where}: unknown stage {section["stage"]}: {nearest(section["stage"], stages)}'
+        )
+    here = [name for name, place in FUNCTIONS.items() if place.stage == section['stage']]
+    if not isinstance(section.get('place'), str):
+        raise ValueError(f'{where} has no place: valid are {", ".join(here)}')
+    if section['place'] in FUNCTIONS and section['place'] not in here:
+        raise ValueError(
+            f'{where}: {section["place"]} is a place of the stage '
+            f'{FUNCTIONS[section["place"]].stage}, not {section["stage"]}'
+        )
+    if section['place'] not in here:
+        raise ValueError(
+            f'{where}: unknown place {section["place"]}: {nearest(section["place"], here)}'
+        )
+    # YAML reads the formula of a constant as a number.
+    expression = section.get('expression', '')
+    if not isinstance(expression, str):
+        expression = str(_number(expression, f'{where}.expression'))
+    ends = section.get('range')
+    if ends is not None and (not isinstance(ends, list) or len(ends) != 2):
+        raise ValueError(f'{where}.range is {ends!r}: give [lowest, highest]')
+    low_high = None if ends is None else _list(ends, f'{where}.range')
+    return TermSpec(
+        section['joint'],
+        section['place'],
+        expression,
+        _list(section.get('values') or [], f'{where}.values'),
+        None if low_high is None else (low_high[0], low_high[1]),
+    )
+
+
+def _list(given: Any, where: str) -> tuple[float, ...]:
+    if not isinstance(given, list):
+        raise ValueError(f'{where} is {given!r}: give a list of numbers')
+    return tuple(_number(value, f'{where}[{i}]') for i, value in enumerate(given))

@@ -1,5 +1,7 @@
 """How far apart two rivals' predictions stay, each refitted to the other's."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -76,7 +78,7 @@ def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescriptio
                 {p.name: float(packed[first + i]) for i, p in enumerate(definition.parameters)},
             )
         )
-    return PlantDescription(joints, plant.sensors, tuple(effects))
+    return replace(plant, joints=joints, effects=tuple(effects))
 
 
 def distance(truth: Recording, rival: PlantDescription, joint: str) -> float:

@@ -1,10 +1,9 @@
 """What was recorded, as arrays: the input of every analysis."""
 
 from endoscope_explain.recording.bag_source import (
-    plant_of_joints,
     recording_from_bag,
     with_unrecorded,
 )
 from endoscope_explain.recording.series import Recording, Series
 
-__all__ = ['Recording', 'Series', 'plant_of_joints', 'recording_from_bag', 'with_unrecorded']
+__all__ = ['Recording', 'Series', 'recording_from_bag', 'with_unrecorded']

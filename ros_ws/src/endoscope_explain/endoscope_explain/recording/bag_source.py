@@ -149,21 +149,13 @@ def recording_from_bag(
     )
 
 
-def plant_of_joints(plant: PlantDescription, joints: Sequence[str]) -> PlantDescription:
-    """Return the plant with those of its joints only that were recorded, and their effects."""
-    return replace(
-        plant,
-        joints={name: plant.joints[name] for name in joints},
-        effects=tuple(e for e in plant.effects if e.joint in joints),
-    )
-
-
 def with_unrecorded(plant: PlantDescription, described: PlantDescription) -> PlantDescription:
     """Return a plant of the recorded joints with the others as they are described."""
     return replace(
         plant,
         joints={name: plant.joints.get(name, joint) for name, joint in described.joints.items()},
         effects=plant.effects + tuple(e for e in described.effects if e.joint not in plant.joints),
+        terms=plant.terms + tuple(t for t in described.terms if t.joint not in plant.joints),
     )
 
 

@@ -92,11 +92,7 @@ def write_answer(
         If the recording has no usable commands, or `out` exists.
     """
     commands = commands_of_bag(recording, plant)
-    driven = replace(
-        plant,
-        joints={joint: plant.joints[joint] for joint in commands.joints},
-        effects=tuple(spec for spec in plant.effects if spec.joint in commands.joints),
-    )
+    driven = plant.of_joints(commands.joints)
     with BagWriter(out) as writer:
         times = {
             suffix: _times(recording, commands, suffix, rate)

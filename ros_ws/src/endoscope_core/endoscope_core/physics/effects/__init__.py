@@ -13,7 +13,7 @@ from endoscope_core.physics.effect import Effect, Symptom, UnknownEffectError, i
 for _module in sorted(module.name for module in pkgutil.iter_modules(__path__)):
     importlib.import_module(f'{__name__}.{_module}')
 
-CATALOGUE: dict[str, Effect] = in_order_of_chain()
+CATALOGUE: dict[str, Effect] = in_order_of_chain(Effect)
 """All effects by their ids, in the order of the chain."""
 
 

@@ -1,0 +1,159 @@
+"""What a place is at which a smooth function of one state can be added to the nominal plant."""
+
+from dataclasses import KW_ONLY, dataclass
+from enum import StrEnum
+
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
+from endoscope_core.physics.functions.interpolation import NODES
+from endoscope_core.physics.hooks import Fold, Hook
+
+SOURCE = (
+    'Missing physics as a smooth function within the simulator: Heiden et al., NeuralSim, IEEE '
+    'ICRA 2021; Kennedy, OHagan, J. R. Stat. Soc. B 63, 2001'
+)
+
+
+class Shape(StrEnum):
+    """What kind of function of its argument a place takes."""
+
+    ANY = 'any'
+    ODD = 'odd'
+    EVEN = 'even'
+    PERIODIC = 'periodic'
+
+
+@dataclass(frozen=True)
+class Argument:
+    """The state that a function depends on.
+
+    Attributes
+    ----------
+    symbol : str
+        In an expression.
+    words, unit : str
+    low, high : float
+        Range of the table where nobody gives one.
+    """
+
+    symbol: str
+    words: str
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Place(Effect):
+    """A smooth function of one state at a place of the chain; no effect of the catalogue.
+
+    Attributes
+    ----------
+    hook : Hook
+        Where it acts. A factor is the exponential of the function; all else is added.
+    argument : Argument
+    at : str
+        The argument in the names of the hook and of the compiled physics.
+    unit : str
+        Of the function.
+    largest : float
+        Largest absolute value that the function may have.
+    shape : Shape
+    from_zero : bool
+        Whether its value at the argument zero is taken away: the wires are tightened there.
+    never_negative : bool
+        Whether a value below zero would give energy to the plant without end.
+    only : str
+        Condition under which it acts, as `at`.
+    sign : str
+        Factor on it, as `at`.
+    by_step : str
+        Slope of the argument by the joint's step, as `at`, where the hook wants it.
+    """
+
+    _: KW_ONLY
+    hook: Hook
+    argument: Argument
+    at: str
+    unit: str
+    largest: float
+    shape: Shape = Shape.ANY
+    from_zero: bool = False
+    never_negative: bool = False
+    only: str = ''
+    sign: str = ''
+    by_step: str = ''
+
+    @property
+    def is_factor(self) -> bool:
+        """Whether the plant takes the exponential of the function as a factor."""
+        return self.hook.fold is Fold.FACTORS
+
+
+def place(
+    place_id: str,
+    stage: Stage,
+    hook: Hook,
+    what: str,
+    argument: Argument,
+    unit: str,
+    largest: float,
+    *,
+    at: str,
+    shape: Shape = Shape.ANY,
+    depends_on_time: bool = False,
+    **more: str | bool,
+) -> Place:
+    """Define a place, whose flag and parameters follow from its shape.
+
+    Parameters
+    ----------
+    place_id : str
+    stage : Stage
+    hook : Hook
+    what : str
+        What the function is, in words.
+    argument : Argument
+    unit : str
+    largest : float
+    at : str
+    shape : Shape
+    depends_on_time : bool
+        See `Traits`.
+    **more
+        The other attributes of a `Place`.
+
+    Returns
+    -------
+    Place
+    """
+    f = f'f({argument.symbol})'
+    enters = f'exp({f})' if hook.fold is Fold.FACTORS else f
+    kind = '' if shape is Shape.ANY else f', {shape}'
+    return Place(
+        place_id,
+        stage,
+        order=0,
+        physics=f'{what}, a function of {argument.words}.',
+        equation=f'{enters}{kind}, {argument.symbol} = {argument.words}',
+        source=SOURCE,
+        parameters=_parameters(argument, unit, largest),
+        traits=Traits(depends_on_time=depends_on_time),
+        hook=hook,
+        argument=argument,
+        at=at,
+        unit=unit,
+        largest=largest,
+        shape=shape,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def _parameters(argument: Argument, unit: str, largest: float) -> tuple[Parameter, ...]:
+    def value(name: str) -> Parameter:
+        return Parameter(name, unit, -largest, largest, 0.0, off=0.0)
+
+    ends = [(name, getattr(argument, name)) for name in ('low', 'high')]
+    return (
+        *(Parameter(name, argument.unit, -1e9, 1e9, end) for name, end in ends),
+        *(value(f'value_{i}') for i in range(NODES)),
+    )
