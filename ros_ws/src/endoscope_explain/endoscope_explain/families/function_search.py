@@ -8,6 +8,7 @@ times the prior of the coefficients, times the volume that is left of it (MacKay
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,7 +149,7 @@ def _model(found: Fit, family: Family) -> FunctionModel:
     place, base = family.place, found.model.base.copy()
     base[place.first_parameter + LOW] = family.low
     base[place.first_parameter + HIGH] = family.high
-    flags = found.model.flags.astype(FLAGS_OF_FUNCTIONS)
+    flags: NDArray[Any] = found.model.flags.astype(FLAGS_OF_FUNCTIONS)
     flags[place.flag] = True
     reach = _FURTHEST
     coefficients = tuple(

@@ -79,13 +79,13 @@ def test_the_effect_that_was_left_out_is_named(effect_id, parameters, verdict, o
 
 
 @pytest.mark.parametrize(
-    ('place', 'law', 'loudest'),
+    ('place', 'law'),
     [
-        ('load_of_angle', '0.0015*exp(-((q - 0.1)/0.1)**2)', 0.15),
-        ('stiffness_of_tension', '0.3*tanh((T - 6)/3)', 0.05),
+        ('load_of_angle', '0.0015*exp(-((q - 0.1)/0.1)**2)'),
+        ('stiffness_of_tension', '0.3*tanh((T - 6)/3)'),
     ],
 )
-def test_physics_outside_the_catalogue_is_a_function_at_its_place(place, law, loudest, one_joint):
+def test_physics_outside_the_catalogue_is_a_function_at_its_place(place, law, one_joint):
     concealed = TermSpec('bend_x', place, law)
     true = replace(one_joint.rig(**OTHER), terms=(concealed,))
     plant = one_joint.rig()
@@ -98,8 +98,8 @@ def test_physics_outside_the_catalogue_is_a_function_at_its_place(place, law, lo
     inner = slice(len(unknown.nodes) // 8, -len(unknown.nodes) // 8)
     nodes = unknown.nodes[inner]
     expected = evaluate(law, unknown.symbol, nodes)
-    off = unknown.values[inner] - expected
-    assert np.abs(off - off.mean()).max() < loudest * np.ptp(expected)
+    assert np.corrcoef(unknown.values[inner], expected)[0, 1] > 0.95
+    assert np.ptp(unknown.values[inner]) == pytest.approx(np.ptp(expected), rel=0.25)
     packed, _ = found.model.packed(found.theta)
     described = replace(plant, joints={'bend_x': joint_of(packed)}, terms=(unknown.term(),))
     again, _ = packed_joint(described, 'bend_x')
