@@ -58,14 +58,10 @@ def html_page(case: ExplainedCase) -> str:
         HTML that needs no other file.
     """
     explanation = case.explanation
-    recorded = view(
-        case.recording,
-        {
-            'nominal': explanation.nominal,
-            'refitted': explanation.refitted,
-            'augmented': explanation.augmented,
-        },
-    )
+    plants = {'nominal': explanation.nominal}
+    if explanation.fit:
+        plants |= {'refitted': explanation.refitted, 'augmented': explanation.augmented}
+    recorded = view(case.recording, plants)
     joint = _joint_of_interest(case, recorded)
     j = case.recording.joints.index(joint)
     command = (case.recording.command.time, case.recording.command.values[:, j] / gear())
@@ -88,6 +84,8 @@ def html_page(case: ExplainedCase) -> str:
         cut=_cut(case, joint),
         effects=[_effect(effect) for effect in case.effects],
         joint=joint,
+        fitted=bool(explanation.fit),
+        mended=case.audit.unusable,
         passage=passage,
         unknown=unknown,
         unknown_svg=unknown_figure(unknown) if unknown else '',
