@@ -16,17 +16,17 @@ from endoscope_explain.audit.receipt_clock import (
     skew_finding,
 )
 from endoscope_explain.audit.saturation import clipped, saturation_finding
-from endoscope_explain.audit.standing_still import (
-    MOVES_RAD,
-    frozen_findings,
-    moves,
-    resting_motor_findings,
-)
 from endoscope_explain.audit.stamps import (
     find_gaps,
     gap_findings,
     order_stamps,
     usual_interval,
+)
+from endoscope_explain.audit.standing_still import (
+    MOVES_RAD,
+    frozen_findings,
+    moves,
+    resting_motor_findings,
 )
 from endoscope_explain.audit.time_unit import in_seconds, stamp_unit_findings
 from endoscope_explain.recording import Recording, Series, plant_of_joints
@@ -87,9 +87,7 @@ def _on_ordered_stamps(recording: Recording, findings: list[Finding]) -> Recordi
     return recording.with_series(cleaned)
 
 
-def _as_meant(
-    recording: Recording, plant: PlantDescription, misread: list[Finding]
-) -> Recording:
+def _as_meant(recording: Recording, plant: PlantDescription, misread: list[Finding]) -> Recording:
     if recording.duration < LEAST_DURATION_S:
         return recording
     plant = plant_of_joints(plant, recording.joints)

@@ -56,7 +56,8 @@ class Misreading:
     def touched(self) -> tuple[int, ...]:
         """Columns that are read otherwise than they are named."""
         return tuple(
-            c for c, (s, f) in enumerate(zip(self.source, self.factor, strict=True))
+            c
+            for c, (s, f) in enumerate(zip(self.source, self.factor, strict=True))
             if (s, f) != (c, 1.0)
         )
 
@@ -213,7 +214,8 @@ def _finding(recording: Recording, mistake: Misreading) -> Finding:
         evidence = {'factor': factor}
     elif mistake.kind == 'sign':
         name = 'wrong_sign'
-        text = f'{named} {verb} of the wrong sign: negated, {"it fits" if verb == "is" else "they fit"} the plant'
+        negated = 'it fits' if len(signals) == 1 else 'they fit'
+        text = f'{named} {verb} of the wrong sign: negated, {negated} the plant'
         remedy = 'multiply by -1'
     else:
         name = 'exchanged'

@@ -35,8 +35,8 @@ SCALES = {
     'bending': (0.0, 3.0),
 }
 """Least and largest scale from a simulated signal to a real one. A servo follows its command. An
-effort is at most the motor's stall torque of 4.1 N m, 200 times what the nominal wires ask for. Wires
-and load cells differ by a factor of 3. A joint may be held fast."""
+effort is at most the motor's stall torque of 4.1 N m, 200 times what the nominal wires ask for.
+Wires and load cells differ by a factor of 3. A joint may be held fast."""
 WINDING, PUSHED_RAD = 1.2, 1.0
 """A joint bends at most this many times as far as its wires are wound up, and as much further as
 loads push it."""
@@ -164,16 +164,18 @@ class Moments:
             left = left + np.maximum(mean[:, None] - highest, 0.0) ** 2
         left = left + np.maximum((self.reach / abs(factor))[:, None] - bounds.reach, 0.0) ** 2
         # What a unit makes small must not pass for noise, unless the reading is as noisy in it.
-        noise = bounds.noise
+        spread = np.full((len(mean), 1), bounds.noise)
         if abs(factor) > 1.0:
-            noise = np.minimum(noise, bounds.scatter[:, None] / abs(factor))
-        floor = (3.0 * noise) ** 2
+            spread = np.minimum(spread, bounds.scatter[:, None] / abs(factor))
+        floor = (3.0 * spread) ** 2
         return np.asarray(np.sqrt(np.maximum(left, 0.0) / (variance + floor + 1e-300)).min(axis=0))
 
     def size(self) -> Array:
         """Times that each measured column is as large as its simulated one, where they agree."""
         power = np.maximum(self.simulated_variance, 1e-300)
-        alike = np.einsum('lmm->lm', self.covariance) / np.sqrt(power * (self.variance + 1e-300))
+        alike = np.einsum('lmm->lm', self.covariance) / np.sqrt(
+            np.maximum(power * self.variance, 1e-300)
+        )
         lag = alike.argmax(axis=0)
         column = np.arange(len(self.mean))
         return np.sqrt(self.variance / power[lag, column]) * (alike.max(axis=0) > 0.0)
@@ -278,7 +280,11 @@ class Comparison:
         if np.abs(self._held).max() > WINDING * shipped_rig().motors.reach:
             return True
         if 'shaft_position' in costs:
-            return any(fits for _, reading, fits in costs['shaft_position'] if reading.kind in ('right', 'sign'))
+            return any(
+                fits
+                for _, reading, fits in costs['shaft_position']
+                if reading.kind in ('right', 'sign')
+            )
         # Bending and tension of half the motion may be those of another rig.
         return not drive.of_gear
 
@@ -290,12 +296,14 @@ class Comparison:
         """Logarithm of the misfit of each way to read each quantity, and whether it fits well."""
         winding = [j.pulley_radius / j.joint_radius for j in self._plant.joints.values()]
         bent = WINDING * np.ptp(self._shaft(command), axis=0) * winding + PUSHED_RAD
-        found = {}
+        found: dict[str, list[tuple[float, Misreading, bool]]] = {}
         for quantity, simulated in self.simulated(command).items():
             lowest, largest = SCALES[quantity]
             if quantity == 'bending':
                 # Where friction all but holds the described joint, another one may bend freely.
-                largest = max(largest, float((bent / np.maximum(np.ptp(simulated, axis=0), 1e-9)).max()))
+                largest = max(
+                    largest, float((bent / np.maximum(np.ptp(simulated, axis=0), 1e-9)).max())
+                )
             bounds = Bounds(
                 (lowest, largest),
                 bent if quantity == 'bending' else np.full(simulated.shape[1], inf),
@@ -365,12 +373,14 @@ def as_meant(recording: Recording, mistakes: Collection[Misreading]) -> Recordin
 
 def _count(mistakes: list[Misreading]) -> int:
     # All that a motor's messages hold is exchanged together.
-    return len({
-        (m.quantity.partition('_')[0], m.kind, m.source)
-        if m.kind == 'order'
-        else (m.quantity, m.kind, m.source)
-        for m in mistakes
-    })
+    return len(
+        {
+            (m.quantity.partition('_')[0], m.kind, m.source)
+            if m.kind == 'order'
+            else (m.quantity, m.kind, m.source)
+            for m in mistakes
+        }
+    )
 
 
 def _span(recording: Recording) -> tuple[float, float]:

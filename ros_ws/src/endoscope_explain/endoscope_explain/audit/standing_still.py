@@ -65,10 +65,13 @@ def frozen_findings(
         for index, (quantity, c) in enumerate(columns):
             constant = np.ptp(values[:, index]) == 0.0
             # An encoder of a motor that is held fast stands still as well.
-            if quantity in ('tension', 'bending') and constant:
-                if _must_move(expected[quantity][:, c], grid, float(time[0]), noise[quantity]):
-                    name = column_name(recording, quantity, c)
-                    findings.append(_finding(recording, [(quantity, c)], float(time[0]), name))
+            if (
+                constant
+                and quantity in ('tension', 'bending')
+                and _must_move(expected[quantity][:, c], grid, float(time[0]), noise[quantity])
+            ):
+                name = column_name(recording, quantity, c)
+                findings.append(_finding(recording, [(quantity, c)], float(time[0]), name))
     command = recording.command
     if not moves(command) and moves(recording.shaft_position):
         columns = [('command', j) for j in range(len(recording.joints))]

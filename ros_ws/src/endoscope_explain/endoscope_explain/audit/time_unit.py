@@ -51,11 +51,13 @@ def in_seconds(recording: Recording, findings: list[Finding]) -> Recording:
     """Return the recording with the stamps of the found topics as they must be meant."""
     divisors = {topic: f.evidence['per_second'] for f in findings for topic in f.signals}
     every = {'command': recording.command, **recording.measured()}
-    return recording.with_series({
-        name: replace(s, time=s.time / divisors[s.topic], received=None)
-        for name, s in every.items()
-        if s.topic in divisors
-    })
+    return recording.with_series(
+        {
+            name: replace(s, time=s.time / divisors[s.topic], received=None)
+            for name, s in every.items()
+            if s.topic in divisors
+        }
+    )
 
 
 def _powers(topics: Mapping[str, Series], sensors: SensorParameters) -> dict[str, int]:
@@ -75,17 +77,17 @@ def _powers(topics: Mapping[str, Series], sensors: SensorParameters) -> dict[str
         return {}
     all_alike = set(by_rate.values())
     found = {}
-    for topic in long:
+    for topic, span in long.items():
         known = by_receipt[topic]
         if known is not None:
             found[topic] = known
             continue
-        others = float(np.median([span for name, span in long.items() if name != topic]))
-        beside = _power(long[topic] / others, AS_LONG)
+        others = float(np.median([other for name, other in long.items() if name != topic]))
+        beside = _power(span / others, AS_LONG)
         if len(all_alike) == 1 and (common := next(iter(all_alike))):
             # All sensors are as far from their rates; the command may be as they are, or right.
             measured = float(np.median([long[name] for name in by_rate]))
-            found[topic] = common + (_power(long[topic] / measured, AS_LONG) or 0)
+            found[topic] = common + _power(span / measured, AS_LONG)
         elif beside and by_rate.get(topic, beside) == beside:
             found[topic] = beside
     return {topic: power for topic, power in found.items() if power}

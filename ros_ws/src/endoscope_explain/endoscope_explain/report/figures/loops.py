@@ -130,7 +130,9 @@ def _shown(recorded: RecordedView, joint: str) -> list[SignalView]:
 def _curves(one: SignalView, inside: NDArray[np.bool_]) -> list[tuple[str, Array, float]]:
     convert = np.degrees if one.quantity == 'bending' else np.asarray
     curves = [('measured', convert(one.measured[inside]), 2.2)]
-    curves += [(name, convert(one.predicted[name][inside]), 1.0) for name in SHOWN if name in one.predicted]
+    curves += [
+        (name, convert(one.predicted[name][inside]), 1.0) for name in SHOWN if name in one.predicted
+    ]
     return curves
 
 
