@@ -92,7 +92,13 @@ def _as_meant(recording: Recording, plant: PlantDescription, misread: list[Findi
         return recording
     plant = plant_of_joints(plant, recording.joints)
     comparison = Comparison(recording, plant)
-    frozen = frozen_findings(recording, comparison.grid, comparison.expected(), comparison.noise)
+    frozen = frozen_findings(
+        recording,
+        comparison.grid,
+        comparison.expected(),
+        comparison.noise,
+        comparison.is_noisy(),
+    )
     misread += frozen
     if not moves(recording.command):
         return recording
@@ -164,7 +170,7 @@ def _rests(shaft: Series | None, begin: float, end: float) -> bool:
     """Whether all motors are known to stand still from begin to end."""
     if shaft is None:
         return False
-    inside = (shaft.time >= begin) & (shaft.time <= end)
+    inside = (shaft.time >= begin) & (shaft.time < end)
     return bool(inside.sum() > 2 and np.ptp(shaft.values[inside], axis=0).max() < MOVES_RAD)
 
 

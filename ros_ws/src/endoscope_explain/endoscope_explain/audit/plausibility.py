@@ -9,7 +9,7 @@ and shapes within those tolerances, or into what no mistake explains.
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from math import inf, pi
+from math import inf, log, pi
 
 import numpy as np
 
@@ -52,6 +52,9 @@ speed and torque change its shape by more."""
 WELL, HARDLY = 0.6, 0.9
 """Misfit, on the mean and at most, up to which signals may be said to be right in another unit,
 sign or order."""
+NOISE_COUNTS, NOISE_APART = 0.2, 100.0
+"""By how much a noise unlike the sensor's counts beside the misfit, and the factor beyond which it
+says no more: a simulated recording has none."""
 PRICE = 1.0
 """Fall of the sum of the misfits' logarithms that each mistake must bring."""
 FREE = 1.3
@@ -254,8 +257,9 @@ class Comparison:
                 cost, reading, _ = min(allowed, key=lambda c: c[0] + PRICE * c[1].weight)
                 reached += cost
                 said += [reading] if reading.weight else []
-            priced = reached + PRICE * sum(reading.weight for reading in said)
-            if priced < least - 1e-9 and _count(said) <= MOST_MISTAKES:
+            weights = _weights(said)
+            priced = reached + PRICE * sum(weights)
+            if priced < least - 1e-9 and len(weights) <= MOST_MISTAKES:
                 least, best = priced, Judged(tuple(said), as_read, reached)
         return best
 
@@ -273,10 +277,20 @@ class Comparison:
         """Simulate the plant on the command as it is read."""
         return self.simulated(next(misreadings('command', self._plant, self._held.shape[1])))
 
+    def is_noisy(self) -> bool:
+        """Whether the readings have noise, as those of a simulation have not."""
+        return any(
+            bool((self._scatter[q] > 0.1 * self.noise[q]).any())
+            for q in ('tension', 'bending')
+            if q in self.measured
+        )
+
     def _may_be_meant(
         self, drive: Misreading, costs: Mapping[str, list[tuple[float, Misreading, bool]]]
     ) -> bool:
         """Whether the command as it is given is impossible, or the shaft follows it as meant."""
+        if np.ptp(self._shaft(drive)[:, list(drive.touched)], axis=0).max() < MOVES:
+            return False
         if np.abs(self._held).max() > WINDING * shipped_rig().motors.reach:
             return True
         if 'shaft_position' in costs:
@@ -329,8 +343,19 @@ class Comparison:
                     mean = np.exp(np.log(judged + 1e-9).mean())
                     well = bool(mean < WELL and judged.max() < HARDLY)
                 kept = np.clip(misfit, LEAST.get(quantity, USUALLY_LEAST), MOST)
-                found[quantity].append((float(np.log(kept).sum()), reading, well))
+                cost = float(np.log(kept).sum()) + self._noise_apart(quantity, reading)
+                found[quantity].append((cost, reading, well))
         return found
+
+    def _noise_apart(self, quantity: str, reading: Misreading) -> float:
+        """How far the readings' noise is from the sensor's, where it is white."""
+        if quantity not in ('tension', 'bending'):
+            return 0.0
+        factor = np.abs(reading.factor)
+        ratio = np.maximum(self._scatter[quantity], 1e-12) / (
+            factor * self.noise[quantity] + 1e-300
+        )
+        return float(NOISE_COUNTS * np.minimum(np.abs(np.log(ratio)), log(NOISE_APART)).sum())
 
     def _of_any_size(self, quantity: str, moments: Moments) -> Iterator[Misreading]:
         """Readings of a factor that belongs to no unit: of a gear, or of a converter."""
@@ -371,16 +396,13 @@ def as_meant(recording: Recording, mistakes: Collection[Misreading]) -> Recordin
     return recording.with_series(changed)
 
 
-def _count(mistakes: list[Misreading]) -> int:
-    # All that a motor's messages hold is exchanged together.
-    return len(
-        {
-            (m.quantity.partition('_')[0], m.kind, m.source)
-            if m.kind == 'order'
-            else (m.quantity, m.kind, m.source)
-            for m in mistakes
-        }
-    )
+def _weights(mistakes: list[Misreading]) -> list[float]:
+    """Weight of each mistake; all that a motor's messages hold is exchanged together."""
+    weights = {
+        (m.quantity.partition('_')[0] if m.kind == 'order' else m.quantity, m.source): m.weight
+        for m in mistakes
+    }
+    return list(weights.values())
 
 
 def _span(recording: Recording) -> tuple[float, float]:

@@ -7,7 +7,7 @@ import numpy as np
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.audit.misreading import column_name
 from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.series import Array
+from endoscope_explain.recording.series import BENDING, Array
 
 MOVES_RAD = 0.01
 """Shaft angle that is a motion."""
@@ -27,6 +27,7 @@ def frozen_findings(
     grid: Array,
     expected: Mapping[str, Array],
     noise: Mapping[str, float],
+    noisy: bool,
 ) -> list[Finding]:
     """Find topics that repeat one reading to the end, or from first to last.
 
@@ -40,6 +41,9 @@ def frozen_findings(
         What the plant makes of the command then.
     noise : mapping of quantity to float
         Of each sensor.
+    noisy : bool
+        Whether the recording shows it: without, a slack wire and a joint that is held fast may
+        well give one reading.
 
     Returns
     -------
@@ -57,8 +61,11 @@ def frozen_findings(
         columns = [
             (quantity, c) for quantity, _ in held for c in range(expected[quantity].shape[1])
         ]
-        if found is not None and any(
-            _must_move(expected[q][:, c], grid, found, noise[q]) for q, c in columns
+        sure = noisy or held[0][1].topic != BENDING
+        if (
+            sure
+            and found is not None
+            and any(_must_move(expected[q][:, c], grid, found, noise[q]) for q, c in columns)
         ):
             findings.append(_finding(recording, columns, found, held[0][1].topic))
             continue
@@ -67,6 +74,7 @@ def frozen_findings(
             # An encoder of a motor that is held fast stands still as well.
             if (
                 constant
+                and noisy
                 and quantity in ('tension', 'bending')
                 and _must_move(expected[quantity][:, c], grid, float(time[0]), noise[quantity])
             ):
