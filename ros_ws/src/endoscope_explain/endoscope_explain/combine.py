@@ -38,9 +38,12 @@ def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[Name
 def combined_verdict(explanation: Explanation, audit: AuditReport) -> Verdict:
     """Say in one word what engine and audit found.
 
-    Missing physics wins over a faulty sensor, that over a faulty recording, and any of them over
-    differing parameters: these always differ a little.
+    Where the rig hardly moves nothing can be told. Missing physics wins over a faulty sensor, that
+    over a faulty recording, and any of them over differing parameters: these always differ a
+    little.
     """
+    if explanation.verdict is Verdict.INSUFFICIENT_DATA:
+        return Verdict.INSUFFICIENT_DATA
     effects = combined_effects(explanation, audit)
     stages = {effect.stage for effect in effects}
     if explanation.verdict is Verdict.UNKNOWN_PHYSICS:

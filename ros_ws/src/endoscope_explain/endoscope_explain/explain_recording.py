@@ -80,16 +80,7 @@ def explain_recording(
     tell = progress or (lambda _: None)
     observations = with_held_noise(observe(recording, plant))
     if not _is_enough(observations):
-        return Explanation(
-            Verdict.INSUFFICIENT_DATA,
-            (),
-            {},
-            plant,
-            plant,
-            plant,
-            {},
-            runtime_s=time.monotonic() - begun,
-        )
+        return Explanation.without_fit(Verdict.INSUFFICIENT_DATA, plant)
     tell('refitting the nominal plant')
     well = plant
     known: dict[str, tuple[str, ...]] = {o.joint: () for o in observations}
@@ -207,5 +198,10 @@ def _is_enough(observations: tuple[JointObservation, ...]) -> bool:
         o.channels
         and o.inputs.shape[1] * 1e-3 >= LEAST_DURATION_S
         and np.ptp(o.inputs[0, :, 0]) >= LEAST_MOTION_RAD
+        and all(
+            np.ptp(c.value) >= LEAST_MOTION_RAD
+            for c in o.channels
+            if c.quantity == 'shaft_position'
+        )
         for o in observations
     )

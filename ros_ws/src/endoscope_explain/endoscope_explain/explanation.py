@@ -240,3 +240,8 @@ class Explanation:
     adequacy: Mapping[str, float] = field(default_factory=dict)
     baseline_used: bool = False
     runtime_s: float = 0.0
+
+    @staticmethod
+    def without_fit(verdict: Verdict, plant: PlantDescription) -> 'Explanation':
+        """What is said where nothing may be fitted, or nothing can be."""
+        return Explanation(verdict, (), {}, plant, plant, plant, {})

@@ -17,7 +17,7 @@ from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.given_physics import GivenJoints
 from endoscope_explain.isolated_samples import with_isolated_marked
 from endoscope_explain.ladder import ladders
-from endoscope_explain.locate.chain_cut import cut_at_motor
+from endoscope_explain.locate.chain_cut import ChainCut, cut_at_motor
 from endoscope_explain.locate.locating import (
     locate_effects,
     locate_findings,
@@ -113,6 +113,23 @@ class JointsDifferError(BagError):
     """A second recording lacks a joint of the first."""
 
 
+class MisreadRecordingError(BagError):
+    """A recording is not in the units, with the signs or in the order that its names say."""
+
+
+def require_as_named(path: Path, audit: AuditReport) -> None:
+    """Refuse a recording that nothing can be fitted to.
+
+    Raises
+    ------
+    MisreadRecordingError
+        Says in one line what is wrong, and what would make it fit.
+    """
+    if audit.unusable:
+        worst = audit.faults()[0]
+        raise MisreadRecordingError(f'{path}: {worst.text}; {worst.remedy}')
+
+
 def read_inputs(sources: Sources) -> Inputs:
     """Read and audit all recordings of a case.
 
@@ -145,7 +162,9 @@ def read_inputs(sources: Sources) -> Inputs:
                 f'{path}: has {", ".join(other.joints)}, but {sources.bag} has '
                 f'{", ".join(raw.joints)}'
             )
-        return audit_recording(other, plant).recording
+        audited = audit_recording(other, plant)
+        require_as_named(path, audited)
+        return audited.recording
 
     return Inputs(
         sources.plant,
@@ -189,19 +208,23 @@ def explain_case(
     audit = inputs.audit
     for finding in audit.findings:
         tell(f'audit: {finding.text}; {finding.remedy}')
-    # A fit's matrices are tall and narrow: threads would only wait for each other.
-    with threadpool_limits(1, 'blas'):
-        explanation = engine(
-            audit.recording,
-            inputs.plant,
-            baseline=inputs.baseline,
-            band=inputs.band,
-            most_effects=inputs.most_effects,
-            given=inputs.given,
-            jobs=jobs,
-            progress=progress,
-        )
-    tell('locating')
+    if audit.unusable:
+        explanation = Explanation.without_fit(Verdict.RECORDING_FAULT, inputs.plant)
+    else:
+        # A fit's matrices are tall and narrow: threads would only wait for each other.
+        with threadpool_limits(1, 'blas'):
+            explanation = engine(
+                audit.recording,
+                inputs.plant,
+                baseline=inputs.baseline,
+                band=inputs.band,
+                most_effects=inputs.most_effects,
+                given=inputs.given,
+                jobs=jobs,
+                progress=progress,
+            )
+    if explanation.fit:
+        tell('locating')
     plant = improved_plant(explanation, audit)
     recording = audit.recording
     case = ExplainedCase(
@@ -216,7 +239,10 @@ def explain_case(
         validation_name='' if inputs.validation is None else inputs.validation.name,
         baseline_name='' if inputs.baseline is None else inputs.baseline.name,
     )
-    case = replace(case, places=_places(case), cuts=cut_at_motor(recording, explanation.refitted))
+    case = replace(case, places=_places(case), cuts=_cuts(case))
+    if not explanation.fit:
+        ladder = ladders(recording, explanation, None, black_boxes=False, jobs=jobs)[0]
+        return replace(case, ladder=ladder, runtime_s=time.monotonic() - begun)
     if extras:
         case = replace(case, next_experiment=_next(case, jobs, tell))
     tell('judging beside black boxes' if extras else 'judging')
@@ -235,6 +261,11 @@ def _next(case: ExplainedCase, jobs: int, tell: Progress) -> NextExperiment | No
             if found is not None:
                 return found
     return None
+
+
+def _cuts(case: ExplainedCase) -> tuple[ChainCut, ...]:
+    fitted = case.explanation.fit
+    return cut_at_motor(case.recording, case.explanation.refitted) if fitted else ()
 
 
 def _places(case: ExplainedCase) -> tuple[Place, ...]:

@@ -15,7 +15,12 @@ from endoscope_explain.fit.pooled import told_alone
 from endoscope_explain.given_physics import GivenJoints, GivenPhysics, without_recording
 from endoscope_explain.held_noise import with_held_noise
 from endoscope_explain.observation import observe
-from endoscope_explain.pipeline import JointsDifferError, Sources, read_inputs
+from endoscope_explain.pipeline import (
+    JointsDifferError,
+    Sources,
+    read_inputs,
+    require_as_named,
+)
 from endoscope_explain.shared_choice import (
     Anchors,
     SharedChoice,
@@ -56,6 +61,7 @@ def physics_of_all(
     with threadpool_limits(1, 'blas'):
         for one in sources:
             inputs = read_inputs(one)
+            require_as_named(one.bag, inputs.audit)
             recording = inputs.audit.recording
             tell(f'{recording.name}: refitting the nominal plant')
             _, anchors = anchored(

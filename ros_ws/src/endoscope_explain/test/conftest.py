@@ -1,6 +1,8 @@
 """Recordings of the plant made in memory."""
 
 import dataclasses
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +23,9 @@ from endoscope_explain.pipeline import Inputs, explain_case
 from endoscope_explain.predicted_signals import rung, view
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.signals import gear
+
+# Tests import each other's recordings by name.
+sys.path.insert(0, str(Path(__file__).parent))
 
 TICK = 1e-3
 TRACKER_EVERY = 25

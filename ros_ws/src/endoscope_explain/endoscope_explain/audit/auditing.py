@@ -7,7 +7,9 @@ import numpy as np
 from endoscope_core.physics.description import PlantDescription, SensorParameters
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
 from endoscope_explain.audit.held_samples import held, held_before_jump, held_findings
+from endoscope_explain.audit.misreading import as_findings
 from endoscope_explain.audit.outliers import find_outliers, motor_travel, outlier_finding
+from endoscope_explain.audit.plausibility import Comparison, as_meant
 from endoscope_explain.audit.receipt_clock import (
     clock_skew_from_receipt,
     retimed,
@@ -20,9 +22,18 @@ from endoscope_explain.audit.stamps import (
     order_stamps,
     usual_interval,
 )
-from endoscope_explain.recording import Recording, Series
+from endoscope_explain.audit.standing_still import (
+    MOVES_RAD,
+    frozen_findings,
+    moves,
+    resting_motor_findings,
+)
+from endoscope_explain.audit.time_unit import in_seconds, stamp_unit_findings
+from endoscope_explain.recording import Recording, Series, plant_of_joints
 from endoscope_explain.recording.signals import gear, signal_name
 
+LEAST_DURATION_S = 2.0
+"""Length of a recording from which on it can be compared with the plant."""
 SETTLING_S = 0.5
 """How long after a gap in the commands the rig's answer is not judged."""
 
@@ -40,11 +51,18 @@ def audit_recording(recording: Recording, plant: PlantDescription) -> AuditRepor
     Returns
     -------
     AuditReport
+        Where the recording is not what its names say, of that alone, with the recording as it must
+        be meant.
     """
     findings: list[Finding] = []
     recording = _on_ordered_stamps(recording, findings)
-    recording = _on_one_clock(recording, findings)
+    misread = stamp_unit_findings(recording, plant.sensors)
+    recording = _on_one_clock(in_seconds(recording, misread), findings)
     recording = _without_commandless_times(recording, findings)
+    recording = _as_meant(recording, plant, misread)
+    if misread:
+        return AuditReport(recording, tuple(misread))
+    findings += resting_motor_findings(recording)
     recording = _audited_motor(recording, plant.sensors, findings)
     recording = replace(
         recording,
@@ -69,6 +87,30 @@ def _on_ordered_stamps(recording: Recording, findings: list[Finding]) -> Recordi
     return recording.with_series(cleaned)
 
 
+def _as_meant(recording: Recording, plant: PlantDescription, misread: list[Finding]) -> Recording:
+    if recording.duration < LEAST_DURATION_S:
+        return recording
+    plant = plant_of_joints(plant, recording.joints)
+    comparison = Comparison(recording, plant)
+    frozen = frozen_findings(
+        recording,
+        comparison.grid,
+        comparison.expected(),
+        comparison.noise,
+        comparison.is_noisy(),
+    )
+    misread += frozen
+    if not moves(recording.command):
+        return recording
+    if frozen:
+        topics = {signal.partition(':')[0] for f in frozen for signal in f.signals}
+        still = [n for n, s in recording.measured().items() if s.topic in topics]
+        comparison = Comparison(recording, plant, still)
+    mistakes = comparison.judged().mistakes
+    misread += as_findings(recording, mistakes)
+    return as_meant(recording, mistakes)
+
+
 def _on_one_clock(recording: Recording, findings: list[Finding]) -> Recording:
     every = {'command': recording.command, **recording.measured()}
     skews = clock_skew_from_receipt({s.topic: s for s in every.values()})
@@ -87,8 +129,13 @@ def _without_commandless_times(recording: Recording, findings: list[Finding]) ->
     gaps = {topic: find_gaps(s, start, end) for topic, s in every.items()}
     intervals = {topic: usual_interval(s.time) for topic, s in every.items()}
     # A command is in force until the next one: a console that pauses, or whose clutch is released,
-    # leaves nothing out. Only where the command has moved on meanwhile some of it is missing.
-    blind = _unknown_command(recording.command, gaps[recording.command.topic], end)
+    # leaves nothing out. Only where the command has moved on meanwhile some of it is missing, and
+    # not even there if the motors have rested: then it began anew from another pose.
+    blind = [
+        (a, b)
+        for a, b in _unknown_command(recording.command, gaps[recording.command.topic], end)
+        if not _rests(recording.shaft_position, a + SETTLING_S, b)
+    ]
     gaps[recording.command.topic] = tuple(blind)
     findings += gap_findings(gaps, intervals, recording.joints[0])
     if not blind:
@@ -117,6 +164,14 @@ def _unknown_command(
         if np.abs(after - before).max() > 2.0 * usual:
             unknown.append((a, b))
     return unknown
+
+
+def _rests(shaft: Series | None, begin: float, end: float) -> bool:
+    """Whether all motors are known to stand still from begin to end."""
+    if shaft is None:
+        return False
+    inside = (shaft.time >= begin) & (shaft.time < end)
+    return bool(inside.sum() > 2 and np.ptp(shaft.values[inside], axis=0).max() < MOVES_RAD)
 
 
 def _audited_motor(

@@ -13,6 +13,8 @@ class Severity(StrEnum):
 
     NOTE = 'note'
     FAULT = 'fault'
+    UNUSABLE = 'unusable'
+    """It changes the verdict, and nothing can be learnt from the recording before it is mended."""
 
 
 @dataclass(frozen=True)
@@ -73,4 +75,9 @@ class AuditReport:
 
     def faults(self) -> tuple[Finding, ...]:
         """Return the findings that change the verdict."""
-        return tuple(f for f in self.findings if f.severity is Severity.FAULT)
+        return tuple(f for f in self.findings if f.severity is not Severity.NOTE)
+
+    @property
+    def unusable(self) -> bool:
+        """Whether the recording is not what its names say, so that nothing must be fitted to it."""
+        return any(f.severity is Severity.UNUSABLE for f in self.findings)

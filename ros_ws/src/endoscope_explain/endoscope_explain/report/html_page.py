@@ -58,18 +58,16 @@ def html_page(case: ExplainedCase) -> str:
         HTML that needs no other file.
     """
     explanation = case.explanation
-    recorded = view(
-        case.recording,
-        {
-            'nominal': explanation.nominal,
-            'refitted': explanation.refitted,
-            'augmented': explanation.augmented,
-        },
-    )
+    plants = {'nominal': explanation.nominal}
+    if explanation.fit:
+        plants |= {'refitted': explanation.refitted, 'augmented': explanation.augmented}
+    recorded = view(case.recording, plants)
     joint = _joint_of_interest(case, recorded)
     j = case.recording.joints.index(joint)
     command = (case.recording.command.time, case.recording.command.values[:, j] / gear())
-    passage = telling_passage(recorded, joint)
+    # Where a sensor repeats one reading, none of its samples is judged.
+    judged = any(v.quantity == 'bending' for v in recorded.of_joint(joint))
+    passage = telling_passage(recorded, joint) if judged else (0.0, case.recording.duration)
     experiment, unknown = case.next_experiment, explanation.unknown
     environment = Environment(
         loader=PackageLoader('endoscope_explain', 'report/templates'),
@@ -88,12 +86,14 @@ def html_page(case: ExplainedCase) -> str:
         cut=_cut(case, joint),
         effects=[_effect(effect) for effect in case.effects],
         joint=joint,
+        fitted=bool(explanation.fit),
+        mended=case.audit.unusable,
         passage=passage,
         unknown=unknown,
         unknown_svg=unknown_figure(unknown) if unknown else '',
-        timeline_svg=timeline_figure(recorded, command, joint, case.places),
-        loops_svg=loops_figure(recorded, command, joint, passage),
-        signals_svg=signals_figure(recorded, joint, passage),
+        timeline_svg=timeline_figure(recorded, command, joint, case.places) if judged else '',
+        loops_svg=loops_figure(recorded, command, joint, passage) if judged else '',
+        signals_svg=signals_figure(recorded, joint, passage) if judged else '',
         ladder_svg=ladder_figure(case.ladder) if case.ladder['nominal'] else '',
         tables=_tables(case, recorded),
         parameters_svg=parameters_figure(explanation.parameters) if explanation.parameters else '',

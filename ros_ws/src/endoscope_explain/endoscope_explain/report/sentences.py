@@ -28,6 +28,8 @@ def verdict_sentence(case: ExplainedCase) -> str:
     """Say in one sentence what was found and how much better the improved plant predicts."""
     if case.verdict is Verdict.INSUFFICIENT_DATA:
         return 'The rig moves too little, or too little was recorded, to tell causes apart.'
+    if case.audit.unusable:
+        return ' '.join(f'{f.text}; {f.remedy}.' for f in case.audit.faults())
     before = worst_ratio(case.ladder, 'nominal')
     after = worst_ratio(case.ladder, 'augmented')
     better = (

@@ -74,7 +74,7 @@ def loops_figure(
     views = _shown(recorded, joint)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 3.5), layout='constrained')
-        for axis, one in zip(figure.subplots(1, len(views)), views, strict=True):
+        for axis, one in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
             inside = (one.time >= passage[0]) & (one.time <= passage[1])
             time = one.time[inside]
             angle = np.degrees(np.interp(time, *command))
@@ -101,7 +101,7 @@ def signals_figure(recorded: RecordedView, joint: str, passage: tuple[float, flo
     views = _shown(recorded, joint)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 1.5 * len(views) + 0.4), layout='constrained')
-        axes = figure.subplots(len(views), 1, sharex=True)
+        axes = figure.subplots(len(views), 1, sharex=True, squeeze=False)[:, 0]
         for axis, one in zip(axes, views, strict=True):
             inside = (one.time >= passage[0]) & (one.time <= passage[1])
             for name, values, width in _curves(one, inside):
@@ -130,7 +130,9 @@ def _shown(recorded: RecordedView, joint: str) -> list[SignalView]:
 def _curves(one: SignalView, inside: NDArray[np.bool_]) -> list[tuple[str, Array, float]]:
     convert = np.degrees if one.quantity == 'bending' else np.asarray
     curves = [('measured', convert(one.measured[inside]), 2.2)]
-    curves += [(name, convert(one.predicted[name][inside]), 1.0) for name in SHOWN]
+    curves += [
+        (name, convert(one.predicted[name][inside]), 1.0) for name in SHOWN if name in one.predicted
+    ]
     return curves
 
 

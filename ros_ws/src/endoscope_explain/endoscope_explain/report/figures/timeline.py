@@ -33,7 +33,7 @@ def timeline_figure(
     Parameters
     ----------
     recorded : RecordedView
-        With the predictions `nominal`, `refitted` and `augmented`.
+        With the prediction `nominal`, and `refitted` and `augmented` where something was fitted.
     command : (array (N,), array (N,))
         Stamps in s and command in rad, joint-equivalent.
     joint : str
@@ -79,7 +79,8 @@ def timeline_figure(
         misfit.set_ylim(0.5, max(10.0, 2.0 * float(np.nanmax(levels['nominal']))))
         misfit.set_ylabel('misfit / noise')
         misfit.set_xlabel('time (s)')
-        misfit.set_title('Misfit of its signals; shaded: what was left out shows')
+        fitted = '; shaded: what was left out shows' if len(levels) > 1 else ''
+        misfit.set_title(f'Misfit of its signals{fitted}')
         misfit.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8)
         misfit.set_xlim(0.0, float(bending.time[-1]))
         return svg(figure)

@@ -1,0 +1,238 @@
+"""Units, signs and orders that people take by mistake, and how each is said."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+from math import pi
+
+from endoscope_bags.units import UNITS
+from endoscope_core.physics.description import PlantDescription
+from endoscope_explain.audit.finding import Finding, Severity
+from endoscope_explain.recording import Recording
+from endoscope_explain.recording.series import DESIRED
+from endoscope_explain.recording.signals import QUANTITY_UNITS, gear, motor_name, signal_name
+
+LARGE = 5.0
+"""Factor that no gear of this rig has, nor a servo that misses its command."""
+STANDARD_GRAVITY = 9.80665
+GEAR = 'radians of the bending joint'
+COUNTS = 'counts of the encoder'
+ELSEWHERE = 0.2
+"""Price, beside that of a whole topic, of a mistake in some of its columns."""
+RARELY = 0.5
+"""The same of a unit that hardly anybody uses."""
+ROUND_ABOUT = 0.5
+"""The same of an order that no single exchange makes."""
+
+
+@dataclass(frozen=True)
+class Misreading:
+    """One way in which the columns of a quantity may be meant.
+
+    Attributes
+    ----------
+    quantity : str
+        Series of a `Recording`.
+    kind : str
+        `right`, `unit`, `sign`, `order` or `factor`, which is no unit known.
+    weight : float
+        0 for what is right, else how many mistakes it counts as.
+    source : tuple of int
+        Measured column that holds each signal.
+    factor : tuple of float
+        Reading of one SI unit in each measured column.
+    unit : str
+        In words.
+    """
+
+    quantity: str
+    kind: str
+    weight: float
+    source: tuple[int, ...]
+    factor: tuple[float, ...]
+    unit: str = ''
+
+    @property
+    def touched(self) -> tuple[int, ...]:
+        """Columns that are read otherwise than they are named."""
+        return tuple(
+            c
+            for c, (s, f) in enumerate(zip(self.source, self.factor, strict=True))
+            if (s, f) != (c, 1.0)
+        )
+
+    @property
+    def is_beyond_reach(self) -> bool:
+        """Whether no physics comes near to such readings."""
+        return self.kind in ('sign', 'order') or max(self.factor) > LARGE
+
+    @property
+    def of_gear(self) -> bool:
+        """Whether the same mistake in command and shaft could be physics as well."""
+        return self.kind == 'factor' or (
+            self.kind == 'unit' and max(self.factor) < LARGE and min(self.factor) > 1.0 / LARGE
+        )
+
+
+def known_units(quantity: str, plant: PlantDescription) -> dict[str, float]:
+    """Return what people give in place of SI, and the reading of one SI unit in each."""
+    degrees = 1.0 / UNITS['deg']
+    radius = next(iter(plant.joints.values())).pulley_radius
+    of_motor = {
+        'deg': degrees,
+        'mrad': 1.0 / UNITS['mrad'],
+        'turns': 1.0 / UNITS['turn'],
+        COUNTS: plant.sensors.encoder_counts / (2.0 * pi),
+        'rad, converted from degrees twice': UNITS['deg'],
+        GEAR: 1.0 / gear(),
+        'radians of the shaft, divided by the gear once more': gear(),
+        'mm of wire': 1e3 * radius,
+    }
+    return {
+        'command': of_motor,
+        'shaft_position': of_motor,
+        'shaft_velocity': {'deg/s': degrees, 'rpm': 1.0 / UNITS['rpm']},
+        'shaft_effort': {'mN m': 1.0 / UNITS['mN m']},
+        'tension': {
+            'mN': 1.0 / UNITS['mN'],
+            'g (gram-force)': 1e3 / STANDARD_GRAVITY,
+            'kg (kilogram-force)': 1.0 / STANDARD_GRAVITY,
+            'kN': 1.0 / UNITS['kN'],
+        },
+        'bending': {'deg': degrees, 'mrad': 1.0 / UNITS['mrad']},
+    }[quantity]
+
+
+def misreadings(quantity: str, plant: PlantDescription, columns: int) -> Iterator[Misreading]:
+    """Ways to read the columns of a quantity, the right one first.
+
+    Parameters
+    ----------
+    quantity : str
+        Series of a `Recording`, or `command`.
+    plant : PlantDescription
+    columns : int
+        One for each joint, or for each wire.
+    """
+    whole = tuple(range(columns))
+    yield Misreading(quantity, 'right', 0.0, whole, (1.0,) * columns)
+    joints = len(plant.joints)
+    parts = [whole]
+    if columns > joints:
+        parts += [(c, c + 1) for c in range(0, columns, 2)]
+    parts += [(c,) for c in whole]
+    parts = list(dict.fromkeys(parts))
+    for unit, factor in known_units(quantity, plant).items():
+        for part in parts:
+            if len(part) * joints >= columns:
+                one = scaled(quantity, 'unit', factor, part, columns, unit)
+                yield replace(one, weight=one.weight + (RARELY if unit == 'mrad' else 0.0))
+    for part in parts:
+        yield scaled(quantity, 'sign', -1.0, part, columns)
+    for order in permutations(whole):
+        if order != whole:
+            moved = sum(a != b for a, b in zip(order, whole, strict=True))
+            # Both plugs of a joint with those of the other one, or all positive with negative ones.
+            plain = moved == 2 or order in ((2, 3, 0, 1), (1, 0, 3, 2))
+            weight = 1.0 if plain else 1.0 + ROUND_ABOUT
+            yield Misreading(quantity, 'order', weight, order, (1.0,) * columns)
+
+
+def scaled(
+    quantity: str, kind: str, factor: float, part: Sequence[int], columns: int, unit: str = ''
+) -> Misreading:
+    """A misreading of some columns by one factor."""
+    weight = 1.0 if len(part) == columns else 1.0 + ELSEWHERE
+    factors = tuple(factor if c in part else 1.0 for c in range(columns))
+    return Misreading(quantity, kind, weight, tuple(range(columns)), factors, unit)
+
+
+def as_findings(recording: Recording, mistakes: Sequence[Misreading]) -> list[Finding]:
+    """Say each mistake in one line.
+
+    Parameters
+    ----------
+    recording : Recording
+    mistakes : sequence of Misreading
+
+    Returns
+    -------
+    list of Finding
+        None of them leaves the recording usable. An exchange of motors is said once.
+    """
+    findings: dict[tuple[str, str, tuple[int, ...]], Finding] = {}
+    for mistake in mistakes:
+        finding = _finding(recording, mistake)
+        topic = finding.signals[0].partition(':')[0]
+        key = (topic, mistake.kind if mistake.kind == 'order' else mistake.quantity, mistake.source)
+        findings.setdefault(key, finding)
+    return list(findings.values())
+
+
+def column_name(recording: Recording, quantity: str, column: int) -> str:
+    """Return the name of a column of a quantity or of the command."""
+    if quantity == 'command':
+        joint = recording.joints[column]
+        name = joint if recording.command.topic == DESIRED else motor_name(joint)
+        return f'{recording.command.topic}:{name}'
+    if quantity == 'tension':
+        return signal_name(quantity, recording.joints[column // 2], column % 2)
+    return signal_name(quantity, recording.joints[column])
+
+
+def _finding(recording: Recording, mistake: Misreading) -> Finding:
+    quantity = mistake.quantity
+    signals = tuple(column_name(recording, quantity, c) for c in mistake.touched)
+    named = ' and '.join(signals)
+    verb = 'is' if len(signals) == 1 else 'are'
+    wanted = QUANTITY_UNITS.get(quantity, 'rad')
+    factor = next((f for f in mistake.factor if f != 1.0), 1.0)
+    per_joint = 2 if quantity == 'tension' else 1
+    evidence = {}
+    gear_of_shaft = mistake.of_gear and quantity == 'shaft_position'
+    if mistake.kind == 'unit' and not gear_of_shaft:
+        times = f'{factor:.3g} times' if factor > 1.0 else f'1/{1.0 / factor:.3g} of'
+        name = 'wrong_unit'
+        text = f'{named} {verb} {times} what the plant can give: in {mistake.unit}, not in {wanted}'
+        remedy = f'divide by {factor:.6g}, or give the unit when the table is converted'
+        evidence = {'factor': factor}
+    elif mistake.kind == 'factor' and not gear_of_shaft:
+        name = 'wrong_unit'
+        text = (
+            f'{named} {verb} about {factor:.2g} times what the plant can give, which is no unit of '
+            'force: counts of a converter, not N'
+        )
+        remedy = 'give what one count is in N as scale when the table is converted'
+        evidence = {'factor': factor}
+    elif gear_of_shaft:
+        name = 'wrong_gear'
+        text = (
+            f'{named} {"turns" if len(signals) == 1 else "turn"} {factor:.3g} times as far as '
+            f'commanded by {recording.command.topic}: a gear is wrong on the way of one of them'
+        )
+        remedy = f'divide the position or multiply the command by {factor:.4g}, whichever is wrong'
+        evidence = {'factor': factor}
+    elif mistake.kind == 'sign':
+        name = 'wrong_sign'
+        negated = 'it fits' if len(signals) == 1 else 'they fit'
+        text = f'{named} {verb} of the wrong sign: negated, {negated} the plant'
+        remedy = 'multiply by -1'
+    else:
+        name = 'exchanged'
+        text = f'{named} are exchanged: ' + ', '.join(
+            f'{column_name(recording, quantity, mistake.source[c]).rpartition(":")[2]} holds '
+            f'{column_name(recording, quantity, c).rpartition(":")[2]}'
+            for c in mistake.touched
+        )
+        remedy = 'exchange their names, or the plugs'
+    return Finding(
+        name,
+        Severity.UNUSABLE,
+        recording.joints[mistake.touched[0] // per_joint],
+        'recording',
+        signals,
+        ((0.0, recording.duration),),
+        text,
+        remedy,
+        evidence=evidence,
+    )

@@ -1,0 +1,143 @@
+"""Topics that stand still while the rig moves, and motors that do not follow at all."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from endoscope_explain.audit.finding import Finding, Severity
+from endoscope_explain.audit.misreading import column_name
+from endoscope_explain.recording import Recording, Series
+from endoscope_explain.recording.series import BENDING, Array
+
+MOVES_RAD = 0.01
+"""Shaft angle that is a motion."""
+LONG_S = 1.0
+SHARE = 0.5
+"""Part of the recording from whose length on a topic is frozen, not held for a moment."""
+NOISES = 10.0
+
+
+def moves(series: Series | None) -> bool:
+    """Whether any column of shaft angles moves."""
+    return series is not None and bool(np.ptp(series.values, axis=0).max() >= MOVES_RAD)
+
+
+def frozen_findings(
+    recording: Recording,
+    grid: Array,
+    expected: Mapping[str, Array],
+    noise: Mapping[str, float],
+    noisy: bool,
+) -> list[Finding]:
+    """Find topics that repeat one reading to the end, or from first to last.
+
+    Parameters
+    ----------
+    recording : Recording
+        With increasing stamps.
+    grid : array (N,)
+        Times in s.
+    expected : mapping of quantity to array (N, columns)
+        What the plant makes of the command then.
+    noise : mapping of quantity to float
+        Of each sensor.
+    noisy : bool
+        Whether the recording shows it: without, a slack wire and a joint that is held fast may
+        well give one reading.
+
+    Returns
+    -------
+    list of Finding
+        Only of what must have moved meanwhile.
+    """
+    findings = []
+    by_topic: dict[str, list[tuple[str, Series]]] = {}
+    for quantity, series in recording.measured().items():
+        by_topic.setdefault(series.topic, []).append((quantity, series))
+    for held in by_topic.values():
+        time = held[0][1].time
+        values = np.concatenate([s.values.reshape(len(time), -1) for _, s in held], axis=1)
+        found = _frozen_since(time, values)
+        columns = [
+            (quantity, c) for quantity, _ in held for c in range(expected[quantity].shape[1])
+        ]
+        sure = noisy or held[0][1].topic != BENDING
+        if (
+            sure
+            and found is not None
+            and any(_must_move(expected[q][:, c], grid, found, noise[q]) for q, c in columns)
+        ):
+            findings.append(_finding(recording, columns, found, held[0][1].topic))
+            continue
+        for index, (quantity, c) in enumerate(columns):
+            constant = np.ptp(values[:, index]) == 0.0
+            # An encoder of a motor that is held fast stands still as well.
+            if (
+                constant
+                and noisy
+                and quantity in ('tension', 'bending')
+                and _must_move(expected[quantity][:, c], grid, float(time[0]), noise[quantity])
+            ):
+                name = column_name(recording, quantity, c)
+                findings.append(_finding(recording, [(quantity, c)], float(time[0]), name))
+    command = recording.command
+    if not moves(command) and moves(recording.shaft_position):
+        columns = [('command', j) for j in range(len(recording.joints))]
+        findings.append(_finding(recording, columns, float(command.time[0]), command.topic))
+    return findings
+
+
+def resting_motor_findings(recording: Recording) -> list[Finding]:
+    """Note motors that stand still although they are commanded to move."""
+    if recording.shaft_position is None:
+        return []
+    findings = []
+    for j, joint in enumerate(recording.joints):
+        commanded = float(np.ptp(recording.command.values[:, j]))
+        if commanded < MOVES_RAD or np.ptp(recording.shaft_position.values[:, j]) >= MOVES_RAD:
+            continue
+        signal = column_name(recording, 'shaft_position', j)
+        findings.append(
+            Finding(
+                'motor_at_rest',
+                Severity.NOTE,
+                joint,
+                'recording',
+                (signal,),
+                ((0.0, recording.duration),),
+                f'{signal} stands still while its command moves by {commanded:.3g} rad',
+                'see whether the motor was enabled and free to turn',
+            )
+        )
+    return findings
+
+
+def _frozen_since(time: Array, values: Array) -> float | None:
+    """When the last change was, where it is long ago."""
+    change = np.flatnonzero((np.diff(values, axis=0) != 0.0).any(axis=1))
+    since = float(time[change[-1] + 1] if len(change) else time[0])
+    long = max(LONG_S, SHARE * float(time[-1] - time[0]))
+    return since if float(time[-1]) - since >= long else None
+
+
+def _must_move(expected: Array, grid: Array, since: float, noise: float) -> bool:
+    later = expected[grid >= since]
+    return len(later) > 1 and bool(np.ptp(later) > max(NOISES * noise, MOVES_RAD))
+
+
+def _finding(
+    recording: Recording, columns: list[tuple[str, int]], since: float, what: str
+) -> Finding:
+    quantity, column = columns[0]
+    per_joint = 2 if quantity == 'tension' else 1
+    meanwhile = 'the command moves' if quantity != 'command' else 'the motors move'
+    return Finding(
+        'frozen',
+        Severity.UNUSABLE,
+        recording.joints[column // per_joint],
+        'recording',
+        tuple(column_name(recording, q, c) for q, c in columns),
+        ((since, recording.duration),),
+        f'{what} is frozen: it repeats one reading from {since:.3f} s to its end while {meanwhile}',
+        'record it anew with its source running',
+    )
