@@ -29,7 +29,7 @@ from endoscope_explain.audit.standing_still import (
     resting_motor_findings,
 )
 from endoscope_explain.audit.time_unit import in_seconds, stamp_unit_findings
-from endoscope_explain.recording import Recording, Series, plant_of_joints
+from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.signals import gear, signal_name
 
 LEAST_DURATION_S = 2.0
@@ -90,7 +90,7 @@ def _on_ordered_stamps(recording: Recording, findings: list[Finding]) -> Recordi
 def _as_meant(recording: Recording, plant: PlantDescription, misread: list[Finding]) -> Recording:
     if recording.duration < LEAST_DURATION_S:
         return recording
-    plant = plant_of_joints(plant, recording.joints)
+    plant = plant.of_joints(recording.joints)
     comparison = Comparison(recording, plant)
     frozen = frozen_findings(
         recording,
