@@ -121,7 +121,6 @@ def _imbalance(
     most: float,
     way: float,
     other: float,
-    push: float,
     time: float,
     tick: float,
 ) -> tuple[float, float]:
@@ -137,7 +136,7 @@ def _imbalance(
         slope += steep
     friction, steep = _friction(x, p, most, step)
     damping = (p[JOINT_DAMPING] + 0.5 * r * r * film) / tick
-    moment += push + r * (ta - tb) - 0.5 * r * film * way / tick
+    moment += r * (ta - tb) - 0.5 * r * film * way / tick
     moment -= p[JOINT_STIFFNESS] * (angle - p[JOINT_REST_ANGLE]) + friction + damping * step
     slope += r * r * (stiff_a * sa + stiff_b * sb) + p[JOINT_STIFFNESS] + steep + damping
     return -moment, slope
@@ -155,7 +154,6 @@ def _step(
     most: float,
     way: float,
     other: float,
-    push: float,
     time: float,
     tick: float,
 ) -> float:
@@ -165,7 +163,7 @@ def _step(
     and pre-sliding soften it: from the last step Newton's method comes to the root from one side.
     """
     missing, slope = _imbalance(
-        x, table, p, on, 0.0, stiff_a, stiff_b, film, most, way, other, push, time, tick
+        x, table, p, on, 0.0, stiff_a, stiff_b, film, most, way, other, time, tick
     )
     if missing == 0.0:
         return 0.0
@@ -174,7 +172,7 @@ def _step(
     step = x[JOINT_STEP] if x[JOINT_STEP] * side > 0.0 else side * _FIRST_STEP
     for _ in range(_TRIES):
         missing, slope = _imbalance(
-            x, table, p, on, step, stiff_a, stiff_b, film, most, way, other, push, time, tick
+            x, table, p, on, step, stiff_a, stiff_b, film, most, way, other, time, tick
         )
         if missing * side <= 0.0:
             near = abs(step)
@@ -197,7 +195,6 @@ def bend(
     on: Flags,
     way: float,
     other: float,
-    push: float,
     time: float,
     tick: float,
 ) -> None:
@@ -213,8 +210,6 @@ def bend(
         By how much the pulley has wound up the positive wire in this tick, m.
     other : float
         The other joint's angle, rad.
-    push : float
-        Latent moment, N m.
     time, tick : float
         Middle of the tick and its length, s.
     """
@@ -234,7 +229,7 @@ def bend(
     if functions_act(on):
         film += film_functions(on, p, x, abs(x[SLIDING_SPEED]))
         most *= friction_functions(on, p, x)
-    step = _step(x, table, p, on, stiff_a, stiff_b, film, most, way, other, push, time, tick)
+    step = _step(x, table, p, on, stiff_a, stiff_b, film, most, way, other, time, tick)
     r = p[JOINT_RADIUS]
     if step != 0.0:
         move(x, WIRE_A, table, JOINT_END, -stiff_a * r * step, x[FLOOR])

@@ -27,9 +27,6 @@ from endoscope_core.physics.layout import (
     IN_COMMAND,
     IN_MOTOR,
     IN_OTHER_JOINT,
-    IN_PUSH_COMMAND,
-    IN_PUSH_MOMENT,
-    IN_PUSH_STRETCH,
     JOINT,
     JOINT_STEP,
     MEAN_TENSION,
@@ -158,10 +155,10 @@ def settle(
     steps = _STEPS_TO_START if shaft != 0.0 else 1
     for k in range(1, steps + 1):
         if length_varies(on) or functions_act(on):
-            _grow(x, table, p, on, 0.0, 0.0)
+            _grow(x, table, p, on, 0.0)
         x[MOTOR] = shaft * k / steps
         _wind_up(x, table, p, on, x[MOTOR])
-        bend(x, table, p, on, 0.0, 0.0, 0.0, -0.5 * _SETTLING_TICK, _SETTLING_TICK)
+        bend(x, table, p, on, 0.0, 0.0, -0.5 * _SETTLING_TICK, _SETTLING_TICK)
         if functions_act(on):
             _keep_up(x, table, 0.0)
     for wire in range(2):
@@ -246,11 +243,11 @@ def _change_friction(
 
 
 @compiled
-def _grow(x: Array, table: Array, p: Array, on: Flags, push: float, time: float) -> None:
-    """Give both wires the length that effects have added to them by `time`, and a latent push."""
+def _grow(x: Array, table: Array, p: Array, on: Flags, time: float) -> None:
+    """Give both wires the length that effects have added to them by `time`."""
     for k in range(2):
         wire = WIRE_A if k == 0 else WIRE_B
-        length = added_length(on, p, x, k, time) + (push if k == 0 else -push)
+        length = added_length(on, p, x, k, time)
         if functions_act(on):
             length += length_functions(on, p, x, k, time)
         grown = length - x[EXTRA_LENGTH + k]
@@ -373,7 +370,6 @@ def advance_tick(
         command = command_at_servo(on, p, x, inputs[IN_COMMAND], history, tick)
         if functions_act(on):
             command += command_functions(on, p, x, command, history, tick)
-        command += inputs[IN_PUSH_COMMAND]
         from_error, kept = x[TRANSITION + 2], x[TRANSITION + 3]
         error = servo_error(on, p, x, x[MOTOR] - command, from_error, kept)
         if functions_act(on):
@@ -392,12 +388,11 @@ def advance_tick(
 
     if exponent_varies(on) or functions_act(on):
         _change_friction(x, sheath, p, on, abs(x[WINDING_SPEED]), time, tick)
-    push = inputs[IN_PUSH_STRETCH]
-    if length_varies(on) or functions_act(on) or push != x[EXTRA_LENGTH]:
-        _grow(x, table, p, on, push, time)
+    if length_varies(on) or functions_act(on):
+        _grow(x, table, p, on, time)
     way = _wind_up(x, table, p, on, shaft)
     x[WINDING_SPEED] = way / tick
-    bend(x, table, p, on, way, other, inputs[IN_PUSH_MOMENT], time, tick)
+    bend(x, table, p, on, way, other, time, tick)
     x[TIP] = tip_angle(on, p, x, x[JOINT])
     x[TICKS] += 1.0
     if something_follows(on):

@@ -150,11 +150,10 @@ HISTORY = 1024
 """Ticks of command and of angle that are kept for delays."""
 COMMAND_HISTORY, ANGLE_HISTORY = 0, 1
 
-IN_COMMAND, IN_OTHER_JOINT, IN_MOTOR, IN_PUSH_COMMAND, IN_PUSH_STRETCH, IN_PUSH_MOMENT = range(6)
-INPUTS = 6
+IN_COMMAND, IN_OTHER_JOINT, IN_MOTOR = range(3)
+INPUTS = 3
 """Columns of the input: command and measured motor angle (NaN: let the servo run) in rad of the
-shaft, the other joint's angle, and latent pushes added to command (rad), length of the positive
-wire (m) and joint moment (N m)."""
+shaft, and the other joint's angle in rad."""
 
 OUT_MOTOR, OUT_MOTOR_SPEED, OUT_EFFORT, OUT_TENSION_A, OUT_TENSION_B, OUT_BENDING, OUT_JOINT = (
     range(7)

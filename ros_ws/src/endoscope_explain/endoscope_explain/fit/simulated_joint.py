@@ -34,7 +34,7 @@ def simulate_joint(
     flags : array (flags,) of bool
         Effects that are on.
     inputs : array (1, N, INPUTS), optional
-        Instead of the observation's own, for latent pushes or cut chains.
+        Instead of the observation's own, for cut chains.
 
     Returns
     -------
