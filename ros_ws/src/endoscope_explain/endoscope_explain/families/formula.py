@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from endoscope_core.physics.description import TermSpec
 from endoscope_core.physics.functions.expression import evaluate
 from endoscope_core.physics.functions.place import Shape
+from endoscope_core.physics.functions.term import tabulated
 from endoscope_explain.families.function_search import FunctionFit
 
 Array = NDArray[np.float64]
@@ -41,7 +43,7 @@ class Formula:
     share : float
         Of what the function does, so much does the formula.
     as_good : bool
-        Whether the data do not tell it from the function.
+        Whether the data do not tell it from the function, and a plant takes it.
     """
 
     expression: str
@@ -84,7 +86,18 @@ def nearest_formula(found: FunctionFit) -> Formula:
     assert best is not None
     _, loss, expression, values = best
     limit = float(chi2.ppf(AS_GOOD, len(wanted)))
-    return Formula(expression, values, max(0.0, 1.0 - loss / max(whole, 1e-300)), loss <= limit)
+    as_good = loss <= limit and _can_be_run(found, expression)
+    return Formula(expression, values, max(0.0, 1.0 - loss / max(whole, 1e-300)), as_good)
+
+
+def _can_be_run(found: FunctionFit, expression: str) -> bool:
+    """Whether a plant takes a formula: one may be too fine for its table, or go too far."""
+    joint, family = found.fit.model.observation.joint, found.family
+    try:
+        tabulated(TermSpec(joint, family.place.id, expression, range=(family.low, family.high)))
+    except ValueError:
+        return False
+    return True
 
 
 def _candidates(found: FunctionFit) -> Iterator[tuple[tuple[str, ...], int]]:

@@ -32,6 +32,8 @@ moves most."""
 REFITTED = 5
 """Families that are refitted, of all that were screened."""
 ITERATIONS = 10
+SETTLING, SETTLED = 40, 1e-4
+"""Steps of the best one's fit, at most, and the share of the cost below which it stands."""
 _COORDINATE = 10.0
 """Coefficients in a coordinate of the fit, whose steps suit logarithms."""
 _FURTHEST = 6.0
@@ -112,8 +114,14 @@ def best_functions(found: Fit, jobs: int) -> list[FunctionFit]:
     promised = [p for p in parallel_map(screened, families, jobs) if p is not None]
     promised.sort(key=lambda p: -p[0])
     likely = [family for gain, family in promised[:REFITTED] if gain > 0.0]
-    fits = parallel_map(lambda family: _fitted(found, family, weight), likely, jobs)
-    return sorted(fits, key=lambda f: -f.gain)
+    models = [_model(found, family) for family in likely]
+    begun = np.concatenate([found.theta, np.zeros(COEFFICIENTS)])
+    fits = parallel_map(lambda m: fit(m, begun, weight=weight, iterations=ITERATIONS), models, jobs)
+    functions = [_judged(found, f, weight) for f in fits]
+    functions.sort(key=lambda f: -f.gain)
+    if functions:
+        functions[0] = _judged(found, _settled(functions[0].fit, weight), weight)
+    return functions
 
 
 def _families(found: Fit) -> Iterable[Family]:
@@ -206,10 +214,30 @@ def _relative_size(found: Fit, answers: Array, weight: Array) -> float:
     return max(shares)
 
 
-def _fitted(found: Fit, family: Family, weight: Array) -> FunctionFit:
-    model = _model(found, family)
-    start = np.concatenate([found.theta, np.zeros(COEFFICIENTS)])
-    fitted = fit(model, start, weight=weight, iterations=ITERATIONS)
+def _settled(found: Fit, weight: Array) -> Fit:
+    """Go on until nothing moves any more, from here and from the plant as described.
+
+    What was missing has bent the other numbers, and they may stay in the corner that it bent them
+    into.
+    """
+    model = found.model
+    described = found.theta.copy()
+    described[:-COEFFICIENTS] = [item.mean for item in model.free[:-COEFFICIENTS]]
+
+    def settled(theta: Array) -> Fit:
+        return fit(model, theta, weight, SETTLING, SETTLED)
+
+    def cost(each: Fit) -> float:
+        return model.cost(weight * each.residuals, each.theta)
+
+    return min((settled(theta) for theta in (found.theta, described)), key=cost)
+
+
+def _judged(found: Fit, fitted: Fit, weight: Array) -> FunctionFit:
+    model = fitted.model
+    assert isinstance(model, FunctionModel)
+    family = model.family
+    assert family is not None
     weighted = fitted.jacobian * weight[:, None]
     precision = weighted.T @ weighted + np.diag(model.prior_weight() ** 2)
     covariance = np.linalg.inv(precision)[-COEFFICIENTS:, -COEFFICIENTS:] * _COORDINATE**2
