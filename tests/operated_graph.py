@@ -21,14 +21,16 @@ from endoscope_nodes.recorder_node import RecorderNode
 ENDOSCOPE = [sys.executable, '-m', 'endoscope_bringup.cli']
 # A shell does this for the programs that it starts.
 _TAKE_TERMINAL = """
-import fcntl, os, sys, termios
+import fcntl, os, signal, sys, termios
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 os.execv(sys.argv[1], sys.argv[1:])
 """
-# A test that runs in the background of a shell ignores SIGINT, and so would its programs.
+# Tests in the background of a shell ignore SIGINT, under nohup SIGHUP, and so would their programs.
 _HEAR_INTERRUPTS = """
 import os, signal, sys
 signal.signal(signal.SIGINT, signal.SIG_DFL)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 os.execv(sys.argv[1], sys.argv[1:])
 """
 _STEP_S = 0.02
