@@ -12,11 +12,9 @@ from typing import Any
 from endoscope_bringup.commands import COMMANDS
 from endoscope_bringup.other_packages import COMES_WITH, commands_of_other_packages
 from endoscope_bringup.subcommands import OneLineParser, add_subcommands, run_chosen
+from endoscope_core.choices import LOG_LEVEL_VARIABLE, LOG_LEVELS
 from endoscope_core.errors import EndoscopeError, printable
 
-# Of the nodes, which no other command is to load.
-LOG_LEVEL = 'ENDOSCOPE_LOG_LEVEL'
-LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 EXIT_UNUSABLE_INPUT = 2
 EXIT_INTERRUPTED = 130
 EXIT_TERMINATED = 143
@@ -58,7 +56,7 @@ def build_parser() -> OneLineParser:
     parser.add_argument('--version', action=_Version, help='print the version and exit')
     parser.add_argument(
         '--log-level',
-        choices=LEVELS,
+        choices=LOG_LEVELS,
         help='the least that the nodes and libraries of this command say to the log (info)',
     )
     own = [f'endoscope_bringup.commands.{name}' for name in COMMANDS]
@@ -98,7 +96,7 @@ def _log_from(level: str) -> None:
     import logging
 
     # ROS takes it from the environment; python has the same levels by the same names.
-    os.environ[LOG_LEVEL] = level
+    os.environ[LOG_LEVEL_VARIABLE] = level
     logging.basicConfig(level=getattr(logging, level.upper()))
 
 

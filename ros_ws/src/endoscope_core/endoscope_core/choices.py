@@ -32,3 +32,6 @@ SIMULATED = 'simulated'
 MOTOR_DEVICES = (SIMULATED, 'dynamixel')
 LOAD_CELL_DEVICES = (SIMULATED, 'modbus_rtu', 'modbus_tcp')
 TRACKER_DEVICES = (SIMULATED, 'aurora')
+LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
+LOG_LEVEL_VARIABLE = 'ENDOSCOPE_LOG_LEVEL'
+"""In the environment: the least that nodes say to the log."""

@@ -79,11 +79,13 @@ class Unexplained:
     left: Array = field(repr=False)
 
 
-def unexplained(anchor: Fit) -> Unexplained:
-    """What a fit leaves to effects that it does not have."""
+def unexplained(anchor: Fit, weight: Array | None = None) -> Unexplained:
+    """What a fit leaves to effects that it does not have, its residuals weighted (size,) if so."""
     model = anchor.model
-    span, _ = np.linalg.qr(np.vstack([anchor.jacobian, np.diag(model.prior_weight())]))
-    here = np.concatenate([anchor.residuals, model.prior(anchor.theta)])
+    weight = np.ones(len(anchor.residuals)) if weight is None else weight
+    slopes = anchor.jacobian * weight[:, None]
+    span, _ = np.linalg.qr(np.vstack([slopes, np.diag(model.prior_weight())]))
+    here = np.concatenate([anchor.residuals * weight, model.prior(anchor.theta)])
     left = here - span @ (span.T @ here)
     return Unexplained(anchor, span, left)
 

@@ -17,6 +17,7 @@ from endoscope_explain.explanation import (
     Explanation,
     NamedEffect,
     NominalEstimate,
+    UnknownTerm,
     Verdict,
 )
 from endoscope_explain.pipeline import Inputs, explain_case
@@ -108,3 +109,27 @@ def stribeck_case(stribeck_recording):
     )
     inputs = Inputs(plant, audit, None, None)
     return explain_case(inputs, lambda *_, **__: explanation, extras=False)
+
+
+@pytest.fixture(scope='session')
+def missing_function():
+    """A function that no effect of the catalogue is, as an explanation has it."""
+    return UnknownTerm(
+        'bend_x',
+        'load_of_angle',
+        "Moment on the joint, a function of the joint's angle",
+        'joint',
+        'N m',
+        'q',
+        "the joint's angle, rad",
+        np.linspace(-1.0, 1.0, 41),
+        np.linspace(-1.0, 1.0, 41) ** 2,
+        np.full(41, 0.05),
+        '0.98*q**2',
+        0.98 * np.linspace(-1.0, 1.0, 41) ** 2,
+        0.99,
+        True,
+        0.9,
+        ('tracker_of_angle',),
+        ('gravity',),
+    )

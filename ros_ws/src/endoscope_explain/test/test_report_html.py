@@ -10,33 +10,12 @@ from endoscope_explain.case import NextExperiment
 from endoscope_explain.explanation import (
     Candidate,
     NominalEstimate,
-    UnknownTerm,
     Verdict,
 )
 from endoscope_explain.report.chain_drawing import STAGES, chain_svg
 from endoscope_explain.report.figures.ladder import parameters_figure
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.sentences import HEADLINES, verdict_sentence
-
-MISSING = UnknownTerm(
-    'bend_x',
-    'load_of_angle',
-    "Moment on the joint, a function of the joint's angle",
-    'joint',
-    'N m',
-    'q',
-    "the joint's angle, rad",
-    np.linspace(-1.0, 1.0, 41),
-    np.linspace(-1.0, 1.0, 41) ** 2,
-    np.full(41, 0.05),
-    '0.98*q**2',
-    0.98 * np.linspace(-1.0, 1.0, 41) ** 2,
-    0.99,
-    True,
-    0.9,
-    ('tracker_of_angle',),
-    ('gravity',),
-)
 
 
 @pytest.fixture(scope='module')
@@ -108,8 +87,10 @@ def test_every_verdict_has_its_sentence(stribeck_case, verdict):
 
 
 @pytest.mark.parametrize(('explained', 'offered'), [(0.9, True), (1e-4, False)])
-def test_a_function_that_explains_nothing_is_not_offered(stribeck_case, explained, offered):
-    term = dataclasses.replace(MISSING, explained=explained)
+def test_a_function_that_explains_nothing_is_not_offered(
+    stribeck_case, missing_function, explained, offered
+):
+    term = dataclasses.replace(missing_function, explained=explained)
     explanation = dataclasses.replace(stribeck_case.explanation, unknown=term)
     case = dataclasses.replace(
         stribeck_case, explanation=explanation, verdict=Verdict.UNKNOWN_PHYSICS
@@ -117,7 +98,7 @@ def test_a_function_that_explains_nothing_is_not_offered(stribeck_case, explaine
     assert ("function of the joint's angle" in verdict_sentence(case)) == offered
 
 
-def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case):
+def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case, missing_function):
     time = np.linspace(0.0, 10.0, 200)
     experiment = NextExperiment(
         'It tells gravity from contact.',
@@ -129,7 +110,7 @@ def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case):
         tuple((float(v), 0.0) for v in np.sin(time)),
         ('bend_x', 'bend_y'),
     )
-    explanation = dataclasses.replace(stribeck_case.explanation, unknown=MISSING)
+    explanation = dataclasses.replace(stribeck_case.explanation, unknown=missing_function)
     page = html_page(
         dataclasses.replace(
             stribeck_case,
@@ -138,7 +119,7 @@ def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case):
             next_experiment=experiment,
         )
     )
-    assert MISSING.expression in page
-    assert html.escape(MISSING.what) in page.replace('&#39;', '&#x27;')
+    assert missing_function.expression in page
+    assert html.escape(missing_function.what) in page.replace('&#39;', '&#x27;')
     assert 'It tells gravity from contact.' in page
     assert page.index('slow ramps') < page.index('>chirp<')

@@ -4,7 +4,6 @@ import dataclasses
 import json
 import math
 
-import numpy as np
 import pytest
 
 from endoscope_core.physics.effects import CATALOGUE
@@ -12,7 +11,7 @@ from endoscope_core.physics.plant_file import load_plant
 from endoscope_explain.audit import AuditReport, Finding, Severity
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.combine import combined_effects, combined_verdict
-from endoscope_explain.explanation import Estimate, UnknownTerm, Verdict
+from endoscope_explain.explanation import Estimate, Verdict
 from endoscope_explain.report.report_mapping import report_mapping
 from endoscope_explain.report.writing import write_report
 
@@ -116,35 +115,16 @@ def test_a_number_that_is_not_finite_is_refused(stribeck_case):
         report_mapping(dataclasses.replace(stribeck_case, runtime_s=math.nan))
 
 
-def test_unknown_physics_carries_its_formula(stribeck_case):
-    term = UnknownTerm(
-        'bend_x',
-        'load_of_angle',
-        "Moment on the joint, a function of the joint's angle",
-        'joint',
-        'N m',
-        'q',
-        "the joint's angle, rad",
-        np.linspace(-1.0, 1.0, 41),
-        np.linspace(-1.0, 1.0, 41) ** 2,
-        np.full(41, 0.05),
-        '0.98*q**2',
-        0.98 * np.linspace(-1.0, 1.0, 41) ** 2,
-        0.99,
-        True,
-        0.9,
-        ('tracker_of_angle',),
-        ('gravity',),
-    )
+def test_unknown_physics_carries_its_formula(stribeck_case, missing_function):
     explanation = dataclasses.replace(
-        stribeck_case.explanation, verdict=Verdict.UNKNOWN_PHYSICS, unknown=term
+        stribeck_case.explanation, verdict=Verdict.UNKNOWN_PHYSICS, unknown=missing_function
     )
     case = dataclasses.replace(
         stribeck_case, explanation=explanation, verdict=Verdict.UNKNOWN_PHYSICS
     )
     report = report_mapping(case)
     check_report(report)
-    assert report['symbolic']['expression'] == term.expression
+    assert report['symbolic']['expression'] == missing_function.expression
     assert report['symbolic']['place'] == 'load_of_angle'
     assert len(report['symbolic']['function']['value']) == 41
     assert report['symbolic']['siblings'] == ['gravity']

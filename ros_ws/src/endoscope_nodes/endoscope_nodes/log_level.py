@@ -4,10 +4,8 @@ import os
 
 from rclpy.logging import LoggingSeverity, set_logger_level
 
+from endoscope_core.choices import LOG_LEVEL_VARIABLE, LOG_LEVELS
 from endoscope_core.errors import EndoscopeError
-
-LOG_LEVEL = 'ENDOSCOPE_LOG_LEVEL'
-LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 
 
 class LogLevelError(EndoscopeError, ValueError):
@@ -24,9 +22,11 @@ def log_as_asked() -> None:
     LogLevelError
         There is no such level.
     """
-    asked = os.environ.get(LOG_LEVEL)
+    asked = os.environ.get(LOG_LEVEL_VARIABLE)
     if not asked:
         return
-    if asked not in LEVELS:
-        raise LogLevelError(f'{LOG_LEVEL} is {asked!r}; give one of {", ".join(LEVELS)}')
+    if asked not in LOG_LEVELS:
+        raise LogLevelError(
+            f'{LOG_LEVEL_VARIABLE} is {asked!r}; give one of {", ".join(LOG_LEVELS)}'
+        )
     set_logger_level('', LoggingSeverity[asked.upper()])

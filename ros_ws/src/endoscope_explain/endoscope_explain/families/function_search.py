@@ -23,6 +23,7 @@ from endoscope_explain.fit.model import Fit, JointModel, fit
 from endoscope_explain.fit.simulated_joint import simulate_joint
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.repeated_motion import motion_repeats
+from endoscope_explain.screen import Unexplained, unexplained
 
 Array = NDArray[np.float64]
 
@@ -105,10 +106,10 @@ def best_functions(found: Fit, jobs: int) -> list[FunctionFit]:
     list of FunctionFit
     """
     weight = _weights(found)
-    span, left = _unexplained(found, weight)
+    left = unexplained(found, weight)
 
     def screened(family: Family) -> tuple[float, Family] | None:
-        return _screened(found, family, weight, span, left)
+        return _screened(left, family, weight)
 
     families = list(_families(found))
     promised = [p for p in parallel_map(screened, families, jobs) if p is not None]
@@ -145,14 +146,6 @@ def _weights(found: Fit) -> Array:
     return weights
 
 
-def _unexplained(found: Fit, weight: Array) -> tuple[Array, Array]:
-    """Directions that the other numbers can move, and what is left across them."""
-    prior = np.diag(found.model.prior_weight())
-    span, _ = np.linalg.qr(np.vstack([found.jacobian * weight[:, None], prior]))
-    here = np.concatenate([found.residuals * weight, found.model.prior(found.theta)])
-    return span, here - span @ (span.T @ here)
-
-
 def _model(found: Fit, family: Family) -> FunctionModel:
     place, base = family.place, found.model.base.copy()
     base[place.first_parameter + LOW] = family.low
@@ -176,17 +169,17 @@ def _answers(found: Fit, family: Family) -> Array:
     model = _model(found, family)
     columns = np.empty((len(found.residuals), COEFFICIENTS))
     begun = np.concatenate([found.theta, np.zeros(COEFFICIENTS)])
-    nothing = model.residuals(begun)
     for k in range(COEFFICIENTS):
         moved = begun.copy()
         moved[len(found.theta) + k] = 1.0 / _COORDINATE
-        columns[:, k] = model.residuals(moved) - nothing
+        columns[:, k] = model.residuals(moved) - found.residuals
     return columns
 
 
 def _screened(
-    found: Fit, family: Family, weight: Array, span: Array, left: Array
+    background: Unexplained, family: Family, weight: Array
 ) -> tuple[float, Family] | None:
+    found, span = background.fit, background.span
     trial = family.scaled(_TRIAL * family.place.largest)
     answers = _answers(found, trial) * weight[:, None]
     size = _relative_size(found, answers, weight)
@@ -195,7 +188,7 @@ def _screened(
     amplitude = PRIOR_SHARE / size
     columns = np.vstack([amplitude * answers, np.zeros((len(found.theta), COEFFICIENTS))])
     columns -= span @ (span.T @ columns)
-    towards = columns.T @ left
+    towards = columns.T @ background.left
     precision = np.eye(COEFFICIENTS) + columns.T @ columns
     gain = 0.5 * float(towards @ np.linalg.solve(precision, towards))
     _, volume = np.linalg.slogdet(precision)

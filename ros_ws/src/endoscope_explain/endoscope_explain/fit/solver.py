@@ -126,8 +126,8 @@ def minimise[R, D](
     for _ in range(effort.iterations):
         damping = min(damping, _LARGEST_AT_FIRST) if exact else damping
         before, accepted = cost, False
+        normal, gradient = objective.normal_equations(theta, residuals, derivative)
         for _ in range(1 if renewal is Renewal.NEVER else TRIES if exact else TRIES_BY_ESTIMATE):
-            normal, gradient = objective.normal_equations(theta, residuals, derivative)
             damped = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-9))
             step = bounded_step(damped, gradient, theta, low, high)
             if float(step @ step) < _NO_STEP:
