@@ -256,3 +256,9 @@ def test_a_plant_with_a_function_is_inverted():
     shaft = 0.5 * unaware.command
     missed = simulate(plant, shaft).bending_true - desired
     assert planned.rmse < 0.5 * np.sqrt(np.mean(missed**2))
+
+
+def test_effects_name_families_that_there_are_of_their_own_stage():
+    for effect in CATALOGUE.values():
+        for place_id in effect.traits.families:
+            assert FUNCTIONS[place_id].stage is effect.stage, f'{effect.id}: {place_id}'

@@ -48,6 +48,7 @@ def explain_recording(
     band: float = BAND,
     most_effects: int = MOST_EFFECTS,
     given: GivenJoints | None = None,
+    left_out: tuple[str, ...] = (),
     jobs: int = 2,
     progress: Progress | None = None,
 ) -> Explanation:
@@ -67,6 +68,8 @@ def explain_recording(
         Largest number of effects on a joint that are looked for.
     given : mapping of joint to GivenPhysics, optional
         The physics of each joint, if it is not to be searched.
+    left_out : tuple of str
+        Effects whose formulas are not tried, so that a law in none of the known forms can be met.
     jobs : int
         Tasks side by side.
     progress : callable, optional
@@ -83,10 +86,10 @@ def explain_recording(
         return Explanation.without_fit(Verdict.INSUFFICIENT_DATA, plant)
     tell('refitting the nominal plant')
     well = plant
-    known: dict[str, tuple[str, ...]] = {o.joint: () for o in observations}
+    known = {o.joint: left_out for o in observations}
     if baseline is not None:
         tell('searching what the baseline lacks')
-        observations, well, known = _healthy(observations, baseline, plant, band, jobs)
+        observations, well, known = _healthy(observations, baseline, plant, band, left_out, jobs)
         band = SAME_RIG
     observations, anchors = anchored(recording, observations, well, band, jobs)
 
@@ -148,6 +151,7 @@ def _healthy(
     baseline: Recording,
     plant: PlantDescription,
     band: float,
+    left_out: tuple[str, ...],
     jobs: int,
 ) -> tuple[tuple[JointObservation, ...], PlantDescription, dict[str, tuple[str, ...]]]:
     """Observations against a baseline, the plant in health, and the effects it has on each joint.
@@ -160,13 +164,13 @@ def _healthy(
     healthy = [
         min(tried.tried(), key=lambda c: c.score)
         for tried in (
-            search(pair, jobs, depth=1) for pair in all_anchors(before, packed, jobs, band)
+            search(pair, jobs, 1, left_out) for pair in all_anchors(before, packed, jobs, band)
         )
     ]
     by_joint = {c.fit.model.observation.joint: c for c in healthy}
     seen = tuple(against_baseline(o, by_joint[o.joint].fit) for o in observations)
     well = plant_of(plant, [c.fit for c in healthy], [c.effects for c in healthy])
-    return seen, well, {joint: c.effects for joint, c in by_joint.items()}
+    return seen, well, {joint: (*left_out, *c.effects) for joint, c in by_joint.items()}
 
 
 def _misled_by_the_other(decisions: list[Decision]) -> list[int]:

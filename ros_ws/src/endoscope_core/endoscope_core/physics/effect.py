@@ -106,6 +106,8 @@ class Traits:
     rescales
         Nominal parameter that it scales by so much that a described value is ambiguous, and by how
         much; None for most.
+    families
+        Places whose smooth functions hold its formula as one of many.
     """
 
     depends_on_time: bool = False
@@ -116,6 +118,7 @@ class Traits:
     symptom: Symptom | None = None
     resembles_time: bool = False
     rescales: tuple[str, float] | None = None
+    families: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

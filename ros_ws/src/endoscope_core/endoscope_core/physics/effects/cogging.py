@@ -3,7 +3,7 @@
 import math
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import PULLEY_ANGLE, hook
 
 EFFECT = Effect(
@@ -29,6 +29,7 @@ EFFECT = Effect(
         Parameter('second_sine', '-', -1.0, 1.0, 0.0),
         Parameter('second_cosine', '-', -1.0, 1.0, 0.0),
     ),
+    traits=Traits(families=('pulley_periodic', 'pulley_of_shaft')),
 )
 AMPLITUDE, CYCLES, PHASE, SECOND_SINE, SECOND_COSINE = EFFECT.places
 

@@ -19,7 +19,7 @@ EFFECT = Effect(
         Parameter('duration_s', 's', 0.0, 5.0, 0.0, starts=(0.05,)),
         Parameter('smooth', '-', 0.0, 1.0, 0.0, counted=True),
     ),
-    traits=Traits(depends_on_time=True),
+    traits=Traits(depends_on_time=True, families=('exponent_of_time',)),
 )
 TIME, FACTOR, DURATION, SMOOTH = EFFECT.places
 

@@ -1,7 +1,7 @@
 """`contact`: compliant, one-sided contact with tissue beyond an angle."""
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.effects.hunt_crossley import push_back
 from endoscope_core.physics.hooks import LOAD, hook
 
@@ -28,6 +28,7 @@ EFFECT = Effect(
         Parameter('exponent', '-', 1.0, 2.5, 1.0),
         Parameter('loss_s', 's', 0.0, 0.5, 0.0),
     ),
+    traits=Traits(families=('load_of_angle',)),
 )
 ANGLE, STIFFNESS, EXPONENT, LOSS = EFFECT.places
 DEPTH = 0.2

@@ -1,7 +1,7 @@
 """`cross_coupling`: the other bending joint moves this one."""
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import END_LENGTH, LOAD, hook
 from endoscope_core.physics.layout import JOINT_RADIUS
 
@@ -22,6 +22,7 @@ EFFECT = Effect(
         Parameter('wire_per_rad', '-', -1.0, 1.0, 0.0, off=0.0, starts=(0.0, 0.1)),
         Parameter('moment_per_rad2', 'N m/rad2', -0.05, 0.05, 0.0),
     ),
+    traits=Traits(families=('load_of_other_angle', 'end_way_of_other_angle')),
 )
 MOMENT, WIRE, SQUARE = EFFECT.places
 

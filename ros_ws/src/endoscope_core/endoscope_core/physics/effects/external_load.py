@@ -27,7 +27,7 @@ EFFECT = Effect(
         Parameter('hold_s', 's', 0.02, EVER, EVER, starts=(EVER, 2.0)),
         Parameter('period_s', 's', 0.04, EVER, EVER),
     ),
-    traits=Traits(depends_on_time=True),
+    traits=Traits(depends_on_time=True, families=('load_of_time',)),
 )
 MOMENT, TIME, DURATION, SMOOTH, HOLD, PERIOD = EFFECT.places
 

@@ -20,7 +20,9 @@ EFFECT = Effect(
         Parameter('distance_m', 'm', 1e-4, 2.0, 0.01, starts=(3e-3, 0.01, 0.03)),
         Parameter('tail', '-', 0.0, 3.0, 0.0, starts=(0.3,)),
     ),
-    traits=Traits(depends_on_time=True, rescales=('capstan_exponent', 1.8)),
+    traits=Traits(
+        depends_on_time=True, rescales=('capstan_exponent', 1.8), families=('exponent_of_distance',)
+    ),
 )
 EXCESS, LENGTH, TAIL = EFFECT.places
 LEAST_TAIL = 1e-9

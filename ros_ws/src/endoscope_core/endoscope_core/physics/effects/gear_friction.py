@@ -3,7 +3,7 @@
 import math
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import EFFORT, hook
 
 EFFECT = Effect(
@@ -20,6 +20,7 @@ EFFECT = Effect(
         Parameter('speed_rad_per_s', 'rad/s', 1e-3, 5.0, 0.03),
         Parameter('viscous', 'N m s/rad', 0.0, 1.0, 0.0, off=0.0),
     ),
+    traits=Traits(families=('effort_of_speed',)),
 )
 TORQUE, SPEED, VISCOUS = EFFECT.places
 

@@ -3,7 +3,7 @@
 import math
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import LOAD, hook
 
 EFFECT = Effect(
@@ -17,6 +17,7 @@ EFFECT = Effect(
         Parameter('moment_nm', 'N m', 0.0, 0.1, 0.001, off=0.0, starts=(0.0006,)),
         Parameter('phase_rad', 'rad', -7.0, 7.0, 0.0, starts=(0.0, 1.6, 3.1, -1.6)),
     ),
+    traits=Traits(families=('load_of_angle',)),
 )
 MOMENT, PHASE = EFFECT.places
 

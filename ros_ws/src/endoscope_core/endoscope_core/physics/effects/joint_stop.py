@@ -1,7 +1,7 @@
 """`joint_stop`: a stiff, two-sided end stop of the bending section."""
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.effects.hunt_crossley import push_back
 from endoscope_core.physics.hooks import LOAD, hook
 
@@ -28,6 +28,7 @@ EFFECT = Effect(
         Parameter('stiffness', 'N m/rad', 0.001, 2.0, 0.1, starts=(0.05,)),
         Parameter('loss_s', 's', 0.0, 0.5, 0.0),
     ),
+    traits=Traits(families=('load_of_angle',)),
 )
 ANGLE, STIFFNESS, LOSS = EFFECT.places
 

@@ -1,7 +1,7 @@
 """`load_cell_crosstalk`: a load cell sees its neighbour."""
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import LOAD_CELL, hook
 
 EFFECT = Effect(
@@ -15,6 +15,7 @@ EFFECT = Effect(
         Parameter('share', '-', -0.9, 0.9, 0.1, off=0.0, starts=(0.05,)),
         Parameter('wire', '-', 0.0, 2.0, 0.0, choices=(0.0, 1.0, 2.0)),
     ),
+    traits=Traits(families=('load_cell_pos_of_other_wire', 'load_cell_neg_of_other_wire')),
 )
 SHARE, WIRE = EFFECT.places
 

@@ -15,7 +15,9 @@ EFFECT = Effect(
         Parameter('rate_n_per_s', 'N/s', -1.0, 1.0, 0.05, off=0.0, starts=(0.02,), comparable=True),
         Parameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
-    traits=Traits(depends_on_time=True),
+    traits=Traits(
+        depends_on_time=True, families=('load_cell_pos_of_time', 'load_cell_neg_of_time')
+    ),
 )
 RATE, WIRE = EFFECT.places
 

@@ -1,7 +1,7 @@
 """`load_cell_gain`: the load cell reads wrong by a factor."""
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import LOAD_CELL, hook
 
 EFFECT = Effect(
@@ -15,6 +15,7 @@ EFFECT = Effect(
         Parameter('gain', '-', 0.2, 3.0, 1.15, off=1.0, starts=(1.05,), comparable=True),
         Parameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
+    traits=Traits(families=('load_cell_pos_of_tension', 'load_cell_neg_of_tension')),
 )
 GAIN, WIRE = EFFECT.places
 

@@ -21,7 +21,7 @@ EFFECT = Effect(
         Parameter('time_constant_s', 's', 1.0, 1e12, 1e12, starts=(60.0,)),
         Parameter('span_s', 's', 1e-3, 1e6, 40.0, is_duration=True),
     ),
-    traits=Traits(depends_on_time=True),
+    traits=Traits(depends_on_time=True, families=('length_of_time',)),
 )
 RATE, TIME_CONSTANT, SPAN = EFFECT.places
 

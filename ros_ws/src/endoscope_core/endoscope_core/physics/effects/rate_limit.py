@@ -3,7 +3,7 @@
 import math
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import COMMAND, SERVO_ERROR, hook
 from endoscope_core.physics.layout import SLOTS
 
@@ -29,6 +29,7 @@ EFFECT = Effect(
         ),
         Parameter('of_command', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
+    traits=Traits(families=('servo_error_of_error',)),
 )
 LIMIT, OF_COMMAND = EFFECT.places
 SLEWED = SLOTS.shaft_angle()

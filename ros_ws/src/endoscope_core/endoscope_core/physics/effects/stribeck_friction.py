@@ -19,7 +19,7 @@ EFFECT = Effect(
         Parameter('stribeck_speed', 'm/s', 1e-5, 2e-2, 1e-3, starts=(3e-4, 1e-3, 3e-3)),
         Parameter('tail', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
     ),
-    traits=Traits(rugged=True),
+    traits=Traits(rugged=True, families=('exponent_of_speed',)),
 )
 RISE, SPEED, TAIL = EFFECT.places
 

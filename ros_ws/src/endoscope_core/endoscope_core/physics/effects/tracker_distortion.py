@@ -3,7 +3,7 @@
 import math
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import TRACKER, hook
 
 EFFECT = Effect(
@@ -23,6 +23,7 @@ EFFECT = Effect(
         Parameter('wave_number', '1/rad', 2.0, 16.0, 8.0, starts=(5.0, 9.0)),
         Parameter('wave_phase', 'rad', -7.0, 7.0, 0.0, starts=(0.0, 1.6)),
     ),
+    traits=Traits(families=('tracker_of_angle',)),
 )
 LINEAR, QUADRATIC, CUBIC, WAVE, WAVE_NUMBER, WAVE_PHASE = EFFECT.places
 

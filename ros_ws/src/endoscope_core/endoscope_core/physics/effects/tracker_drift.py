@@ -16,7 +16,7 @@ EFFECT = Effect(
             'rate_rad_per_s', 'rad/s', -0.1, 0.1, 0.003, off=0.0, starts=(0.001,), comparable=True
         ),
     ),
-    traits=Traits(depends_on_time=True),
+    traits=Traits(depends_on_time=True, families=('tracker_of_time',)),
 )
 (RATE,) = EFFECT.places
 

@@ -1,7 +1,7 @@
 """`viscous_friction`: sheath friction proportional to the sliding speed."""
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import EXPONENT, FILM_DRAG, hook
 from endoscope_core.physics.layout import CAPSTAN_EXPONENT
 
@@ -20,6 +20,7 @@ EFFECT = Effect(
         Parameter('load_factor', 's/m', 0.0, 500.0, 0.0, off=0.0, starts=(0.0, 100.0)),
         Parameter('thinning', 's/m', 0.0, 1000.0, 0.0),
     ),
+    traits=Traits(families=('exponent_of_speed', 'film_drag_of_speed')),
 )
 COEFFICIENT, LOAD_FACTOR, THINNING = EFFECT.places
 LARGEST_EXPONENT = 3.0

@@ -1,7 +1,7 @@
 """`wire_geometry`: the wires' travel is not proportional to the motor's angle."""
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import TRAVEL_OF, hook
 from endoscope_core.physics.layout import PULLEY_RADIUS
 
@@ -18,6 +18,7 @@ EFFECT = Effect(
     'of Nho et al., IEEE Robot. Autom. Lett. 2021: one wire gives 1.28 mm, the other takes 1.22 mm '
     'at 60 deg, asymmetry 0.04',
     parameters=(Parameter('asymmetry', '-', -2.0, 2.0, 0.05, off=0.0, starts=(-0.1, 0.1)),),
+    traits=Traits(families=('travel_of_travel',)),
 )
 (ASYMMETRY,) = EFFECT.places
 

@@ -3,7 +3,7 @@
 import math
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.physics.effect import Effect, Parameter, Stage
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.hooks import STIFFNESS, hook
 from endoscope_core.physics.layout import REST_TENSION, WIRE_STIFFNESS
 
@@ -19,6 +19,7 @@ EFFECT = Effect(
         Parameter('growth_per_m', '1/m', 0.0, 500.0, 80.0, off=0.0, starts=(50.0,)),
         Parameter('cubic_per_m2', '1/m^2', 0.0, 5e6, 0.0, off=0.0, starts=(0.0, 1e5)),
     ),
+    traits=Traits(families=('stiffness_of_tension',)),
 )
 GROWTH, CUBIC = EFFECT.places
 LARGEST, LEAST = math.exp(2.0), 0.05
