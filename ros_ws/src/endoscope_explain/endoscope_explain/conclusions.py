@@ -7,9 +7,7 @@ import numpy as np
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.beyond_band import leaves_band_of
-from endoscope_explain.compose import Composition
-from endoscope_explain.decision import Decision
+from endoscope_explain.decide.decision import Decision, MissingTerm
 from endoscope_explain.explanation import (
     Candidate,
     ChannelFit,
@@ -18,15 +16,17 @@ from endoscope_explain.explanation import (
     UnknownTerm,
     Verdict,
 )
+from endoscope_explain.fit.evidence import misfit
 from endoscope_explain.fit.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
+from endoscope_explain.fit.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.fit.score import misfit
 from endoscope_explain.fit.simulated_joint import joint_of
-from endoscope_explain.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.observation import JointObservation
-from endoscope_explain.probability import probability
-from endoscope_explain.search import JointSearch
+from endoscope_explain.search.candidate import Candidate as Term
+from endoscope_explain.search.formula import fitted_function, nearest_formula
+from endoscope_explain.search.levels import JointSearch
+from endoscope_explain.search.refit import Composition
 
 CHANGED = 0.04
 """Relative difference of a nominal parameter that is worth a verdict."""
@@ -53,38 +53,15 @@ def named(
     observations: tuple[JointObservation, ...], decisions: list[Decision]
 ) -> tuple[NamedEffect, ...]:
     """Chosen effects of all joints, the most certain first and each id once before any again."""
-    effects = []
-    for observation, decision in zip(observations, decisions, strict=True):
-        for effect_id in decision.chosen.effects:
-            definition = CATALOGUE[effect_id]
-            rivals = decision.alternatives[effect_id]
-            effects.append(
-                NamedEffect(
-                    effect_id,
-                    observation.joint,
-                    str(definition.stage),
-                    probability(
-                        decision.gaps[effect_id],
-                        decision.margins[effect_id],
-                        decision.adequate,
-                        len(rivals),
-                    ),
-                    definition.equation,
-                    definition.source,
-                    effect_estimates(
-                        decision.chosen.fit,
-                        definition.first_parameter,
-                        {p.name: p.unit for p in definition.parameters},
-                    ),
-                    rivals,
-                    {
-                        'margin': decision.margins[effect_id],
-                        'gap': decision.gaps[effect_id],
-                        'explained': decision.explained,
-                    },
-                )
-            )
-    ordered = sorted(effects, key=lambda e: (-e.probability, -e.evidence['margin']))
+    ordered = sorted(
+        (
+            _named(observation.joint, decision, term)
+            for observation, decision in zip(observations, decisions, strict=True)
+            for term in decision.missing
+            if term.is_known
+        ),
+        key=lambda e: (-e.probability, -e.evidence['gain']),
+    )
     # A clock belongs to a device, not to a joint; a tracker's fault shows on both. Each id comes
     # once before any comes again.
     once: dict[tuple[str, str], NamedEffect] = {}
@@ -100,9 +77,39 @@ def named(
     return tuple(first + again)
 
 
+def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
+    definition = CATALOGUE[term.name]
+    assert term.formula is not None
+    modelled = term.name in decision.chosen.effects
+    numbers = decision.chosen.fit if modelled else term.formula.fit
+    return NamedEffect(
+        term.name,
+        joint,
+        str(definition.stage),
+        term.probability,
+        definition.equation,
+        definition.source,
+        effect_estimates(
+            numbers,
+            definition.first_parameter,
+            {p.name: p.unit for p in definition.parameters},
+        ),
+        term.alternatives,
+        {
+            'gain': term.gain,
+            'p_value': term.p_value,
+            'rival': term.rival,
+            'explained': decision.explained,
+            'as_formula': float(modelled),
+        },
+    )
+
+
 def verdict_of(effects: tuple[NamedEffect, ...], decisions: list[Decision]) -> Verdict:
     """What the named effects, or the parameters alone, amount to."""
-    if not all(d.adequate for d in decisions):
+    unknown = any(not term.is_known for d in decisions for term in d.missing)
+    unnamed = any(not d.adequate and not d.missing for d in decisions)
+    if unknown or unnamed:
         return Verdict.UNKNOWN_PHYSICS
     stages = {effect.stage for effect in effects}
     if stages & {Stage.ACTUATOR, Stage.TRANSMISSION, Stage.JOINT}:
@@ -129,59 +136,105 @@ def has_changed(name: str, estimate: NominalEstimate) -> bool:
     return outside and abs(np.log(estimate.value / estimate.nominal)) > CHANGED
 
 
-def plant_of(
-    plant: PlantDescription, fits: list[Fit], effects: list[tuple[str, ...]]
-) -> PlantDescription:
-    """A plant with the parameters of its joints' fits, and with their effects."""
-    joints, specs = dict(plant.joints), list(plant.effects)
-    for f, added in zip(fits, effects, strict=True):
-        joint = f.model.observation.joint
-        packed, _ = f.model.packed(f.theta)
+def plant_of(plant: PlantDescription, fits: list[Composition]) -> PlantDescription:
+    """A plant with the numbers of its joints' fits, and with their effects and functions."""
+    joints, specs, terms = dict(plant.joints), list(plant.effects), list(plant.terms)
+    for one in fits:
+        joint = one.fit.model.observation.joint
+        packed, _ = one.fit.model.packed(one.fit.theta)
         joints[joint] = joint_of(packed)
-        for effect_id in added:
-            definition = CATALOGUE[effect_id]
-            first = definition.first_parameter
-            specs.append(
-                EffectSpec(
-                    effect_id,
-                    joint,
-                    {p.name: float(packed[first + i]) for i, p in enumerate(definition.parameters)},
-                )
-            )
-    return replace(plant, joints=joints, effects=tuple(specs))
+        for term in one.terms:
+            if term.is_function:
+                terms.append(unknown_term(one, term).term())
+                continue
+            names = [p.name for p in term.term.parameters]
+            values = packed[list(term.term.places)].tolist()
+            specs.append(EffectSpec(term.id, joint, dict(zip(names, values, strict=True))))
+    return replace(plant, joints=joints, effects=tuple(specs), terms=tuple(terms))
 
 
-def with_term(plant: PlantDescription, unknown: UnknownTerm | None) -> PlantDescription:
-    """The plant with a function that no effect of the catalogue is."""
-    if unknown is None:
-        return plant
-    return replace(plant, terms=(*plant.terms, unknown.term()))
+def unknown_term(
+    one: Composition,
+    term: Term,
+    share: float = 1.0,
+    rivals: tuple[str, ...] = (),
+    siblings: tuple[str, ...] = (),
+) -> UnknownTerm:
+    """A function of a fitted joint, with the formula that comes nearest to it.
+
+    Parameters
+    ----------
+    one : Composition
+    term : Term
+        One of its functions.
+    share : float
+        Of the excess misfit that the joint's terms remove.
+    rivals, siblings : tuple of str
+        Other places, and effects of the catalogue, nearest first.
+
+    Returns
+    -------
+    UnknownTerm
+    """
+    function = fitted_function(one.fit, term.id)
+    place, formula = function.family.place, nearest_formula(function)
+    return UnknownTerm(
+        function.joint,
+        place.id,
+        place.physics.rstrip('.'),
+        str(place.stage),
+        place.unit,
+        place.argument.symbol,
+        f'{place.argument.words}, {place.argument.unit}',
+        function.family.nodes,
+        function.values,
+        function.deviation,
+        formula.expression,
+        formula.values,
+        formula.share,
+        formula.as_good,
+        share,
+        rivals,
+        siblings,
+    )
+
+
+def missing_function(decisions: list[Decision]) -> UnknownTerm | None:
+    """The function that explains most of what no formula does, of all joints."""
+    found = [
+        (term.gain, decision, term)
+        for decision in decisions
+        for term in decision.missing
+        if term.term.is_function
+    ]
+    if not found:
+        return None
+    _, decision, term = max(found, key=lambda each: each[0])
+    siblings = () if term.formula is None else (term.name,)
+    return unknown_term(decision.chosen, term.term, decision.explained, term.alternatives, siblings)
 
 
 def refitted(tried: JointSearch, decision: Decision) -> Composition:
     """The nominal plant of a joint: beyond its band where that is all that was chosen."""
-    return tried.nominal if decision.chosen.effects else decision.chosen
+    return tried.nominal if decision.chosen.terms else decision.chosen
 
 
 def ladder(
     anchors: list[tuple[Fit, Fit]],
     searches: list[JointSearch],
     decisions: list[Decision],
-    final: list[Fit],
 ) -> dict[str, dict[str, ChannelFit]]:
     """Misfit of the plant as described, refitted and augmented, on held-out blocks."""
     rungs: dict[str, dict[str, ChannelFit]] = {'nominal': {}, 'refitted': {}, 'augmented': {}}
-    for (_, described), tried, decision, last in zip(
-        anchors, searches, decisions, final, strict=True
-    ):
+    for (_, described), tried, decision in zip(anchors, searches, decisions, strict=True):
         observation = described.model.observation
         judged, _ = held_out_masks(observation)
         rungs['nominal'] |= on_samples(observation, described.residuals, judged)
         before = refitted(tried, decision).fit
         rungs['refitted'] |= held_out_fit(before)
         rungs['augmented'] |= (
-            held_out_fit(last)
-            if last is not before
+            held_out_fit(decision.chosen.fit)
+            if decision.chosen.terms
             else {s.signal: rungs['refitted'][s.signal] for s in observation.channels}
         )
     return rungs
@@ -197,10 +250,10 @@ def candidates(
             found.append(
                 Candidate(
                     observation.joint,
-                    c.effects,
-                    c.score,
+                    tuple(term.id for term in c.terms),
+                    tried.nominal.evidence - c.evidence,
                     misfit(c.fit).total / observation.size,
-                    leaves_band_of(c.fit, tried.nominal.fit),
+                    not c.terms and c is not tried.nominal,
                 )
             )
     return tuple(sorted(found, key=lambda c: c.score))

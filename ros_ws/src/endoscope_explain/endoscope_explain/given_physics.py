@@ -1,17 +1,21 @@
 """Explain a joint by physics that was chosen elsewhere."""
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.compose import Composition
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.decide.decision import Decision, MissingTerm, share_explained, with_form
+from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.free_parameters import FreeParameter
 from endoscope_explain.fit.model import Fit, JointModel, fit, without_effect
-from endoscope_explain.fit.score import score
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search import JointSearch
+from endoscope_explain.search.candidate import Candidate
+from endoscope_explain.search.levels import JointSearch
+from endoscope_explain.search.refit import composition
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -57,7 +61,9 @@ def settled(model: JointModel, theta: Array) -> Fit:
     return fit(model, theta, iterations=SETTLING_STEPS, tolerance=SETTLED)
 
 
-def explained_by(anchors: tuple[Fit, Fit], given: GivenPhysics, jobs: int) -> JointSearch:
+def explained_by(
+    anchors: tuple[Fit, Fit], given: GivenPhysics, jobs: int
+) -> tuple[JointSearch, Decision]:
     """Fit given physics to a joint, and see what each of its effects is needed for.
 
     Parameters
@@ -70,19 +76,21 @@ def explained_by(anchors: tuple[Fit, Fit], given: GivenPhysics, jobs: int) -> Jo
 
     Returns
     -------
-    JointSearch
-        One level: all effects together, then without each of them.
+    (JointSearch, Decision)
+        Nothing was searched; each effect gains what the joint loses without it.
     """
-    nominal = Composition((), anchors[0], score(anchors[0]))
+    nominal = composition((), anchors[0])
+    nothing = JointSearch(nominal, ())
     if not given.effects:
-        return JointSearch(nominal, ())
+        found, adequate = with_form(nominal.fit, jobs)
+        return nothing, Decision(replace(nominal, fit=found), (), adequate, 1.0)
     model = JointModel(anchors[0].model.observation, given.base, given.flags, given.free)
-    found = settled(model, given.theta)
-    whole = Composition(given.effects, found, score(found))
+    found, adequate = with_form(settled(model, given.theta), jobs)
+    whole = composition(tuple(Candidate(CATALOGUE[each]) for each in given.effects), found)
     lesser = [without_effect(found, effect_id) for effect_id in given.effects]
     fits = parallel_map(lambda less: fit(*less), lesser, jobs)
-    level = [
-        Composition(tuple(e for e in given.effects if e != effect_id), f, score(f))
-        for effect_id, f in zip(given.effects, fits, strict=True)
-    ]
-    return JointSearch(nominal, ((whole, *sorted(level, key=lambda c: c.score)),))
+    missing = tuple(
+        MissingTerm(term, term.id, (), whole.evidence - log_evidence(less), 0.0, math.nan, whole)
+        for term, less in zip(whole.terms, fits, strict=True)
+    )
+    return nothing, Decision(whole, missing, adequate, share_explained(nominal, whole))

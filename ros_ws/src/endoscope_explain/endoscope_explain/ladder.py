@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from endoscope_explain.black_box.rungs import Exam, black_box_rungs
 from endoscope_explain.case import Ladder
 from endoscope_explain.explanation import ChannelFit, Explanation
-from endoscope_explain.held_out import fitted_at, judged_at
+from endoscope_explain.fit.held_out import fitted_at, judged_at
 from endoscope_explain.predicted_signals import rung, view
 from endoscope_explain.recording import Recording
 

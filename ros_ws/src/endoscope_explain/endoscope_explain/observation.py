@@ -4,7 +4,7 @@ Wires and motor are averaged over `ANALYSIS_PERIOD` (the average is the anti-ali
 it acts on simulated readings just the same); the tracker is taken at its own stamps.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi, sqrt
 
@@ -94,16 +94,19 @@ class JointObservation:
     ----------
     joint : str
     inputs : array (1, N, INPUTS)
-        Input of the compiled physics on 1 ms ticks.
+        Input of the compiled physics on ticks.
     start : float
         Shaft angle in rad at which the motor rests at first.
     channels : tuple of Channel
+    tick : float
+        In s.
     """
 
     joint: str
     inputs: Array
     start: float
     channels: tuple[Channel, ...]
+    tick: float = TICK
 
     @property
     def size(self) -> int:
@@ -113,7 +116,16 @@ class JointObservation:
     @property
     def duration(self) -> float:
         """Length in s."""
-        return self.inputs.shape[1] * TICK
+        return self.inputs.shape[1] * self.tick
+
+    def coarser(self, factor: int) -> 'JointObservation':
+        """The same readings on ticks that are longer by a factor, with the mean command of each."""
+        ticks = -(-self.inputs.shape[1] // factor) + 1
+        missing = ticks * factor - self.inputs.shape[1]
+        padded = np.concatenate([self.inputs, np.repeat(self.inputs[:, -1:], missing, axis=1)], 1)
+        inputs = padded.reshape(1, ticks, factor, INPUTS).mean(axis=2)
+        channels = tuple(_on_coarser(channel, factor) for channel in self.channels)
+        return replace(self, inputs=inputs, channels=channels, tick=factor * self.tick)
 
     def slices(self) -> tuple[slice, ...]:
         """Place of each channel in a residual vector of all channels."""
@@ -200,6 +212,12 @@ def _channels(
             )
         )
     return tuple(channels)
+
+
+def _on_coarser(channel: Channel, factor: int) -> Channel:
+    place = (channel.tick + channel.share) / factor
+    tick = place.astype(np.int64)
+    return replace(channel, tick=tick, share=place - tick)
 
 
 def _valid_column(

@@ -30,7 +30,7 @@ from endoscope_explain.recording import (
     recording_from_bag,
     with_unrecorded,
 )
-from endoscope_explain.search import MOST_EFFECTS
+from endoscope_explain.search.levels import MOST_EFFECTS
 
 Progress = Callable[[str], None]
 Engine = Callable[..., Explanation]

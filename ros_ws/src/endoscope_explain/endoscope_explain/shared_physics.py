@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.anchoring import anchored
+from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.fit.pooled import told_alone
 from endoscope_explain.given_physics import GivenJoints, GivenPhysics, without_recording
 from endoscope_explain.held_noise import with_held_noise

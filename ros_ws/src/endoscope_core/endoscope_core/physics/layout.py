@@ -7,7 +7,7 @@ one test of a flag.
 
 from endoscope_core.physics.sheath import TABLE_ROWS, wire_states
 
-PROFILE_TERMS = 4
+PROFILE_TERMS = 8
 """Most coefficients that a friction profile can have."""
 
 NOMINAL_KEYS = (

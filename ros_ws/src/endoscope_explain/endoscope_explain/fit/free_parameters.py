@@ -21,6 +21,12 @@ Array = NDArray[np.float64]
 
 LEAD = -1
 """Index that stands for the reading's lead, which is not a parameter of the plant."""
+COEFFICIENT = -2
+"""Index that stands for a coefficient of a free function."""
+COORDINATE = 10.0
+"""Coefficients in a coordinate of a fit, whose steps suit logarithms."""
+_FURTHEST = 6.0
+"""Standard deviations of its prior that a coefficient may reach."""
 LEAD_PRIOR = (1.0, 0.5)
 SCALED_NOMINAL = (
     'pretension',
@@ -193,3 +199,19 @@ def _of_effect(index: int, parameter: Parameter) -> FreeParameter:
     positive = parameter.low > 0.0 and not math.isfinite(parameter.off)
     unit = parameter.scale or abs(parameter.typical) or 0.1 * (parameter.high - parameter.low)
     return FreeParameter(index, parameter.name, positive, unit, parameter.low, parameter.high)
+
+
+def coefficients(place_id: str, count: int) -> tuple[FreeParameter, ...]:
+    """The coefficients of a function at a place, each normal with a variance of one."""
+    return tuple(
+        FreeParameter(
+            COEFFICIENT,
+            f'{place_id}_{k}',
+            False,
+            COORDINATE,
+            -_FURTHEST,
+            _FURTHEST,
+            spread=1.0 / COORDINATE,
+        )
+        for k in range(count)
+    )

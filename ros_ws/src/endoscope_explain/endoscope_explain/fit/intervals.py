@@ -1,9 +1,7 @@
-"""Intervals of fitted numbers that allow for serially correlated errors of form.
+"""Intervals of fitted numbers: what noise and an error of form leave open.
 
-The covariance is the sandwich estimate: the curvature of the cost on both sides of the scatter of
-its gradient, summed over blocks longer than the misfit's memory (White, Econometrica 50, 1982;
-Newey and West, Econometrica 55, 1987). Where nothing but noise is left, it is the Fisher
-information's; an error of form widens it by what it does to the gradient.
+Noise alone makes intervals that hold a third of the true values where the form differs. By how much
+rigs of another form move the numbers is added to it, see `other_forms`.
 """
 
 import math
@@ -11,23 +9,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t
 
 from endoscope_core.physics.effect import Effect
 from endoscope_explain.explanation import Estimate, NominalEstimate
-from endoscope_explain.fit.free_parameters import BAND, FITTED_NOMINAL, FORM_SPREAD
+from endoscope_explain.fit.evidence import weights
+from endoscope_explain.fit.free_parameters import BAND, COEFFICIENT, FITTED_NOMINAL, FORM_SPREAD
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.fit.whiteness import is_noise
 
 Array = NDArray[np.float64]
 
-BLOCK_S = 1.0
 NINETY_PERCENT = 1.645
-WIDENING = 1.2
-"""Calibrated on concealed cases: what the sandwich misses when the form differs."""
-FORM = 0.0012
-"""Relative error of a parameter by form alone, where nothing but noise is left."""
-FORM_SEEN = 0.0072
-"""The same where an error of form is seen."""
+DEGREES = 19
+"""Of freedom of what moves the numbers: rigs of another form that were fitted."""
 
 
 @dataclass(frozen=True)
@@ -50,45 +44,31 @@ class Intervals:
 
 
 def covariance(fit: Fit) -> Array:
-    """Sandwich covariance (n, n) of the coordinates of a fit."""
-    prior = np.diag(fit.model.prior_weight() ** 2)
-    ridge = 1e-9 * np.diag(np.maximum(np.sum(fit.jacobian**2, axis=0), 1e-12))
-    curvature = np.linalg.inv(fit.jacobian.T @ fit.jacobian + prior + ridge)
-    middle = prior.copy()
-    observation = fit.model.observation
-    gradients = fit.jacobian * fit.residuals[:, None]
-    blocks = np.concatenate(
-        [np.floor(channel.time / BLOCK_S).astype(int) for channel in observation.channels]
-    )
-    sums = np.zeros((int(blocks.max()) + 1, fit.jacobian.shape[1]))
-    np.add.at(sums, blocks, gradients)
-    middle += sums.T @ sums
-    sandwich = curvature @ middle @ curvature
-    # Quantised channels scatter less than white noise; nothing is known better than it allows.
-    return np.asarray(
-        np.where(np.eye(len(sandwich)) > 0, np.maximum(sandwich, curvature), sandwich)
-    )
+    """Covariance (n, n) of the coordinates of a fit by what is left as white noise."""
+    weighted = fit.jacobian * weights(fit.model.observation, fit.residuals)[:, None]
+    precision = weighted.T @ weighted + np.diag(fit.model.prior_weight() ** 2)
+    ridge = 1e-9 * np.diag(np.maximum(np.diag(precision), 1e-12))
+    return np.asarray(np.linalg.inv(precision + ridge))
 
 
 def intervals(fit: Fit) -> Intervals:
     """90 % intervals of a fit, within the parameters' bounds."""
-    free = fit.model.free
-    share = FORM if is_noise(fit) else FORM_SEEN
-    form = np.array(
-        [
-            share * (1.0 if item.logarithmic else abs(t))
-            for item, t in zip(free, fit.theta, strict=True)
-        ]
-    )
-    reach = np.hypot(
-        NINETY_PERCENT * WIDENING * np.sqrt(np.diag(covariance(fit))), NINETY_PERCENT * form
-    )
+    kept = [k for k, item in enumerate(fit.model.free) if item.index != COEFFICIENT]
+    free = [fit.model.free[k] for k in kept]
+    theta = fit.theta[kept]
+    reach = NINETY_PERCENT * np.sqrt(np.diag(covariance(fit)))[kept]
+    if fit.moved_by_form is not None:
+        reach = np.hypot(reach, t.ppf(0.95, DEGREES) * fit.moved_by_form[kept])
+
+    def values(coordinates: Array) -> Array:
+        return np.array([item.value(c) for item, c in zip(free, coordinates, strict=True)])
+
     return Intervals(
         tuple(item.name for item in free),
         tuple(item.index for item in free),
-        np.array([item.value(t) for item, t in zip(free, fit.theta, strict=True)]),
-        np.array([item.value(t) for item, t in zip(free, fit.theta - reach, strict=True)]),
-        np.array([item.value(t) for item, t in zip(free, fit.theta + reach, strict=True)]),
+        values(theta),
+        values(theta - reach),
+        values(theta + reach),
     )
 
 
@@ -99,10 +79,10 @@ def may_be_absent(fit: Fit, effect: Effect) -> bool:
         for index, parameter in zip(effect.places, effect.parameters, strict=True)
         if math.isfinite(parameter.off)
     }
-    strengths = [k for k, item in enumerate(fit.model.free) if item.index in off]
+    found = intervals(fit)
+    strengths = [k for k, index in enumerate(found.indices) if index in off]
     if not strengths:
         return False
-    found = intervals(fit)
     return all(found.low[k] <= off[found.indices[k]] <= found.high[k] for k in strengths)
 
 

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.effect import Symptom
 from endoscope_core.physics.effects import CATALOGUE, showing
-from endoscope_explain.fit.free_parameters import LEAD, FreeParameter
+from endoscope_core.physics.functions.interpolation import NODES, VALUES
+from endoscope_explain.fit.family import Family
+from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
 from endoscope_explain.fit.simulated_joint import residuals, simulate_joint
 from endoscope_explain.fit.solver import STEP, Effort, Renewal, minimise
 from endoscope_explain.observation import JointObservation
@@ -17,6 +19,8 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 CLOCK_RATE = showing(Symptom.CLOCK_RATE)
+COARSE = 5
+"""Ticks in one of the simulations that only tell in which direction something goes."""
 WIDE_STEP = 0.1
 """With sticking and slipping, the times of the slips jump with the parameters, and so do the
 residuals: a wide difference looks over the jumps."""
@@ -35,6 +39,8 @@ class JointModel:
     free : tuple of FreeParameter
     wide_step : float
         Difference step of a coordinate where an effect makes the misfit rugged.
+    families : tuple of Family
+        Of functions that are free; their coefficients are free parameters, in the same order.
     """
 
     observation: JointObservation
@@ -42,6 +48,7 @@ class JointModel:
     flags: Flags
     free: tuple[FreeParameter, ...]
     wide_step: float = WIDE_STEP
+    families: tuple[Family, ...] = ()
 
     def packed(self, theta: Array) -> tuple[Array, float]:
         """Packed parameters and reading lead at the coordinates `theta` (n,)."""
@@ -50,16 +57,30 @@ class JointModel:
         for item, coordinate in zip(self.free, theta, strict=True):
             if item.index == LEAD:
                 lead = item.value(float(coordinate))
-            else:
+            elif item.index != COEFFICIENT:
                 parameters[item.index] = item.value(float(coordinate))
+        for family, coefficients in zip(self.families, self.coefficients(theta), strict=True):
+            first = family.place.first_parameter + VALUES
+            parameters[first : first + NODES] = family.values(coefficients)
         return parameters, lead
+
+    def coefficients(self, theta: Array) -> list[Array]:
+        """Coefficients (K,) of each function at the coordinates `theta` (n,)."""
+        return [COORDINATE * theta[places] for places in self.places_of_coefficients()]
+
+    def places_of_coefficients(self) -> list[NDArray[np.int64]]:
+        """Places (K,) of each function's coefficients among the free parameters."""
+        found = [k for k, item in enumerate(self.free) if item.index == COEFFICIENT]
+        ends = np.cumsum([family.basis.shape[1] for family in self.families])
+        return np.split(np.array(found, dtype=np.int64), ends[:-1]) if self.families else []
 
     def begun_at(self, theta: Array) -> Array:
         """Coordinates `theta` of the first free parameters; the others as `base` has them."""
-        others = self.free[len(theta) :]
-        return np.concatenate(
-            [theta, [item.coordinate(float(self.base[item.index])) for item in others]]
-        )
+        others = [
+            0.0 if item.index == COEFFICIENT else item.coordinate(float(self.base[item.index]))
+            for item in self.free[len(theta) :]
+        ]
+        return np.concatenate([theta, others])
 
     def holding(self, places: range, theta: Array) -> tuple['JointModel', Array]:
         """The model with the packed `places` held as in `base`, and the coordinates left free."""
@@ -119,6 +140,8 @@ class Fit:
         Of the residuals, at or near `theta`.
     cost : float
         Half weighted squares, prior included.
+    moved_by_form : array (n,), optional
+        By how much (rms) an error of form as large as what is left moves each coordinate.
     """
 
     model: JointModel
@@ -126,6 +149,7 @@ class Fit:
     residuals: Array
     jacobian: Array = field(repr=False)
     cost: float
+    moved_by_form: Array | None = field(default=None, repr=False)
 
 
 def without_effect(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
@@ -136,15 +160,16 @@ def without_effect(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
     return replace(found.model, flags=flags).holding(definition.places, found.theta)
 
 
-def jacobian(model: JointModel, theta: Array, at: Array, columns: list[int] | None = None) -> Array:
-    """Difference quotients of the residuals `at` the coordinates `theta`.
+def jacobian(model: JointModel, theta: Array, columns: list[int] | None = None) -> Array:
+    """Difference quotients of the residuals at the coordinates `theta`, on coarser ticks.
+
+    What is left of the error of coarse ticks in a difference turns a step by a few per cent; a fit
+    ends where the residuals on its own ticks do.
 
     Parameters
     ----------
     model : JointModel
     theta : array (n,)
-    at : array (size,)
-        Residuals at `theta`.
     columns : list of int, optional
         Coordinates to differentiate by; all if not given.
 
@@ -154,6 +179,8 @@ def jacobian(model: JointModel, theta: Array, at: Array, columns: list[int] | No
     """
     low, high = model.bounds()
     columns = list(range(len(theta))) if columns is None else columns
+    coarse = replace(model, observation=model.observation.coarser(COARSE))
+    at = coarse.residuals(theta)
     result = np.empty((len(at), len(columns)))
     for i, c in enumerate(columns):
         moved = theta.copy()
@@ -161,7 +188,7 @@ def jacobian(model: JointModel, theta: Array, at: Array, columns: list[int] | No
         step = min(step, 0.5 * (high[c] - low[c]))
         step = step if theta[c] + step <= high[c] else -step
         moved[c] += step
-        result[:, i] = (model.residuals(moved) - at) / (moved[c] - theta[c])
+        result[:, i] = (coarse.residuals(moved) - at) / (moved[c] - theta[c])
     return result
 
 
@@ -212,7 +239,13 @@ def fit(
     return Fit(model, found.theta, found.residuals, found.derivative, found.cost)
 
 
-def glance(model: JointModel, start: Array, known_jacobian: Array, steps: int) -> Fit:
+def glance(
+    model: JointModel,
+    start: Array,
+    known_jacobian: Array,
+    steps: int,
+    weight: Array | None = None,
+) -> Fit:
     """Fit by few simulations: a derivative that is known near `start` is updated, never renewed.
 
     Parameters
@@ -222,13 +255,15 @@ def glance(model: JointModel, start: Array, known_jacobian: Array, steps: int) -
     known_jacobian : array (size, n)
     steps : int
         Simulations, at most.
+    weight : array (size,), optional
+        Factors on the residuals.
 
     Returns
     -------
     Fit
     """
     effort = Effort(steps, renewal=Renewal.NEVER)
-    found = minimise(_OneJoint(model), start, effort, known_jacobian)
+    found = minimise(_OneJoint(model, weight), start, effort, known_jacobian)
     return Fit(model, found.theta, found.residuals, found.derivative, found.cost)
 
 
@@ -245,7 +280,7 @@ class _OneJoint:
         return residuals, self.model.cost(self._weighted(residuals), theta)
 
     def derivative(self, theta: Array, residuals: Array, stride: float) -> Array:
-        return jacobian(self.model, theta, residuals)
+        return jacobian(self.model, theta)
 
     def normal_equations(
         self, theta: Array, residuals: Array, derivative: Array

@@ -42,9 +42,9 @@ def simulate_joint(
     """
     inputs = observation.inputs if inputs is None else inputs
     packed, on = parameters[None], flags[None]
-    at_rest = rest_state(packed, on, TICK, np.array([observation.start]))
+    at_rest = rest_state(packed, on, observation.tick, np.array([observation.start]))
     out = np.empty((1, inputs.shape[1], OUTPUTS))
-    run_joints(*at_rest, packed, on, inputs, False, TICK, out)
+    run_joints(*at_rest, packed, on, inputs, False, observation.tick, out)
     return out[0]
 
 
@@ -53,8 +53,9 @@ def residuals(
 ) -> Array:
     """Return simulated minus measured, in units of the known noise, all channels in a row (size,).
 
-    `lead` in ticks and `skew` of the tracker's clock are as in `Channel.predicted`.
+    `lead` in units of `TICK` and `skew` of the tracker's clock are as in `Channel.predicted`.
     """
+    lead *= TICK / observation.tick
     return np.concatenate(
         [
             (

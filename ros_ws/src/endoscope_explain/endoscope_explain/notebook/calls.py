@@ -18,7 +18,7 @@ from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.notebook.signals import Signals, signals_of_bag
 from endoscope_explain.pipeline import Progress, Sources
 from endoscope_explain.recording.series import COMMAND, DESIRED
-from endoscope_explain.search import MOST_EFFECTS
+from endoscope_explain.search.levels import MOST_EFFECTS
 from endoscope_explain.simulation.answer_bag import write_answer
 
 Plant = str | Path | PlantDescription

@@ -40,9 +40,29 @@ def held_out_masks(observation: JointObservation) -> tuple[Mask, Mask]:
 
 def held_out_fit(final: Fit) -> dict[str, ChannelFit]:
     """Refit without the held-out blocks and return the fit of every signal on them."""
+    judged, residuals = _held_out(final)
+    return on_samples(final.model.observation, residuals, judged)
+
+
+def predicts_better(one: Fit, other: Fit) -> bool:
+    """Whether a fit predicts held-out blocks better than another one of the same recording."""
+
+    def misfit(found: Fit) -> float:
+        judged, residuals = _held_out(found)
+        return sum(
+            float(np.log(np.maximum(np.mean(residuals[part][judged[part]] ** 2), 1.0)))
+            for part in found.model.observation.slices()
+            if judged[part].any()
+        )
+
+    return misfit(one) < misfit(other)
+
+
+def _held_out(final: Fit) -> tuple[Mask, Array]:
+    """Held-out samples (size,), and the residuals (size,) of a fit that has not seen them."""
     judged, used = held_out_masks(final.model.observation)
     if judged.all():
-        return on_samples(final.model.observation, final.residuals, judged)
+        return judged, final.residuals
     again = fit(
         final.model,
         final.theta,
@@ -50,7 +70,7 @@ def held_out_fit(final: Fit) -> dict[str, ChannelFit]:
         iterations=REFIT_STEPS,
         known_jacobian=final.jacobian,
     )
-    return on_samples(final.model.observation, again.residuals, judged)
+    return judged, again.residuals
 
 
 def on_samples(

@@ -11,7 +11,10 @@ from endoscope_core.physics.description import TermSpec
 from endoscope_core.physics.functions.expression import evaluate
 from endoscope_core.physics.functions.place import Shape
 from endoscope_core.physics.functions.term import tabulated
-from endoscope_explain.families.function_search import FunctionFit
+from endoscope_explain.fit.evidence import weights
+from endoscope_explain.fit.family import Family
+from endoscope_explain.fit.free_parameters import COORDINATE
+from endoscope_explain.fit.model import Fit
 
 Array = NDArray[np.float64]
 
@@ -28,6 +31,59 @@ _FORMS = {Shape.ODD: _ODD, Shape.EVEN: _EVEN}
 _CENTRES = np.linspace(0.05, 0.95, 13)
 _WIDTHS = (0.03, 0.05, 0.08, 0.12, 0.2, 0.35, 0.6)
 """Shares of the range."""
+
+
+@dataclass(frozen=True)
+class FittedFunction:
+    """A function as a fit has it.
+
+    Attributes
+    ----------
+    joint : str
+    family : Family
+    coefficients : array (K,)
+    covariance : array (K, K)
+        Of the coefficients, the other numbers free.
+    samples : int
+        That the fit has seen.
+    """
+
+    joint: str
+    family: Family
+    coefficients: Array
+    covariance: Array
+    samples: int
+
+    @property
+    def values(self) -> Array:
+        """The function at the family's nodes (NODES,)."""
+        return self.family.values(self.coefficients)
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviation of the function at its nodes (NODES,)."""
+        basis = self.family.basis
+        spread = np.einsum('nk,kl,nl->n', basis, self.covariance, basis)
+        return np.sqrt(np.maximum(spread, 0.0))
+
+
+def fitted_function(found: Fit, place_id: str) -> FittedFunction:
+    """The function that a fit has at a place."""
+    model = found.model
+    which = [family.place.id for family in model.families].index(place_id)
+    weight = weights(model.observation, found.residuals)
+    weighted = found.jacobian * weight[:, None]
+    precision = weighted.T @ weighted + np.diag(model.prior_weight() ** 2)
+    precision += 1e-9 * np.diag(np.maximum(np.diag(precision), 1e-12))
+    own = model.places_of_coefficients()[which]
+    covariance = np.linalg.inv(precision)[np.ix_(own, own)] * COORDINATE**2
+    return FittedFunction(
+        model.observation.joint,
+        model.families[which],
+        model.coefficients(found.theta)[which],
+        covariance,
+        len(found.residuals),
+    )
 
 
 @dataclass(frozen=True)
@@ -52,12 +108,12 @@ class Formula:
     as_good: bool
 
 
-def nearest_formula(found: FunctionFit) -> Formula:
+def nearest_formula(found: FittedFunction) -> Formula:
     """The formula that costs least: what it misses, and half a logarithm for each number in it.
 
     Parameters
     ----------
-    found : FunctionFit
+    found : FittedFunction
 
     Returns
     -------
@@ -69,7 +125,7 @@ def nearest_formula(found: FunctionFit) -> Formula:
     root = np.linalg.cholesky(metric).T @ inverse
     wanted = root @ found.values
     whole = float(wanted @ wanted)
-    price = np.log(len(found.fit.residuals))
+    price = np.log(found.samples)
     odd = family.place.shape is Shape.ODD
     best: tuple[float, float, str, Array] | None = None
     for terms, shapes in _candidates(found):
@@ -90,9 +146,9 @@ def nearest_formula(found: FunctionFit) -> Formula:
     return Formula(expression, values, max(0.0, 1.0 - loss / max(whole, 1e-300)), as_good)
 
 
-def _can_be_run(found: FunctionFit, expression: str) -> bool:
+def _can_be_run(found: FittedFunction, expression: str) -> bool:
     """Whether a plant takes a formula: one may be too fine for its table, or go too far."""
-    joint, family = found.fit.model.observation.joint, found.family
+    joint, family = found.joint, found.family
     try:
         tabulated(TermSpec(joint, family.place.id, expression, range=(family.low, family.high)))
     except ValueError:
@@ -100,7 +156,7 @@ def _can_be_run(found: FunctionFit, expression: str) -> bool:
     return True
 
 
-def _candidates(found: FunctionFit) -> Iterator[tuple[tuple[str, ...], int]]:
+def _candidates(found: FittedFunction) -> Iterator[tuple[tuple[str, ...], int]]:
     """Terms of each formula with its shape's numbers written in, and how many those are."""
     family = found.family
     extent = family.high - family.low

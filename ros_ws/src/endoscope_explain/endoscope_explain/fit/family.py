@@ -23,7 +23,7 @@ from endoscope_core.physics.layout import (
     OUT_TENSION_B,
     PULLEY_RADIUS,
 )
-from endoscope_explain.observation import TICK, JointObservation
+from endoscope_explain.observation import JointObservation
 
 Array = NDArray[np.float64]
 
@@ -57,13 +57,46 @@ class Family:
         """The argument at the nodes (NODES,)."""
         return np.linspace(self.low, self.high, NODES)
 
+    def values(self, coefficients: Array) -> Array:
+        """Values (NODES,) at the nodes, within what the place allows."""
+        values = self.basis @ coefficients
+        if self.place.never_negative:
+            values = np.maximum(values, 0.0)
+        return np.clip(values, -self.place.largest, self.place.largest)
+
+    def finer(self, count: int, length: float) -> 'Family':
+        """Functions at the same place, of the same size, that vary over a shorter length."""
+        size = np.sqrt(np.mean(np.sum(self.basis**2, axis=1)))
+        found = family_at(self.place, (self.low, self.high), count, length)
+        assert found is not None
+        return found.scaled(size / np.sqrt(np.mean(np.sum(found.basis**2, axis=1))))
+
     def scaled(self, amplitude: float) -> 'Family':
         """The same functions, larger by a factor."""
         return Family(self.place, self.low, self.high, amplitude * self.basis)
 
 
-def family_at(place: Place, visited: tuple[float, float]) -> Family | None:
-    """Functions of unit variance over the visited range; None where the state did not move."""
+def family_at(
+    place: Place,
+    visited: tuple[float, float],
+    count: int = COEFFICIENTS,
+    length: float = LENGTH,
+) -> Family | None:
+    """Functions of unit variance over the visited range; None where the state did not move.
+
+    Parameters
+    ----------
+    place : Place
+    visited : (float, float)
+    count : int
+        Coefficients.
+    length : float
+        Over which they vary, as a share of the range.
+
+    Returns
+    -------
+    Family or None
+    """
     low, high = visited
     if place.shape in (Shape.ODD, Shape.EVEN):
         high = max(abs(low), abs(high))
@@ -71,12 +104,12 @@ def family_at(place: Place, visited: tuple[float, float]) -> Family | None:
     if high - low <= LEAST_RANGE * (place.argument.high - place.argument.low):
         return None
     side = np.linspace(0.0, 1.0, NODES)
-    covariance = _matern(side[:, None] - side[None, :])
+    covariance = _matern((side[:, None] - side[None, :]) / length)
     if place.shape in (Shape.ODD, Shape.EVEN):
-        mirrored = _matern(side[:, None] - (1.0 - side[None, :]))
+        mirrored = _matern((side[:, None] - (1.0 - side[None, :])) / length)
         covariance += mirrored if place.shape is Shape.EVEN else -mirrored
     sizes, vectors = np.linalg.eigh(covariance)
-    largest = np.argsort(sizes)[::-1][:COEFFICIENTS]
+    largest = np.argsort(sizes)[::-1][:count]
     return Family(place, low, high, vectors[:, largest] * np.sqrt(sizes[largest]))
 
 
@@ -93,7 +126,7 @@ def visited_ranges(
     outputs : array (N, OUTPUTS)
     """
     angle, shaft = outputs[:, OUT_JOINT], outputs[:, OUT_MOTOR]
-    speed = np.gradient(angle, TICK)
+    speed = np.gradient(angle, observation.tick)
     shaft_speed = outputs[:, OUT_MOTOR_SPEED]
     slid = 0.5 * np.abs(parameters[PULLEY_RADIUS] * shaft_speed + parameters[JOINT_RADIUS] * speed)
     tensions = outputs[:, [OUT_TENSION_A, OUT_TENSION_B]]
@@ -101,7 +134,7 @@ def visited_ranges(
     found = {
         ('t', 's'): np.array([0.0, observation.duration]),
         ('v', 'm/s'): np.array([0.0, np.quantile(slid, 0.99)]),
-        ('d', 'm'): np.array([0.0, TICK * float(np.sum(slid))]),
+        ('d', 'm'): np.array([0.0, observation.tick * float(np.sum(slid))]),
         ('T', 'N'): tensions,
         ('D', 'N'): tensions[:, 0] - tensions[:, 1],
         ('q', 'rad'): angle,
@@ -116,5 +149,5 @@ def visited_ranges(
 
 
 def _matern(distance: Array) -> Array:
-    scaled = np.sqrt(5.0) * np.abs(distance) / LENGTH
+    scaled = np.sqrt(5.0) * np.abs(distance)
     return np.asarray((1.0 + scaled + scaled**2 / 3.0) * np.exp(-scaled))

@@ -3,14 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.layout import IN_COMMAND
 from endoscope_explain.observation import TICK, JointObservation
 
 Array = NDArray[np.float64]
 
-DEPENDS_ON_TIME = frozenset(e.id for e in CATALOGUE.values() if e.traits.depends_on_time)
-"""Effects that make the same motion look different at another time."""
+
 EVERY = 20
 """Ticks between the moments compared."""
 APART_S = 1.0

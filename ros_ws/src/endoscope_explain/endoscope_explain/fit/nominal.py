@@ -1,0 +1,153 @@
+"""The nominal plant fitted to every joint of a recording: where all searches begin."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.layout import OUT_JOINT
+from endoscope_explain.fit.free_parameters import (
+    BAND,
+    SCALED_NOMINAL,
+    FreeParameter,
+    nominal_parameters,
+)
+from endoscope_explain.fit.model import Fit, JointModel, fit, jacobian
+from endoscope_explain.fit.simulated_joint import packed_joint, simulate_joint
+from endoscope_explain.fit.whiteness import is_noise
+from endoscope_explain.isolated_samples import without_isolated
+from endoscope_explain.observation import JointObservation, couple
+from endoscope_explain.parallel import parallel_map
+from endoscope_explain.recording import Recording
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+FINISHED = 20
+"""Further steps of a nominal refit that may be on its way to noise."""
+FURTHEST = 4.0
+"""Factor by which a description may be wrong, either way."""
+ANY_NUMBER = 20
+"""Steps of a fit with numbers that may be any."""
+AT_THE_END = 1e-3
+"""Relative distance from the end of a band within which a number leans on it."""
+
+
+def anchored(
+    recording: Recording,
+    observations: tuple[JointObservation, ...],
+    plant: PlantDescription,
+    band: float,
+    jobs: int,
+) -> tuple[tuple[JointObservation, ...], list[tuple[Fit, Fit]]]:
+    """Fit the nominal plant, and once more where that shows isolated wrong samples.
+
+    Parameters
+    ----------
+    recording : Recording
+        Tells which samples the audit found wrong.
+    observations : tuple of JointObservation
+        Of the recording.
+    plant : PlantDescription
+        In health.
+    band : float
+        Relative tolerance of its parameters.
+    jobs : int
+        Tasks side by side.
+
+    Returns
+    -------
+    observations : tuple of JointObservation
+        Without the samples that stick out.
+    anchors : list of (Fit, Fit)
+        Of each joint, refitted and as described.
+    """
+    packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
+    anchors = all_anchors(observations, packed, jobs, band)
+    cleaned = without_isolated(recording, observations, tuple(fitted for fitted, _ in anchors))
+    if cleaned is observations:
+        return observations, anchors
+    return cleaned, all_anchors(cleaned, packed, jobs, band)
+
+
+def all_anchors(
+    observations: tuple[JointObservation, ...],
+    packed: dict[str, tuple[Array, Flags]],
+    jobs: int,
+    band: float = BAND,
+) -> list[tuple[Fit, Fit]]:
+    """Refit the nominal plant of every joint, and let the joints see each other's angle."""
+    anchors = parallel_map(lambda o: nominal_anchors(o, *packed[o.joint], band), observations, jobs)
+    couple(observations, tuple(simulated_bending(fitted) for fitted, _ in anchors))
+    return anchors
+
+
+def simulated_bending(fitted: Fit) -> Array:
+    """Bending angle (N,) in rad of a fitted joint at every tick of its recording."""
+    parameters, _ = fitted.model.packed(fitted.theta)
+    return simulate_joint(fitted.model.observation, parameters, fitted.model.flags)[:, OUT_JOINT]
+
+
+def nominal_anchors(
+    observation: JointObservation,
+    base: Array,
+    flags: Flags,
+    band: float = BAND,
+) -> tuple[Fit, Fit]:
+    """The nominal plant refitted, and as described, each with its derivative.
+
+    Parameters
+    ----------
+    observation : JointObservation
+    base : array (parameters,), flags : array (flags,)
+        Packed plant as described, with what effects it has.
+    band : float
+        Relative deviation of a healthy rig from its description.
+
+    Returns
+    -------
+    refitted, described : Fit
+    """
+    model = JointModel(observation, base, flags, nominal_parameters(base, band))
+    theta = np.array([item.mean for item in model.free])
+    residuals = model.residuals(theta)
+    described = Fit(
+        model,
+        theta,
+        residuals,
+        jacobian(model, theta),
+        0.5 * float(residuals @ residuals),
+    )
+    refitted = fit(model, theta, known_jacobian=described.jacobian)
+    if is_noise(refitted):
+        return refitted, described
+    # On to the end only where no physics is missing: it would bend the parameters ever further.
+    finished = fit(model, refitted.theta, iterations=FINISHED, known_jacobian=refitted.jacobian)
+    return finished if is_noise(finished) else refitted, described
+
+
+def leans(fitted: Fit) -> bool:
+    """Whether a fit holds a nominal number at an end of its band."""
+    low, high = fitted.model.bounds()
+    at_the_end = np.minimum(fitted.theta - low, high - fitted.theta) < AT_THE_END
+    free = fitted.model.free
+    return any(e and i.name in SCALED_NOMINAL for e, i in zip(at_the_end, free, strict=True))
+
+
+def with_any_numbers(fitted: Fit) -> Fit:
+    """Refit with nominal numbers that may leave their band.
+
+    A rig that is described wrongly by a third lacks no physics. Within its band no refit shows
+    that, and an effect that can do a wrong number's work would be named for it. The priors stay, so
+    that a number far from its description has its price.
+    """
+    model = fitted.model
+    model = replace(model, free=tuple(_widened(item) for item in model.free))
+    return fit(model, fitted.theta, iterations=ANY_NUMBER)
+
+
+def _widened(item: FreeParameter) -> FreeParameter:
+    if item.name not in SCALED_NOMINAL:
+        return item
+    return replace(item, low=item.low / FURTHEST, high=item.high * FURTHEST)

@@ -1,0 +1,90 @@
+"""Rigs of another form than the fitted one: what a simulation of the wrong form leaves.
+
+A fit's misfit is mostly an error of form, not noise: friction along a real sheath has a finer
+profile than the few terms that are fitted. Rigs are simulated at the fitted numbers with a profile
+drawn anew beyond those terms, and the model is fitted to each of them. What that leaves, and by how
+much it moves the numbers, is what form alone does (a parametric bootstrap over forms: Efron,
+Tibshirani, An Introduction to the Bootstrap, 1993, ch. 21).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
+from endoscope_explain.fit.evidence import weights
+from endoscope_explain.fit.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
+from endoscope_explain.fit.model import Fit, glance
+from endoscope_explain.fit.simulated_joint import simulate_joint
+from endoscope_explain.observation import JointObservation
+from endoscope_explain.parallel import parallel_map
+
+Array = NDArray[np.float64]
+
+STEPS = 3
+"""Simulations in which the model is fitted to a rig of another form, whose numbers are its own."""
+_SEED = 7
+
+
+@dataclass(frozen=True)
+class OtherForms:
+    """What rigs of another form leave, without noise.
+
+    Attributes
+    ----------
+    residuals : array (size, B)
+        In noise units, with the model fitted to each rig.
+    moved : array (n, B)
+        By how much the form moves the fit's coordinates.
+    """
+
+    residuals: Array
+    moved: Array
+
+
+def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
+    """Simulate rigs of another form at a fit's numbers and fit its model to them.
+
+    Parameters
+    ----------
+    found : Fit
+    count : int
+        Rigs B.
+    jobs : int
+        Tasks side by side.
+
+    Returns
+    -------
+    OtherForms
+    """
+    model = found.model
+    parameters, _ = model.packed(found.theta)
+    # The fitted numbers are these rigs' own: there is nothing that would draw a fit elsewhere.
+    free = tuple(
+        replace(item, mean=float(t)) for item, t in zip(model.free, found.theta, strict=True)
+    )
+    weight = weights(model.observation, found.residuals)
+    finer = slice(FRICTION_PROFILE + len(FRICTION_PROFILE_NAMES), FRICTION_PROFILE + PROFILE_TERMS)
+    size = FORM_SPREAD[FRICTION_PROFILE_NAMES[0]]
+    draws = size * np.random.default_rng(_SEED).normal(size=(count, finer.stop - finer.start))
+
+    def fitted(draw: Array) -> tuple[Array, Array]:
+        rig = parameters.copy()
+        rig[finer] = draw
+        outputs = simulate_joint(model.observation, rig, model.flags)
+        seen = replace(model, observation=_reading(model.observation, outputs), free=free)
+        near = glance(seen, found.theta, found.jacobian, STEPS, weight)
+        return near.residuals, near.theta - found.theta
+
+    results = parallel_map(fitted, list(draws), jobs)
+    return OtherForms(
+        np.stack([residuals for residuals, _ in results], axis=1),
+        np.stack([moved for _, moved in results], axis=1),
+    )
+
+
+def _reading(observation: JointObservation, outputs: Array) -> JointObservation:
+    """The same sensors without noise on other outputs."""
+    channels = tuple(replace(c, value=c.predicted(outputs)) for c in observation.channels)
+    return replace(observation, channels=channels)

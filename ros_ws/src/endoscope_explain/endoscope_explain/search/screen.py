@@ -1,0 +1,241 @@
+"""What each term promises before it is fitted: all of them at once, by linear algebra.
+
+A term moves the residual along few directions. What is left of these after the numbers that are
+free already have done their best is projected on the residual: Rao's score test with differences in
+place of derivatives (Rao, Proc. Camb. Phil. Soc. 44, 1948), and with a normal prior on how much of
+each direction there is, from which follows the evidence. The same directions, with residuals that
+rigs of another form would have left, say what evidence means nothing.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_explain.fit.evidence import counts, log_likelihood, weights
+from endoscope_explain.fit.model import COARSE, Fit, JointModel
+from endoscope_explain.fit.simulated_joint import residuals as misfit_of
+from endoscope_explain.fit.simulated_joint import simulate_joint
+from endoscope_explain.parallel import parallel_map
+from endoscope_explain.search.candidate import Candidate, mirrored
+
+Array = NDArray[np.float64]
+
+PRIOR_SHARE = 0.1
+"""Share of a channel's signal by which a function drawn from the prior moves the channel that it
+moves most."""
+_TRIAL = 1e-3
+"""Share of the largest value that a function may have, of the one that is tried."""
+_NOTHING = 1e-6
+"""Squares in noise units below which a term does nothing."""
+
+
+@dataclass(frozen=True)
+class Promised:
+    """A term and what it promises.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        A function has the size of its prior.
+    gain : float
+        Logarithm of the evidence with it over that without it.
+    """
+
+    candidate: Candidate
+    gain: float
+
+
+@dataclass(frozen=True)
+class Background:
+    """A fit, and what its own numbers cannot take away.
+
+    Attributes
+    ----------
+    fit : Fit
+    weight : array (size,)
+    span : array (size + n, n)
+        Orthonormal directions in which its numbers move weighted residuals and priors' deviations.
+    coarse : JointModel
+        The same model on coarser ticks.
+    at : array (size,)
+        Residuals of `coarse`.
+    """
+
+    fit: Fit
+    weight: Array = field(repr=False)
+    span: Array = field(repr=False)
+    coarse: JointModel = field(repr=False)
+    at: Array = field(repr=False)
+
+    def left(self, residuals: Array) -> Array:
+        """What is left (size, ...) of weighted residuals once the model's numbers are refitted."""
+        n = len(self.fit.theta)
+        prior = self.fit.model.prior(self.fit.theta)
+        deviations = prior if residuals.ndim == 1 else np.zeros((n, residuals.shape[1]))
+        whole = np.concatenate([residuals, deviations])
+        return np.asarray((whole - self.span @ (self.span.T @ whole))[: len(residuals)])
+
+
+def background(found: Fit) -> Background:
+    """What a fit leaves to terms that it does not have."""
+    observation, model = found.model.observation, found.model
+    weight = weights(observation, found.residuals)
+    slopes = found.jacobian * weight[:, None]
+    span, _ = np.linalg.qr(np.vstack([slopes, np.diag(model.prior_weight())]))
+    coarse = replace(model, observation=observation.coarser(COARSE))
+    return Background(found, weight, span, coarse, _simulated(coarse, found.theta))
+
+
+@dataclass(frozen=True)
+class Directions:
+    """Where a term moves weighted residuals once the model's own numbers are refitted.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    columns : array (size, k)
+    """
+
+    candidate: Candidate
+    columns: Array = field(repr=False)
+
+
+def directions(
+    behind: Background, terms: tuple[Candidate, ...], jobs: int
+) -> tuple[Directions, ...]:
+    """Directions of all terms that move anything.
+
+    Parameters
+    ----------
+    behind : Background
+    terms : tuple of Candidate
+    jobs : int
+        Tasks side by side.
+
+    Returns
+    -------
+    tuple of Directions
+    """
+    found = parallel_map(lambda term: _directions(behind, term), terms, jobs)
+    return tuple(each for each in found if each is not None)
+
+
+def _directions(behind: Background, term: Candidate) -> Directions | None:
+    if term.family is None:
+        model = term.added_to(behind.coarse)
+        moved = _simulated(model, model.begun_at(behind.fit.theta)) - behind.at
+        columns = behind.left((moved * behind.weight)[:, None])
+        return Directions(term, columns) if float(np.sum(columns**2)) > _NOTHING else None
+    trial = replace(term, family=term.family.scaled(_TRIAL * term.family.place.largest))
+    model = trial.added_to(behind.coarse)
+    begun = model.begun_at(behind.fit.theta)
+    places = model.places_of_coefficients()[-1]
+    answers = np.empty((len(behind.at), len(places)))
+    for k, place in enumerate(places):
+        moved = begun.copy()
+        moved[place] = 1.0 / model.free[place].unit
+        answers[:, k] = (_simulated(model, moved) - behind.at) * behind.weight
+    size = _relative_size(behind, answers)
+    if size <= 0.0:
+        return None
+    amplitude = PRIOR_SHARE / size
+    assert trial.family is not None
+    scaled = replace(term, family=trial.family.scaled(amplitude))
+    return Directions(scaled, behind.left(amplitude * answers))
+
+
+def _simulated(model: JointModel, theta: Array) -> Array:
+    parameters, lead = model.packed(theta)
+    return misfit_of(
+        model.observation, simulate_joint(model.observation, parameters, model.flags), lead
+    )
+
+
+def _relative_size(behind: Background, answers: Array) -> float:
+    """By what share of its signal the channel moves that moves most, rms over the prior."""
+    shares = [0.0]
+    observation = behind.fit.model.observation
+    for channel, part in zip(observation.channels, observation.slices(), strict=True):
+        signal = (channel.value - np.mean(channel.value)) / channel.noise * behind.weight[part]
+        size = float(np.sum(signal**2))
+        if size > 0.0:
+            shares.append(float(np.sqrt(np.sum(answers[part] ** 2) / size)))
+    return max(shares)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of all terms on several residuals, from inner products alone.
+
+    Attributes
+    ----------
+    values : array (terms, B)
+    left : array (terms, B, C)
+        Mean squares of each channel, weighted, that the best of each term leaves.
+    """
+
+    values: Array
+    left: Array
+
+
+def gains(behind: Background, found: tuple[Directions, ...], residuals: Array) -> Gains:
+    """What each term gains on each of several residuals.
+
+    Parameters
+    ----------
+    behind : Background
+    found : tuple of Directions
+    residuals : array (size, B)
+        Weighted, with what the model's own numbers can take away taken away.
+
+    Returns
+    -------
+    Gains
+    """
+    observation = behind.fit.model.observation
+    number = counts(observation)
+    parts = observation.slices()
+    # Weighted by what the fit left: the sensor's own noise is this much less than one there.
+    floor = np.array([behind.weight[part][0] ** 2 for part in parts])
+    before = np.stack([np.mean(residuals[part] ** 2, axis=0) for part in parts], axis=-1)
+    base = log_likelihood(before / floor, number)
+    values = np.empty((len(found), residuals.shape[1]))
+    left = np.empty((len(found), residuals.shape[1], len(parts)))
+    for i, each in enumerate(found):
+        grams = [each.columns[part].T @ each.columns[part] for part in parts]
+        towards = [each.columns[part].T @ residuals[part] for part in parts]
+        precision = np.sum(grams, axis=0) + np.eye(each.columns.shape[1])
+        if each.candidate.is_linear:
+            shares = -np.linalg.solve(precision, np.sum(towards, axis=0))
+            _, volume = np.linalg.slogdet(precision)
+        else:
+            shares, volume = np.ones((1, residuals.shape[1])), 0.0
+        for c, (gram, toward) in enumerate(zip(grams, towards, strict=True)):
+            moved = 2.0 * np.sum(shares * toward, axis=0)
+            moved += np.einsum('kb,kl,lb->b', shares, gram, shares)
+            left[i, :, c] = before[:, c] + moved / number[c]
+        price = 0.5 * np.sum(shares**2, axis=0) + 0.5 * volume
+        values[i] = log_likelihood(left[i] / floor, number) - base
+        values[i] -= price if each.candidate.is_linear else 0.0
+    return Gains(values, left)
+
+
+def promises(behind: Background, found: tuple[Directions, ...]) -> list[Promised]:
+    """What each term promises on the recording itself, the best start of each effect first."""
+    residuals = behind.left(behind.fit.residuals * behind.weight)[:, None]
+    ranked = []
+    for each, gain in zip(found, gains(behind, found, residuals).values[:, 0], strict=True):
+        candidate = _sided(behind, each, residuals)
+        if candidate is not None:
+            ranked.append(Promised(candidate, float(gain)))
+    return sorted(ranked, key=lambda p: -p.gain)
+
+
+def _sided(behind: Background, each: Directions, residuals: Array) -> Candidate | None:
+    """The effect on the side of nothing on which it helps; None where it does not on any."""
+    candidate = each.candidate
+    helps = float((each.columns.T @ residuals)[0, 0]) < 0.0
+    if candidate.is_function or helps or not candidate.is_linear:
+        return candidate
+    return mirrored(candidate)
