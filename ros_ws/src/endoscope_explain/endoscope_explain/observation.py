@@ -120,6 +120,8 @@ class JointObservation:
 
     def coarser(self, factor: int) -> 'JointObservation':
         """The same readings on ticks that are longer by a factor, with the mean command of each."""
+        if factor == 1:
+            return self
         ticks = -(-self.inputs.shape[1] // factor) + 1
         missing = ticks * factor - self.inputs.shape[1]
         padded = np.concatenate([self.inputs, np.repeat(self.inputs[:, -1:], missing, axis=1)], 1)

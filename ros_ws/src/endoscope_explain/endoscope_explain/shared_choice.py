@@ -1,6 +1,6 @@
 """One set of effects for several recordings of a rig, and the sets with one effect more.
 
-The sum of all scores decides; all recordings are fitted together, see `shared_fit`.
+The sum of the evidence decides; all recordings are fitted together, see `fit.pooled`.
 """
 
 import math
@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.compose import searchable_effects
+from endoscope_explain.fit.evidence import log_evidence, weights
 from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.fit.pooled import fit_together, with_common_numbers
-from endoscope_explain.fit.score import score
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.rank import Look, look, polish
-from endoscope_explain.repeated_motion import DEPENDS_ON_TIME, motion_repeats
-from endoscope_explain.screen import Promise, promises, unexplained
+from endoscope_explain.search.candidate import Candidate, candidates
+from endoscope_explain.search.levels import null_gains
+from endoscope_explain.search.refit import Look, look, polish
+from endoscope_explain.search.repeated_motion import motion_repeats
+from endoscope_explain.search.screen import background, directions, promises
 
 Array = NDArray[np.float64]
 Anchors = tuple[Fit, ...]
@@ -28,9 +28,8 @@ Begun = tuple[list[JointModel], list[Array]]
 Variant = tuple[str, tuple[float, ...]]
 """An effect, and what it acts on or which of its forms it has, which no shape of a tube changes."""
 
-LIKE_TIME = DEPENDS_ON_TIME | {e.id for e in CATALOGUE.values() if e.traits.resembles_time}
-"""Effects that a motion made only once does not tell from a change with time: wires that go on
-stretching for seconds look like a sensor that drifts."""
+LOOKED_AT = 10
+"""Effects that get a cheap fit in each recording."""
 STARTS = 2
 """Starting points of an effect that get a cheap fit."""
 POLISHED_FIRST, POLISHED = 6, 3
@@ -47,7 +46,7 @@ class SharedChoice:
     effects : tuple of str
         In the order in which they were added.
     recordings : tuple of anchors
-        Fits of each recording; see `rank.look`. One that has no use for an effect lacks it.
+        Fits of each recording; see `search.refit.look`. One that has no use for an effect lacks it.
     """
 
     joint: str
@@ -55,12 +54,34 @@ class SharedChoice:
     recordings: tuple[Anchors, ...]
 
     def total(self) -> float:
-        """Sum of the scores of all recordings."""
-        return sum(score(anchors[0]) for anchors in self.recordings)
+        """Sum of the evidence of all recordings."""
+        return sum(log_evidence(anchors[0]) for anchors in self.recordings)
 
-    def fall_to(self, other: 'SharedChoice') -> float:
-        """Mean fall of the score of a recording from this choice to another."""
-        return (self.total() - other.total()) / len(self.recordings)
+    def gain_of(self, other: 'SharedChoice') -> float:
+        """Gain of evidence from this choice to another."""
+        return other.total() - self.total()
+
+    def form_gains_of(self, other: 'SharedChoice', jobs: int) -> Array:
+        """Gains (B,) that rigs of another form, in which nothing is missing, would show.
+
+        Parameters
+        ----------
+        other : SharedChoice
+            With one effect more.
+        jobs : int
+            Tasks side by side.
+
+        Returns
+        -------
+        array (B,)
+            Of the best effect of each recording.
+        """
+        total: Array = np.zeros(1)
+        for before, after in zip(self.recordings, other.recordings, strict=True):
+            behind = background(before[0])
+            ways = directions(behind, _effects(before[0]), jobs)
+            total = total + null_gains(behind, ways, after[0], jobs)
+        return total
 
     def leaves_noise(self) -> bool:
         """Whether nothing is left to explain in any recording."""
@@ -94,51 +115,56 @@ def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
             for variant, recordings in zip(promising, fitted, strict=True)
         ),
         key=SharedChoice.total,
+        reverse=True,
+    )
+
+
+def _effects(found: Fit) -> tuple[Candidate, ...]:
+    """Effects that may be added: what was fitted to one motion is not told from time by another."""
+    repeats = motion_repeats(found.model.observation)
+    return tuple(
+        term
+        for term in candidates(found)
+        if not term.is_function and (repeats or not term.term.traits.resembles_time)
     )
 
 
 def _looks(choice: SharedChoice, jobs: int) -> dict[Variant, list[Look | None]]:
     """The best cheap fit of each promising variant of an effect, for each recording."""
-    recordings = choice.recordings
-    repeated = all(motion_repeats(anchors[0].model.observation) for anchors in recordings)
-    tasks = [
-        (e, n)
-        for e in searchable_effects()
-        if e not in choice.effects and (repeated or e not in LIKE_TIME)
-        for n in range(len(recordings))
-    ]
-    left = [unexplained(anchors[0]) for anchors in recordings]
-
-    def looked(task: tuple[str, int]) -> dict[Variant, Look]:
-        effect_id, n = task
-        starts: dict[Variant, list[Promise]] = {}
-        for promise in promises(left[n], effect_id):
-            starts.setdefault(_variant(promise), []).append(promise)
-        return {
-            variant: min(
-                (look(recordings[n], choice.effects, start) for start in own[:STARTS]),
-                key=lambda item: item.cost,
-            )
-            for variant, own in starts.items()
-        }
-
     looks: dict[Variant, list[Look | None]] = {}
-    for (_, n), found in zip(tasks, parallel_map(looked, tasks, jobs), strict=True):
-        for variant, item in found.items():
-            looks.setdefault(variant, [None] * len(recordings))[n] = item
+    everywhere = set.intersection(
+        *({t.id for t in _effects(anchors[0])} for anchors in choice.recordings)
+    )
+    for n, anchors in enumerate(choice.recordings):
+        behind = background(anchors[0])
+        terms = tuple(t for t in _effects(anchors[0]) if t.id in everywhere)
+        starts: dict[Variant, list[Candidate]] = {}
+        for promised in promises(behind, directions(behind, terms, jobs)):
+            starts.setdefault(promised.candidate.variant, []).append(promised.candidate)
+        tasks = [term for own in list(starts.values())[:LOOKED_AT] for term in own[:STARTS]]
+
+        def looked(term: Candidate, anchors: Anchors = anchors) -> Look:
+            return look(anchors, term)
+
+        for item in parallel_map(looked, tasks, jobs):
+            found = looks.setdefault(item.candidate.variant, [None] * len(choice.recordings))
+            before = found[n]
+            if before is None or item.cost < before.cost:
+                found[n] = item
     return looks
-
-
-def _variant(promise: Promise) -> Variant:
-    parameters = CATALOGUE[promise.effect_id].parameters
-    return promise.effect_id, tuple(promise.start[p.name] for p in parameters if p.choices)
 
 
 def _logarithm_of_costs(choice: SharedChoice, looks: list[Look | None]) -> float:
     return sum(
-        math.log(anchors[0].cost if item is None else min(item.cost, anchors[0].cost))
+        math.log(_cost(anchors[0]) if item is None else min(item.cost, _cost(anchors[0])))
         for anchors, item in zip(choice.recordings, looks, strict=True)
     )
+
+
+def _cost(found: Fit) -> float:
+    """Half the squares of a fit, weighted as those of a first look beside it are."""
+    weighted = found.residuals * weights(found.model.observation, found.residuals)
+    return found.model.cost(weighted, found.theta)
 
 
 def _begun(choice: SharedChoice, effect_id: str, looks: list[Look | None]) -> Begun:
@@ -148,7 +174,7 @@ def _begun(choice: SharedChoice, effect_id: str, looks: list[Look | None]) -> Be
     """
     models, starts = [], []
     for anchors, item in zip(choice.recordings, looks, strict=True):
-        found = anchors[0] if item is None else polish(item)
+        found = anchors[0] if item is None else polish(item, anchors[0])
         models.append(found.model)
         starts.append(found.theta)
     return models, starts
@@ -181,8 +207,8 @@ def settled_together(choices: Sequence[SharedChoice], jobs: int) -> list[SharedC
     for choice, recordings in zip(twice, _side_by_side(begun, jobs, rough=False), strict=True):
         found = replace(choice, recordings=recordings)
         key = frozenset(choice.effects)
-        best[key] = min(best.get(key, found), found, key=SharedChoice.total)
-    return sorted(best.values(), key=SharedChoice.total)
+        best[key] = max(best.get(key, found), found, key=SharedChoice.total)
+    return sorted(best.values(), key=SharedChoice.total, reverse=True)
 
 
 def _side_by_side(begun: Sequence[Begun], jobs: int, *, rough: bool) -> list[tuple[Anchors, ...]]:

@@ -2,11 +2,12 @@
 
 A rig whose tube is bent differently from one recording to the next keeps its physics, and only its
 parameters change. Explained one by one, two recordings may well be given different names for the
-same misfit; the effects are therefore chosen by the sum of all scores, and fitted together.
+same misfit; the effects are therefore chosen by the sum of the evidence, and fitted together.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.physics.effects import CATALOGUE
@@ -21,6 +22,7 @@ from endoscope_explain.pipeline import (
     read_inputs,
     require_as_named,
 )
+from endoscope_explain.search.levels import FALSE_ALARMS
 from endoscope_explain.shared_choice import (
     Anchors,
     SharedChoice,
@@ -30,8 +32,6 @@ from endoscope_explain.shared_choice import (
 
 BEAM = 3
 """Choices of effects that are gone on with."""
-LEAST_FALL = 4.0
-"""Fall of the score per recording that an effect must bring."""
 
 
 def physics_of_all(
@@ -92,7 +92,7 @@ def shared_effects(
     Parameters
     ----------
     recordings : sequence of mapping of joint name to anchors
-        Nominal fits of each joint of each recording; see `rank.look`.
+        Nominal fits of each joint of each recording; see `search.refit.look`.
     most_effects : int
         Largest number of effects on a joint.
     jobs : int
@@ -130,13 +130,15 @@ def _searched(
             tell(f'{nominal.joint}: what all recordings lack beside {_listed(choice)}')
             for found in with_one_more(choice, jobs):
                 key = frozenset(found.effects)
-                grown[key] = min(found, grown.get(key, found), key=SharedChoice.total)
-        chosen = sorted(grown.values(), key=SharedChoice.total)[:BEAM]
+                grown[key] = max(found, grown.get(key, found), key=SharedChoice.total)
+        chosen = sorted(grown.values(), key=SharedChoice.total, reverse=True)[:BEAM]
         beam = settled_together(chosen, jobs)
-        fall = best.fall_to(beam[0]) if beam else 0.0
-        if fall < LEAST_FALL:
+        if not beam:
             break
-        tell(f'{nominal.joint}: {_listed(beam[0])}, better by {fall:.0f} per recording')
+        gain = best.gain_of(beam[0])
+        if np.mean(best.form_gains_of(beam[0], jobs) >= gain) > FALSE_ALARMS:
+            break
+        tell(f'{nominal.joint}: {_listed(beam[0])}, better by {gain:.0f} nats')
         best = beam[0]
     return best
 

@@ -3,7 +3,7 @@ import pytest
 
 from endoscope_explain.black_box.features import PLAY_WIDTHS, motion_features
 from endoscope_explain.black_box.regressors import GaussianProcess, NeuralNetwork, training
-from endoscope_explain.held_out import fitted_at, judged_at
+from endoscope_explain.fit.held_out import fitted_at, judged_at
 from endoscope_explain.ladder import ladders
 
 

@@ -41,6 +41,8 @@ class JointModel:
         Difference step of a coordinate where an effect makes the misfit rugged.
     families : tuple of Family
         Of functions that are free; their coefficients are free parameters, in the same order.
+    coarse : int
+        Ticks in one of the simulations from which derivatives are differences.
     """
 
     observation: JointObservation
@@ -49,6 +51,11 @@ class JointModel:
     free: tuple[FreeParameter, ...]
     wide_step: float = WIDE_STEP
     families: tuple[Family, ...] = ()
+    coarse: int = COARSE
+
+    def on_coarse_ticks(self) -> 'JointModel':
+        """The model for questions of direction and rank, which need no fine ticks."""
+        return replace(self, observation=self.observation.coarser(self.coarse), coarse=1)
 
     def packed(self, theta: Array) -> tuple[Array, float]:
         """Packed parameters and reading lead at the coordinates `theta` (n,)."""
@@ -179,7 +186,7 @@ def jacobian(model: JointModel, theta: Array, columns: list[int] | None = None) 
     """
     low, high = model.bounds()
     columns = list(range(len(theta))) if columns is None else columns
-    coarse = replace(model, observation=model.observation.coarser(COARSE))
+    coarse = model.on_coarse_ticks()
     at = coarse.residuals(theta)
     result = np.empty((len(at), len(columns)))
     for i, c in enumerate(columns):

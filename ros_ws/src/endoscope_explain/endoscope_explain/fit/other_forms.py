@@ -58,7 +58,7 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
     -------
     OtherForms
     """
-    model = found.model
+    model = found.model.on_coarse_ticks()
     parameters, _ = model.packed(found.theta)
     # The fitted numbers are these rigs' own: there is nothing that would draw a fit elsewhere.
     free = tuple(

@@ -24,7 +24,8 @@ from endoscope_explain.observation import observe
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording
 from endoscope_explain.recording.signals import gear
-from endoscope_explain.screen import promises, unexplained
+from endoscope_explain.search.candidate import Candidate, starting_points
+from endoscope_explain.search.screen import background, directions, promises
 
 Array = NDArray[np.float64]
 
@@ -112,12 +113,18 @@ def rival_plant(
     if rival not in CATALOGUE:
         return None
     others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
-    bare = replace(plant, effects=others)
+    families = CATALOGUE[effect.id].traits.families if effect.id in CATALOGUE else ()
+    functions = tuple(
+        t for t in plant.terms if t.joint != effect.joint or t.place not in (effect.id, *families)
+    )
+    bare = replace(plant, effects=others, terms=functions)
     observation = next(o for o in observe(recording, bare) if o.joint == effect.joint)
-    ranked = promises(unexplained(refit(bare, observation, 0.2, 2)), rival)
+    behind = background(refit(bare, observation, 0.2, 2))
+    terms = tuple(Candidate(CATALOGUE[rival], start) for start in starting_points(CATALOGUE[rival]))
+    ranked = promises(behind, directions(behind, terms, 1))
     if not ranked:
         return None
-    spec = EffectSpec(rival, effect.joint, ranked[0].start)
+    spec = EffectSpec(rival, effect.joint, dict(ranked[0].candidate.start))
     candidate = replace(bare, effects=(*others, spec))
     return with_fit(candidate, effect.joint, refit(candidate, observation, 0.2, 6))
 

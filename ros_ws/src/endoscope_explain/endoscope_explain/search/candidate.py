@@ -49,6 +49,12 @@ class Candidate:
         return self.term.id
 
     @property
+    def variant(self) -> tuple[str, tuple[float, ...]]:
+        """Its id, and what it acts on or which of its forms it has."""
+        choices = [p.name for p in self.term.parameters if p.choices and p.name in self.start]
+        return self.id, tuple(self.start[name] for name in choices)
+
+    @property
     def is_function(self) -> bool:
         """Whether it is a function of no known form."""
         return self.family is not None

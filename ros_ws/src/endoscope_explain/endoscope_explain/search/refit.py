@@ -21,8 +21,10 @@ Array = NDArray[np.float64]
 FINER = ((14, 0.125), (21, 0.08))
 """Coefficients of finer functions, and lengths over which they vary, as shares of the range."""
 LOOK_STEPS = 6
-ITERATIONS, SETTLED = 25, 1e-4
-"""Steps of a fit, at most, and the share of the cost below which it stands."""
+FINE_STEPS = 4
+ITERATIONS, ROUGH, SETTLED = 25, 1e-2, 1e-4
+"""Steps of a fit, at most, and the shares of the cost below which it tells and below which it
+stands."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,8 @@ def look(anchors: tuple[Fit, ...], candidate: Candidate) -> Look:
     -------
     Look
     """
-    model = candidate.added_to(anchors[0].model)
+    fine = candidate.added_to(anchors[0].model)
+    model = fine.on_coarse_ticks()
     weight = weights(model.observation, anchors[0].residuals)
     best: Look | None = None
     for anchor in anchors:
@@ -95,13 +98,13 @@ def look(anchors: tuple[Fit, ...], candidate: Candidate) -> Look:
         derivative = np.hstack([anchor.jacobian, jacobian(model, theta, new)])
         found = glance(model, theta, derivative, LOOK_STEPS, weight)
         if best is None or found.cost < best.cost:
-            best = Look(candidate, model, found.theta, found.cost)
+            best = Look(candidate, fine, found.theta, found.cost)
     assert best is not None
     return best
 
 
 def polish(seen: Look, without: Fit) -> Fit:
-    """Fit of a term from where its first look ended, until nothing moves any more.
+    """Fit of a term from where its first look ended, as far as tells which term is the best.
 
     Parameters
     ----------
@@ -114,14 +117,30 @@ def polish(seen: Look, without: Fit) -> Fit:
     Fit
     """
     weight = weights(seen.model.observation, without.residuals)
-    found = fit(seen.model, seen.theta, weight, ITERATIONS)
+    found = fit(seen.model, seen.theta, weight, ITERATIONS, ROUGH)
     weight = weights(seen.model.observation, found.residuals)
-    return out_of_valleys(settled(found, weight), weight)
+    found = fit(found.model, found.theta, weight, ITERATIONS, ROUGH, found.jacobian)
+    return out_of_valleys(found, weight)
 
 
 def settled(found: Fit, weight: Array) -> Fit:
     """Go on with a fit until nothing moves any more."""
     return fit(found.model, found.theta, weight, ITERATIONS, SETTLED, found.jacobian)
+
+
+def until_it_stands(one: Composition) -> Composition:
+    """A composition fitted on until nothing moves any more."""
+    weight = weights(one.fit.model.observation, one.fit.residuals)
+    again = composition(one.terms, settled(one.fit, weight))
+    return again if again.evidence > one.evidence else one
+
+
+def exactly_settled(one: Composition) -> Composition:
+    """A composition fitted on by derivatives on fine ticks, where coarse ones may mislead."""
+    model = replace(one.fit.model, coarse=1)
+    found = fit(model, one.fit.theta, weights(model.observation, one.fit.residuals), FINE_STEPS)
+    again = composition(one.terms, replace(found, model=one.fit.model))
+    return again if again.evidence > one.evidence else one
 
 
 def refined(one: Composition, without: Fit) -> Composition:

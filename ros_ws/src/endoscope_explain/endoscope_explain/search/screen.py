@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.fit.evidence import counts, log_likelihood, weights
-from endoscope_explain.fit.model import COARSE, Fit, JointModel
+from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.fit.simulated_joint import residuals as misfit_of
 from endoscope_explain.fit.simulated_joint import simulate_joint
 from endoscope_explain.parallel import parallel_map
@@ -83,7 +83,7 @@ def background(found: Fit) -> Background:
     weight = weights(observation, found.residuals)
     slopes = found.jacobian * weight[:, None]
     span, _ = np.linalg.qr(np.vstack([slopes, np.diag(model.prior_weight())]))
-    coarse = replace(model, observation=observation.coarser(COARSE))
+    coarse = model.on_coarse_ticks()
     return Background(found, weight, span, coarse, _simulated(coarse, found.theta))
 
 

@@ -1,111 +1,110 @@
-"""Where screening begins and where a fit of an onset ends."""
+"""Derivatives, onsets, and what rigs of another form leave."""
 
-import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.compose import Composition, nominal_anchors, nominal_model
+from endoscope_explain.fit.evidence import log_evidence, weights
+from endoscope_explain.fit.intervals import intervals, may_be_absent
 from endoscope_explain.fit.model import fit, jacobian
-from endoscope_explain.fit.score import score
+from endoscope_explain.fit.nominal import nominal_anchors
+from endoscope_explain.fit.other_forms import other_forms
 from endoscope_explain.fit.simulated_joint import packed_joint
-from endoscope_explain.fit.whiteness import is_noise
+from endoscope_explain.fit.valleys import out_of_valleys
 from endoscope_explain.observation import observe
-from endoscope_explain.onset_scan import redated
-from endoscope_explain.refit_from_description import from_description, promised_by_description
-from endoscope_explain.screen import promises, unexplained, with_effect
+from endoscope_explain.search.candidate import with_effect
+
+LOAD = CATALOGUE['external_load']
 
 
-def anchors(one_joint, effect_id, parameters, *others):
-    """Nominal plant, refitted and as described, of a rig that has an effect, and `others`."""
+def anchors(one_joint, *effects, band=0.15):
+    """Nominal plant, refitted and as described, of a rig that has effects."""
     plant = one_joint.rig()
-    true = one_joint.rig(EffectSpec(effect_id, 'bend_x', parameters), *others)
+    true = one_joint.rig(*(EffectSpec(name, 'bend_x', values) for name, values in effects))
     (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
-    return nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+    return nominal_anchors(observation, *packed_joint(plant, 'bend_x'), band)
+
+
+def evenly(found):
+    """Weights that leave the residuals as they are."""
+    return np.ones(len(found.residuals))
 
 
 def test_a_load_that_was_dated_seconds_late_is_dated_again(one_joint):
-    refitted, _ = anchors(one_joint, 'external_load', {'moment_nm': 0.0008, 'time_s': 3.2})
-    model = with_effect(refitted.model, 'external_load', {'moment_nm': 0.0006, 'time_s': 8.0})
+    refitted, _ = anchors(one_joint, ('external_load', {'moment_nm': 0.0008, 'time_s': 3.2}))
+    model = with_effect(refitted.model, LOAD, {'moment_nm': 0.0006, 'time_s': 6.5})
     late = fit(model, model.begun_at(refitted.theta), iterations=10)
-    first = CATALOGUE['external_load'].first_parameter
-    again = redated(late)
+    again = out_of_valleys(late, evenly(late))
     dated, _ = again.model.packed(again.theta)
-    assert abs(late.model.packed(late.theta)[0][first + 1] - 3.2) > 1.0
-    assert dated[first + 1] == pytest.approx(3.2, abs=0.05)
-    assert dated[first] == pytest.approx(0.0008, rel=0.03)
+    assert abs(late.model.packed(late.theta)[0][LOAD.first_parameter + 1] - 3.2) > 1.0
+    assert dated[LOAD.first_parameter + 1] == pytest.approx(3.2, abs=0.05)
+    assert dated[LOAD.first_parameter] == pytest.approx(0.0008, rel=0.03)
 
 
 def test_a_load_after_the_end_has_no_other_date(one_joint):
-    refitted, _ = anchors(one_joint, 'gravity', {'moment_nm': 0.0006, 'phase_rad': 0.0})
-    model = with_effect(refitted.model, 'external_load', {'moment_nm': 0.0, 'time_s': 60.0})
+    refitted, _ = anchors(one_joint, ('gravity', {'moment_nm': 0.0006, 'phase_rad': 0.0}))
+    model = with_effect(refitted.model, LOAD, {'moment_nm': 0.0, 'time_s': 60.0})
     never = fit(model, model.begun_at(refitted.theta), iterations=0)
-    assert redated(never) is never
-
-
-def test_a_disturbance_in_the_opposite_phase_is_promised_there(one_joint):
-    _, described = anchors(
-        one_joint, 'breathing', {'moment_nm': 0.0006, 'frequency_hz': 0.3, 'phase_rad': -2.5}
-    )
-    found = promises(unexplained(described), 'breathing')
-    best = next(p for p in found if p.start['frequency_hz'] == pytest.approx(0.3))
-    distance = math.remainder(best.start['phase_rad'] + 2.5, 2.0 * math.pi)
-    assert abs(distance) < math.pi / 2.0
-
-
-def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(one_joint):
-    _, described = anchors(one_joint, 'torque_limit', {'limit_nm': 0.01})
-    found = promises(unexplained(described), 'torque_limit')
-    assert found[0].start['limit_nm'] == pytest.approx(0.01, rel=0.05)
-    gains = {p.start['limit_nm']: p.gain for p in found}
-    assert gains[max(gains)] == pytest.approx(0.0, abs=1e-6)
-    assert gains[min(gains)] < 0.99 * found[0].gain
-
-
-def test_two_effects_are_found_from_the_described_plant_with_the_other_choice(one_joint):
-    refitted, described = anchors(
-        one_joint,
-        'rate_limit',
-        {'limit_rad_per_s': 0.75, 'of_command': 0.0},
-        EffectSpec('transport_delay', 'bend_x', {'delay_s': 0.037}),
-    )
-    of_command = {'limit_rad_per_s': 0.75, 'of_command': 1.0}
-    limited = with_effect(refitted.model, 'rate_limit', of_command)
-    first = fit(limited, limited.begun_at(refitted.theta), iterations=10)
-    late = with_effect(limited, 'transport_delay', {'delay_s': 0.03})
-    both = fit(late, late.begun_at(first.theta), iterations=10)
-    effects = ('rate_limit', 'transport_delay')
-    found = from_description([Composition(effects, both, score(both))], described, 1)
-    best = min(found, key=lambda c: c.score)
-    values, _ = best.fit.model.packed(best.fit.theta)
-    assert not is_noise(both)
-    assert best.fit.cost < 0.5 * both.cost
-    assert values[CATALOGUE['rate_limit'].first_parameter + 1] == 0.0
-    delay = values[CATALOGUE['transport_delay'].first_parameter]
-    assert delay == pytest.approx(0.037, rel=0.03)
-
-
-def test_a_torque_limit_is_found_from_the_described_plant(one_joint):
-    refitted, described = anchors(one_joint, 'torque_limit', {'limit_nm': 0.0101, 'droop': 1e-3})
-    found = promised_by_description(described, ('torque_limit', 'gear_backlash', 'cogging'), 1)
-    best = min(found, key=lambda c: c.score)
-    assert not is_noise(refitted)
-    assert best.effects == ('torque_limit',)
-    assert is_noise(best.fit)
+    again = out_of_valleys(never, evenly(never))
+    assert again.model.packed(again.theta)[0][LOAD.first_parameter + 1] == pytest.approx(60.0)
 
 
 def test_a_number_that_may_hardly_move_has_a_derivative_over_a_wide_step(one_joint):
-    plant = one_joint.rig()
-    true = one_joint.rig(EffectSpec('stribeck_friction', 'bend_x', {'rise': 0.5}))
-    (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
-    narrow = nominal_model(observation, *packed_joint(plant, 'bend_x'), band=0.03)
+    refitted, _ = anchors(one_joint, ('stribeck_friction', {'rise': 0.5}), band=0.03)
+    narrow = refitted.model
     start = {'rise': 0.5, 'stribeck_speed': 2e-3}
-    model = with_effect(narrow, 'stribeck_friction', start)
+    model = with_effect(narrow, CATALOGUE['stribeck_friction'], start)
     low, high = model.bounds()
     theta = np.clip(model.begun_at(low[: len(narrow.free)]), low, high)
-    derivative = jacobian(model, theta, model.residuals(theta))
+    derivative = jacobian(model, theta)
     assert (high - low)[0] < model.step
     assert np.all(np.isfinite(derivative))
     assert np.any(derivative[:, 0] != 0.0)
+
+
+def test_differences_on_coarse_ticks_are_those_on_fine_ones(one_joint):
+    refitted, _ = anchors(one_joint)
+    model, theta = refitted.model, refitted.theta
+    coarse = jacobian(model, theta)
+    for k in range(len(theta)):
+        moved = theta.copy()
+        moved[k] += 1e-3
+        fine = (model.residuals(moved) - model.residuals(theta)) / 1e-3
+        if np.linalg.norm(fine) > 1.0:
+            assert np.linalg.norm(coarse[:, k] - fine) < 0.15 * np.linalg.norm(fine)
+
+
+def test_an_effect_that_is_there_has_more_evidence_and_one_that_is_not_has_less(one_joint):
+    for concealed, more in ((('joint_backlash', {'gap_rad': 0.06}),), True), ((), False):
+        refitted, _ = anchors(one_joint, *concealed)
+        model = with_effect(refitted.model, CATALOGUE['joint_backlash'], {'gap_rad': 0.02})
+        found = fit(model, model.begun_at(refitted.theta), iterations=20)
+        assert (log_evidence(found) > log_evidence(refitted)) is more
+        assert may_be_absent(found, CATALOGUE['joint_backlash']) is not more
+
+
+def test_channels_that_are_off_count_less(one_joint):
+    refitted, _ = anchors(one_joint, ('tracker_bias', {'bias_rad': 0.2}))
+    observation = refitted.model.observation
+    residuals = refitted.residuals.copy()
+    first, *_ = observation.slices()
+    residuals[first] = 10.0
+    weight = weights(observation, residuals)
+    assert np.allclose(weight[first], 0.1)
+    assert np.all(weight <= 1.0)
+
+
+def test_another_form_widens_intervals_by_what_it_moves_the_numbers(one_joint):
+    refitted, _ = anchors(one_joint)
+    forms = other_forms(refitted, 8, 2)
+    assert forms.residuals.shape == (len(refitted.residuals), 8)
+    moved = np.sqrt(np.mean(forms.moved**2, axis=1))
+    named = [item.name for item in refitted.model.free]
+    exponent = named.index('capstan_exponent')
+    assert moved[exponent] > 0.0
+    plain, wide = intervals(refitted), intervals(replace(refitted, moved_by_form=moved))
+    assert wide.high[exponent] > plain.high[exponent]
+    assert np.all(wide.high >= plain.high)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.anchoring import all_anchors
+from endoscope_explain.fit.nominal import all_anchors
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.isolated_samples import with_isolated_marked, without_isolated
 from endoscope_explain.observation import observe

@@ -6,12 +6,8 @@ import pytest
 from endoscope_core.physics.description import EffectSpec, TermSpec
 from endoscope_core.physics.functions.expression import evaluate
 from endoscope_core.physics.simulator import simulate
-from endoscope_explain.compose import nominal_anchors
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.families.unknown_physics import unknown_physics
-from endoscope_explain.fit.simulated_joint import joint_of, packed_joint
-from endoscope_explain.observation import observe
 from endoscope_explain.recording.signals import gear
 
 OTHER = {'wire_stiffness': 3300.0, 'capstan_exponent': 0.83, 'joint_friction': 8.2e-4}
@@ -80,42 +76,31 @@ def test_the_effect_that_was_left_out_is_named(effect_id, parameters, verdict, o
 
 
 @pytest.mark.parametrize(
-    ('place', 'law'),
+    ('place', 'law', 'verdict'),
     [
-        ('load_of_angle', '0.0015*exp(-((q - 0.1)/0.1)**2)'),
-        ('stiffness_of_tension', '0.3*tanh((T - 6)/3)'),
+        ('load_of_angle', '0.0015*exp(-((q - 0.1)/0.1)**2)', Verdict.MISSING_PHYSICS),
+        ('exponent_of_angle', '0.4*sin(4*q)', Verdict.UNKNOWN_PHYSICS),
     ],
 )
-def test_physics_outside_the_catalogue_is_a_function_at_its_place(place, law, one_joint):
+def test_a_law_of_no_known_form_is_a_function_at_its_place(place, law, verdict, one_joint):
     concealed = TermSpec('bend_x', place, law)
     true = replace(one_joint.rig(**OTHER), terms=(concealed,))
-    plant = one_joint.rig()
-    (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
-    refitted, _ = nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
-    unknown, found = unknown_physics(refitted, 2, ('contact',))
+    explanation = explain_recording(
+        one_joint.record(true, one_joint.motion()), one_joint.rig(), jobs=2
+    )
+    assert explanation.verdict is verdict
+    unknown = explanation.unknown
     assert unknown.place == place
     assert unknown.explained > 0.95
-    assert unknown.siblings == ('contact',)
     inner = slice(len(unknown.nodes) // 8, -len(unknown.nodes) // 8)
-    nodes = unknown.nodes[inner]
-    expected = evaluate(law, unknown.symbol, nodes)
+    expected = evaluate(law, unknown.symbol, unknown.nodes[inner])
     assert np.corrcoef(unknown.values[inner], expected)[0, 1] > 0.95
-    joints = [joint_of(f.model.packed(f.theta)[0]) for f in (found, refitted)]
-    improved = replace(plant, joints={'bend_x': joints[0]}, terms=(unknown.term(),))
-    fitted = replace(plant, joints={'bend_x': joints[1]})
     time = 1e-3 * np.arange(6000)
     other = gear() * (0.9 * np.sin(1.7 * time) + 0.3 * np.sin(4.1 * time))
-    answers = [simulate(each, other[:, None]).bending for each in (true, improved, fitted)]
+    plants = (true, explanation.augmented, explanation.refitted)
+    answers = [simulate(each, other[:, None]).bending for each in plants]
     with_term, without = (np.sqrt(np.mean((answers[0] - a) ** 2)) for a in answers[1:])
     assert with_term < 0.3 * without
-
-
-def test_nothing_is_a_function_of_nothing(one_joint):
-    plant = one_joint.rig()
-    recording = one_joint.record(one_joint.rig(**OTHER), one_joint.motion(6.0))
-    (observation,) = observe(recording, plant)
-    refitted, _ = nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
-    assert unknown_physics(refitted, 2, ()) is None
 
 
 def test_what_was_there_in_health_is_not_explained_again(one_joint):

@@ -7,11 +7,11 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.anchoring import anchored
 from endoscope_explain.fit.model import fit
+from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.fit.pooled import SPREAD, fit_together, told_alone, with_common_numbers
 from endoscope_explain.observation import observe
-from endoscope_explain.screen import with_effect
+from endoscope_explain.search.candidate import with_effect
 
 GAIN = 0.9
 STIFFNESS = 0.005
@@ -40,7 +40,7 @@ def separate(one_joint):
         recording = one_joint.record(rig, size * one_joint.motion(3.0))
         plant = one_joint.rig()
         _, ((nominal, _),) = anchored(recording, observe(recording, plant), plant, 0.5, 1)
-        model = with_effect(nominal.model, 'load_cell_gain', {'gain': 0.95, 'wire': 1.0})
+        model = with_effect(nominal.model, CATALOGUE['load_cell_gain'], {'gain': 0.95, 'wire': 1.0})
         fits.append(fit(model, model.begun_at(nominal.theta), iterations=20))
     return fits
 

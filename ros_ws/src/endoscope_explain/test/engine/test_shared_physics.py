@@ -4,13 +4,13 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.anchoring import anchored
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.fit.model import fit
+from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.given_physics import without_recording
 from endoscope_explain.observation import observe
-from endoscope_explain.screen import with_effect
+from endoscope_explain.search.candidate import with_effect
 from endoscope_explain.shared_physics import shared_effects
 
 GAIN = 0.9
@@ -72,7 +72,7 @@ def test_one_effect_that_does_not_explain_a_recording_is_its_only_sibling(one_jo
     plant = one_joint.rig()
     observations = observe(recordings[0], plant)
     _, ((refitted, _),) = anchored(recordings[0], observations, plant, 0.15, 1)
-    model = with_effect(refitted.model, 'cogging', {})
+    model = with_effect(refitted.model, CATALOGUE['cogging'], {})
     given = without_recording(('cogging',), fit(model, model.begun_at(refitted.theta)))
     explanation = explain_recording(recordings[0], plant, band=0.15, given={'bend_x': given})
     assert explanation.verdict is Verdict.UNKNOWN_PHYSICS

@@ -1,0 +1,179 @@
+"""What is searched, what is found, and what is said about it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from endoscope_core.physics.description import EffectSpec, TermSpec
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_explain.decide.decision import decide
+from endoscope_explain.fit.nominal import nominal_anchors
+from endoscope_explain.fit.simulated_joint import packed_joint
+from endoscope_explain.fit.whiteness import is_noise
+from endoscope_explain.observation import observe
+from endoscope_explain.search.candidate import Candidate, candidates, starting_points
+from endoscope_explain.search.levels import Level, search
+from endoscope_explain.search.refit import Composition
+from endoscope_explain.search.screen import background, directions, gains, promises
+
+
+@pytest.fixture
+def anchors(one_joint):
+    """Makes the nominal plant, refitted and as described, of a rig with effects and functions."""
+
+    def made(*terms, seconds=12.0):
+        effects = [term for term in terms if isinstance(term, EffectSpec)]
+        functions = tuple(term for term in terms if isinstance(term, TermSpec))
+        plant = one_joint.rig()
+        true = replace(one_joint.rig(*effects), terms=functions)
+        (observation,) = observe(one_joint.record(true, one_joint.motion(seconds)), plant)
+        return nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+
+    return made
+
+
+def effect(name, **values):
+    return EffectSpec(name, 'bend_x', values)
+
+
+def starts_of(name):
+    return tuple(Candidate(CATALOGUE[name], start) for start in starting_points(CATALOGUE[name]))
+
+
+def promised(found, name):
+    behind = background(found)
+    return promises(behind, directions(behind, starts_of(name), 1))
+
+
+def test_a_disturbance_in_the_opposite_phase_is_promised_there(anchors):
+    hidden = effect('breathing', moment_nm=0.0006, frequency_hz=0.3, phase_rad=-2.5)
+    refitted, _ = anchors(hidden)
+    near = [
+        p.candidate.start['phase_rad']
+        for p in promised(refitted, 'breathing')
+        if p.candidate.start['frequency_hz'] == pytest.approx(0.3)
+    ]
+    assert np.cos(near[0] + 2.5) > 0.0
+
+
+def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(anchors):
+    _, described = anchors(effect('torque_limit', limit_nm=0.01))
+    found = promised(described, 'torque_limit')
+    assert found[0].candidate.start['limit_nm'] == pytest.approx(0.01, rel=0.05)
+    reached = [p.candidate.start['limit_nm'] for p in found]
+    assert max(reached) < 0.03
+
+
+def test_what_is_there_already_is_not_tried_again(anchors):
+    refitted, _ = anchors()
+    tried = {term.id for term in candidates(refitted)}
+    assert {'gravity', 'load_of_angle', 'contact'} <= tried
+    with_function = Candidate(FUNCTIONS['load_of_angle'], family=_family(refitted)).added_to(
+        refitted.model
+    )
+    model = replace(refitted, model=with_function, theta=with_function.begun_at(refitted.theta))
+    tried = {term.id for term in candidates(model, left_out=('viscous_friction',))}
+    assert not tried & {'gravity', 'load_of_angle', 'contact', 'viscous_friction'}
+    assert 'stribeck_friction' in tried
+
+
+def _family(found):
+    return next(term.family for term in candidates(found) if term.id == 'load_of_angle')
+
+
+def test_gains_by_linear_algebra_are_those_of_the_residuals_themselves(anchors):
+    refitted, _ = anchors(effect('gravity', moment_nm=0.002))
+    behind = background(refitted)
+    ways = directions(behind, starts_of('gravity')[:2], 1)
+    residuals = behind.left(refitted.residuals * behind.weight)[:, None]
+    found = gains(behind, ways, residuals)
+    way = ways[0]
+    share = -float(way.columns[:, 0] @ residuals[:, 0]) / (1.0 + float(np.sum(way.columns**2)))
+    left = residuals[:, 0] + share * way.columns[:, 0]
+    for c, part in enumerate(refitted.model.observation.slices()):
+        assert found.left[0, 0, c] == pytest.approx(float(np.mean(left[part] ** 2)), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    'hidden',
+    [
+        effect('torque_limit', limit_nm=0.0101, droop=1e-3),
+        effect('tracker_delay', delay_s=0.05),
+        effect('joint_backlash', gap_rad=0.05),
+    ],
+)
+def test_an_effect_is_found_by_its_formula_with_nothing_left(hidden, anchors):
+    tried = search(anchors(hidden), 2)
+    decision = decide(tried, 2)
+    assert [term.name for term in decision.missing] == [hidden.id]
+    assert decision.missing[0].alternatives == ()
+    assert decision.adequate
+    assert is_noise(decision.chosen.fit)
+    assert decision.missing[0].p_value < 0.05
+
+
+def test_two_effects_are_found_one_after_the_other(anchors):
+    hidden = (
+        effect('joint_inertia', inertia_kg_m2=2e-5),
+        effect('tracker_drift', rate_rad_per_s=0.002),
+    )
+    decision = decide(search(anchors(*hidden, seconds=20.0), 2), 2)
+    assert {term.name for term in decision.missing} == {each.id for each in hidden}
+    assert is_noise(decision.chosen.fit)
+
+
+def test_nothing_is_searched_where_only_noise_is_left(anchors):
+    tried = search(anchors(), 2)
+    assert tried.levels == ()
+    assert decide(tried, 2).missing == ()
+
+
+def test_a_law_whose_formula_is_left_out_is_named_by_its_place(anchors):
+    hidden = effect('stribeck_friction', rise=0.6, stribeck_speed=1e-3)
+    tried = search(anchors(hidden, seconds=20.0), 2, left_out=('stribeck_friction',))
+    decision = decide(tried, 2)
+    term = decision.missing[0]
+    assert term.term.id == 'exponent_of_speed'
+    assert decision.explained > 0.95
+
+
+def _composition(evidence, *terms, found=None):
+    return Composition(terms, found, evidence)
+
+
+def _level(evidences, null):
+    """A level whose compositions are a function of the angle, its formulas, and a tracker's."""
+    function = replace(Candidate(FUNCTIONS['load_of_angle']), family=object())
+    terms = {
+        'function': function,
+        'gravity': Candidate(CATALOGUE['gravity']),
+        'tracker_delay': Candidate(CATALOGUE['tracker_delay']),
+    }
+    found = [_composition(value, terms[name]) for name, value in evidences.items()]
+    found.sort(key=lambda c: -c.evidence)
+    return Level(_composition(0.0), tuple(found), np.asarray(null, dtype=float))
+
+
+def test_a_formula_is_taken_where_it_loses_no_more_than_form_is_worth():
+    close = _level({'function': 500.0, 'gravity': 480.0}, np.linspace(0.0, 50.0, 39))
+    far = _level({'function': 500.0, 'gravity': 400.0}, np.linspace(0.0, 50.0, 39))
+    assert close.best.terms[0].id == 'gravity'
+    assert far.best.terms[0].id == 'load_of_angle'
+
+
+def test_rivals_are_those_behind_by_no_more_than_form_is_worth():
+    null = np.linspace(0.0, 50.0, 39)
+    near = _level({'gravity': 500.0, 'tracker_delay': 470.0}, null)
+    far = _level({'gravity': 500.0, 'tracker_delay': 300.0}, null)
+    assert [c.terms[0].id for c in near.rivals()] == ['tracker_delay']
+    assert far.rivals() == ()
+
+
+def test_nothing_is_found_that_another_form_shows_as_well():
+    null = np.linspace(0.0, 1000.0, 39)
+    assert not _level({'gravity': 500.0}, null).is_found
+    assert _level({'gravity': 1001.0}, null).is_found
+    assert _level({'gravity': 1001.0}, null).p_value == pytest.approx(1.0 / 40.0)
+    assert not replace(_level({'gravity': 1001.0}, null), predicts=False).is_found
