@@ -30,6 +30,9 @@ from endoscope_explain.search.refit import Composition
 
 CHANGED = 0.04
 """Relative difference of a nominal parameter that is worth a verdict."""
+MOST = 0.5
+"""Share of the misfit that names must explain where they leave more than another form would: with
+less, the main thing has no name."""
 NOMINAL_UNITS = {
     'pretension': 'N',
     'wire_stiffness': 'N/m',
@@ -108,7 +111,7 @@ def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
 def verdict_of(effects: tuple[NamedEffect, ...], decisions: list[Decision]) -> Verdict:
     """What the named effects, or the parameters alone, amount to."""
     unknown = any(not term.is_known for d in decisions for term in d.missing)
-    unnamed = any(not d.adequate and not d.missing for d in decisions)
+    unnamed = any(not d.adequate and d.explained < MOST for d in decisions)
     if unknown or unnamed:
         return Verdict.UNKNOWN_PHYSICS
     stages = {effect.stage for effect in effects}
