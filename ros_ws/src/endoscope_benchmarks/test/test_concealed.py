@@ -15,6 +15,7 @@ from endoscope_benchmarks.concealed.readings import misfit, read, record
 from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
 from endoscope_benchmarks.concealed.strata import STRATA, drawn_case
 from endoscope_benchmarks.concealed.strength import OutOfReachError, moved, scaled_to
+from endoscope_benchmarks.concealed.visible import left
 from endoscope_benchmarks.concealed.visited import visited
 from endoscope_core.physics import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
@@ -97,6 +98,17 @@ def test_a_form_can_be_drawn_at_every_place_and_is_no_line(place, rig):
     assert np.corrcoef(grid, values)[0, 1] ** 2 < 0.82
     other, _ = drawn_form(np.random.default_rng(SEED + 1), place, 'bend_x', (low, high))
     assert other(1.0).expression != form(1.0).expression
+
+
+def test_what_the_rig_itself_could_do_is_not_left_of_a_law(rig):
+    _, true, command = rig
+    joint = true.joints['bend_x']
+    stiffer = dataclasses.replace(joint, joint_stiffness=1.02 * joint.joint_stiffness)
+    refitted = dataclasses.replace(true, joints={**true.joints, 'bend_x': stiffer})
+    bias = EffectSpec('tracker_bias', 'bend_x', {'bias_rad': 0.05})
+    biased = dataclasses.replace(true, effects=(bias,))
+    assert left(true, refitted, command) < 0.2
+    assert left(true, biased, command) > 2.0
 
 
 def test_noise_of_a_recording_is_that_of_its_sensors(rig):

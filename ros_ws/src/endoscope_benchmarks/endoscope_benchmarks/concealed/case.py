@@ -44,7 +44,8 @@ class Case:
     ----------
     stratum : str
     seed : int
-    described, true : PlantDescription
+    described, bare, true : PlantDescription
+        The rig as its engineer describes it, as it is without the laws, and with them.
     laws : tuple of Law
         Concealed; empty where nothing is.
     recording, second : Recording
@@ -65,6 +66,7 @@ class Case:
     stratum: str
     seed: int
     described: PlantDescription
+    bare: PlantDescription
     true: PlantDescription
     laws: tuple[Law, ...]
     recording: Recording

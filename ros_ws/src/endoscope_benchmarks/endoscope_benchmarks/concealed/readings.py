@@ -1,6 +1,7 @@
 """Recordings in memory: what the sensors of a simulated rig read, and how far a plant is off."""
 
 import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,6 +67,11 @@ class Readings:
     shaft_effort: Array
     tension: Array
     bending: Array
+
+    def signals(self) -> dict[str, Array]:
+        """What sensors read, by the names of a recording's series."""
+        names = ('shaft_position', 'shaft_velocity', 'shaft_effort', 'tension', 'bending')
+        return {name: getattr(self, name) for name in names}
 
     def channels(self) -> list[Array]:
         """Shaft angle, effort, both tensions and bending angle of every joint, joint by joint."""
@@ -138,24 +144,41 @@ def record(
 
 def misfit(plant: PlantDescription, recording: Recording, sensors: SensorParameters) -> float:
     """Rmse of a plant's prediction over the noise of the sensors, of the signal that is worst."""
-    predicted = read(plant, recording.command.values)
-    counts = 2.0 * math.pi / sensors.encoder_counts
+    predicted = in_noise(read(plant, recording.command.values).signals(), sensors)
+    measured = in_noise({k: s.values for k, s in recording.measured().items()}, sensors)
+    return worst_rms(np.subtract(*pair) for pair in zip(measured, predicted, strict=True))
+
+
+def in_noise(signals: Mapping[str, Array], sensors: SensorParameters) -> list[Array]:
+    """Signals over the noise of the sensors, column by column: means of what is judged as one.
+
+    Parameters
+    ----------
+    signals : mapping of str to array (N, J) or (N, J, 2)
+        As `Readings.signals`; shaft velocity is left out.
+    sensors : SensorParameters
+    """
     kinds = (
-        ('shaft_position', 0.0, counts),
+        ('shaft_position', 0.0, 2.0 * math.pi / sensors.encoder_counts),
         ('shaft_effort', sensors.effort_noise, sensors.effort_resolution),
         ('tension', sensors.load_cell_noise, sensors.load_cell_resolution),
         ('bending', sensors.tracker_noise, 0.0),
     )
-    worst = 0.0
+    columns: list[Array] = []
     for name, white, step in kinds:
-        error = recording.measured()[name].values - getattr(predicted, name)
         over = 1 if name == 'bending' else MEAN_OVER
-        error = error[: len(error) // over * over]
-        means = error.reshape(-1, over, *error.shape[1:]).mean(axis=1)
+        values = signals[name].reshape(len(signals[name]), -1)
+        values = values[: len(values) // over * over]
+        means = values.reshape(-1, over, values.shape[1]).mean(axis=1)
         # Rounding of a quiet signal is the same in all readings of a mean.
         noise = math.sqrt(white**2 / over + step**2 / 12.0 / (over if white else 1))
-        worst = max(worst, float(np.sqrt(np.mean(means**2, axis=0)).max()) / noise)
-    return worst
+        columns += list(means.T / noise)
+    return columns
+
+
+def worst_rms(columns: Iterable[Array]) -> float:
+    """Rms of the column that has the largest."""
+    return max(float(np.sqrt(np.mean(column**2))) for column in columns)
 
 
 def _added(

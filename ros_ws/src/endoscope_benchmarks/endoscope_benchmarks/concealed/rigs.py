@@ -2,12 +2,16 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from endoscope_core.physics import PlantDescription, SensorParameters
+from endoscope_core.physics import JointParameters, PlantDescription, SensorParameters
 from endoscope_core.physics.family import shipped_family
 from endoscope_core.physics.layout import PROFILE_TERMS
+
+Array = NDArray[np.float64]
 
 JOINTS = ('bend_x', 'bend_y')
 MOST_BENT = math.radians(240.0)
@@ -100,7 +104,29 @@ def coarse_sensors(generator: np.random.Generator) -> SensorParameters:
     )
 
 
-def _sum(profile: tuple[float, ...], terms: np.ndarray) -> tuple[float, ...]:
+def spreads(joint: JointParameters) -> dict[str, float]:
+    """Rms by which each number of a rig differs from its description; `friction_profile_1`..."""
+    uniform = 1.0 / math.sqrt(3.0)
+    return {
+        **{key: OFF * uniform * getattr(joint, key) for key in _SCALED},
+        'pretension_profile': -TIGHTENING * uniform,
+        'joint_rest_angle': REST_ANGLE * uniform,
+        'joint_presliding_spread': SPREAD * uniform,
+        **{f'friction_profile_{k}': UNEVENNESS / k for k in (1, 2, 3)},
+    }
+
+
+def with_number(joint: JointParameters, key: str, added: float) -> JointParameters:
+    """The joint with something added to one of the numbers that `spreads` names."""
+    if key.startswith('friction_profile_'):
+        term = np.zeros(int(key[-1]))
+        term[-1] = added
+        return replace(joint, friction_profile=_sum(joint.friction_profile, term))
+    changed: dict[str, Any] = {key: getattr(joint, key) + added}
+    return replace(joint, **changed)
+
+
+def _sum(profile: tuple[float, ...], terms: Array) -> tuple[float, ...]:
     size = max(len(profile), len(terms))
     return tuple(
         (np.pad(profile, (0, size - len(profile))) + np.pad(terms, (0, size - len(terms)))).tolist()

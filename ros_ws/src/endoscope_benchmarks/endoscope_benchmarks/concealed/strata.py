@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -250,9 +251,7 @@ def _concealed(
     for _ in range(_TRIES):
         added, begin = drawn()
         try:
-            return scaled_to(
-                aim, lambda strength, add=added: add(rig.true, strength), rig.command, begin
-            )
+            return scaled_to(aim, partial(added, rig.true), rig.command, begin)
         except OutOfReachError:
             continue
     raise RuntimeError(f'no law of {_TRIES} moves {100.0 * aim:.0f} % of a signal')
@@ -272,6 +271,7 @@ def _finished(
         '',
         seed,
         rig.described,
+        rig.true,
         true,
         () if law is None else (law,),
         record(true, rig.command, _noise_seed(generator), noise),

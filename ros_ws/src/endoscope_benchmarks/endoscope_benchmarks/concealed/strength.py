@@ -76,8 +76,9 @@ def scaled_to(
             share = moved(bare, read(plant, command))
         except ValueError:
             share = math.inf
-        if abs(share - aim) <= CLOSE * aim:
-            return plant, share
+        else:
+            if abs(share - aim) <= CLOSE * aim:
+                return plant, share
         if share < aim:
             below = strength
         else:

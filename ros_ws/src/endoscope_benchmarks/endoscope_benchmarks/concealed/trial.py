@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from endoscope_benchmarks.concealed.judge import judged, statements
 from endoscope_benchmarks.concealed.readings import misfit
 from endoscope_benchmarks.concealed.strata import drawn_case
+from endoscope_benchmarks.concealed.visible import left
 from endoscope_explain.explain_recording import explain_recording
 
 GOOD = 1.3
@@ -30,6 +31,8 @@ class Row:
         What is particular to the case.
     moved : float
         What the laws change, over the signal.
+    left : float
+        What a refit of the rig's numbers leaves of them, over noise.
     verdict : str
     said : tuple of str
         Names with their joints, most certain first.
@@ -48,6 +51,7 @@ class Row:
     concealed: tuple[str, ...]
     note: str
     moved: float
+    left: float
     verdict: str
     said: tuple[str, ...]
     first: bool
@@ -69,7 +73,8 @@ class Row:
         note = f' [{self.note}]' if self.note else ''
         return (
             f'{self.stratum:17s}{self.seed:4d}  {right or "WRONG":6s}{self.seconds:6.1f} s  '
-            f'{" + ".join(self.concealed) or "nothing"}{note}, moves {100.0 * self.moved:.0f} %: '
+            f'{" + ".join(self.concealed) or "nothing"}{note}, moves {100.0 * self.moved:.0f} %, '
+            f'a refit leaves {self.left:.2g}: '
             f'{self.verdict}, {" + ".join(self.said) or "nothing"}; second {ratios}'
         )
 
@@ -91,21 +96,24 @@ def explained(stratum: str, seed: int) -> Row:
         seconds = time.monotonic() - begun
     names = statements(said)
     judgement = judged(case.laws, names, case.also)
-    second = {
-        kind: misfit(getattr(said, kind), case.second, case.described.sensors)
-        for kind in ('nominal', 'refitted', 'augmented')
-    }
+    nominal, refitted, augmented = (
+        misfit(plant, case.second, case.described.sensors)
+        for plant in (said.nominal, said.refitted, said.augmented)
+    )
     return Row(
         stratum,
         seed,
         tuple(f'{law.name}@{law.joint or "all"}' for law in case.laws),
         case.note,
         case.moved,
+        left(case.bare, case.true, case.recording.command.values) if case.laws else 0.0,
         str(said.verdict),
         tuple(f'{each.name}@{each.joint}' for each in names),
+        nominal=nominal,
+        refitted=refitted,
+        augmented=augmented,
         seconds=seconds,
         **vars(judgement),
-        **second,
     )
 
 
@@ -113,7 +121,7 @@ def failed(stratum: str, seed: int, error: BaseException) -> Row:
     """The row of a case that could not be explained: wrong in every respect."""
     nan = float('nan')
     return Row(
-        stratum, seed, (), f'{type(error).__name__}: {error}', nan, 'FAILED', (), False, False,
+        stratum, seed, (), f'{type(error).__name__}: {error}', nan, nan, 'FAILED', (), False, False,
         False, False, 0, False, nan, nan, nan, nan, nan,
     )  # fmt: skip
 
