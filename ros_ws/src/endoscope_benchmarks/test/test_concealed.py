@@ -8,15 +8,13 @@ import pytest
 from endoscope_benchmarks.benches.concealed import seeds
 from endoscope_benchmarks.concealed import motions
 from endoscope_benchmarks.concealed.case import law_at_place, law_of_effect
-from endoscope_benchmarks.concealed.forms import drawn_form
+from endoscope_benchmarks.concealed.forms import drawn_form, visited
 from endoscope_benchmarks.concealed.formulas import DRAWN, drawn_formula
 from endoscope_benchmarks.concealed.judge import Statement, judged
 from endoscope_benchmarks.concealed.readings import misfit, read, record
 from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
 from endoscope_benchmarks.concealed.strata import STRATA, drawn_case
-from endoscope_benchmarks.concealed.strength import OutOfReachError, moved, scaled_to
-from endoscope_benchmarks.concealed.visible import left
-from endoscope_benchmarks.concealed.visited import visited
+from endoscope_benchmarks.concealed.strength import OutOfReachError, left, moved, scaled_to
 from endoscope_core.physics import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
@@ -60,7 +58,7 @@ def test_a_formula_of_no_strength_is_no_effect(effect, rig):
 
 
 @pytest.mark.parametrize('aim', [0.03, 0.3])
-@pytest.mark.parametrize('effect', ['wire_stiffening', 'joint_stop', 'load_cell_gain'])
+@pytest.mark.parametrize('effect', ['gravity', 'joint_stop', 'load_cell_gain'])
 def test_strength_reaches_its_share_of_the_signal(effect, aim, rig):
     _, true, command = rig
     formula = drawn_formula(np.random.default_rng(SEED), effect, 'bend_x', 30.0)

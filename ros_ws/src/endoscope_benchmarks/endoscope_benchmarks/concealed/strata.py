@@ -15,7 +15,7 @@ from endoscope_benchmarks.concealed.case import (
     law_at_place,
     law_of_effect,
 )
-from endoscope_benchmarks.concealed.forms import drawn_form
+from endoscope_benchmarks.concealed.forms import drawn_form, visited
 from endoscope_benchmarks.concealed.formulas import DRAWN, OF_THE_OTHER, drawn_formula
 from endoscope_benchmarks.concealed.readings import Noise, record
 from endoscope_benchmarks.concealed.rigs import (
@@ -25,7 +25,6 @@ from endoscope_benchmarks.concealed.rigs import (
     true_rig,
 )
 from endoscope_benchmarks.concealed.strength import OutOfReachError, scaled_to
-from endoscope_benchmarks.concealed.visited import visited
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
@@ -247,14 +246,14 @@ def _concealed(
     generator: Generator, rig: _Rig, drawn: Callable[[], tuple[Added, float]], aims: Array
 ) -> tuple[PlantDescription, float]:
     """The rig with a law that moves a share of the signal, drawn anew where it cannot."""
-    aim = float(np.exp(generator.uniform(*np.log(aims))))
     for _ in range(_TRIES):
         added, begin = drawn()
+        aim = float(np.exp(generator.uniform(*np.log(aims))))
         try:
             return scaled_to(aim, partial(added, rig.true), rig.command, begin)
         except OutOfReachError:
             continue
-    raise RuntimeError(f'no law of {_TRIES} moves {100.0 * aim:.0f} % of a signal')
+    raise RuntimeError(f'no law of {_TRIES} moves {100.0 * aims[0]:.0f} % of a signal')
 
 
 def _finished(

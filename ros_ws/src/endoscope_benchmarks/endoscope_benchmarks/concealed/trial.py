@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from endoscope_benchmarks.concealed.judge import judged, statements
 from endoscope_benchmarks.concealed.readings import misfit
 from endoscope_benchmarks.concealed.strata import drawn_case
-from endoscope_benchmarks.concealed.visible import left
+from endoscope_benchmarks.concealed.strength import left
 from endoscope_explain.explain_recording import explain_recording
 
 GOOD = 1.3
