@@ -13,7 +13,7 @@ from endoscope_benchmarks.concealed.formulas import DRAWN, drawn_formula
 from endoscope_benchmarks.concealed.judge import Statement, judged
 from endoscope_benchmarks.concealed.readings import misfit, read, record
 from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
-from endoscope_benchmarks.concealed.strata import STRATA, drawn_case
+from endoscope_benchmarks.concealed.strata import PLACES, STRATA, drawn_case
 from endoscope_benchmarks.concealed.strength import OutOfReachError, left, moved, scaled_to
 from endoscope_core.physics import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
@@ -40,7 +40,10 @@ def test_every_stratum_draws_the_same_case_for_the_same_seed(stratum):
         assert np.isfinite(one.tension.values).all()
         assert np.isfinite(one.bending.values).all()
     assert bool(first.laws) == (first.moved > 0.0)
-    assert drawn_case(stratum, SEED + 1).true != first.true
+
+
+def test_another_seed_is_another_case():
+    assert drawn_case('nulls', SEED).true != drawn_case('nulls', SEED + 1).true
 
 
 def test_the_rig_itself_predicts_its_second_recording_to_the_noise():
@@ -57,7 +60,7 @@ def test_a_formula_of_no_strength_is_no_effect(effect, rig):
     assert moved(read(true, command), read(with_it, command)) < 1e-9
 
 
-@pytest.mark.parametrize('aim', [0.03, 0.3])
+@pytest.mark.parametrize('aim', [0.03, 0.15])
 @pytest.mark.parametrize('effect', ['gravity', 'joint_stop', 'load_cell_gain'])
 def test_strength_reaches_its_share_of_the_signal(effect, aim, rig):
     _, true, command = rig
@@ -82,7 +85,7 @@ def test_a_share_that_no_strength_reaches_is_said(rig):
         scaled_to(100.0, plant_of, command)
 
 
-@pytest.mark.parametrize('place', FUNCTIONS)
+@pytest.mark.parametrize('place', PLACES)
 def test_a_form_can_be_drawn_at_every_place_and_is_no_line(place, rig):
     _, true, command = rig
     argument = FUNCTIONS[place].argument
@@ -99,7 +102,8 @@ def test_a_form_can_be_drawn_at_every_place_and_is_no_line(place, rig):
 
 
 def test_what_the_rig_itself_could_do_is_not_left_of_a_law(rig):
-    _, true, command = rig
+    _, both, command = rig
+    true, command = both.of_joints(['bend_x']), command[:, :1]
     joint = true.joints['bend_x']
     stiffer = dataclasses.replace(joint, joint_stiffness=1.02 * joint.joint_stiffness)
     refitted = dataclasses.replace(true, joints={**true.joints, 'bend_x': stiffer})

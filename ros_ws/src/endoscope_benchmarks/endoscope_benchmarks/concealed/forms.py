@@ -1,15 +1,35 @@
 """Forms of laws that nobody put into the catalogue: drawn expression trees of one state."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics import PlantDescription, TermSpec, simulate
+from endoscope_core.physics import PlantDescription, TermSpec
 from endoscope_core.physics.functions import FUNCTIONS, places
 from endoscope_core.physics.functions.expression import evaluate
 from endoscope_core.physics.functions.place import Argument, Place, Shape
 from endoscope_core.physics.functions.term import tabulated
+from endoscope_core.physics.kernel import run_joints
+from endoscope_core.physics.layout import (
+    IN_COMMAND,
+    IN_MOTOR,
+    INPUTS,
+    JOINT,
+    JOINT_STEP,
+    MEAN_TENSION,
+    MOTOR,
+    MOTOR_SPEED,
+    OTHER,
+    OUT_TENSION_A,
+    OUT_TENSION_B,
+    OUTPUTS,
+    PATH,
+    SLIDING_SPEED,
+    TENSION_DIFFERENCE,
+)
+from endoscope_core.physics.packing import pack, rest_state
 from endoscope_core.physics.simulator import TICK
 
 Array = NDArray[np.float64]
@@ -28,6 +48,8 @@ _TRIES = 1000
 PERIODS_S = (1.5, 6.0)
 CYCLES = (3.0, 10.0)
 """Of a law that repeats with the shaft, over the shaft's range."""
+EVERY = 10
+"""Ticks from one look at the states to the next."""
 _EDGE = 0.005
 """Quantile at which the range of a speed ends."""
 
@@ -169,32 +191,45 @@ def visited(
         Motor shaft command in rad, every ms.
     joint : str
     """
-    answer, names = simulate(plant, command), plant.joint_names()
-    j, own = names.index(joint), plant.joints[joint]
-    angle, shaft = answer.bending_true[:, j], answer.shaft_position[:, j]
-    speed, asked = answer.shaft_velocity[:, j], command[:, j]
-    wound = own.pulley_radius * shaft
-    slid = np.abs(own.pulley_radius * speed)
-    pair = answer.tension[:, j]
-    other = answer.bending_true[:, 1 - j] if len(names) == 2 else np.zeros(1)
+    names = plant.joint_names()
+    if not plant.terms:
+        # Some states are kept only where a place has a function.
+        plant = replace(plant, terms=(TermSpec(joint, 'tracker_of_time', '0*t'),))
+    parameters, flags = pack(plant)
+    inputs = np.zeros((len(names), len(command), INPUTS))
+    inputs[:, :, IN_COMMAND] = command.T
+    inputs[:, :, IN_MOTOR] = np.nan
+    states, histories, sheaths = rest_state(parameters, flags, TICK)
+    out = np.empty((len(names), EVERY, OUTPUTS))
+    j, rows = names.index(joint), []
+    for k in range(0, len(command) - EVERY + 1, EVERY):
+        now = np.ascontiguousarray(inputs[:, k : k + EVERY])
+        run_joints(states, histories, sheaths, parameters, flags, now, True, TICK, out)
+        rows.append(np.r_[states[j], out[j, -1], command[k, j]])
+    x = np.array(rows).T
+    outputs, asked = x[len(states[j]) : -1], x[-1]
+    angle, speed = x[JOINT], x[MOTOR_SPEED]
+    wound = plant.joints[joint].pulley_radius * x[MOTOR]
+    mean, half = x[MEAN_TENSION], 0.5 * x[TENSION_DIFFERENCE]
+    readings = outputs[[OUT_TENSION_A, OUT_TENSION_B]]
     found = {
-        places.TIME: answer.time,
-        places.SPEED: np.array([0.0, np.quantile(slid, 1.0 - _EDGE)]),
-        places.DISTANCE: np.array([0.0, np.sum(slid) * TICK]),
-        places.TENSION: pair,
-        places.BOTH_TENSIONS: pair.mean(axis=1),
-        places.DIFFERENCE: pair[:, 0] - pair[:, 1],
+        places.TIME: np.array([0.0, len(command) * TICK]),
+        places.SPEED: np.array([0.0, np.quantile(np.abs(x[SLIDING_SPEED]), 1.0 - _EDGE)]),
+        places.DISTANCE: x[PATH],
+        places.TENSION: np.concatenate([mean + half, mean - half]),
+        places.BOTH_TENSIONS: mean,
+        places.DIFFERENCE: 2.0 * half,
         places.ANGLE: angle,
-        places.OTHER_ANGLE: other,
-        places.ANGULAR_SPEED: np.quantile(np.gradient(angle, TICK), [_EDGE, 1.0 - _EDGE]),
-        places.SHAFT: shaft,
+        places.OTHER_ANGLE: x[OTHER],
+        places.ANGULAR_SPEED: np.quantile(x[JOINT_STEP] / TICK, [_EDGE, 1.0 - _EDGE]),
+        places.SHAFT: x[MOTOR],
         places.SHAFT_SPEED: np.quantile(speed, [_EDGE, 1.0 - _EDGE]),
         places.COMMANDED: asked,
-        places.SERVO: asked - shaft,
+        places.SERVO: asked - x[MOTOR],
         places.WOUND: np.concatenate([wound, -wound]),
-        places.READING: pair,
-        places.NEIGHBOUR: pair,
+        places.READING: readings,
+        places.NEIGHBOUR: readings,
         places.CYCLE: np.array(PERIODS_S),
-        places.CYCLE_OF_SHAFT: np.ptp(shaft) / np.array(CYCLES),
+        places.CYCLE_OF_SHAFT: np.ptp(x[MOTOR]) / np.array(CYCLES),
     }
     return {key: (float(values.min()), float(values.max())) for key, values in found.items()}
