@@ -178,8 +178,8 @@ def table(rows: Sequence[Row]) -> str:
     """A line for each stratum."""
     above = (
         f'{"":17s}{"":>6s}{"named":>7s}{"right":>7s}{"right":>7s}{"exact":>7s}{"false":>7s}'
-        f'{"in set":>8s}{"names":>7s}{"inter-":>8s}   second recording over noise: median (within 1.3)   '
-        f'{"seconds":>9s}'
+        f'{"in set":>8s}{"names":>7s}{"inter-":>8s}   '
+        f'{"second recording over noise: median (within 1.3)":48s}{"seconds":>9s}'
     )
     heads = (
         f'{"stratum":17s}{"cases":>6s}{"first":>7s}{"place":>7s}{"stage":>7s}{"set":>7s}'
