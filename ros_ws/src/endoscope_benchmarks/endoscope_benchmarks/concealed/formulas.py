@@ -24,6 +24,8 @@ OF_THE_OTHER = frozenset(
 """Effects that the other joint causes."""
 _WIDEST = 1e3
 """Ratio of a parameter's starts above which there is nothing between them."""
+WIDER = 1.5
+"""Factor by which what is drawn reaches beyond where a search begins, on either side."""
 _WITHIN = (0.25, 0.7)
 """Share of the recording in which something happens."""
 
@@ -87,8 +89,10 @@ def _setting(generator: np.random.Generator, parameter: Parameter, duration: flo
     values = np.array([*parameter.starts, parameter.typical])
     sizes = np.abs(values)
     if sizes.min() == 0.0:
-        return float(generator.uniform(values.min(), values.max()))
-    if sizes.max() / sizes.min() > _WIDEST:
-        return float(generator.choice(values))
-    sign = generator.choice(np.sign(values))
-    return float(sign * np.exp(generator.uniform(*np.log([sizes.min(), sizes.max()]))))
+        drawn = generator.uniform(min(values.min(), 0.0), WIDER * values.max())
+    elif sizes.max() / sizes.min() > _WIDEST:
+        drawn = generator.choice(values) * WIDER ** generator.uniform(-1.0, 1.0)
+    else:
+        ends = np.log([sizes.min() / WIDER, sizes.max() * WIDER])
+        drawn = generator.choice(np.sign(values)) * np.exp(generator.uniform(*ends))
+    return float(np.clip(drawn, parameter.low, parameter.high))

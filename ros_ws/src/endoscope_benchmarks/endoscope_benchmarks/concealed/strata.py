@@ -50,7 +50,7 @@ PLACES = tuple(p for p in FUNCTIONS if FUNCTIONS[p].argument is not BOTH_TENSION
 """Places at which a law shows."""
 _FAMILIES = [p for p in PLACES if effects_at(p)]
 _OUTSIDE = [p for p in PLACES if not effects_at(p)]
-_WITH_FAMILIES = [e for e in DRAWN if CATALOGUE[e].traits.families]
+_WITH_FAMILIES = [e for e in DRAWN if set(CATALOGUE[e].traits.families) & set(PLACES)]
 
 
 @dataclass(frozen=True)
