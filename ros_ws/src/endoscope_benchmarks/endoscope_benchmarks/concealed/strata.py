@@ -130,7 +130,7 @@ def nulls(generator: Generator, seed: int) -> Case:
     kind = ('numbers', 'slow noise', 'coarse sensors', 'heavy tails')[seed % 4]
     rig = _rig(generator, 1, drilled=kind == 'numbers')
     noise = {
-        'slow noise': Noise(generator.uniform(0.5, 1.5), generator.uniform(0.5, 4.0)),
+        'slow noise': Noise(generator.uniform(0.3, 1.0), generator.uniform(0.5, 4.0)),
         'heavy tails': Noise(freedom=generator.uniform(3.0, 5.0)),
     }.get(kind)
     if kind == 'coarse sensors':
