@@ -4,6 +4,7 @@ BENCHES: tuple[str, ...] = (
     'graph',
     'recorder',
     'explain',
+    'concealed',
     'simulate',
     'calibration_rate',
     'papers',

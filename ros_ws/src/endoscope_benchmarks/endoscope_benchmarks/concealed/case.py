@@ -1,0 +1,102 @@
+"""What a case is: a rig, what is concealed in it, and its recordings."""
+
+from dataclasses import dataclass
+
+from endoscope_core.physics import PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_explain.recording import Recording
+
+
+@dataclass(frozen=True)
+class Law:
+    """A concealed law, and what may be said of it.
+
+    Attributes
+    ----------
+    name : str
+        Effect, or place of the law.
+    joint : str
+        On which it acts; empty where it acts on all.
+    stage : str
+        Of the chain.
+    ids : frozenset of str
+        Effects that are a right name.
+    places : frozenset of str
+        Places that are right.
+    is_unknown : bool
+        Whether the right name is that it is unknown, wherever it is said to be.
+    """
+
+    name: str
+    joint: str
+    stage: str
+    ids: frozenset[str]
+    places: frozenset[str]
+    is_unknown: bool = False
+
+
+@dataclass(frozen=True)
+class Case:
+    """A rig as it was described and as it is, and its recordings.
+
+    Attributes
+    ----------
+    stratum : str
+    seed : int
+    described, bare, true : PlantDescription
+        The rig as its engineer describes it, as it is without the laws, and with them.
+    laws : tuple of Law
+        Concealed; empty where nothing is.
+    recording, second : Recording
+        To explain, and of another motion to judge on.
+    baseline : Recording or None
+        The rig before anything was concealed.
+    left_out : tuple of str
+        Effects whose formulas are not tried.
+    also : frozenset of str
+        Effects and places that are no false names: the form of the rig itself.
+    moved : float
+        What the laws change, over the signal, each alone, of the channel that shows it most: the
+        least of them.
+    note : str
+        What else is particular.
+    """
+
+    stratum: str
+    seed: int
+    described: PlantDescription
+    bare: PlantDescription
+    true: PlantDescription
+    laws: tuple[Law, ...]
+    recording: Recording
+    second: Recording
+    baseline: Recording | None = None
+    left_out: tuple[str, ...] = ()
+    also: frozenset[str] = frozenset()
+    moved: float = 0.0
+    note: str = ''
+
+
+def law_of_effect(effect_id: str, joint: str) -> Law:
+    """The law that is an effect of the catalogue."""
+    effect = CATALOGUE[effect_id]
+    return Law(
+        effect_id,
+        '' if effect.traits.of_device else joint,
+        str(effect.stage),
+        frozenset({effect_id}),
+        frozenset(effect.traits.families),
+    )
+
+
+def law_at_place(place_id: str, joint: str) -> Law:
+    """The law of a drawn form at a place; unknown where no effect is of the place's family."""
+    ids = effects_at(place_id)
+    stage = str(FUNCTIONS[place_id].stage)
+    return Law(place_id, joint, stage, ids, frozenset({place_id}), not ids)
+
+
+def effects_at(place_id: str) -> frozenset[str]:
+    """Effects whose formula is one of the functions at a place."""
+    return frozenset(e.id for e in CATALOGUE.values() if place_id in e.traits.families)

@@ -1,0 +1,235 @@
+"""Forms of laws that nobody put into the catalogue: drawn expression trees of one state."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.physics import PlantDescription, TermSpec
+from endoscope_core.physics.functions import FUNCTIONS, places
+from endoscope_core.physics.functions.expression import evaluate
+from endoscope_core.physics.functions.place import Argument, Place, Shape
+from endoscope_core.physics.functions.term import tabulated
+from endoscope_core.physics.kernel import run_joints
+from endoscope_core.physics.layout import (
+    IN_COMMAND,
+    IN_MOTOR,
+    INPUTS,
+    JOINT,
+    JOINT_STEP,
+    MEAN_TENSION,
+    MOTOR,
+    MOTOR_SPEED,
+    OTHER,
+    OUT_TENSION_A,
+    OUT_TENSION_B,
+    OUTPUTS,
+    PATH,
+    SLIDING_SPEED,
+    TENSION_DIFFERENCE,
+)
+from endoscope_core.physics.packing import pack, rest_state
+from endoscope_core.physics.simulator import TICK
+
+Array = NDArray[np.float64]
+Tree = Callable[[str], str]
+"""From the text of the argument, about -1 to 1, to that of the formula."""
+Form = Callable[[float], TermSpec]
+"""From the strength of a law to the law."""
+
+DEPTH = 3
+LONGEST = 150
+"""Characters of a tree; a place that takes odd functions has it twice."""
+LIKE_A_LINE = 0.8
+"""Share of a form that a line may make over the visited range: lines are stiffness and gain."""
+GRID = 400
+_TRIES = 1000
+PERIODS_S = (1.5, 6.0)
+CYCLES = (3.0, 10.0)
+"""Of a law that repeats with the shaft, over the shaft's range."""
+EVERY = 10
+"""Ticks from one look at the states to the next."""
+_EDGE = 0.005
+"""Quantile at which the range of a speed ends."""
+
+
+def drawn_tree(generator: np.random.Generator, depth: int = DEPTH) -> Tree:
+    """Draw from + - *, tanh, exp(-x^2), powers of the size, a rational function and a sine."""
+
+    def leaf() -> Tree:
+        slope = generator.choice([-1.0, 1.0]) * np.exp(generator.uniform(-0.4, 1.1))
+        shift = generator.uniform(-0.7, 0.7)
+        return lambda u: f'({slope:.3g}*{u} + {shift:.3g})'
+
+    if depth == 0:
+        return leaf()
+    kind = generator.choice(['sum', 'difference', 'product', 'tanh', 'bell', 'power', 'rational',
+                             'sine'])  # fmt: skip
+    inner = drawn_tree(generator, 0 if generator.random() < 0.4 else depth - 1)
+    if kind in ('sum', 'difference', 'product'):
+        sign = {'sum': '+', 'difference': '-', 'product': '*'}[str(kind)]
+        other = drawn_tree(generator, 0 if generator.random() < 0.4 else depth - 1)
+        return lambda u: f'({inner(u)} {sign} {other(u)})'
+    power, wave = generator.uniform(0.5, 3.0), generator.uniform(1.0, 4.0)
+    texts = {'tanh': 'tanh({})', 'bell': 'exp(-({})**2)', 'power': f'abs({{}})**{power:.3g}',
+             'rational': '1/(1 + ({})**2)', 'sine': f'sin({wave:.3g}*{{}})'}  # fmt: skip
+    return lambda u: texts[str(kind)].format(inner(u))
+
+
+def drawn_form(
+    generator: np.random.Generator,
+    place_id: str,
+    joint: str,
+    visited: tuple[float, float],
+) -> tuple[Form, float]:
+    """Draw a law at a place that is no line over the visited range.
+
+    Parameters
+    ----------
+    generator : numpy.random.Generator
+    place_id : str
+    joint : str
+    visited : (float, float)
+        Range of the place's argument; of one that repeats, the range in which the period is drawn.
+
+    Returns
+    -------
+    form : callable
+        The law by its strength: the rms over the range in the unit of the place.
+    largest : float
+        Strength at which it would leave what the place takes.
+
+    Raises
+    ------
+    RuntimeError
+        If no tree of a thousand will do.
+    """
+    place = FUNCTIONS[place_id]
+    for _ in range(_TRIES):
+        low, high = _range(generator, place, visited)
+        text = _text(generator, place, low, high)
+        try:
+            grid = np.linspace(low, high, GRID)
+            values = evaluate(text, place.argument.symbol, grid)
+            rms = float(np.sqrt(np.mean(values**2)))
+            if not 1e-3 < rms < 1e3 or _share_of_a_line(grid, values) > LIKE_A_LINE:
+                continue
+            largest = 0.99 * place.largest / float(np.abs(values).max())
+            tabulated(_law(place, joint, text, 1e-6 * largest, (low, high)))
+        except ValueError:
+            continue
+
+        def form(
+            strength: float,
+            text: str = text,
+            rms: float = rms,
+            ends: tuple[float, float] = (low, high),
+        ) -> TermSpec:
+            return _law(place, joint, text, strength / rms, ends)
+
+        return form, largest * rms
+    raise RuntimeError(f'no form of {_TRIES} can stand at {place_id}')
+
+
+def _law(place: Place, joint: str, text: str, factor: float, ends: tuple[float, float]) -> TermSpec:
+    return TermSpec(joint, place.id, f'{factor:.6g}*({text})', range=ends)
+
+
+def _range(
+    generator: np.random.Generator, place: Place, visited: tuple[float, float]
+) -> tuple[float, float]:
+    low, high = visited
+    if place.shape is Shape.PERIODIC:
+        return 0.0, float(np.exp(generator.uniform(np.log(low), np.log(high))))
+    if place.shape in (Shape.ODD, Shape.EVEN):
+        high = max(abs(low), abs(high))
+        low = -high
+    return low, high
+
+
+def _text(generator: np.random.Generator, place: Place, low: float, high: float) -> str:
+    tree = drawn_tree(generator)
+    while len(tree('u')) > LONGEST:
+        tree = drawn_tree(generator)
+    symbol, middle, half = place.argument.symbol, 0.5 * (low + high), 0.5 * (high - low)
+    if place.shape is Shape.PERIODIC:
+        phase = generator.uniform(-np.pi, np.pi)
+        return _centred(tree(f'sin({np.pi / half:.9g}*{symbol} + {phase:.3g})'), place, low, high)
+    if place.shape is Shape.ODD:
+        return f'{tree(f"({symbol}/{half:.4g})")} - {tree(f"(-{symbol}/{half:.4g})")}'
+    if place.shape is Shape.EVEN:
+        return _centred(tree(f'(abs({symbol})/{half:.4g})'), place, low, high)
+    text = tree(f'(({symbol} - {middle:.4g})/{half:.4g})')
+    if place.never_negative:
+        return f'({text})**2'
+    return _centred(text, place, low, high)
+
+
+def _centred(text: str, place: Place, low: float, high: float) -> str:
+    """Without its mean, which is the exponent, the rest angle or the offset itself."""
+    mean = float(np.mean(evaluate(text, place.argument.symbol, np.linspace(low, high, GRID))))
+    return f'{text} - {mean:.9g}'
+
+
+def _share_of_a_line(grid: Array, values: Array) -> float:
+    spread = float(np.std(values))
+    if spread < 1e-9:
+        return 1.0
+    return float(np.corrcoef(grid, values)[0, 1]) ** 2
+
+
+def visited(
+    plant: PlantDescription, command: Array, joint: str
+) -> dict[Argument, tuple[float, float]]:
+    """Range of the argument of every place; of one that repeats, that of its period.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+    command : array (N, J)
+        Motor shaft command in rad, every ms.
+    joint : str
+    """
+    names = plant.joint_names()
+    if not plant.terms:
+        # Some states are kept only where a place has a function.
+        plant = replace(plant, terms=(TermSpec(joint, 'tracker_of_time', '0*t'),))
+    parameters, flags = pack(plant)
+    inputs = np.zeros((len(names), len(command), INPUTS))
+    inputs[:, :, IN_COMMAND] = command.T
+    inputs[:, :, IN_MOTOR] = np.nan
+    states, histories, sheaths = rest_state(parameters, flags, TICK)
+    out = np.empty((len(names), EVERY, OUTPUTS))
+    j, rows = names.index(joint), []
+    for k in range(0, len(command) - EVERY + 1, EVERY):
+        now = np.ascontiguousarray(inputs[:, k : k + EVERY])
+        run_joints(states, histories, sheaths, parameters, flags, now, True, TICK, out)
+        rows.append(np.r_[states[j], out[j, -1], command[k, j]])
+    x = np.array(rows).T
+    outputs, asked = x[len(states[j]) : -1], x[-1]
+    angle, speed = x[JOINT], x[MOTOR_SPEED]
+    wound = plant.joints[joint].pulley_radius * x[MOTOR]
+    mean, half = x[MEAN_TENSION], 0.5 * x[TENSION_DIFFERENCE]
+    readings = outputs[[OUT_TENSION_A, OUT_TENSION_B]]
+    found = {
+        places.TIME: np.array([0.0, len(command) * TICK]),
+        places.SPEED: np.array([0.0, np.quantile(np.abs(x[SLIDING_SPEED]), 1.0 - _EDGE)]),
+        places.DISTANCE: x[PATH],
+        places.TENSION: np.concatenate([mean + half, mean - half]),
+        places.BOTH_TENSIONS: mean,
+        places.DIFFERENCE: 2.0 * half,
+        places.ANGLE: angle,
+        places.OTHER_ANGLE: x[OTHER],
+        places.ANGULAR_SPEED: np.quantile(x[JOINT_STEP] / TICK, [_EDGE, 1.0 - _EDGE]),
+        places.SHAFT: x[MOTOR],
+        places.SHAFT_SPEED: np.quantile(speed, [_EDGE, 1.0 - _EDGE]),
+        places.COMMANDED: asked,
+        places.SERVO: asked - x[MOTOR],
+        places.WOUND: np.concatenate([wound, -wound]),
+        places.READING: readings,
+        places.NEIGHBOUR: readings,
+        places.CYCLE: np.array(PERIODS_S),
+        places.CYCLE_OF_SHAFT: np.ptp(x[MOTOR]) / np.array(CYCLES),
+    }
+    return {key: (float(values.min()), float(values.max())) for key, values in found.items()}

@@ -1,0 +1,151 @@
+"""What is said of a case, and when it is right."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+from endoscope_benchmarks.concealed.case import Law
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_explain.explanation import Explanation, Verdict
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One thing that is said to be missing.
+
+    Attributes
+    ----------
+    name : str
+        Effect, or place of an unknown term.
+    joint, stage : str
+    rivals : tuple of str
+        Names that may stand for it as well.
+    """
+
+    name: str
+    joint: str
+    stage: str
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def places(self) -> frozenset[str]:
+        """Places that it points at."""
+        if self.name in FUNCTIONS:
+            return frozenset({self.name})
+        return frozenset(CATALOGUE[self.name].traits.families)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """How far what is said is right.
+
+    Attributes
+    ----------
+    first : bool
+        As many statements as there are laws, the first ones, name all of them; where nothing is
+        concealed, nothing is said.
+    place, stage : bool
+        They point at the right places, and parts of the chain.
+    exact : bool
+        All is named first, and nothing else is said.
+    false : int
+        Names that are of no law.
+    in_set : bool
+        Each law is among the first statements or their rivals.
+    set_size : float
+        Names of a statement with its rivals, mean of the first ones.
+    """
+
+    first: bool
+    place: bool
+    stage: bool
+    exact: bool
+    false: int
+    in_set: bool
+    set_size: float
+
+
+def statements(said: Explanation) -> tuple[Statement, ...]:
+    """What an explanation says is missing, in its order; each name once.
+
+    The unknown term is the headline where the verdict says so, else it comes last.
+    """
+    found = [Statement(e.id, e.joint, e.stage, e.alternatives) for e in said.effects]
+    if said.unknown is not None:
+        term = said.unknown
+        unknown = Statement(term.place, term.joint, term.stage, term.rivals)
+        place = 0 if said.verdict is Verdict.UNKNOWN_PHYSICS else len(found)
+        found.insert(place, unknown)
+    return tuple({(each.name, each.joint): each for each in found}.values())
+
+
+def judged(
+    laws: Sequence[Law], said: Sequence[Statement], also: frozenset[str] = frozenset()
+) -> Judgement:
+    """Compare what is said with what is concealed.
+
+    Parameters
+    ----------
+    laws : sequence of Law
+    said : sequence of Statement
+        The most certain first.
+    also : frozenset of str
+        Effects and places that are neither right nor false.
+    """
+    named = [s for s in said if any(_names(s, law) for law in laws)]
+    wrong = [s for s in said if s not in named and s.name not in also and not s.places & also]
+    false = len({s.name for s in wrong})
+    if not laws:
+        none = not false
+        return Judgement(none, none, none, none, false, none, 1.0)
+    kept = _once([s for s in said if s in named or s in wrong], laws)
+    leading = kept[: len(laws)]
+    first = _all(leading, laws, _names)
+    return Judgement(
+        first,
+        _all(leading, laws, _is_at),
+        _all(leading, laws, lambda s, law: s.stage == law.stage),
+        first and len(kept) == len(laws),
+        false,
+        _all(leading, laws, _may_name),
+        sum(1 + len(s.rivals) for s in leading) / max(len(leading), 1),
+    )
+
+
+def _names(said: Statement, law: Law) -> bool:
+    if law.joint not in ('', said.joint):
+        return False
+    if law.is_unknown:
+        return said.name in FUNCTIONS
+    return said.name in law.ids or said.name in law.places
+
+
+def _is_at(said: Statement, law: Law) -> bool:
+    if law.joint not in ('', said.joint):
+        return False
+    return said.name in law.ids or bool(said.places & law.places)
+
+
+def _may_name(said: Statement, law: Law) -> bool:
+    names = (said.name, *said.rivals)
+    return any(_names(Statement(name, said.joint, said.stage), law) for name in names)
+
+
+def _once(said: Sequence[Statement], laws: Sequence[Law]) -> list[Statement]:
+    """What is said, a device's fault once although it shows on every joint."""
+    of_device = {name for law in laws if not law.joint for name in law.ids}
+    kept: dict[tuple[str, str], Statement] = {}
+    for each in said:
+        kept.setdefault((each.name, '' if each.name in of_device else each.joint), each)
+    return list(kept.values())
+
+
+def _all(
+    said: Sequence[Statement], laws: Sequence[Law], agrees: Callable[[Statement, Law], bool]
+) -> bool:
+    """Whether each statement agrees with a law of its own."""
+    return len(said) == len(laws) and any(
+        all(agrees(s, law) for s, law in zip(order, laws, strict=True))
+        for order in permutations(said)
+    )

@@ -1,0 +1,204 @@
+"""Recordings in memory: what the sensors of a simulated rig read, and how far a plant is off."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.physics import (
+    PlantDescription,
+    SensorModel,
+    SensorParameters,
+    recording_faults,
+    simulate,
+)
+from endoscope_core.physics.sensing import quantise
+from endoscope_explain.recording import Recording, Series
+from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
+
+Array = NDArray[np.float64]
+
+TRACKER_TICKS = 25
+"""Ticks from one sample of the tracker to the next: 40 Hz."""
+MEAN_OVER = 10
+"""Readings of wires and motor that are judged as one, their mean: 10 ms, as in a report."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Forms of noise that the description of the sensors does not have.
+
+    Attributes
+    ----------
+    slow : float
+        Rms of a slow part (Ornstein-Uhlenbeck) of load cells and tracker, in their white noise.
+    slow_s : float
+        Its correlation time.
+    freedom : float
+        Degrees of freedom of Student's t that load cells and tracker draw from, of the same rms;
+        infinite for a normal distribution.
+    """
+
+    slow: float = 0.0
+    slow_s: float = 2.0
+    freedom: float = math.inf
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Noise-free readings at their stamps, for J joints.
+
+    Attributes
+    ----------
+    time, tracker_time : array (N,), array (M,)
+        In s.
+    command, shaft_position, shaft_velocity, shaft_effort : array (N, J)
+    tension : array (N, J, 2)
+    bending : array (M, J)
+    """
+
+    time: Array
+    tracker_time: Array
+    command: Array
+    shaft_position: Array
+    shaft_velocity: Array
+    shaft_effort: Array
+    tension: Array
+    bending: Array
+
+    def signals(self) -> dict[str, Array]:
+        """What sensors read, by the names of a recording's series."""
+        names = ('shaft_position', 'shaft_velocity', 'shaft_effort', 'tension', 'bending')
+        return {name: getattr(self, name) for name in names}
+
+    def channels(self) -> list[Array]:
+        """Shaft angle, effort, both tensions and bending angle of every joint, joint by joint."""
+        return [
+            column
+            for j in range(self.command.shape[1])
+            for column in (
+                self.shaft_position[:, j],
+                self.shaft_effort[:, j],
+                self.tension[:, j, 0],
+                self.tension[:, j, 1],
+                self.bending[:, j],
+            )
+        ]
+
+
+def read(plant: PlantDescription, command: Array) -> Readings:
+    """Simulate a rig and read it without noise.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+    command : array (N, J)
+        Motor shaft command in rad, every ms.
+    """
+    answer = simulate(plant, command)
+    stamps = answer.time[::TRACKER_TICKS]
+    # A clock that runs fast stamps what was read before.
+    seen = recording_faults(plant).tracker_time(stamps)
+    bending = np.column_stack([np.interp(seen, answer.time, q) for q in answer.bending.T])
+    return Readings(
+        answer.time,
+        stamps,
+        command,
+        answer.shaft_position,
+        answer.shaft_velocity,
+        answer.shaft_effort,
+        answer.tension,
+        bending,
+    )
+
+
+def record(
+    plant: PlantDescription, command: Array, seed: int, noise: Noise | None = None
+) -> Recording:
+    """What a rig's sensors read with their noise, as `read`."""
+    noise = noise or Noise()
+    clean, own = read(plant, command), plant.sensors
+    if math.isfinite(noise.freedom):
+        own = replace(own, load_cell_noise=0.0, tracker_noise=0.0, load_cell_resolution=0.0)
+    sensors = SensorModel(own, seed)
+    draw = np.random.default_rng([seed, 1])
+    tension = sensors.tension(clean.tension + _added(draw, clean.tension, 1e-3, noise, plant, True))
+    tracker_s = 1e-3 * TRACKER_TICKS
+    bending = sensors.bending(
+        clean.bending + _added(draw, clean.bending, tracker_s, noise, plant, False)
+    )
+    return Recording(
+        'concealed',
+        0.0,
+        plant.joint_names(),
+        Series.of(COMMAND, clean.time, command),
+        Series.of(WIRES, clean.time, quantise(tension, plant.sensors.load_cell_resolution)),
+        Series.of(BENDING, clean.tracker_time, bending),
+        Series.of(MOTOR, clean.time, sensors.shaft_position(clean.shaft_position)),
+        Series.of(MOTOR, clean.time, sensors.shaft_velocity(clean.shaft_velocity)),
+        Series.of(MOTOR, clean.time, sensors.shaft_effort(clean.shaft_effort)),
+    )
+
+
+def misfit(plant: PlantDescription, recording: Recording, sensors: SensorParameters) -> float:
+    """Rmse of a plant's prediction over the noise of the sensors, of the signal that is worst."""
+    predicted = in_noise(read(plant, recording.command.values).signals(), sensors)
+    measured = in_noise({k: s.values for k, s in recording.measured().items()}, sensors)
+    return worst_rms(np.subtract(*pair) for pair in zip(measured, predicted, strict=True))
+
+
+def in_noise(signals: Mapping[str, Array], sensors: SensorParameters) -> list[Array]:
+    """Signals over the noise of the sensors, column by column: means of what is judged as one.
+
+    Parameters
+    ----------
+    signals : mapping of str to array (N, J) or (N, J, 2)
+        As `Readings.signals`; shaft velocity is left out.
+    sensors : SensorParameters
+    """
+    kinds = (
+        ('shaft_position', 0.0, 2.0 * math.pi / sensors.encoder_counts),
+        ('shaft_effort', sensors.effort_noise, sensors.effort_resolution),
+        ('tension', sensors.load_cell_noise, sensors.load_cell_resolution),
+        ('bending', sensors.tracker_noise, 0.0),
+    )
+    columns: list[Array] = []
+    for name, white, step in kinds:
+        over = 1 if name == 'bending' else MEAN_OVER
+        values = signals[name].reshape(len(signals[name]), -1)
+        values = values[: len(values) // over * over]
+        means = values.reshape(-1, over, values.shape[1]).mean(axis=1)
+        # Rounding of a quiet signal is the same in all readings of a mean.
+        noise = math.sqrt(white**2 / over + step**2 / 12.0 / (over if white else 1))
+        columns += list(means.T / noise)
+    return columns
+
+
+def worst_rms(columns: Iterable[Array]) -> float:
+    """Rms of the column that has the largest."""
+    return max(float(np.sqrt(np.mean(column**2))) for column in columns)
+
+
+def _added(
+    draw: np.random.Generator,
+    like: Array,
+    period: float,
+    noise: Noise,
+    plant: PlantDescription,
+    of_cells: bool,
+) -> Array:
+    rms = plant.sensors.load_cell_noise if of_cells else plant.sensors.tracker_noise
+    added = np.zeros_like(like)
+    if math.isfinite(noise.freedom):
+        spread = math.sqrt(noise.freedom / (noise.freedom - 2.0))
+        added += rms / spread * draw.standard_t(noise.freedom, like.shape)
+    if noise.slow:
+        kept = math.exp(-period / noise.slow_s)
+        white = math.sqrt(1.0 - kept**2) * draw.standard_normal(like.shape)
+        white[0] = draw.standard_normal(like.shape[1:])
+        for k in range(1, len(white)):
+            white[k] += kept * white[k - 1]
+        added += noise.slow * rms * white
+    return added

@@ -1,0 +1,299 @@
+"""The strata of the benchmark: how each draws its cases."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_benchmarks.concealed import motions
+from endoscope_benchmarks.concealed.case import (
+    Case,
+    Law,
+    effects_at,
+    law_at_place,
+    law_of_effect,
+)
+from endoscope_benchmarks.concealed.forms import drawn_form, visited
+from endoscope_benchmarks.concealed.formulas import DRAWN, OF_THE_OTHER, drawn_formula
+from endoscope_benchmarks.concealed.readings import Noise, record
+from endoscope_benchmarks.concealed.rigs import (
+    coarse_sensors,
+    described_rig,
+    other_sheath,
+    true_rig,
+)
+from endoscope_benchmarks.concealed.strength import OutOfReachError, scaled_to
+from endoscope_core.physics import PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_core.physics.functions.places import BOTH_TENSIONS, OTHER_ANGLE
+
+Array = NDArray[np.float64]
+Generator = np.random.Generator
+Added = Callable[[PlantDescription, float], PlantDescription]
+"""Adds a law of some strength to a rig."""
+Motion = Callable[[Generator, int], Array]
+
+AIM = (0.1, 0.6)
+"""Share of the signal that a law moves of the channel that shows it most."""
+WEAKER = 0.1
+FORM_AIM = (0.02, 0.05)
+"""The same of a form of the sheath that is no concealed law."""
+_TRIES = 30
+_BEGIN = 0.02
+"""Share of what a place takes at which the search for a law's strength begins."""
+
+# What both wires carry together does not change while neither is slack.
+PLACES = tuple(p for p in FUNCTIONS if FUNCTIONS[p].argument is not BOTH_TENSIONS)
+"""Places at which a law shows."""
+_FAMILIES = [p for p in PLACES if effects_at(p)]
+_OUTSIDE = [p for p in PLACES if not effects_at(p)]
+_WITH_FAMILIES = [e for e in DRAWN if set(CATALOGUE[e].traits.families) & set(PLACES)]
+
+
+@dataclass(frozen=True)
+class _Rig:
+    """A rig in the making: described, true, and the motion of its recording."""
+
+    described: PlantDescription
+    true: PlantDescription
+    command: Array
+
+
+def catalogue(
+    generator: Generator,
+    seed: int,
+    motion: Motion = motions.commissioning,
+    weaker: float = 1.0,
+) -> Case:
+    """One effect in its own formula."""
+    effect = _turn(DRAWN, seed)
+    rig = _rig(generator, _joints_of(effect), motion)
+    return _finished(generator, seed, rig, *_with_effect(generator, rig, effect, weaker))
+
+
+def leave_a_form_out(generator: Generator, seed: int) -> Case:
+    """One effect in its own formula, which explain is not given."""
+    effect = _turn(_WITH_FAMILIES, seed)
+    rig = _rig(generator, _joints_of(effect))
+    case = _finished(generator, seed, rig, *_with_effect(generator, rig, effect))
+    return replace(case, left_out=(effect,))
+
+
+def mixed_forms(generator: Generator, seed: int) -> Case:
+    """A drawn form at a place of some effect's family."""
+    place = _turn(_FAMILIES, seed)
+    rig = _rig(generator, _joints_of(place))
+    return _finished(generator, seed, rig, *_with_form(generator, rig, place))
+
+
+def outside(generator: Generator, seed: int) -> Case:
+    """A drawn form at a place of no effect's family; two of them in every fourth case."""
+    place = _turn(_OUTSIDE, seed)
+    rig = _rig(generator, _joints_of(place))
+    true, law, share = _with_form(generator, rig, place)
+    if seed % 4:
+        return _finished(generator, seed, rig, true, law, share)
+    rest = [p for p in _OUTSIDE if _joints_of(p) <= len(rig.true.joints) and p != place]
+    second = str(generator.choice(rest))
+    true, other, least = _with_form(generator, replace(rig, true=true), second)
+    case = _finished(generator, seed, rig, true, law, min(share, least))
+    return replace(case, laws=(law, other))
+
+
+def another_sheath(generator: Generator, seed: int) -> Case:
+    """Sheath and joint of another form; every second case an effect, two of four a baseline."""
+    effect = _turn(DRAWN, seed // 2)
+    rig = _rig(generator, _joints_of(effect))
+    rig = replace(rig, true=other_sheath(generator, rig.true))
+    place = str(generator.choice(['exponent_of_angle', 'stiffness_of_tension']))
+    for joint in rig.true.joints:
+        true, _, _ = _with_form(generator, rig, place, joint, FORM_AIM)
+        rig = replace(rig, true=true)
+    if seed % 2:
+        case = _finished(generator, seed, rig, *_with_effect(generator, rig, effect))
+    else:
+        case = _finished(generator, seed, rig, rig.true, None, 0.0)
+    baseline = None
+    if seed // 2 % 2:
+        command = motions.commissioning(generator, len(rig.true.joints))
+        baseline = record(rig.true, command, _noise_seed(generator))
+    also = frozenset({place}) | effects_at(place)
+    note = f'{place}, {"with" if baseline else "no"} baseline'
+    return replace(case, baseline=baseline, also=also, note=note)
+
+
+def nulls(generator: Generator, seed: int) -> Case:
+    """Nothing concealed: other numbers, slow noise, coarse sensors, heavy tails, in turn."""
+    kind = ('numbers', 'slow noise', 'coarse sensors', 'heavy tails')[seed % 4]
+    rig = _rig(generator, 1, drilled=kind == 'numbers')
+    noise = {
+        'slow noise': Noise(generator.uniform(0.3, 1.0), generator.uniform(0.5, 4.0)),
+        'heavy tails': Noise(freedom=generator.uniform(3.0, 5.0)),
+    }.get(kind)
+    if kind == 'coarse sensors':
+        rig = replace(rig, true=replace(rig.true, sensors=coarse_sensors(generator)))
+    return replace(_finished(generator, seed, rig, rig.true, None, 0.0, noise), note=kind)
+
+
+def pairs(generator: Generator, seed: int) -> Case:
+    """Two effects of different stages on a rig of two joints."""
+    rig = _rig(generator, 2)
+    first = _turn(DRAWN, seed)
+    others = [e for e in DRAWN if CATALOGUE[e].stage != CATALOGUE[first].stage]
+    true, law, share = _with_effect(generator, rig, first)
+    second = str(generator.choice(others))
+    both, other, least = _with_effect(generator, replace(rig, true=true), second)
+    case = _finished(generator, seed, rig, both, law, min(share, least))
+    return replace(case, laws=(law, other))
+
+
+def tenth(generator: Generator, seed: int) -> Case:
+    """One effect with a tenth of the strength."""
+    return catalogue(generator, seed, weaker=WEAKER)
+
+
+def sinusoid(generator: Generator, seed: int) -> Case:
+    """One effect under the 9 s calibration."""
+    return catalogue(generator, seed, motions.sinusoid)
+
+
+def teleoperation(generator: Generator, seed: int) -> Case:
+    """One effect under a surgeon's motion."""
+    return catalogue(generator, seed, motions.teleoperation)
+
+
+STRATA: dict[str, Callable[[Generator, int], Case]] = {
+    'catalogue': catalogue,
+    'leave_a_form_out': leave_a_form_out,
+    'mixed_forms': mixed_forms,
+    'outside': outside,
+    'other_sheath': another_sheath,
+    'nulls': nulls,
+    'pairs': pairs,
+    'tenth': tenth,
+    'sinusoid': sinusoid,
+    'teleoperation': teleoperation,
+}
+
+
+def drawn_case(stratum: str, seed: int) -> Case:
+    """Draw a case; the same one for the same seed.
+
+    Raises
+    ------
+    KeyError
+        If there is no such stratum.
+    RuntimeError
+        If no law of some reaches its share of the signal.
+    """
+    generator = np.random.default_rng([list(STRATA).index(stratum), seed])
+    return replace(STRATA[stratum](generator, seed), stratum=stratum)
+
+
+def _rig(
+    generator: Generator,
+    joints: int,
+    motion: Motion = motions.commissioning,
+    drilled: bool = False,
+) -> _Rig:
+    described = described_rig(generator, joints)
+    return _Rig(described, true_rig(generator, described, drilled), motion(generator, joints))
+
+
+def _with_effect(
+    generator: Generator, rig: _Rig, effect_id: str, weaker: float = 1.0
+) -> tuple[PlantDescription, Law, float]:
+    joint = str(generator.choice(list(rig.true.joints)))
+    law = law_of_effect(effect_id, joint)
+    joints = [joint] if law.joint else list(rig.true.joints)
+
+    def drawn() -> tuple[Added, float]:
+        formula = drawn_formula(generator, effect_id, joint, 1e-3 * len(rig.command))
+
+        def added(plant: PlantDescription, strength: float) -> PlantDescription:
+            specs = [replace(formula(strength), joint=name) for name in joints]
+            return replace(plant, effects=(*plant.effects, *specs))
+
+        return added, 1.0
+
+    true, share = _concealed(generator, rig, drawn, weaker * np.array(AIM))
+    return true, law, share
+
+
+def _with_form(
+    generator: Generator,
+    rig: _Rig,
+    place: str,
+    joint: str | None = None,
+    aim: tuple[float, float] = AIM,
+) -> tuple[PlantDescription, Law, float]:
+    joint = joint or str(generator.choice(list(rig.true.joints)))
+    seen = visited(rig.true, rig.command, joint)[FUNCTIONS[place].argument]
+
+    def drawn() -> tuple[Added, float]:
+        form, largest = drawn_form(generator, place, joint, seen)
+
+        def added(plant: PlantDescription, strength: float) -> PlantDescription:
+            return replace(plant, terms=(*plant.terms, form(strength)))
+
+        return added, _BEGIN * largest
+
+    true, share = _concealed(generator, rig, drawn, np.array(aim))
+    return true, law_at_place(place, joint), share
+
+
+def _concealed(
+    generator: Generator, rig: _Rig, drawn: Callable[[], tuple[Added, float]], aims: Array
+) -> tuple[PlantDescription, float]:
+    """The rig with a law that moves a share of the signal, drawn anew where it cannot."""
+    for _ in range(_TRIES):
+        added, begin = drawn()
+        aim = float(np.exp(generator.uniform(*np.log(aims))))
+        try:
+            return scaled_to(aim, partial(added, rig.true), rig.command, begin)
+        except OutOfReachError:
+            continue
+    raise RuntimeError(f'no law of {_TRIES} moves {100.0 * aims[0]:.0f} % of a signal')
+
+
+def _finished(
+    generator: Generator,
+    seed: int,
+    rig: _Rig,
+    true: PlantDescription,
+    law: Law | None,
+    share: float,
+    noise: Noise | None = None,
+) -> Case:
+    command = motions.another(generator, len(true.joints))
+    return Case(
+        '',
+        seed,
+        rig.described,
+        rig.true,
+        true,
+        () if law is None else (law,),
+        record(true, rig.command, _noise_seed(generator), noise),
+        record(true, command, _noise_seed(generator), noise),
+        moved=share,
+    )
+
+
+def _turn(names: Sequence[str], seed: int) -> str:
+    """Each name in its turn, in an order that does not follow the chain."""
+    order = np.random.default_rng(len(names)).permutation(len(names))
+    return names[int(order[seed % len(names)])]
+
+
+def _joints_of(name: str) -> int:
+    """Joints of a rig on which an effect, or a law at a place, shows."""
+    if name in FUNCTIONS:
+        return 2 if FUNCTIONS[name].argument is OTHER_ANGLE else 1
+    return 2 if name in OF_THE_OTHER else 1
+
+
+def _noise_seed(generator: Generator) -> int:
+    return int(generator.integers(2**31))

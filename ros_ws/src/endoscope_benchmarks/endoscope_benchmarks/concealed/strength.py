@@ -1,0 +1,130 @@
+"""How strong a law is: by what it moves, and by what a refit of the rig leaves of it."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_benchmarks.concealed.readings import Readings, in_noise, read, worst_rms
+from endoscope_benchmarks.concealed.rigs import spreads, with_number
+from endoscope_core.physics import PlantDescription
+
+Array = NDArray[np.float64]
+
+CLOSE = 0.05
+"""Relative error of the share that is reached."""
+_TRIES = 40
+_STEP = 8.0
+NUDGE = 0.1
+"""Of a difference for a slope, in spreads."""
+
+
+class OutOfReachError(RuntimeError):
+    """A law that does not move what is measured as far as it should."""
+
+
+def moved(bare: Readings, other: Readings) -> float:
+    """Rms of what a law changes, over the rms of the signal about its mean, of the worst channel.
+
+    Parameters
+    ----------
+    bare : Readings
+        Without the law.
+    other : Readings
+        With it.
+    """
+    return max(
+        float(np.sqrt(np.mean((b - a) ** 2)) / max(np.std(a), 1e-12))
+        for a, b in zip(bare.channels(), other.channels(), strict=True)
+    )
+
+
+def scaled_to(
+    aim: float,
+    plant_of: Callable[[float], PlantDescription],
+    command: Array,
+    start: float = 1.0,
+) -> tuple[PlantDescription, float]:
+    """Find the strength at which a law moves what is measured by `aim`.
+
+    Parameters
+    ----------
+    aim : float
+        Share, see `moved`.
+    plant_of : callable
+        The rig by the law's strength, without the law at zero; raises ValueError where the law
+        cannot be as strong.
+    command : array (N, J)
+    start : float
+        Strength where to begin.
+
+    Returns
+    -------
+    PlantDescription
+        The rig with the law at that strength.
+    float
+        Share that is reached.
+
+    Raises
+    ------
+    OutOfReachError
+        If no strength reaches the share.
+    """
+    bare = read(plant_of(0.0), command)
+    strength, below, above = start, 0.0, math.inf
+    for _ in range(_TRIES):
+        try:
+            plant = plant_of(strength)
+            share = moved(bare, read(plant, command))
+        except ValueError:
+            share = math.inf
+        else:
+            if abs(share - aim) <= CLOSE * aim:
+                return plant, share
+        if share < aim:
+            below = strength
+        else:
+            above = strength
+        guess = strength * min(_STEP, max(1.0 / _STEP, aim / max(share, 1e-9)))
+        if math.isfinite(above) and not below < guess < above:
+            guess = math.sqrt(below * above) if below else above / _STEP
+        elif guess <= below:
+            guess = _STEP * below
+        if math.isfinite(above) and above - below < 1e-6 * above:
+            break
+        strength = guess
+    raise OutOfReachError(f'no strength moves what is measured by {100.0 * aim:.0f} %')
+
+
+def left(bare: PlantDescription, true: PlantDescription, command: Array) -> float:
+    """What a refit leaves of a law, over the noise (rms), of the signal that shows it most.
+
+    The refit is linear, around the rig without the law, and holds the rig's numbers to the spreads
+    from which they are drawn.
+
+    Parameters
+    ----------
+    bare, true : PlantDescription
+        The rig without the law and with it.
+    command : array (N, J)
+        Motor shaft command in rad, every ms.
+    """
+
+    def seen(plant: PlantDescription) -> list[Array]:
+        return in_noise(read(plant, command).signals(), bare.sensors)
+
+    without = seen(bare)
+    sizes = np.cumsum([len(column) for column in without])[:-1]
+    start = np.concatenate(without)
+    law = np.concatenate(seen(true)) - start
+    slopes = []
+    for name, joint in bare.joints.items():
+        for key, spread in spreads(joint).items():
+            other = with_number(joint, key, NUDGE * spread)
+            plant = replace(bare, joints={**bare.joints, name: other})
+            slopes.append((np.concatenate(seen(plant)) - start) / NUDGE)
+    jacobian = np.column_stack(slopes)
+    held = jacobian.T @ jacobian + np.eye(len(slopes))
+    return worst_rms(np.split(law - jacobian @ np.linalg.solve(held, jacobian.T @ law), sizes))
