@@ -17,7 +17,7 @@ from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate, candidates
 from endoscope_explain.search.levels import null_gains
-from endoscope_explain.search.refit import Look, look, polish
+from endoscope_explain.search.refit import Look, composition, look, polish
 from endoscope_explain.search.repeated_motion import motion_repeats
 from endoscope_explain.search.screen import background, directions, promises
 
@@ -137,14 +137,15 @@ def _looks(choice: SharedChoice, jobs: int) -> dict[Variant, list[Look | None]]:
     )
     for n, anchors in enumerate(choice.recordings):
         behind = background(anchors[0])
+        offset = behind.offset
         terms = tuple(t for t in _effects(anchors[0]) if t.id in everywhere)
         starts: dict[Variant, list[Candidate]] = {}
         for promised in promises(behind, directions(behind, terms, jobs)):
             starts.setdefault(promised.candidate.variant, []).append(promised.candidate)
         tasks = [term for own in list(starts.values())[:LOOKED_AT] for term in own[:STARTS]]
 
-        def looked(term: Candidate, anchors: Anchors = anchors) -> Look:
-            return look(anchors, term)
+        def looked(term: Candidate, anchors: Anchors = anchors, offset: Array = offset) -> Look:
+            return look(anchors, term, offset)
 
         for item in parallel_map(looked, tasks, jobs):
             found = looks.setdefault(item.candidate.variant, [None] * len(choice.recordings))
@@ -174,7 +175,7 @@ def _begun(choice: SharedChoice, effect_id: str, looks: list[Look | None]) -> Be
     """
     models, starts = [], []
     for anchors, item in zip(choice.recordings, looks, strict=True):
-        found = anchors[0] if item is None else polish(item, anchors[0])
+        found = anchors[0] if item is None else polish(item, composition((), anchors[0])).fit
         models.append(found.model)
         starts.append(found.theta)
     return models, starts

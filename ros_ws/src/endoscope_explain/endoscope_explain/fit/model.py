@@ -43,6 +43,8 @@ class JointModel:
         Of functions that are free; their coefficients are free parameters, in the same order.
     coarse : int
         Ticks in one of the simulations from which derivatives are differences.
+    offset : array (size,), optional
+        Added to the residuals: what coarse ticks do to them, as known somewhere near.
     """
 
     observation: JointObservation
@@ -52,10 +54,12 @@ class JointModel:
     wide_step: float = WIDE_STEP
     families: tuple[Family, ...] = ()
     coarse: int = COARSE
+    offset: Array | None = field(default=None, repr=False)
 
-    def on_coarse_ticks(self) -> 'JointModel':
+    def on_coarse_ticks(self, offset: Array | None = None) -> 'JointModel':
         """The model for questions of direction and rank, which need no fine ticks."""
-        return replace(self, observation=self.observation.coarser(self.coarse), coarse=1)
+        observation = self.observation.coarser(self.coarse)
+        return replace(self, observation=observation, coarse=1, offset=offset)
 
     def packed(self, theta: Array) -> tuple[Array, float]:
         """Packed parameters and reading lead at the coordinates `theta` (n,)."""
@@ -99,7 +103,8 @@ class JointModel:
         parameters, lead = self.packed(theta)
         skew = parameters[CLOCK_RATE.first_parameter] if self.flags[CLOCK_RATE.flag] else 0.0
         outputs = simulate_joint(self.observation, parameters, self.flags)
-        return residuals(self.observation, outputs, lead, skew)
+        found = residuals(self.observation, outputs, lead, skew)
+        return found if self.offset is None else found + self.offset
 
     @property
     def step(self) -> float:

@@ -23,7 +23,6 @@ from endoscope_explain.search.refit import (
     Composition,
     Look,
     composition,
-    exactly_settled,
     look,
     polish,
     refined,
@@ -51,7 +50,9 @@ AS_GOOD = 0.9
 LOOKED_AT, POLISHED = 10, 4
 """Terms that get a first fit and a full one: in the study the truth was among the first three of
 the screen in 46 cases of 48, and among the first five in 47."""
-SETTLED_FIRST = 2
+REFINED = 3
+"""Functions of these, the best, that are let vary faster."""
+SETTLED = 2
 """Of these the best ones and those at the place of the best are fitted until they stand."""
 PARENTS = 2
 """Compositions that are added to."""
@@ -182,53 +183,29 @@ def search(
         levels.append(level)
         if not level.is_found or not level.best.terms:
             break
-        best = (level.best, *level.variants(), *level.rivals())[:PARENTS]
-        parents = [(each, (each.fit,)) for each in best if each.terms]
+        others = [c for c in (*level.variants(), *level.rivals()) if c.terms][: PARENTS - 1]
+        best = [level.best, *(until_it_stands(c) for c in others)]
+        parents = [(each, (each.fit,)) for each in best]
     return JointSearch(nominal, tuple(levels))
 
 
 def _level(
     parents: Sequence[tuple[Composition, tuple[Fit, ...]]], jobs: int, left_out: tuple[str, ...]
 ) -> Level:
-    first, anchors = parents[0]
-    behind, ways, found = _grown(first, anchors, jobs, left_out)
-    for parent, own in parents[1:]:
-        found += _grown(parent, own, jobs, left_out)[2]
+    first, _ = parents[0]
+    grown = [_grown(parent, anchors, jobs, left_out) for parent, anchors in parents]
+    found = [each for _, _, compositions in grown for each in compositions]
     if not first.terms and leans(first.fit):
         found.append(composition((), with_any_numbers(first.fit)))
-    found = _with_finer_function(found, [first, *(parent for parent, _ in parents[1:])])
     best: dict[frozenset[tuple[str, tuple[float, ...]]], Composition] = {}
     for each in sorted(found, key=lambda c: -c.evidence):
         best.setdefault(frozenset(term.variant for term in each.terms), each)
-    ranked = list(best.values())
+    ranked = tuple(best.values())
     if not ranked:
         return Level(first, (), np.zeros(0))
-    if not is_noise(ranked[0].fit):
-        ranked[0] = exactly_settled(ranked[0])
+    behind, ways, _ = grown[0]
     null = null_gains(behind, ways, ranked[0].fit, jobs)
-    return Level(first, tuple(ranked), null, predicts_better(ranked[0].fit, first.fit))
-
-
-def _with_finer_function(found: list[Composition], parents: list[Composition]) -> list[Composition]:
-    """Compositions with the function at the best one's place as fine as there is evidence for."""
-    if not found:
-        return found
-    top = max(found, key=lambda c: c.evidence)
-    if not top.terms or is_noise(top.fit):
-        return found
-    functions = [
-        each
-        for each in found
-        if each.terms
-        and each.terms[-1].is_function
-        and each.terms[:-1] == top.terms[:-1]
-        and each.terms[-1].shares_place(top.terms[-1])
-    ]
-    if not functions:
-        return found
-    coarse = max(functions, key=lambda c: c.evidence)
-    (parent,) = (p for p in parents if p.terms == coarse.terms[:-1])
-    return [*(c for c in found if c is not coarse), refined(coarse, parent.fit)]
+    return Level(first, ranked, null, predicts_better(ranked[0].fit, first.fit))
 
 
 def _grown(
@@ -237,18 +214,27 @@ def _grown(
     behind = background(parent.fit)
     ways = directions(behind, candidates(parent.fit, left_out), jobs)
     likely = _most_promising(promises(behind, ways))
-    looks = parallel_map(lambda term: look(anchors, term), likely, jobs)
+    looks = parallel_map(lambda term: look(anchors, term, behind.offset), likely, jobs)
     chosen = _worth_a_fit(looks)
-    fits = parallel_map(lambda seen: polish(seen, parent.fit), chosen, jobs)
-    grown = [
-        composition((*parent.terms, seen.candidate), found)
-        for seen, found in zip(chosen, fits, strict=True)
-    ]
+    grown = parallel_map(lambda seen: polish(seen, parent), chosen, jobs)
     grown.sort(key=lambda c: -c.evidence)
-    first = grown[:SETTLED_FIRST]
-    first += [c for c in grown[SETTLED_FIRST:] if c.terms[-1].shares_place(grown[0].terms[-1])]
-    rest = [c for c in grown if all(c is not each for each in first)]
-    return behind, ways, parallel_map(until_it_stands, first, jobs) + rest
+    if grown and not is_noise(grown[0].fit):
+        grown = _with_finer_functions(grown, behind, jobs)
+    settled = [c for c in grown[SETTLED:] if c.terms[-1].shares_place(grown[0].terms[-1])] + grown[
+        :SETTLED
+    ]
+    rest = [c for c in grown if all(c is not each for each in settled)]
+    return behind, ways, parallel_map(until_it_stands, settled, jobs) + rest
+
+
+def _with_finer_functions(
+    grown: list[Composition], behind: Background, jobs: int
+) -> list[Composition]:
+    """Compositions, best first, whose best functions are as fine as there is evidence for."""
+    functions = [c for c in grown if c.terms[-1].is_function][:REFINED]
+    rest = [c for c in grown if all(c is not each for each in functions)]
+    finer = parallel_map(lambda c: refined(c, behind.fit, behind.offset), functions, jobs)
+    return sorted([*finer, *rest], key=lambda c: -c.evidence)
 
 
 def _most_promising(ranked: list[Promised]) -> list[Candidate]:

@@ -14,6 +14,7 @@ from endoscope_explain.fit.evidence import log_evidence, weights
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, fit, glance, jacobian
 from endoscope_explain.fit.valleys import out_of_valleys
+from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.search.candidate import Candidate
 
 Array = NDArray[np.float64]
@@ -57,12 +58,15 @@ def composition(terms: tuple[Candidate, ...], found: Fit) -> Composition:
 
 @dataclass(frozen=True)
 class Look:
-    """A term after a first fit of few simulations.
+    """A term after a first fit of few simulations on coarse ticks.
 
     Attributes
     ----------
     candidate : Candidate
     model : JointModel
+        On fine ticks.
+    coarse : JointModel
+        The same on coarse ones.
     theta : array (n,)
     cost : float
         Half the squares, weighted by what the fit without it is off by.
@@ -70,11 +74,12 @@ class Look:
 
     candidate: Candidate
     model: JointModel
+    coarse: JointModel
     theta: Array
     cost: float
 
 
-def look(anchors: tuple[Fit, ...], candidate: Candidate) -> Look:
+def look(anchors: tuple[Fit, ...], candidate: Candidate, offset: Array) -> Look:
     """First fit of one term more.
 
     Parameters
@@ -83,67 +88,50 @@ def look(anchors: tuple[Fit, ...], candidate: Candidate) -> Look:
         Fits of the same model without the term, to start from: what was missing has bent the
         numbers of the first one, and the description may be nearer. The better one is taken.
     candidate : Candidate
+    offset : array (size,)
+        What coarse ticks do to the residuals of the first of them.
 
     Returns
     -------
     Look
     """
-    fine = candidate.added_to(anchors[0].model)
-    model = fine.on_coarse_ticks()
+    model = candidate.added_to(anchors[0].model)
+    coarse = model.on_coarse_ticks(offset)
     weight = weights(model.observation, anchors[0].residuals)
     best: Look | None = None
     for anchor in anchors:
         theta = model.begun_at(anchor.theta)
         new = list(range(len(anchor.theta), len(theta)))
-        derivative = np.hstack([anchor.jacobian, jacobian(model, theta, new)])
-        found = glance(model, theta, derivative, LOOK_STEPS, weight)
+        derivative = np.hstack([anchor.jacobian, jacobian(coarse, theta, new)])
+        found = glance(coarse, theta, derivative, LOOK_STEPS, weight)
         if best is None or found.cost < best.cost:
-            best = Look(candidate, fine, found.theta, found.cost)
+            best = Look(candidate, model, coarse, found.theta, found.cost)
     assert best is not None
     return best
 
 
-def polish(seen: Look, without: Fit) -> Fit:
+def polish(seen: Look, without: Composition) -> Composition:
     """Fit of a term from where its first look ended, as far as tells which term is the best.
 
     Parameters
     ----------
     seen : Look
-    without : Fit
+    without : Composition
         By what this is off, channels are weighted at first; then by what is left.
 
     Returns
     -------
-    Fit
+    Composition
+        Fitted on coarse ticks; see `until_it_stands`.
     """
-    weight = weights(seen.model.observation, without.residuals)
-    found = fit(seen.model, seen.theta, weight, ITERATIONS, ROUGH)
-    weight = weights(seen.model.observation, found.residuals)
-    found = fit(found.model, found.theta, weight, ITERATIONS, ROUGH, found.jacobian)
-    return out_of_valleys(found, weight)
+    weight = weights(seen.model.observation, without.fit.residuals)
+    found = _twice(seen.coarse, seen.theta, weight)
+    found = out_of_valleys(found, weights(seen.model.observation, found.residuals))
+    model = replace(seen.model, base=found.model.base)
+    return composition((*without.terms, seen.candidate), replace(found, model=model))
 
 
-def settled(found: Fit, weight: Array) -> Fit:
-    """Go on with a fit until nothing moves any more."""
-    return fit(found.model, found.theta, weight, ITERATIONS, SETTLED, found.jacobian)
-
-
-def until_it_stands(one: Composition) -> Composition:
-    """A composition fitted on until nothing moves any more."""
-    weight = weights(one.fit.model.observation, one.fit.residuals)
-    again = composition(one.terms, settled(one.fit, weight))
-    return again if again.evidence > one.evidence else one
-
-
-def exactly_settled(one: Composition) -> Composition:
-    """A composition fitted on by derivatives on fine ticks, where coarse ones may mislead."""
-    model = replace(one.fit.model, coarse=1)
-    found = fit(model, one.fit.theta, weights(model.observation, one.fit.residuals), FINE_STEPS)
-    again = composition(one.terms, replace(found, model=one.fit.model))
-    return again if again.evidence > one.evidence else one
-
-
-def refined(one: Composition, without: Fit) -> Composition:
+def refined(one: Composition, without: Fit, offset: Array) -> Composition:
     """A composition whose last function is as fine as the evidence is for.
 
     Parameters
@@ -152,32 +140,54 @@ def refined(one: Composition, without: Fit) -> Composition:
         Its last term is a function.
     without : Fit
         The fit without that function.
+    offset : array (size,)
+        As for `look`.
 
     Returns
     -------
     Composition
+        Fitted on coarse ticks.
     """
     best, term = one, one.terms[-1]
-    assert term.family is not None
-    values = fitted_values(one.fit)
     for count, length in FINER:
+        assert term.family is not None
         finer = replace(term, family=term.family.finer(count, length))
-        model = finer.added_to(without.model)
-        theta = model.begun_at(one.fit.theta[: len(without.theta)])
         assert finer.family is not None
+        model = finer.added_to(without.model)
+        values = best.fit.model.families[-1].values(best.fit.model.coefficients(best.fit.theta)[-1])
         near, *_ = np.linalg.lstsq(finer.family.basis, values, rcond=None)
+        theta = model.begun_at(best.fit.theta[: len(without.theta)])
         theta[model.places_of_coefficients()[-1]] = near / COORDINATE
         low, high = model.bounds()
-        weight = weights(model.observation, one.fit.residuals)
-        found = fit(model, np.clip(theta, low, high), weight, ITERATIONS)
-        weight = weights(model.observation, found.residuals)
-        again = composition((*one.terms[:-1], finer), settled(found, weight))
+        weight = weights(model.observation, best.fit.residuals)
+        found = _twice(model.on_coarse_ticks(offset), np.clip(theta, low, high), weight)
+        again = composition((*one.terms[:-1], finer), replace(found, model=model))
         if again.evidence <= best.evidence:
             break
         best = again
     return best
 
 
-def fitted_values(found: Fit) -> Array:
-    """The last function of a fit at its nodes (NODES,)."""
-    return found.model.families[-1].values(found.model.coefficients(found.theta)[-1])
+def _twice(model: JointModel, theta: Array, weight: Array) -> Fit:
+    """Fit with channels weighted as given, then by what that leaves."""
+    found = fit(model, theta, weight, ITERATIONS, ROUGH)
+    weight = weights(model.observation, found.residuals)
+    return fit(model, found.theta, weight, ITERATIONS, ROUGH, found.jacobian)
+
+
+def until_it_stands(one: Composition) -> Composition:
+    """A composition fitted on fine ticks until nothing moves any more.
+
+    Derivatives are on coarse ticks, and in the end on fine ones where more than noise is left.
+    """
+    model = one.fit.model
+    found = _standing(model, one.fit, one.fit.jacobian)
+    if not is_noise(found):
+        found = _standing(replace(model, coarse=1), found, None)
+    return composition(one.terms, replace(found, model=model))
+
+
+def _standing(model: JointModel, found: Fit, known: Array | None) -> Fit:
+    weight = weights(model.observation, found.residuals)
+    steps = ITERATIONS if known is not None else FINE_STEPS
+    return fit(model, found.theta, weight, steps, SETTLED, known)

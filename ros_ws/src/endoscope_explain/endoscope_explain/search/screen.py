@@ -68,6 +68,11 @@ class Background:
     coarse: JointModel = field(repr=False)
     at: Array = field(repr=False)
 
+    @property
+    def offset(self) -> Array:
+        """What coarse ticks do to the residuals (size,)."""
+        return self.fit.residuals - self.at
+
     def left(self, residuals: Array) -> Array:
         """What is left (size, ...) of weighted residuals once the model's numbers are refitted."""
         n = len(self.fit.theta)
