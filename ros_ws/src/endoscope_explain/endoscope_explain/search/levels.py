@@ -22,6 +22,7 @@ from endoscope_explain.search.candidate import Candidate, candidates
 from endoscope_explain.search.refit import (
     Composition,
     Look,
+    by_fine_derivatives,
     composition,
     look,
     polish,
@@ -203,6 +204,8 @@ def _level(
     ranked = tuple(best.values())
     if not ranked:
         return Level(first, (), np.zeros(0))
+    if not is_noise(ranked[0].fit):
+        ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     behind, ways, _ = grown[0]
     null = null_gains(behind, ways, ranked[0].fit, jobs)
     return Level(first, ranked, null, predicts_better(ranked[0].fit, first.fit))

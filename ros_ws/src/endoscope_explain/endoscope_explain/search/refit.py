@@ -14,7 +14,6 @@ from endoscope_explain.fit.evidence import log_evidence, weights
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, fit, glance, jacobian
 from endoscope_explain.fit.valleys import out_of_valleys
-from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.search.candidate import Candidate
 
 Array = NDArray[np.float64]
@@ -22,7 +21,7 @@ Array = NDArray[np.float64]
 FINER = ((14, 0.125), (21, 0.08))
 """Coefficients of finer functions, and lengths over which they vary, as shares of the range."""
 LOOK_STEPS = 6
-FINE_STEPS = 4
+FINE_STEPS = 2
 ITERATIONS, ROUGH, SETTLED = 25, 1e-2, 1e-4
 """Steps of a fit, at most, and the shares of the cost below which it tells and below which it
 stands."""
@@ -176,18 +175,16 @@ def _twice(model: JointModel, theta: Array, weight: Array) -> Fit:
 
 
 def until_it_stands(one: Composition) -> Composition:
-    """A composition fitted on fine ticks until nothing moves any more.
-
-    Derivatives are on coarse ticks, and in the end on fine ones where more than noise is left.
-    """
-    model = one.fit.model
-    found = _standing(model, one.fit, one.fit.jacobian)
-    if not is_noise(found):
-        found = _standing(replace(model, coarse=1), found, None)
-    return composition(one.terms, replace(found, model=model))
+    """A composition fitted on fine ticks until nothing moves any more."""
+    weight = weights(one.fit.model.observation, one.fit.residuals)
+    found = fit(one.fit.model, one.fit.theta, weight, ITERATIONS, SETTLED, one.fit.jacobian)
+    return composition(one.terms, found)
 
 
-def _standing(model: JointModel, found: Fit, known: Array | None) -> Fit:
-    weight = weights(model.observation, found.residuals)
-    steps = ITERATIONS if known is not None else FINE_STEPS
-    return fit(model, found.theta, weight, steps, SETTLED, known)
+def by_fine_derivatives(one: Composition) -> Composition:
+    """A composition fitted on by derivatives on fine ticks, where coarse ones may mislead."""
+    model = replace(one.fit.model, coarse=1)
+    weight = weights(model.observation, one.fit.residuals)
+    found = fit(model, one.fit.theta, weight, FINE_STEPS, SETTLED)
+    again = composition(one.terms, replace(found, model=one.fit.model))
+    return again if again.evidence > one.evidence else one
