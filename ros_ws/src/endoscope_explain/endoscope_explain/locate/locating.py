@@ -82,9 +82,18 @@ def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place
     term = explanation.unknown
     recorded = view(recording, {'refitted': explanation.refitted})
     found = excess_between(list(recorded.signals.values()), 'refitted', None)
-    joint = term.joint if term is not None else found[0].view.joint
-    stage = term.stage if term is not None else 'joint'
-    return [place(recording, found, stage, joint)]
+    if term is not None and term.helps:
+        return [place(recording, found, term.stage, term.joint)]
+    return [place(recording, found, _shows_in(found), found[0].view.joint)]
+
+
+def _shows_in(found: Sequence[SignalExcess]) -> str:
+    """The last stage whose readings are right is before what is wrong with no function known."""
+    quantities = {e.view.quantity for e in found if e.view.signal in shares(found)}
+    if quantities & {'shaft_position', 'shaft_velocity'}:
+        return 'actuator'
+    # A wrong tension bends the joint wrongly too: alone it is misread.
+    return 'joint' if 'tension' in quantities and 'bending' in quantities else 'sensing'
 
 
 def locate_parameters(recording: Recording, explanation: Explanation) -> list[Place]:
