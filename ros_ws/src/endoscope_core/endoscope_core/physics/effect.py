@@ -75,7 +75,7 @@ class Parameter:
         for value in (*self.starts, *self.choices):
             if not self.low <= value <= self.high:
                 raise ValueError(f'{self.name}: {value} is outside its bounds')
-        if self.is_switch and len(self.words) != len(self._admissible):
+        if self.is_switch and len(self.words) != len(self.admissible):
             raise ValueError(f'{self.name}: give a word for each of its values')
 
     @property
@@ -84,13 +84,14 @@ class Parameter:
         return bool(self.choices) or self.counted
 
     @property
-    def _admissible(self) -> tuple[float, ...]:
+    def admissible(self) -> tuple[float, ...]:
+        """All values of a switch."""
         return self.choices or tuple(range(int(self.low), int(self.high) + 1))
 
     def said(self, value: float) -> str:
         """What a value of a switch stands for."""
-        nearest = min(self._admissible, key=lambda choice: abs(choice - value))
-        return self.words[self._admissible.index(nearest)]
+        nearest = min(self.admissible, key=lambda choice: abs(choice - value))
+        return self.words[self.admissible.index(nearest)]
 
 
 class Symptom(StrEnum):
