@@ -65,6 +65,8 @@ def explained_case(
     sources: Sources, jobs: int = 1, progress: Progress | None = None
 ) -> ExplainedCase:
     """Explain one bag; parameters and errors as in `explain_one`."""
+    if progress is not None:
+        progress(f'reading and auditing {sources.bag.name}')
     inputs = read_inputs(sources)
     for note in inputs.audit.recording.notes:
         if progress is not None:

@@ -21,7 +21,7 @@ from endoscope_explain.predicted_signals import rung, view
 from endoscope_explain.recording import Series
 from endoscope_explain.report.chain_drawing import STAGES, chain_svg
 from endoscope_explain.report.html_page import html_page
-from endoscope_explain.report.numbers import in_degrees, judged, moving_joints
+from endoscope_explain.report.numbers import in_degrees, judged, moving_joints, shown
 from endoscope_explain.report.sentences import (
     HEADLINES,
     before_and_after,
@@ -304,6 +304,11 @@ def test_angles_are_in_degrees(page):
     assert in_degrees('angle_rad', 'rad')[:2] == ('angle_deg', 'deg')
     assert in_degrees('rate_rad_per_s', 'rad/s')[:2] == ('rate_deg_per_s', 'deg/s')
     assert in_degrees('motor_bandwidth', 'rad/s') == ('motor_bandwidth', 'rad/s', 1.0)
+
+
+def test_a_narrow_interval_keeps_its_ends():
+    assert str(shown('gain', Estimate(1.2, 1.1996, 1.2004, '-'))) == 'gain 1.2 (1.1996 to 1.2004)'
+    assert shown('wire_stiffness', Estimate(3000.0, 2990.0, 3010.0, 'N/m')).value == '3000'
 
 
 def test_switches_are_said_in_words(stribeck_case):

@@ -9,7 +9,7 @@ from endoscope_bringup.progress_line import ProgressLine
 from endoscope_bringup.subcommands import add_json_option, print_json
 from endoscope_core.errors import EndoscopeError
 
-STEPS = 4
+STEPS = 5
 """Of every explanation, beside one for each joint: read, refit, judge, locate."""
 
 

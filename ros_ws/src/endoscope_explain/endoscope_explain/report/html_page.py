@@ -27,6 +27,7 @@ from endoscope_explain.report.figures.timeline import timeline_figure
 from endoscope_explain.report.numbers import (
     MODELS,
     PLANTS,
+    digits,
     in_degrees,
     judged,
     measurable,
@@ -211,7 +212,7 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         'rows': rows or [None],
         'probability': f'{100 * effect.probability:.0f} %',
         'evidence': [
-            {'key': key, 'value': f'{value:.3g}', 'meaning': EVIDENCE.get(key, '')}
+            {'key': key, 'value': digits(value), 'meaning': EVIDENCE.get(key, '')}
             for key, value in effect.evidence.items()
         ],
     }
@@ -234,7 +235,7 @@ def _table(case: ExplainedCase, title: str, ladder: Ladder) -> dict[str, Any]:
         cells = [
             {'text': '', 'best': False}
             if f is None
-            else {'text': f'{text} ({f.ratio:.2f})', 'best': f.rmse <= 1.02 * least}
+            else {'text': f'{text} ({digits(f.ratio)})', 'best': f.rmse <= 1.02 * least}
             for f, (text, _) in zip(fits, texts, strict=True)
         ]
         rows.append({'signal': plain(signal), 'unit': texts[0][1], 'cells': cells})
@@ -252,8 +253,8 @@ def _parameters(case: ExplainedCase) -> list[dict[str, Any]]:
                 {
                     'joint': joint,
                     'number': shown(name, e),
-                    'described': f'{factor * e.nominal:.3g}',
-                    'tolerance': f'{factor * low:.3g} … {factor * high:.3g}',
+                    'described': digits(factor * e.nominal),
+                    'tolerance': f'{digits(factor * low)} … {digits(factor * high)}',
                     'outside': not low <= e.value <= high,
                 }
             )

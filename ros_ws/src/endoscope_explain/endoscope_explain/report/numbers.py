@@ -45,6 +45,11 @@ class Shown:
         return f'{self.name} {self.value}{unit} ({self.low} to {self.high})'
 
 
+def digits(value: float, count: int = 3) -> str:
+    """A number with so many digits, without a power of ten where it can be read without."""
+    return f'{float(f"{value:.{count}g}"):.12g}'
+
+
 def in_degrees(name: str, unit: str) -> tuple[str, str, float]:
     """Name, unit and factor with which a person reads a number: angles are in degrees."""
     if unit == 'rad':
@@ -57,7 +62,10 @@ def in_degrees(name: str, unit: str) -> tuple[str, str, float]:
 def shown(name: str, estimate: Estimate) -> Shown:
     """An estimate as text."""
     name, unit, factor = in_degrees(name, estimate.unit)
-    value, low, high = (f'{factor * v:.3g}' for v in (estimate.value, estimate.low, estimate.high))
+    numbers = [factor * v for v in (estimate.value, estimate.low, estimate.high)]
+    # As many digits as tell the ends of the interval apart.
+    count = next((n for n in range(3, 8) if len({digits(v, n) for v in numbers[1:]}) > 1), 3)
+    value, low, high = (digits(v, count) for v in numbers)
     return Shown(name, value, low, high, unit)
 
 
@@ -110,7 +118,7 @@ def judged(case: ExplainedCase, ladder: Ladder) -> dict[str, dict[str, ChannelFi
 def rmse(signal: str, fit: ChannelFit) -> tuple[str, str]:
     """Error of a signal and its unit, as text."""
     _, unit, factor = in_degrees('_rad', _units(JOINT_NAMES)[signal])
-    return f'{factor * fit.rmse:.3g}', unit
+    return digits(factor * fit.rmse), unit
 
 
 def _known(effect: NamedEffect) -> Mapping[str, Parameter]:

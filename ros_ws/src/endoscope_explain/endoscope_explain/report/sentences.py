@@ -6,7 +6,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.case import ExplainedCase, Place
 from endoscope_explain.combine import changed_parameters
 from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
-from endoscope_explain.report.numbers import PLANTS, form, in_degrees, judged
+from endoscope_explain.report.numbers import PLANTS, digits, form, in_degrees, judged
 
 HEADLINES = {
     Verdict.CONSISTENT: 'Simulation and recording agree',
@@ -70,8 +70,9 @@ def physics_of(effect: NamedEffect) -> str:
 
 
 def where(place: Place) -> str:
-    """Where a mismatch shows."""
-    return f'{place.stage} of {place.joint}, {place.regime}'
+    """Where a mismatch shows: in which state of the rig, or in which signals."""
+    how = place.regime if place.shares else ' and '.join(map(plain, place.signals))
+    return f'{place.stage} of {place.joint}, {how}'
 
 
 def differing(case: ExplainedCase) -> dict[tuple[str, str], NominalEstimate]:
@@ -92,8 +93,8 @@ def before_and_after(case: ExplainedCase) -> str:
     best = 'augmented' if 'augmented' in plants else 'refitted'
     after = plants[best][signal].ratio if best in plants else before.ratio
     return (
-        f'{plain(signal)} is off by {before.ratio:.3g} times its noise as described, by '
-        f'{after:.3g} times {PLANTS[best]}.'
+        f'{plain(signal)} is off by {digits(before.ratio)} times its noise as described, by '
+        f'{digits(after)} times {PLANTS[best]}.'
     )
 
 
@@ -136,7 +137,7 @@ def _differing(case: ExplainedCase) -> str:
     name, unit, factor = in_degrees(name, e.unit)
     more = f', and {len(changed) - 1} more differ' if len(changed) > 1 else ''
     return (
-        f'{name} of {joint} is {factor * e.value:.3g} instead of {factor * e.nominal:.3g}'
+        f'{name} of {joint} is {digits(factor * e.value)} instead of {digits(factor * e.nominal)}'
         f'{f" {unit}" if unit else ""}{more}.'
     )
 

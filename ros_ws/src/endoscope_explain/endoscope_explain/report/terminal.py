@@ -3,7 +3,7 @@
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.report.columns import table
-from endoscope_explain.report.numbers import PLANTS, judged, measurable, shown
+from endoscope_explain.report.numbers import PLANTS, digits, judged, measurable, shown
 from endoscope_explain.report.sentences import (
     differing,
     next_step,
@@ -52,7 +52,7 @@ def fits_table(case: ExplainedCase) -> tuple[tuple[str, ...], list[tuple[str, ..
     if not plants.get('nominal'):
         return None
     rows = [
-        (plain(signal), *(f'{fits[signal].ratio:.2f}' for fits in plants.values()))
+        (plain(signal), *(digits(fits[signal].ratio) for fits in plants.values()))
         for signal in plants['nominal']
     ]
     return ('signal', *(PLANTS[name] for name in plants)), rows
