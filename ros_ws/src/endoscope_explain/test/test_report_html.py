@@ -311,6 +311,29 @@ def test_a_narrow_interval_keeps_its_ends():
     assert shown('wire_stiffness', Estimate(3000.0, 2990.0, 3010.0, 'N/m')).value == '3000'
 
 
+def test_digits_that_the_interval_does_not_know_are_left_out():
+    assert str(shown('profile', Estimate(-1.08e-5, -0.00366, 0.00363, '-'))) == (
+        'profile 0 (-0.00366 to 0.00363)'
+    )
+
+
+def test_of_what_does_not_move_no_loop_is_drawn(consistent):
+    recording = consistent.recording
+    series = {'command': recording.command, 'shaft_position': recording.shaft_position}
+    still = {n: dataclasses.replace(s, values=0.0 * s.values) for n, s in series.items()}
+    nothing = with_explanation(
+        consistent,
+        recording=recording.with_series(still),
+        verdict=Verdict.INSUFFICIENT_DATA,
+        fit={},
+        ladder={'nominal': {}, 'refitted': {}, 'augmented': {}},
+    )
+    assert 'Hysteresis loops' in html_page(consistent)
+    page = html_page(nothing)
+    assert 'Hysteresis loops' not in page
+    assert 'What was recorded' in page
+
+
 def test_switches_are_said_in_words(stribeck_case):
     effect = named('load_cell_gain', gain=1.2, wire=1.0)
     case = dataclasses.replace(stribeck_case, effects=(effect,))

@@ -31,6 +31,7 @@ from endoscope_explain.report.numbers import (
     in_degrees,
     judged,
     measurable,
+    moving_joints,
     rmse,
     shown,
 )
@@ -87,6 +88,9 @@ def html_page(case: ExplainedCase) -> str:
     # Where a sensor repeats one reading, none of its samples is judged.
     judgeable = any(v.quantity == 'bending' for v in recorded.of_joint(joint))
     passage = telling_passage(recorded, joint) if judgeable else (0.0, case.recording.duration)
+    moved = judgeable and joint in moving_joints(case.recording)
+    # What is drawn is then what was meant, and shows nothing.
+    shaded = () if case.audit.unusable else case.places
     experiment = case.next_experiment
     found = explanation.unknown
     unknown = found if found is not None and found.helps else None
@@ -120,9 +124,9 @@ def html_page(case: ExplainedCase) -> str:
         unknown=unknown,
         formula=formula,
         unknown_svg=unknown_figure(unknown, formula) if unknown else '',
-        timeline_svg=timeline_figure(recorded, command, joint, case.places) if judgeable else '',
-        loops_svg=loops_figure(recorded, command, joint, passage) if judgeable else '',
-        signals_svg=signals_figure(recorded, joint, passage) if judgeable else '',
+        timeline_svg=timeline_figure(recorded, command, joint, shaded) if judgeable else '',
+        loops_svg=loops_figure(recorded, command, joint, passage) if moved else '',
+        signals_svg=signals_figure(recorded, joint, passage) if moved else '',
         ladder_svg=ladder_figure(ladder) if ladder else '',
         tables=_tables(case, ladder),
         parameters=_parameters(case),
@@ -182,7 +186,8 @@ def _place(place: Place) -> dict[str, Any]:
     return {
         'stage': place.stage,
         'joint': place.joint,
-        'regime': place.regime,
+        # The audit's findings have no state of the rig: their text stands above.
+        'regime': place.regime if place.shares else '',
         'bars': [{'signal': plain(s), 'share': place.shares.get(s, 0.0)} for s in place.signals],
         'intervals': shown + (f' s and {more} more' if more > 0 else ' s') if shown else '',
         'band': f'{low:.2g} … {high:.2g} Hz' if high > 0 else '',

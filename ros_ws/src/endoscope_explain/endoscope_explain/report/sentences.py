@@ -93,8 +93,8 @@ def before_and_after(case: ExplainedCase) -> str:
     best = 'augmented' if 'augmented' in plants else 'refitted'
     after = plants[best][signal].ratio if best in plants else before.ratio
     return (
-        f'{plain(signal)} is off by {digits(before.ratio)} times its noise as described, by '
-        f'{digits(after)} times {PLANTS[best]}.'
+        f'{plain(signal)} is off by {digits(before.ratio)} times its noise with the described '
+        f'plant, by {digits(after)} times with the {PLANTS[best]} one.'
     )
 
 

@@ -25,6 +25,9 @@ from endoscope_explain.report.figures.style import (
 
 Array = NDArray[np.float64]
 
+LEAST = 0.5
+"""What is less than this share of the noise is drawn here."""
+
 
 def timeline_figure(
     recorded: RecordedView, command: tuple[Array, Array], joint: str, places: Sequence[Place]
@@ -65,7 +68,7 @@ def timeline_figure(
         for name, level in levels.items():
             misfit.step(
                 centres,
-                level,
+                np.maximum(level, LEAST),
                 RUNG_STYLE[name],
                 where='mid',
                 color=RUNG_COLOUR[name],
@@ -83,7 +86,7 @@ def timeline_figure(
             ha='right',
         )
         misfit.set_yscale('log')
-        misfit.set_ylim(0.5, max(10.0, 2.0 * float(np.nanmax(levels['nominal']))))
+        misfit.set_ylim(0.9 * LEAST, max(10.0, 2.0 * float(np.nanmax(levels['nominal']))))
         misfit.set_ylabel('misfit / noise')
         misfit.set_xlabel('time (s)')
         marked = '; shaded: where it shows' if any(place.intervals for place in places) else ''
