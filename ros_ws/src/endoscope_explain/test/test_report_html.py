@@ -172,7 +172,7 @@ def test_the_numbers_of_the_plant_have_their_tolerance(stribeck_case):
     assert page.count('<td class="bad">') == 1
     assert '<td class="bad">4.33</td>' in page
     assert 'bend_x pretension N 5 4.33 4.2 … 4.4 4.35 … 5.75' in text_of(page)
-    assert 'joint_rest_angle_deg deg 0 1.15 0.573 … 1.72' in text_of(page)
+    assert 'joint_rest_angle_deg deg 0 1.1 0.573 … 1.72' in text_of(page)
     assert 'divided, and multiplied, by 1.15' in text_of(page)
     assert tolerance('pretension', 5.0, 3.0) == (1.25, 20.0)
 
