@@ -88,12 +88,14 @@ def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place
 
 
 def _shows_in(found: Sequence[SignalExcess]) -> str:
-    """The last stage whose readings are right is before what is wrong with no function known."""
-    quantities = {e.view.quantity for e in found if e.view.signal in shares(found)}
-    if quantities & {'shaft_position', 'shaft_velocity'}:
+    """Stage of what is wrong with no function known, by the signals that show it."""
+    # Off by more than its noise: a tracker has too few samples for a share of the misfit.
+    off = {e.view.quantity for e in found if e.total > len(e.excess)}
+    behind = off & {'tension', 'bending'}
+    if not behind:
         return 'actuator'
-    # A wrong tension bends the joint wrongly too: alone it is misread.
-    return 'joint' if 'tension' in quantities and 'bending' in quantities else 'sensing'
+    # A wrong tension bends the joint wrongly too: alone, either is misread.
+    return 'joint' if len(behind) == 2 else 'sensing'
 
 
 def locate_parameters(recording: Recording, explanation: Explanation) -> list[Place]:
