@@ -18,15 +18,18 @@ class ProgressLine:
     ----------
     steps : int
         How many steps there are, about: a bar is full only when all is done.
+    first : str
+        The step that begins at once. It is no line where there is no bar: bad input is refused in
+        it, with one line alone.
     stream : TextIO, optional
         Where to write; stderr if none is given. Where it is no terminal, each step is a line.
     """
 
-    def __init__(self, steps: int, stream: TextIO | None = None) -> None:
+    def __init__(self, steps: int, first: str, stream: TextIO | None = None) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._steps = steps
-        self._done = -1
-        self._step = ''
+        self._done = 0
+        self._step = first
         self._begun = time.monotonic()
         self._ended = threading.Event()
         self._lock = threading.Lock()
@@ -36,6 +39,7 @@ class ProgressLine:
     def __enter__(self) -> Self:
         """Start the clock."""
         if self._shows:
+            self._draw()
             self._clock.start()
         return self
 
@@ -76,7 +80,7 @@ class ProgressLine:
                 self._draw()
 
     def _draw(self) -> None:
-        share = min(max(self._done, 0) / self._steps, 1.0 - 1.0 / WIDTH)
+        share = min(self._done / self._steps, 1.0 - 1.0 / WIDTH)
         full = round(WIDTH * share)
         elapsed = time.monotonic() - self._begun
         line = f'[{"#" * full}{"." * (WIDTH - full)}] {elapsed:.0f} s  {self._step}'

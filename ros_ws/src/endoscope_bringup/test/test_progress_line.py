@@ -14,7 +14,7 @@ class Terminal(io.StringIO):
 
 def steps(stream):
     found = io.StringIO()
-    with ProgressLine(2, stream) as progress:
+    with ProgressLine(4, 'reading', stream) as progress:
         progress.step('refitting')
         progress.step('audit: a remark')
         progress.step('searching')
@@ -31,7 +31,8 @@ def test_without_a_terminal_each_step_is_a_line():
 def test_in_a_terminal_a_bar_says_what_is_done_and_goes():
     said, found = steps(Terminal())
     drawn = said.split('\r\x1b[K')
-    assert '[....................] 0 s  refitting' in drawn
+    assert '[....................] 0 s  reading' in drawn
+    assert '[#####...............] 0 s  refitting' in drawn
     assert 'audit: a remark\n' in drawn
     assert '[##########..........] 0 s  searching' in drawn
     assert drawn[-1] == ''
@@ -40,7 +41,7 @@ def test_in_a_terminal_a_bar_says_what_is_done_and_goes():
 
 def test_a_bar_is_full_only_when_all_is_done():
     terminal = Terminal()
-    with ProgressLine(1, terminal) as progress:
+    with ProgressLine(1, 'reading', terminal) as progress:
         for name in 'abcd':
             progress.step(name)
     assert '#' * 20 not in terminal.getvalue()

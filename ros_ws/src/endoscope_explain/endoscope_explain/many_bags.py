@@ -65,8 +65,6 @@ def explained_case(
     sources: Sources, jobs: int = 1, progress: Progress | None = None
 ) -> ExplainedCase:
     """Explain one bag; parameters and errors as in `explain_one`."""
-    if progress is not None:
-        progress(f'reading and auditing {sources.bag.name}')
     inputs = read_inputs(sources)
     for note in inputs.audit.recording.notes:
         if progress is not None:
@@ -157,8 +155,6 @@ def explain_bags(
             _write(reported, folder)
         say(f'{reported.told}\nReport: {out / REPORT_HTML}')
         return {unique_names([sources[0].bag])[0]: reported}
-    if progress is not None:
-        progress(f'explaining {len(sources)} recordings')
     if dask_address is None and not same_physics:
         for one in sources:
             read_inputs(one)

@@ -121,7 +121,7 @@ def run(args: argparse.Namespace) -> int:
         )
         for bag, second in zip(args.bags, _seconds(args), strict=True)
     ]
-    with ProgressLine(STEPS + len(plant.joints)) as progress:
+    with ProgressLine(STEPS + len(plant.joints), 'reading') as progress:
         found = explain_bags(
             sources,
             args.out,
