@@ -120,6 +120,7 @@ def test_a_page_lists_all_that_was_tried(page):
     text = text_of(page)
     assert 'no effect, numbers beyond their tolerance 60.0 50.0' in text
     assert 'gravity + breathing 70.0 60.0' in text
+    assert 'No effect was tried on bend_y: the refitted plant leaves noise alone.' in text
     (rest,) = re.findall(r'promised less: ([^.]*)\.', text)
     tried = {'stribeck_friction', 'gravity', 'contact', 'breathing'}
     (late,) = re.findall(r'no motion twice: ([^.]*)\.', text) or ['']

@@ -291,6 +291,7 @@ def _not_refitted(case: ExplainedCase, recorded: RecordedView) -> list[dict[str,
     for observation in recorded.observations:
         sets = [c.effects for c in case.explanation.candidates if c.joint == observation.joint]
         if not any(sets):
+            found.append({'joint': observation.joint, 'less': [], 'late': []})
             continue
         known = {effect for effects in sets for effect in effects}
         rest = [e for e in CATALOGUE.values() if e.id not in known and not e.traits.audited]

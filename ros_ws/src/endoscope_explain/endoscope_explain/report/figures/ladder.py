@@ -53,7 +53,7 @@ def ladder_figure(ladder: Ladder) -> str:
             axis.plot(
                 [v for _, v in known],
                 # Beside each other, so that none is hidden where two models are as good.
-                [r + 0.12 * (0.5 * (len(rungs) - 1) - number) for r, _ in known],
+                [r + 0.17 * (0.5 * (len(rungs) - 1) - number) for r, _ in known],
                 MARKERS[name],
                 color=RUNG_COLOUR[name],
                 ms=6.5,
