@@ -44,7 +44,7 @@ def verdict_sentence(case: ExplainedCase) -> str:
     if case.verdict is Verdict.INSUFFICIENT_DATA:
         return 'The rig moves too little, or too little was recorded, to tell causes apart.'
     if case.audit.unusable:
-        return f'{case.audit.faults()[0].text}.'
+        return f'{_capital(case.audit.faults()[0].text)}.'
     if case.verdict is Verdict.CONSISTENT:
         return f'The described plant predicts the recording of {_all(case.recording.joints)}.'
     if case.verdict is Verdict.PARAMETERS_DIFFER:
@@ -58,7 +58,7 @@ def verdict_sentence(case: ExplainedCase) -> str:
         missing = case.verdict is Verdict.MISSING_PHYSICS
         begin = 'The simulation leaves out' if missing else 'The recording shows'
         return f'{begin} {_all(named)}.'
-    return f'{case.audit.faults()[0].text}.'
+    return f'{_capital(case.audit.faults()[0].text)}.'
 
 
 def physics_of(effect: NamedEffect) -> str:
@@ -159,4 +159,5 @@ def _all(names: Sequence[str]) -> str:
 
 
 def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    # The name of a signal stays as it is.
+    return text if '/' in text.split()[0] else text[:1].upper() + text[1:]
