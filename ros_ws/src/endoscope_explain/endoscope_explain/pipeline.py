@@ -230,7 +230,7 @@ def explain_case(
                 progress=progress,
             )
     if explanation.fit:
-        tell('locating')
+        tell('locating what was found')
     plant = improved_plant(explanation, audit)
     recording = audit.recording
     case = ExplainedCase(
@@ -252,7 +252,7 @@ def explain_case(
         return replace(case, ladder=ladder, runtime_s=time.monotonic() - begun)
     if extras:
         case = replace(case, next_experiment=_next(case, jobs, tell))
-    tell('judging beside black boxes' if extras else 'judging')
+    tell('judging beside black boxes' if extras else 'comparing the plants')
     validation = inputs.validation
     if validation is not None:
         validation = with_isolated_marked(validation, plant)

@@ -160,4 +160,4 @@ def _all(names: Sequence[str]) -> str:
 
 def _capital(text: str) -> str:
     # The name of a signal stays as it is.
-    return text if '/' in text.split()[0] else text[:1].upper() + text[1:]
+    return text if '/' in text.split(maxsplit=1)[0] else text[:1].upper() + text[1:]
