@@ -17,6 +17,7 @@ from endoscope_bringup.other_packages import commands_of_other_packages
 from endoscope_core.physics import JointParameters, SensorParameters
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_explain.report.sentences import EVIDENCE
 from endoscope_nodes import program
 from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.parameters import described
@@ -144,3 +145,16 @@ def _missing(site: Path, page: str, names: Iterable[str]) -> list[str]:
 def _what_parameters_do() -> list[str]:
     kinds = [kind for kinds in (OF_PROCESS, *OF_NODE.values()) for kind in kinds]
     return [one.description.replace('`', '') for kind in kinds for one in described(kind)]
+
+
+def test_every_number_of_an_effects_evidence_is_explained() -> None:
+    page = (WORKSPACE / 'doc/explaining.md').read_text()
+    assert [key for key in EVIDENCE if f'`{key}`' not in page] == []
+    given = {
+        key
+        for path in (WORKSPACE / 'src/endoscope_explain/endoscope_explain').rglob('*.py')
+        for literal in re.findall(r'evidence(?:: dict\S*)? ?= ?\{([^}]*)\}', path.read_text())
+        for key in re.findall(r"'(\w+)':", literal)
+    }
+    assert len(given) > 5
+    assert given <= EVIDENCE.keys()

@@ -1,6 +1,8 @@
 """`endoscope explain` from bags to reports: what it writes, and what it refuses."""
 
 import csv
+import hashlib
+import html
 import json
 from dataclasses import replace
 
@@ -33,7 +35,12 @@ def explain(rig, out, *arguments):
 def test_a_stop_is_named_shown_and_exported(rig, tmp_path, capsys):
     out = tmp_path / 'out'
     assert explain(rig, out, rig / 'stopped.mcap', '--validate', rig / 'stopped.mcap') == 0
-    assert 'joint_stop on bend_x' in capsys.readouterr().out
+    printed = capsys.readouterr()
+    first, *rest = printed.out.splitlines()
+    assert first.startswith('The simulation leaves out joint_stop on bend_x (')
+    assert any(line.startswith('    angle_deg 6.') for line in rest)
+    assert rest[-1] == f'Report: {out / "report.html"}'
+    assert 'refitting the nominal plant' in printed.err
     report = json.loads((out / 'report.json').read_text())
     assert report['verdict'] == 'missing_physics'
     (effect,) = report['effects']
@@ -47,7 +54,12 @@ def test_a_stop_is_named_shown_and_exported(rig, tmp_path, capsys):
     (place,) = report['where']
     assert place['stage'] == 'joint'
     assert [e.id for e in load_plant(out / 'plant.yaml').effects] == ['joint_stop']
-    assert '<h1>The simulation leaves out physics</h1>' in (out / 'report.html').read_text()
+    page = (out / 'report.html').read_text()
+    assert '<h1>The simulation leaves out physics</h1>' in page
+    # What the page was made from is said by their hashes.
+    for file in (rig / 'stopped.mcap', rig / 'plant.yaml'):
+        assert hashlib.sha256(file.read_bytes()).hexdigest() in page
+    assert html.escape(f'endoscope explain {rig / "stopped.mcap"}') in page
 
 
 def test_the_exported_plant_is_what_simulate_runs(rig, tmp_path):
@@ -109,7 +121,7 @@ def test_sound_recordings_of_one_rig_share_no_missing_physics(rig, tmp_path, cap
     out = tmp_path / 'out'
     assert explain(rig, out, *bags, '--quick', '--same-physics') == 0
     assert summary(out) == {'sound': 'consistent', 'sound_2': 'consistent'}
-    assert 'only noise is left beside nothing' in capsys.readouterr().out
+    assert 'only noise is left beside nothing' in capsys.readouterr().err
 
 
 def test_a_dask_cluster_does_the_same(rig, tmp_path):

@@ -56,7 +56,7 @@ def first_two_zero(stamps):
 def test_stray_stamps_are_left_out_and_noted(explain, tmp_path):
     status, printed = explain({'slave/measured_js': first_two_zero})
     assert status == 0
-    assert 'note: 2 of 160 messages of /rig/slave/measured_js are left out' in printed.out
+    assert 'note: 2 of 160 messages of /rig/slave/measured_js are left out' in printed.err
     report = json.loads((tmp_path / 'out' / 'report.json').read_text())
     assert report['verdict'] == 'consistent'
 

@@ -118,8 +118,8 @@ def test_an_explanation_is_looked_at_saved_and_gone_on_with(bag, tmp_path):
     assert found.verdict == 'consistent'
     assert found.effects == ()
     assert 'refitting the nominal plant' in told
-    assert 'rms error over noise' in repr(found)
-    assert 'slave/measured_js:bend_x' in repr(found)
+    assert 'rmse / noise' in repr(found)
+    assert 'slave:bend_x' in repr(found)
     html = found._repr_html_()
     assert html.count('src="data:image/png;base64,') == html.count('src=') == 1
     assert [axis.get_ylabel() for axis in found.plot().axes] == ['bend_x [deg]', 'error [deg]']

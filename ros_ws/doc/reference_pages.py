@@ -15,6 +15,7 @@ from sphinx.application import Sphinx
 from endoscope_bags.table_mapping import EXAMPLE
 from endoscope_bringup.cli import build_parser
 from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, SensorParameters
+from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.plant_file import REACH, plant_to_mapping
@@ -222,6 +223,10 @@ class Mapping(_Generated):
         yield from ('```yaml', *EXAMPLE.splitlines(), '```')
 
 
+def _switch(parameter: Parameter) -> str:
+    return ', '.join(f'{_number(v)}: {parameter.said(v)}' for v in parameter.admissible)
+
+
 class Effects(_Generated):
     """The catalogue of effects."""
 
@@ -240,7 +245,7 @@ class Effects(_Generated):
                 [
                     (
                         f'`{p.name}`',
-                        ', '.join(map(_number, p.choices)) or _range(p.low, p.high),
+                        _switch(p) if p.is_switch else _range(p.low, p.high),
                         p.unit,
                         _number(p.typical),
                         '' if math.isnan(p.off) else _number(p.off),

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import shlex
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -71,6 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     143 when terminated. An exception that is not the user's to act on keeps its traceback.
     """
     args = build_parser().parse_args(argv)
+    args.command_line = shlex.join(['endoscope', *(sys.argv[1:] if argv is None else argv)])
     if args.log_level is not None:
         _log_from(args.log_level)
     try:

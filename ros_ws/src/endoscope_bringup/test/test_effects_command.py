@@ -37,13 +37,15 @@ def test_tells_equation_source_and_parameters(capsys):
     assert definition.equation in told
     assert definition.source in told
     assert '0.05 to 2.5 rad, typical 0.25, off at 2.5' in told
-    assert 'one of 0, 1' in told
+    assert (
+        'wire 0: the cell of the positive wire, 1: the cell of the negative wire, typical' in told
+    )
 
 
-def test_tells_which_parameters_are_counted(capsys):
+def test_tells_what_counted_parameters_stand_for(capsys):
     assert main(['effects', 'configuration_change']) == 0
     told = ' '.join(capsys.readouterr().out.split())
-    assert 'smooth a whole number from 0 to 1, typical 0' in told
+    assert 'smooth 0: changes evenly, 1: changes smoothly, typical 0' in told
 
 
 def test_an_unknown_effect_is_one_line_and_exit_2(capsys):

@@ -10,7 +10,7 @@ from physics_rig import ACTING, NOMINAL, hand, run
 
 from endoscope_core import physics
 from endoscope_core.physics import layout as L
-from endoscope_core.physics.effect import Stage, Symptom
+from endoscope_core.physics.effect import Parameter, Stage, Symptom
 from endoscope_core.physics.effects import CATALOGUE, showing
 from endoscope_core.physics.hooks import LINKS, ON_SAMPLES
 
@@ -156,3 +156,13 @@ def test_nominal_keys_are_those_of_the_rig():
 @pytest.mark.parametrize('symptom', Symptom)
 def test_a_symptom_is_of_one_effect(symptom):
     assert [e for e in CATALOGUE.values() if e.traits.symptom is symptom] == [showing(symptom)]
+
+
+def test_what_chooses_a_form_has_words_for_each_choice():
+    with pytest.raises(ValueError, match='wire: give a word for each of its values'):
+        Parameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0), words=('first',))
+    wire = Parameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0), words=('first', 'second'))
+    smooth = Parameter('smooth', '-', 2.0, 3.0, 2.0, counted=True, words=('even', 'smooth'))
+    gain = Parameter('gain', '-', 0.5, 2.0, 1.0)
+    assert [p.is_switch for p in (wire, smooth, gain)] == [True, True, False]
+    assert (wire.said(1.0), smooth.said(3.0)) == ('second', 'smooth')

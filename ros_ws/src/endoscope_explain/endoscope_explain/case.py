@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport
 from endoscope_explain.explanation import ChannelFit, Explanation, NamedEffect, Verdict
+from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.locate.chain_cut import ChainCut
 from endoscope_explain.recording import Recording
 
@@ -76,6 +77,33 @@ class NextExperiment:
 
 
 @dataclass(frozen=True)
+class Provenance:
+    """What a report was made from, so that anybody can make it again.
+
+    Attributes
+    ----------
+    bag, plant : str
+        Files; the plant's is empty where it came from no file.
+    bag_sha256, plant_sha256 : str
+        Of their bytes; of all messages' files of a bag in the order of their names.
+    version : str
+        Of the program.
+    command : str
+        As it was typed; empty where no command line made it.
+    date : str
+        ISO 8601.
+    """
+
+    bag: str
+    bag_sha256: str
+    plant: str
+    plant_sha256: str
+    version: str
+    command: str
+    date: str
+
+
+@dataclass(frozen=True)
 class ExplainedCase:
     """All that is known about one recording.
 
@@ -102,6 +130,9 @@ class ExplainedCase:
     next_experiment : NextExperiment or None
     cuts : tuple of ChainCut
         Whether the refitted plant does better when the measured motor drives it.
+    band : float
+        Relative tolerance of the plant's parameters.
+    provenance : Provenance or None
     runtime_s : float
     """
 
@@ -118,4 +149,6 @@ class ExplainedCase:
     baseline_name: str = ''
     next_experiment: NextExperiment | None = None
     cuts: tuple[ChainCut, ...] = ()
+    band: float = BAND
+    provenance: Provenance | None = None
     runtime_s: float = 0.0

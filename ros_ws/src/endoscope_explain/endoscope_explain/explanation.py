@@ -11,6 +11,9 @@ from endoscope_core.physics.description import PlantDescription, TermSpec
 
 Array = NDArray[np.float64]
 
+LEAST_EXPLAINED = 0.05
+"""A function that takes away less of the excess misfit than this is not offered as what acts."""
+
 
 class Verdict(StrEnum):
     """The one-word answer."""
@@ -75,9 +78,7 @@ class NamedEffect:
     alternatives : tuple of str
         Ids that the data cannot tell from this one, nearest first.
     evidence : mapping of str to float
-        `margin`: score lost by the best explanation without this effect (half deviance units);
-        `gap`: score lost by the best rival in its place; `share`: part of the excess misfit that
-        this effect removes.
+        Each key has its meaning in `report.sentences.EVIDENCE`.
     """
 
     id: str
@@ -190,6 +191,11 @@ class UnknownTerm:
     explained: float
     rivals: tuple[str, ...] = ()
     siblings: tuple[str, ...] = ()
+
+    @property
+    def helps(self) -> bool:
+        """Whether the function explains enough to be offered."""
+        return self.explained >= LEAST_EXPLAINED
 
     def term(self) -> TermSpec:
         """As a plant has it: the formula where it is as good, else the function's values."""

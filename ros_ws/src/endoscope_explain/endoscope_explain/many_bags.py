@@ -16,7 +16,9 @@ from endoscope_core.worker_pool import worker_pool
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
-from endoscope_explain.report.writing import REPORT_JSON, write_report
+from endoscope_explain.provenance import provenance
+from endoscope_explain.report.terminal import told
+from endoscope_explain.report.writing import REPORT_HTML, REPORT_JSON, write_report
 from endoscope_explain.shared_physics import physics_of_all
 
 SUMMARY_CSV = 'summary.csv'
@@ -41,9 +43,17 @@ class Reported:
     ----------
     files : mapping of str to bytes
         By name.
+    told : str
+        What a person reads in the terminal; its first line is the verdict's sentence.
     """
 
     files: Mapping[str, bytes]
+    told: str
+
+    @property
+    def sentence(self) -> str:
+        """The verdict's sentence."""
+        return self.told.partition('\n')[0]
 
     def content(self) -> dict[str, object]:
         """Return what report.json says."""
@@ -59,9 +69,11 @@ def explained_case(
     for note in inputs.audit.recording.notes:
         if progress is not None:
             progress(f'note: {note}')
-    return explain_case(
+    case = explain_case(
         inputs, explain_recording, jobs=jobs, progress=progress, extras=not sources.quick
     )
+    made_from = provenance(sources.bag, sources.plant_file, sources.command)
+    return replace(case, provenance=made_from)
 
 
 def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = None) -> Reported:
@@ -87,7 +99,8 @@ def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = Non
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         write_report(case, folder)
-        return Reported({path.name: path.read_bytes() for path in sorted(folder.iterdir())})
+        files = {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+        return Reported(files, told(case))
 
 
 def explain_bags(
@@ -98,6 +111,7 @@ def explain_bags(
     dask_address: str | None = None,
     same_physics: bool = False,
     say: Say = print,
+    progress: Progress | None = None,
 ) -> dict[str, Reported]:
     """Explain bags and write their reports, all or none.
 
@@ -113,7 +127,9 @@ def explain_bags(
     same_physics : bool
         Whether all bags show one rig, so that one choice of effects has to explain all of them.
     say : callable
-        Told each line for the terminal.
+        Told what was found.
+    progress : callable, optional
+        Told in a few words what is being done.
 
     Returns
     -------
@@ -131,13 +147,13 @@ def explain_bags(
             raise TogetherError(
                 '--same-physics cannot be had with --baseline: leave one of them out'
             )
-        all_given = physics_of_all(sources, jobs, say)
+        all_given = physics_of_all(sources, jobs, progress or say)
         sources = [replace(o, given=g) for o, g in zip(sources, all_given, strict=True)]
     if len(sources) == 1 and dask_address is None:
-        reported = explain_one(sources[0], jobs, say)
+        reported = explain_one(sources[0], jobs, progress)
         with atomic_directory(out) as folder:
             _write(reported, folder)
-        say(sentence(reported))
+        say(f'{reported.told}\nReport: {out / REPORT_HTML}')
         return {unique_names([sources[0].bag])[0]: reported}
     if dask_address is None and not same_physics:
         for one in sources:
@@ -151,10 +167,11 @@ def explain_bags(
             (folder / name).mkdir()
             _write(reported, folder / name)
             rows[name] = reported
-            say(f'{len(rows)}/{len(sources)} {name}: {sentence(reported)}')
+            say(f'{len(rows)}/{len(sources)} {name}: {reported.sentence}')
         in_order = {name: rows[name] for name in names}
         (folder / SUMMARY_CSV).write_text(summary_table(in_order), encoding='utf-8')
         (folder / PARAMETERS_CSV).write_text(parameter_table(in_order), encoding='utf-8')
+    say(f'Reports: {out}')
     return in_order
 
 
@@ -169,16 +186,6 @@ def unique_names(bags: Sequence[Path]) -> list[str]:
             name = f'{stem}_{count}'
         names.append(name)
     return names
-
-
-def sentence(reported: Reported) -> str:
-    """Return verdict and named effects in one line."""
-    content = reported.content()
-    effects = content['effects']
-    if not isinstance(effects, list) or not effects:
-        return str(content['verdict'])
-    named = ', '.join(f'{e["id"]} on {e["joint"]} ({e["probability"]:.2f})' for e in effects)
-    return f'{content["verdict"]}: {named}'
 
 
 def summary(name: str, reported: Reported) -> dict[str, Any]:

@@ -62,6 +62,10 @@ class Sources:
         The physics of each joint, if it is not to be searched.
     namespace : str or None
         Of the rig's topics, where a bag has several rigs.
+    plant_file : Path or None
+        Where the plant was read from.
+    command : str
+        As it was typed.
     """
 
     bag: Path
@@ -74,6 +78,8 @@ class Sources:
     most_effects: int = MOST_EFFECTS
     given: GivenJoints | None = None
     namespace: str | None = None
+    plant_file: Path | None = None
+    command: str = ''
 
 
 @dataclass(frozen=True)
@@ -224,7 +230,7 @@ def explain_case(
                 progress=progress,
             )
     if explanation.fit:
-        tell('locating')
+        tell('locating what was found')
     plant = improved_plant(explanation, audit)
     recording = audit.recording
     case = ExplainedCase(
@@ -238,6 +244,7 @@ def explain_case(
         {},
         validation_name='' if inputs.validation is None else inputs.validation.name,
         baseline_name='' if inputs.baseline is None else inputs.baseline.name,
+        band=inputs.band,
     )
     case = replace(case, places=_places(case), cuts=_cuts(case))
     if not explanation.fit:
@@ -245,7 +252,7 @@ def explain_case(
         return replace(case, ladder=ladder, runtime_s=time.monotonic() - begun)
     if extras:
         case = replace(case, next_experiment=_next(case, jobs, tell))
-    tell('judging beside black boxes' if extras else 'judging')
+    tell('judging beside black boxes' if extras else 'comparing the plants')
     validation = inputs.validation
     if validation is not None:
         validation = with_isolated_marked(validation, plant)

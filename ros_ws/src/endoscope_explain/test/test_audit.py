@@ -46,6 +46,13 @@ def test_a_gap_is_named_with_its_topic_and_its_beginning(sound, quantity):
     assert finding.severity is Severity.FAULT
 
 
+def test_readings_without_noise_may_repeat_themselves(record):
+    """As those of a simulation, whose joint stands still while the motor turns back."""
+    silent = replace(PLANT.sensors, load_cell_noise=0.0, tracker_noise=0.0)
+    recording = record(replace(PLANT, sensors=silent))
+    assert 'held_samples' not in named(recording)
+
+
 def test_a_topic_that_starts_late_has_a_gap(sound):
     finding = named(sound.with_series({'bending': sound.bending.taken(sound.bending.time > 2.0)}))
     assert finding['recording_gap'].intervals[0][0] == 0.0

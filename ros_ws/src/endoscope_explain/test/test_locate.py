@@ -5,10 +5,10 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.explanation import Estimate, NamedEffect
+from endoscope_explain.explanation import Estimate, Explanation, NamedEffect, Verdict
 from endoscope_explain.fit.free_parameters import FRICTION_PROFILE_NAMES
 from endoscope_explain.locate.chain_cut import cut_at_motor
-from endoscope_explain.locate.locating import STAGE_OF_PARAMETER, locate_effects
+from endoscope_explain.locate.locating import STAGE_OF_PARAMETER, locate_effects, locate_unknown
 from endoscope_explain.locate.regime import information
 
 PLANT = PlantDescription()
@@ -101,3 +101,13 @@ def test_cutting_the_chain_at_the_motor_tells_on_which_side_the_fault_is(record,
 def test_without_a_recorded_shaft_there_is_no_cut(record):
     recording = record(duration=3.0)
     assert cut_at_motor(recording.with_series({'shaft_position': None}), PLANT) == ()
+
+
+def test_what_shows_in_the_load_cells_alone_is_a_sensors(record):
+    gain = EffectSpec('load_cell_gain', 'bend_x', {'gain': 1.3})
+    stop = EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.1})
+    for effect, stage in ((gain, 'sensing'), (stop, 'joint')):
+        recording = record(dataclasses.replace(PLANT, effects=(effect,)), duration=8.0)
+        explanation = Explanation.without_fit(Verdict.UNKNOWN_PHYSICS, PLANT)
+        (place,) = locate_unknown(recording, explanation)
+        assert (place.stage, place.joint) == (stage, 'bend_x')

@@ -63,6 +63,16 @@ def test_the_readings_are_handed_on_as_they_must_be_meant(record):
     np.testing.assert_allclose(audit.recording.bending.values, sound.bending.values)
 
 
+def test_plugs_that_were_exchanged_are_at_the_sensors(record):
+    sound = record()
+    swapped = replace(sound.tension, values=sound.tension.values[:, ::-1])
+    plant = PlantDescription()
+    audit = audit_recording(sound.with_series({'tension': swapped}), plant)
+    case = explain_case(Inputs(plant, audit, None, None), never, extras=False)
+    assert case.verdict is Verdict.RECORDING_FAULT
+    assert {place.stage for place in case.places} == {'sensing'}
+
+
 def test_a_pause_that_ends_at_another_pose_is_no_gap(record):
     """A console that was let go begins anew where the rig is, not where it commanded last."""
     sound = record()

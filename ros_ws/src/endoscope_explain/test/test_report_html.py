@@ -6,16 +6,88 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from endoscope_explain.case import NextExperiment
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.audit import AuditReport, Finding, Severity
+from endoscope_explain.case import NextExperiment, Provenance
 from endoscope_explain.explanation import (
     Candidate,
+    Estimate,
+    NamedEffect,
     NominalEstimate,
     Verdict,
 )
+from endoscope_explain.predicted_signals import rung, view
+from endoscope_explain.recording import Series
 from endoscope_explain.report.chain_drawing import STAGES, chain_svg
-from endoscope_explain.report.figures.ladder import parameters_figure
 from endoscope_explain.report.html_page import html_page
-from endoscope_explain.report.sentences import HEADLINES, verdict_sentence
+from endoscope_explain.report.numbers import in_degrees, judged, moving_joints, shown
+from endoscope_explain.report.sentences import (
+    HEADLINES,
+    before_and_after,
+    next_step,
+    physics_of,
+    verdict_sentence,
+)
+from endoscope_explain.report.terminal import told
+from endoscope_explain.tolerance import tolerance
+
+PLANT = PlantDescription()
+
+
+def with_explanation(case, **fields):
+    """The case with another explanation; fields of the case itself by their names."""
+    own = {f.name for f in dataclasses.fields(case)} - {'explanation'}
+    explanation = dataclasses.replace(
+        case.explanation, **{k: v for k, v in fields.items() if k not in own - {'effects'}}
+    )
+    mine = {k: v for k, v in fields.items() if k in own}
+    return dataclasses.replace(case, explanation=explanation, **mine)
+
+
+def text_of(page):
+    """What a reader sees: no drawings, no tags."""
+    text = re.sub(r'<svg.*?</svg>|<style.*?</style>', ' ', page, flags=re.DOTALL)
+    return html.unescape(' '.join(re.sub(r'<[^>]+>', ' ', text).split()))
+
+
+def named(effect_id, stage=None, **parameters):
+    definition = CATALOGUE[effect_id]
+    units = {p.name: p.unit for p in definition.parameters}
+    return NamedEffect(
+        effect_id,
+        'bend_x',
+        stage or str(definition.stage),
+        0.97,
+        definition.equation,
+        definition.source,
+        {n: Estimate(v, 0.9 * v, 1.1 * v, units[n]) for n, v in parameters.items()},
+    )
+
+
+@pytest.fixture(scope='module')
+def consistent(stribeck_case, record):
+    """A recording of the described plant whose refitted plant differs a little."""
+    joint = dataclasses.replace(PLANT.joints['bend_x'], pretension=5.02)
+    refitted = dataclasses.replace(PLANT, joints={**PLANT.joints, 'bend_x': joint})
+    recording = record(PLANT, duration=8.0)
+    seen = view(recording, {'nominal': PLANT, 'refitted': refitted})
+    ladder = {name: rung(seen, name) for name in ('nominal', 'refitted')}
+    ladder['augmented'] = dict(ladder['refitted'])
+    return with_explanation(
+        stribeck_case,
+        verdict=Verdict.CONSISTENT,
+        effects=(),
+        nominal=PLANT,
+        refitted=refitted,
+        augmented=refitted,
+        fit=ladder,
+        ladder=ladder,
+        recording=recording,
+        audit=AuditReport(recording, ()),
+        places=(),
+        cuts=(),
+    )
 
 
 @pytest.fixture(scope='module')
@@ -23,10 +95,11 @@ def page(stribeck_case):
     ranked = (
         Candidate('bend_x', ('stribeck_friction',), 10.0, 1.0),
         Candidate('bend_x', (), 60.0, 6.0, True),
+        *(Candidate('bend_x', ('gravity', e), 70.0, 9.0) for e in ('contact', 'breathing')),
         Candidate('bend_x', (), 90.0, 9.0),
     )
-    explanation = dataclasses.replace(stribeck_case.explanation, candidates=ranked)
-    return html_page(dataclasses.replace(stribeck_case, explanation=explanation))
+    made = Provenance('bags/rig', 'a1' * 32, 'plant.yaml', 'b2' * 32, '1.2', 'endoscope x', 'today')
+    return html_page(with_explanation(stribeck_case, candidates=ranked, provenance=made))
 
 
 def test_a_page_needs_no_other_file(page):
@@ -37,16 +110,40 @@ def test_a_page_needs_no_other_file(page):
 
 
 def test_a_page_says_what_was_left_out_and_where(page):
-    text = re.sub(r'<[^>]+>', ' ', page)
-    assert 'The simulation leaves out physics' in text
-    assert 'stribeck_friction on bend_x, 97 %' in text
-    assert 'cannot tell it from viscous_friction' in ' '.join(text.split())
-    assert 'nominal, refitted beyond the band 60.0 50.0' in ' '.join(text.split())
+    text = text_of(page)
+    assert 'The simulation leaves out stribeck_friction on bend_x (97 %).' in text
+    assert 'cannot tell it from viscous_friction' in text
+    assert 'margin 120 (score lost without it, in nats)' in text
+
+
+def test_a_page_lists_all_that_was_tried(page):
+    text = text_of(page)
+    assert 'no effect, numbers beyond their tolerance 60.0 50.0' in text
+    assert 'gravity + breathing 70.0 60.0' in text
+    assert 'No effect was tried on bend_y: the refitted plant leaves noise alone.' in text
+    (rest,) = re.findall(r'promised less: ([^.]*)\.', text)
+    tried = {'stribeck_friction', 'gravity', 'contact', 'breathing'}
+    (late,) = re.findall(r'no motion twice: ([^.]*)\.', text) or ['']
+    simulated = {e.id for e in CATALOGUE.values() if not e.traits.audited}
+    assert {*rest.split(', '), *filter(None, late.split(', '))} == simulated - tried
+
+
+def test_a_page_says_what_it_was_made_from(page):
+    text = text_of(page)
+    for word in (
+        'bags/rig',
+        'a1' * 32,
+        'plant.yaml',
+        'b2' * 32,
+        'endoscope x',
+        'endoscope 1.2, today',
+    ):
+        assert word in text
 
 
 def test_every_drawing_is_whole(page):
     drawings = re.findall(r'<svg.*?</svg>', page, re.DOTALL)
-    assert len(drawings) >= 6
+    assert len(drawings) >= 5
     for drawing in drawings:
         ET.fromstring(drawing)
 
@@ -64,26 +161,42 @@ def test_findings_of_neighbouring_stages_do_not_overlap():
     assert drawing.count('>parameters differ<') == drawing.count('>(bend_x)<') == 2
 
 
-def test_every_parameter_of_every_joint_is_within_its_figure():
-    def estimate(value):
-        return NominalEstimate(value, value, value, 'N', 1.0, value < 1.15)
-
-    drawing = ET.fromstring(
-        parameters_figure({'bend_x': {'a': estimate(1.1)}, 'bend_y': {'a': estimate(2.0)}})
-    )
-    text = ET.tostring(drawing, encoding='unicode')
-    assert text.count('#b3261e') > 0
-    width = float(drawing.get('viewBox').split()[2])
-    markers = [e for e in drawing.iter() if e.tag.endswith('}use') and 'b3261e' in str(e.attrib)]
-    assert markers
-    assert all(0.0 < float(e.get('x')) < width for e in markers)
+def test_the_numbers_of_the_plant_have_their_tolerance(stribeck_case):
+    low = NominalEstimate(0.867 * 5.0, 4.2, 4.4, 'N', 5.0, False)
+    within = NominalEstimate(0.871 * 5.0, 4.2, 4.5, 'N', 5.0, True)
+    angle = NominalEstimate(0.02, 0.01, 0.03, 'rad', 0.0, True)
+    parameters = {
+        'bend_x': {'pretension': low, 'joint_rest_angle': angle},
+        'bend_y': {'pretension': within},
+    }
+    page = html_page(with_explanation(stribeck_case, parameters=parameters))
+    assert page.count('<td class="bad">') == 1
+    assert '<td class="bad">4.33</td>' in page
+    assert 'bend_x pretension N 5 4.33 4.2 … 4.4 4.35 … 5.75' in text_of(page)
+    assert 'joint_rest_angle_deg deg 0 1.1 0.573 … 1.72' in text_of(page)
+    assert 'divided, and multiplied, by 1.15' in text_of(page)
+    assert tolerance('pretension', 5.0, 3.0) == (1.25, 20.0)
 
 
 @pytest.mark.parametrize('verdict', list(Verdict))
 def test_every_verdict_has_its_sentence(stribeck_case, verdict):
-    case = dataclasses.replace(stribeck_case, verdict=verdict)
-    assert verdict in HEADLINES
-    assert verdict_sentence(case).endswith('.')
+    effects = tuple(named(e) for e in ('stribeck_friction', 'contact', 'gravity'))
+    for some in (effects[:1], effects):
+        case = dataclasses.replace(stribeck_case, verdict=verdict, effects=some)
+        assert verdict in HEADLINES
+        for text in (verdict_sentence(case), next_step(case), before_and_after(case)):
+            assert text.endswith('.')
+            assert is_short(text)
+
+
+def is_short(text):
+    return all(len(sentence.split()) <= 20 for sentence in re.split(r'(?<=[.;])\s', text))
+
+
+@pytest.mark.parametrize('effect_id', list(CATALOGUE))
+def test_what_an_effect_does_is_said_in_twenty_words(effect_id):
+    typical = {p.name: p.typical for p in CATALOGUE[effect_id].parameters}
+    assert is_short(physics_of(named(effect_id, **typical)))
 
 
 @pytest.mark.parametrize(('explained', 'offered'), [(0.9, True), (1e-4, False)])
@@ -96,6 +209,29 @@ def test_a_function_that_explains_nothing_is_not_offered(
         stribeck_case, explanation=explanation, verdict=Verdict.UNKNOWN_PHYSICS
     )
     assert ("function of the joint's angle" in verdict_sentence(case)) == offered
+    assert (term.expression in text_of(html_page(case))) == offered
+
+
+@pytest.mark.parametrize(('share', 'offered'), [(0.9, True), (0.01, False)])
+def test_a_formula_that_explains_little_is_not_offered(
+    stribeck_case, missing_function, share, offered
+):
+    term = dataclasses.replace(missing_function, formula_share=share, formula_is_as_good=False)
+    page = html_page(
+        with_explanation(stribeck_case, effects=(), unknown=term, verdict=Verdict.UNKNOWN_PHYSICS)
+    )
+    assert (term.expression in page) == offered
+    assert page.count('>formula<') == offered
+    # The picture comes first, in degrees; the formula is below it.
+    first = page[page.index('<svg') : page.index('</svg>')]
+    assert 'function, with 90 % band' in first
+    assert 'joint&#39;s angle (deg)' in first or "joint's angle (deg)" in first
+    assert (
+        verdict_sentence(
+            with_explanation(stribeck_case, unknown=term, verdict=Verdict.UNKNOWN_PHYSICS)
+        )
+        == "Missing on bend_x: moment on the joint, a function of the joint's angle."
+    )
 
 
 def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case, missing_function):
@@ -120,6 +256,145 @@ def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case, missin
         )
     )
     assert missing_function.expression in page
-    assert html.escape(missing_function.what) in page.replace('&#39;', '&#x27;')
     assert 'It tells gravity from contact.' in page
     assert page.index('slow ramps') < page.index('>chirp<')
+
+
+def test_one_word_for_each_plant(page, consistent):
+    for text in (page, html_page(consistent)):
+        for word in ('nominal', 'augmented', 'with what was left out', 'as given', 'plant given'):
+            assert word not in re.sub(r'<style.*?</style>', '', text, flags=re.DOTALL)
+        assert 'described' in text
+        assert 'refitted' in text
+    assert 'improved' in page
+
+
+def test_sections_and_curves_fit_a_consistent_verdict(consistent):
+    page = html_page(consistent)
+    assert 'What was left out' not in page
+    assert 'When it shows' not in page
+    # The refitted plant is the improved one: it is drawn once, by its own name.
+    assert 'improved' not in text_of(page)
+    assert '>refitted<' in page
+    assert '>improved<' not in page
+    assert list(judged(consistent, consistent.ladder)) == ['nominal', 'refitted']
+    assert next_step(consistent) == 'Go on with the described plant.'
+
+
+def test_what_did_not_move_is_left_out(consistent):
+    still = consistent.recording.command.values.copy()
+    still[:, 1] = 0.0
+    command = dataclasses.replace(consistent.recording.command, values=still)
+    shaft = consistent.recording.shaft_position
+    held = Series.of(shaft.topic, shaft.time, shaft.values * [1.0, 0.0])
+    recording = dataclasses.replace(consistent.recording, command=command, shaft_position=held)
+    case = dataclasses.replace(consistent, recording=recording)
+    assert moving_joints(recording) == ('bend_x',)
+    signals = judged(case, case.ladder)['nominal']
+    assert signals
+    assert all('_x' in signal for signal in signals)
+    assert 'wire_y_pos' not in told(case)
+    tables = html_page(case)
+    assert 'wires:wire_x_pos' in tables
+    assert 'wires:wire_y_pos' not in tables
+
+
+def test_angles_are_in_degrees(page):
+    assert re.search(r'slave:bend_x deg [\d.]+ \(', text_of(page))
+    assert ' rad ' not in text_of(page[page.index('The ladder of fits') :].split('Next step')[0])
+    assert in_degrees('angle_rad', 'rad')[:2] == ('angle_deg', 'deg')
+    assert in_degrees('rate_rad_per_s', 'rad/s')[:2] == ('rate_deg_per_s', 'deg/s')
+    assert in_degrees('motor_bandwidth', 'rad/s') == ('motor_bandwidth', 'rad/s', 1.0)
+
+
+def test_a_narrow_interval_keeps_its_ends():
+    assert str(shown('gain', Estimate(1.2, 1.1996, 1.2004, '-'))) == 'gain 1.2 (1.1996 to 1.2004)'
+    assert shown('wire_stiffness', Estimate(3000.0, 2990.0, 3010.0, 'N/m')).value == '3000'
+
+
+def test_digits_that_the_interval_does_not_know_are_left_out():
+    assert str(shown('profile', Estimate(-1.08e-5, -0.00366, 0.00363, '-'))) == (
+        'profile 0 (-0.00366 to 0.00363)'
+    )
+
+
+def test_of_what_does_not_move_no_loop_is_drawn(consistent):
+    recording = consistent.recording
+    series = {'command': recording.command, 'shaft_position': recording.shaft_position}
+    still = {n: dataclasses.replace(s, values=0.0 * s.values) for n, s in series.items()}
+    nothing = with_explanation(
+        consistent,
+        recording=recording.with_series(still),
+        verdict=Verdict.INSUFFICIENT_DATA,
+        fit={},
+        ladder={'nominal': {}, 'refitted': {}, 'augmented': {}},
+    )
+    assert 'Hysteresis loops' in html_page(consistent)
+    page = html_page(nothing)
+    assert 'Hysteresis loops' not in page
+    assert 'What was recorded' in page
+
+
+def test_switches_are_said_in_words(stribeck_case):
+    effect = named('load_cell_gain', gain=1.2, wire=1.0)
+    case = dataclasses.replace(stribeck_case, effects=(effect,))
+    for text in (text_of(html_page(case)), told(case)):
+        assert 'the cell of the negative wire' in text
+        assert 'gain' in text
+        assert not re.search(r'\bwire 1\b', text)
+
+
+def test_what_does_nothing_is_no_number(stribeck_case):
+    effect = named('contact', angle_rad=0.2, stiffness=0.01, exponent=1.0, loss_s=0.0)
+    text = told(dataclasses.replace(stribeck_case, effects=(effect,)))
+    assert 'angle_deg 11.5 deg (10.3 to 12.6)' in text
+    assert 'exponent' not in text
+    assert 'loss_s' not in text
+
+
+def test_the_terminal_says_it_all(stribeck_case):
+    lines = told(stribeck_case).splitlines()
+    assert lines[0] == 'The simulation leaves out stribeck_friction on bend_x (97 %).'
+    assert '    rise 0.8 (0.72 to 0.88)' in lines
+    assert any(line.startswith('Where: transmission of bend_x, ') for line in lines)
+    (head,) = [k for k, line in enumerate(lines) if line.startswith('rmse / noise')]
+    assert lines[head].split()[3:] == ['described', 'refitted', 'improved']
+    wire = next(line.split() for line in lines if line.startswith('wires:wire_x_pos'))
+    before, _, after = map(float, wire[1:])
+    assert before > 2.0 * after
+    assert lines[-1].startswith('Next: ')
+
+
+def test_the_block_that_was_touched_is_marked(stribeck_case):
+    finding = Finding(
+        'exchanged',
+        Severity.UNUSABLE,
+        'bend_x',
+        'sensing',
+        ('wires/measured_js:wire_x_pos',),
+        ((0.0, 1.0),),
+        'wires are exchanged',
+        'exchange their names, or the plugs',
+    )
+    audit = AuditReport(stribeck_case.recording, (finding,))
+    place = dataclasses.replace(stribeck_case.places[0], stage='sensing')
+    case = dataclasses.replace(
+        stribeck_case, verdict=Verdict.RECORDING_FAULT, effects=(), audit=audit, places=(place,)
+    )
+    drawing = re.findall(r'<svg.*?</svg>', html_page(case), re.DOTALL)[0]
+    assert drawing.count('#8c1d18') == 1
+    red = drawing[drawing.index('#8c1d18') :]
+    assert re.search(r'>([^<]+)</text>', red)[1] == 'Sensors'
+    assert next_step(case) == 'Exchange their names, or the plugs.'
+
+
+def test_slips_that_nothing_predicts_are_said(consistent):
+    assert 'stick and slip' not in text_of(html_page(consistent))
+    spiky = consistent.recording.tension.values.copy()
+    rng = np.random.default_rng(1)
+    burst = (np.arange(len(spiky)) // 1000) % 3 == 0
+    spiky[burst, 0] += 0.4 * rng.standard_normal((int(burst.sum()), 2))
+    tension = dataclasses.replace(consistent.recording.tension, values=spiky)
+    recording = dataclasses.replace(consistent.recording, tension=tension)
+    text = text_of(html_page(dataclasses.replace(consistent, recording=recording)))
+    assert 'bend_x: wires stick and slip' in text

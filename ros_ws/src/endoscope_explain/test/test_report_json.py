@@ -11,7 +11,7 @@ from endoscope_core.physics.plant_file import load_plant
 from endoscope_explain.audit import AuditReport, Finding, Severity
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.combine import combined_effects, combined_verdict
-from endoscope_explain.explanation import Estimate, Verdict
+from endoscope_explain.explanation import Estimate, NominalEstimate, Verdict
 from endoscope_explain.report.report_mapping import report_mapping
 from endoscope_explain.report.writing import write_report
 
@@ -108,6 +108,24 @@ def test_an_open_interval_ends_at_the_parameters_bound(stribeck_case):
     report = report_mapping(dataclasses.replace(stribeck_case, effects=(changed,)))
     bound = next(p.high for p in CATALOGUE['stribeck_friction'].parameters if p.name == 'rise')
     assert report['effects'][0]['parameters']['rise']['high'] == bound
+
+
+def test_what_chooses_a_form_is_no_parameter(stribeck_case):
+    effect = stribeck_case.effects[0]
+    tail = Estimate(1.0, 1.0, 1.0, '-')
+    changed = dataclasses.replace(effect, parameters={**effect.parameters, 'tail': tail})
+    report = report_mapping(dataclasses.replace(stribeck_case, effects=(changed,)))
+    assert set(report['effects'][0]['parameters']) == {'rise', 'stribeck_speed'}
+
+
+@pytest.mark.parametrize(('band', 'inside'), [(0.15, False), (0.2, True)])
+def test_the_tolerance_is_the_one_that_was_asked_for(stribeck_case, band, inside):
+    estimate = NominalEstimate(5.9, 5.8, 6.0, 'N', 5.0, False)
+    explanation = dataclasses.replace(
+        stribeck_case.explanation, parameters={'bend_x': {'pretension': estimate}}
+    )
+    case = dataclasses.replace(stribeck_case, explanation=explanation, band=band)
+    assert report_mapping(case)['parameters']['bend_x']['pretension']['in_band'] is inside
 
 
 def test_a_number_that_is_not_finite_is_refused(stribeck_case):

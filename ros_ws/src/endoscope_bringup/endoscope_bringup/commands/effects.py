@@ -97,7 +97,17 @@ def _as_json(definition: 'Effect') -> dict[str, object]:
         'parameters': [
             {
                 key: getattr(parameter, key)
-                for key in ('name', 'unit', 'low', 'high', 'typical', 'off', 'choices', 'counted')
+                for key in (
+                    'name',
+                    'unit',
+                    'low',
+                    'high',
+                    'typical',
+                    'off',
+                    'choices',
+                    'counted',
+                    'words',
+                )
             }
             for parameter in definition.parameters
         ],
@@ -129,10 +139,8 @@ def _told_of_place(place: 'Place') -> str:
 
 
 def _parameter(parameter: 'Parameter') -> str:
-    if parameter.choices:
-        allowed = 'one of ' + ', '.join(f'{choice:g}' for choice in parameter.choices)
-    elif parameter.counted:
-        allowed = f'a whole number from {parameter.low:g} to {parameter.high:g}'
+    if parameter.is_switch:
+        allowed = ', '.join(f'{v:g}: {parameter.said(v)}' for v in parameter.admissible)
     else:
         allowed = f'{parameter.low:g} to {parameter.high:g} {parameter.unit}'
     off = '' if math.isnan(parameter.off) else f', off at {parameter.off:g}'

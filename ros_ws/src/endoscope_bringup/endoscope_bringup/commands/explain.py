@@ -5,8 +5,12 @@ import sys
 from functools import partial
 from pathlib import Path
 
+from endoscope_bringup.progress_line import ProgressLine
 from endoscope_bringup.subcommands import add_json_option, print_json
 from endoscope_core.errors import EndoscopeError
+
+STEPS = 5
+"""Of every explanation, beside one for each joint: read, refit, judge, locate."""
 
 
 class SecondsError(EndoscopeError, ValueError):
@@ -19,7 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'explain',
         help='say where a recording and its simulation differ, and what was left out',
         description='Explains what the simulation P.yaml leaves out of each recording BAG. Writes '
-        'report.json, report.html and the improved plant.yaml to DIR; with several bags to '
+        'report.json, report.html and the improved plant, plant.yaml, to DIR; with several bags to '
         'one folder each in DIR, and a summary table.',
     )
     parser.add_argument('bags', nargs='+', type=Path, metavar='BAG', help='rosbag2 folder or .mcap')
@@ -112,18 +116,22 @@ def run(args: argparse.Namespace) -> int:
             args.band,
             args.effects,
             namespace=args.namespace,
+            plant_file=args.plant,
+            command=args.command_line,
         )
         for bag, second in zip(args.bags, _seconds(args), strict=True)
     ]
-    found = explain_bags(
-        sources,
-        args.out,
-        jobs=args.jobs,
-        dask_address=args.dask,
-        same_physics=args.same_physics,
-        # What is printed is then one document; progress goes beside it.
-        say=partial(print, file=sys.stderr) if args.json else print,
-    )
+    with ProgressLine(STEPS + len(plant.joints), 'reading') as progress:
+        found = explain_bags(
+            sources,
+            args.out,
+            jobs=args.jobs,
+            dask_address=args.dask,
+            same_physics=args.same_physics,
+            # What is printed is then one document; all else goes beside it.
+            say=partial(progress.print, file=sys.stderr if args.json else sys.stdout),
+            progress=progress.step,
+        )
     if args.json:
         print_json([summary(name, reported) for name, reported in found.items()])
     return 0

@@ -37,6 +37,8 @@ class Parameter:
         Value at which the effect vanishes, or NaN where no value of this parameter does that.
     choices : tuple of float
         All admissible values of a parameter that is not continuous (a wire's number); else empty.
+    words : tuple of str
+        What each choice, or each whole number from `low` on, stands for.
     starts : tuple of float
         Where a fit begins; the typical value if empty.
     comparable : bool
@@ -59,6 +61,7 @@ class Parameter:
     typical: float
     off: float = math.nan
     choices: tuple[float, ...] = ()
+    words: tuple[str, ...] = ()
     starts: tuple[float, ...] = ()
     comparable: bool = False
     phase: bool = False
@@ -72,6 +75,23 @@ class Parameter:
         for value in (*self.starts, *self.choices):
             if not self.low <= value <= self.high:
                 raise ValueError(f'{self.name}: {value} is outside its bounds')
+        if self.is_switch and len(self.words) != len(self.admissible):
+            raise ValueError(f'{self.name}: give a word for each of its values')
+
+    @property
+    def is_switch(self) -> bool:
+        """Whether it chooses a form: it is no number that a person could measure."""
+        return bool(self.choices) or self.counted
+
+    @property
+    def admissible(self) -> tuple[float, ...]:
+        """All values of a switch."""
+        return self.choices or tuple(range(int(self.low), int(self.high) + 1))
+
+    def said(self, value: float) -> str:
+        """What a value of a switch stands for."""
+        nearest = min(self.admissible, key=lambda choice: abs(choice - value))
+        return self.words[self.admissible.index(nearest)]
 
 
 class Symptom(StrEnum):

@@ -59,15 +59,15 @@ def audit_recording(recording: Recording, plant: PlantDescription) -> AuditRepor
     misread = stamp_unit_findings(recording, plant.sensors)
     recording = _on_one_clock(in_seconds(recording, misread), findings)
     recording = _without_commandless_times(recording, findings)
-    recording = _as_meant(recording, plant, misread)
+    recording, noisy = _as_meant(recording, plant, misread)
     if misread:
         return AuditReport(recording, tuple(misread))
     findings += resting_motor_findings(recording)
     recording = _audited_motor(recording, plant.sensors, findings)
     recording = replace(
         recording,
-        tension=_audited_tension(recording, plant.sensors, findings),
-        bending=_audited_bending(recording, plant, findings),
+        tension=_audited_tension(recording, plant.sensors, findings, noisy),
+        bending=_audited_bending(recording, plant, findings, noisy),
     )
     order = {Severity.FAULT: 0, Severity.NOTE: 1}
     findings.sort(key=lambda f: order[f.severity])
@@ -87,28 +87,28 @@ def _on_ordered_stamps(recording: Recording, findings: list[Finding]) -> Recordi
     return recording.with_series(cleaned)
 
 
-def _as_meant(recording: Recording, plant: PlantDescription, misread: list[Finding]) -> Recording:
+def _as_meant(
+    recording: Recording, plant: PlantDescription, misread: list[Finding]
+) -> tuple[Recording, bool]:
+    """The recording as it must be meant, and whether its readings have noise."""
     if recording.duration < LEAST_DURATION_S:
-        return recording
+        return recording, True
     plant = plant.of_joints(recording.joints)
     comparison = Comparison(recording, plant)
+    noisy = comparison.is_noisy()
     frozen = frozen_findings(
-        recording,
-        comparison.grid,
-        comparison.expected(),
-        comparison.noise,
-        comparison.is_noisy(),
+        recording, comparison.grid, comparison.expected(), comparison.noise, noisy
     )
     misread += frozen
     if not moves(recording.command):
-        return recording
+        return recording, noisy
     if frozen:
         topics = {signal.partition(':')[0] for f in frozen for signal in f.signals}
         still = [n for n, s in recording.measured().items() if s.topic in topics]
         comparison = Comparison(recording, plant, still)
     mistakes = comparison.judged().mistakes
     misread += as_findings(recording, mistakes)
-    return as_meant(recording, mistakes)
+    return as_meant(recording, mistakes), noisy
 
 
 def _on_one_clock(recording: Recording, findings: list[Finding]) -> Recording:
@@ -194,7 +194,7 @@ def _audited_motor(
 
 
 def _audited_tension(
-    recording: Recording, sensors: SensorParameters, findings: list[Finding]
+    recording: Recording, sensors: SensorParameters, findings: list[Finding], noisy: bool
 ) -> Series:
     series = recording.tension
     interval = usual_interval(series.time)
@@ -221,14 +221,15 @@ def _audited_tension(
             repeated, _ = held(
                 values, sensors.load_cell_noise, sensors.load_cell_resolution, interval
             )
-            repeated &= ~at_limit
+            # A reading without noise, as of a simulation, may well repeat itself.
+            repeated &= ~at_limit & noisy
             findings += held_findings(joint, signal, series.time, repeated)
             wrong[:, j, wire] = at_limit | repeated
     return series.without(wrong)
 
 
 def _audited_bending(
-    recording: Recording, plant: PlantDescription, findings: list[Finding]
+    recording: Recording, plant: PlantDescription, findings: list[Finding], noisy: bool
 ) -> Series:
     series = recording.bending
     interval = usual_interval(series.time)
@@ -239,6 +240,7 @@ def _audited_bending(
         signal = signal_name('bending', joint)
         values = series.values[:, j]
         repeated, _ = held(values, plant.sensors.tracker_noise, 0.0, interval)
+        repeated &= noisy
         findings += held_findings(joint, signal, series.time, repeated)
         travel = motor_travel(series.time, motor.time, motor.values[:, j] / gear(), 3.0 * interval)
         spikes = find_outliers(values, plant.sensors.tracker_noise, travel)

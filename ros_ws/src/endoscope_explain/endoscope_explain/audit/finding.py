@@ -30,7 +30,7 @@ class Finding:
     joint : str
         Joint it concerns; the first one if it concerns all.
     stage : str
-        `recording` or `sensing`.
+        `recording`, `sensing` or, for exchanged or inverted motors, `actuator`.
     signals : tuple of str
         Written `wires/measured_js:wire_x_pos`.
     intervals : tuple of (float, float)

@@ -120,8 +120,8 @@ def held_findings(joint: str, signal: str, time: Array, repeated: Mask) -> list[
             'recording',
             (signal,),
             spans,
-            f'{signal} stands still for up to {longest:.3f} s (first from {spans[0][0]:.3f} s), '
-            'which its noise does not allow: the source repeated an old sample',
+            f'{signal} repeats an old sample for up to {longest:.3f} s, first from '
+            f'{spans[0][0]:.3f} s',
             'repeated samples are not judged',
             evidence={'count': float(repeated.sum()), 'longest_s': longest},
         )

@@ -229,10 +229,17 @@ def _finding(recording: Recording, mistake: Misreading) -> Finding:
         name,
         Severity.UNUSABLE,
         recording.joints[mistake.touched[0] // per_joint],
-        'recording',
+        _stage(mistake),
         signals,
         ((0.0, recording.duration),),
         text,
         remedy,
         evidence=evidence,
     )
+
+
+def _stage(mistake: Misreading) -> str:
+    """The part of the chain that somebody has touched: plugs and signs are of a device."""
+    if mistake.kind not in ('sign', 'order'):
+        return 'recording'
+    return 'sensing' if mistake.quantity in ('tension', 'bending') else 'actuator'

@@ -136,7 +136,6 @@ def gap_findings(
     # The first missing sample was due between one interval after the last sample and that sample.
     onset = Estimate(begin + 0.5 * usual, begin, begin + usual, 's')
     missing = {t: sum(b - a - intervals[t] for a, b in g) for t, g in gaps_by_topic.items() if g}
-    counts = ', '.join(f'{t} ({missing[t]:.3f} s in {len(gaps_by_topic[t])})' for t in topics)
     return [
         Finding(
             showing(Symptom.MISSING_SAMPLES).id,
@@ -145,7 +144,7 @@ def gap_findings(
             'recording',
             topics,
             tuple(sorted({(a, b) for _, a, b, _ in every})),
-            f'samples are missing: {counts}; the longest gap lasts {length:.3f} s '
+            f'samples of {", ".join(topics)} are missing: the longest gap lasts {length:.3f} s '
             f'from {begin:.3f} s',
             'nothing is judged where samples are missing',
             parameters={

@@ -82,9 +82,20 @@ def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place
     term = explanation.unknown
     recorded = view(recording, {'refitted': explanation.refitted})
     found = excess_between(list(recorded.signals.values()), 'refitted', None)
-    joint = term.joint if term is not None else found[0].view.joint
-    stage = term.stage if term is not None else 'joint'
-    return [place(recording, found, stage, joint)]
+    if term is not None and term.helps:
+        return [place(recording, found, term.stage, term.joint)]
+    return [place(recording, found, _shows_in(found), found[0].view.joint)]
+
+
+def _shows_in(found: Sequence[SignalExcess]) -> str:
+    """Stage of what is wrong with no function known, by the signals that show it."""
+    # Off by more than its noise: a tracker has too few samples for a share of the misfit.
+    off = {e.view.quantity for e in found if e.total > len(e.excess)}
+    behind = off & {'tension', 'bending'}
+    if not behind:
+        return 'actuator'
+    # A wrong tension bends the joint wrongly too: alone, either is misread.
+    return 'joint' if len(behind) == 2 else 'sensing'
 
 
 def locate_parameters(recording: Recording, explanation: Explanation) -> list[Place]:

@@ -78,9 +78,8 @@ def propose(
     columns[:, JOINTS.index(best.joint)] = best.angle
     rivals = ' and '.join(plants)
     return NextExperiment(
-        f'{best.name.capitalize()} of {best.joint} would tell {rivals} apart: there their '
-        f'predictions differ by {distances[best.name]:.1f} times the noise at least, after each '
-        'has been refitted to the other.',
+        f'{best.name.capitalize()} of {best.joint} would tell {rivals} apart. Each refitted to the '
+        f'other, they still differ by {distances[best.name]:.1f} times the noise at least.',
         tuple(plants),
         best.name,
         best.joint,

@@ -153,6 +153,7 @@ def explain(
         band,
         effects,
         namespace=namespace,
+        plant_file=None if isinstance(plant, PlantDescription) else Path(plant),
     )
     return Explained(explained_case(sources, jobs, progress))
 

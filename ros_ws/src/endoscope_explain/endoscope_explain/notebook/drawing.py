@@ -13,16 +13,6 @@ OUTSIDE = {'loc': 'upper left', 'bbox_to_anchor': (1.0, 1.0), 'fontsize': 7, 'fr
 """Where a legend hides no curve."""
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return rows below their heads in columns of even width."""
-    lines = [head, *rows]
-    widths = [max(len(row[k]) for row in lines) for k in range(len(head))]
-    return '\n'.join(
-        '  '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in lines
-    )
-
-
 def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return the same as an HTML table."""
     lines = [''.join(f'<th>{escape(cell)}</th>' for cell in head)]

@@ -13,19 +13,19 @@ from endoscope_core.atomic_output import atomic_directory
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explanation import NamedEffect, NominalEstimate
-from endoscope_explain.notebook.drawing import OUTSIDE, embedded, html_table, table
+from endoscope_explain.notebook.drawing import OUTSIDE, embedded, html_table
 from endoscope_explain.predicted_signals import RecordedView, view
 from endoscope_explain.report.html_page import html_page
+from endoscope_explain.report.numbers import PLANTS, Shown, measurable, shown
 from endoscope_explain.report.report_mapping import report_mapping
-from endoscope_explain.report.sentences import HEADLINES, verdict_sentence
+from endoscope_explain.report.sentences import HEADLINES, next_step, verdict_sentence
+from endoscope_explain.report.terminal import fits_table, told
 from endoscope_explain.report.writing import write_report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_EFFECTS = ('effect', 'joint', 'probability', 'parameter', 'value', '90 % interval', 'unit')
-_FITS = ('signal', 'given plant', 'refitted', 'improved')
-GIVEN, IMPROVED = 'nominal', 'augmented'
+_EFFECTS = ('effect', 'joint', 'probability', 'number', 'value', '90 % interval', 'unit')
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,10 @@ class Explained:
 
     @cached_property
     def predicted(self) -> RecordedView:
-        """Every signal as measured, and as the plant given and the improved one predict it."""
+        """Every signal as measured, and as the described plant and the improved one predict it."""
         explanation = self.case.explanation
-        plants = {GIVEN: explanation.nominal, IMPROVED: explanation.augmented}
+        best = 'refitted' if explanation.augmented == explanation.refitted else 'augmented'
+        plants = {'nominal': explanation.nominal, best: explanation.augmented}
         return view(self.case.recording, plants)
 
     def page(self) -> str:
@@ -89,7 +90,7 @@ class Explained:
         return Path(folder)
 
     def plot(self) -> 'Figure':
-        """Draw each joint's angle: as measured, and by the plant given and the improved one.
+        """Draw each joint's angle: as measured, and by the described plant and the improved one.
 
         Returns
         -------
@@ -106,15 +107,16 @@ class Explained:
         )[:, 0].tolist()
         for angle, error, signal in zip(axes[::2], axes[1::2], bending, strict=True):
             angle.plot(signal.time, np.degrees(signal.measured), c='#9aa5b1', lw=2.4)
-            for name, colour in ((GIVEN, '#b3261e'), (IMPROVED, '#136b4f')):
-                predicted = signal.predicted[name]
+            for (name, predicted), style, colour in zip(
+                signal.predicted.items(), ('-', '--'), ('#b3261e', '#136b4f'), strict=True
+            ):
                 wrong = np.degrees(predicted - signal.measured)
-                style = {GIVEN: '-', IMPROVED: '--'}[name]
                 angle.plot(signal.time, np.degrees(predicted), style, c=colour, lw=1.1)
                 rmse = float(np.sqrt(np.mean(wrong**2)))
-                label = {GIVEN: 'plant given', IMPROVED: 'improved plant'}[name]
-                error.plot(signal.time, wrong, c=colour, lw=0.9, label=f'{label}: {rmse:.2f} rms')
-            angle.legend(['measured', 'plant given', 'improved plant'], **OUTSIDE)
+                error.plot(
+                    signal.time, wrong, c=colour, lw=0.9, label=f'{PLANTS[name]}: {rmse:.2f} rms'
+                )
+            angle.legend(['measured', *(PLANTS[name] for name in signal.predicted)], **OUTSIDE)
             angle.set_ylabel(f'{signal.joint} [deg]')
             error.set_ylabel('error [deg]')
             error.legend(**OUTSIDE)
@@ -127,30 +129,15 @@ class Explained:
         rows: list[tuple[str, ...]] = []
         for effect in self.effects:
             named = (effect.id, effect.joint, f'{effect.probability:.2f}')
-            for name, e in effect.parameters.items() or [('-', None)]:
-                told = ('-', '-', '-') if e is None else _told(e.value, e.low, e.high, e.unit)
-                rows.append((*named, name, *told))
+            numbers = [shown(name, e) for name, e in measurable(effect).items()]
+            for one in numbers or [Shown('-', '-', '-', '-', '-')]:
+                rows.append((*named, one.name, one.value, f'{one.low} to {one.high}', one.unit))
                 named = ('', '', '')
         return rows
 
-    def _fit_rows(self) -> list[tuple[str, ...]]:
-        rungs = [self.case.ladder.get(rung, {}) for rung in (GIVEN, 'refitted', IMPROVED)]
-        return [
-            (signal, *(f'{rung[signal].ratio:.2f}' if signal in rung else '-' for rung in rungs))
-            for signal in rungs[0]
-        ]
-
     def __repr__(self) -> str:
-        parts = [
-            f'{self.case.recording.name}: {self.verdict}. {HEADLINES[self.case.verdict]}.',
-            verdict_sentence(self.case),
-        ]
-        if self.effects:
-            parts.append(table(_EFFECTS, self._effect_rows()))
-        fits = self._fit_rows()
-        if fits:
-            parts += ['rms error over noise, on samples held out:', table(_FITS, fits)]
-        return '\n'.join(parts)
+        name = self.case.recording.name
+        return f'{name}: {self.verdict}. {HEADLINES[self.case.verdict]}.\n{told(self.case)}'
 
     def _repr_html_(self) -> str:
         name = escape(self.case.recording.name)
@@ -160,13 +147,10 @@ class Explained:
         ]
         if self.effects:
             parts.append(html_table(_EFFECTS, self._effect_rows()))
-        fits = self._fit_rows()
+        fits = fits_table(self.case)
         if fits:
-            parts.append('<p>rms error over noise, on samples held out</p>')
-            parts.append(html_table(_FITS, fits))
+            parts.append('<p>rmse / noise, on samples held out</p>')
+            parts.append(html_table(*fits))
             parts.append(embedded(self.plot()))
+        parts.append(f'<p>{escape(next_step(self.case))}</p>')
         return ''.join(parts)
-
-
-def _told(value: float, low: float, high: float, unit: str) -> tuple[str, str, str]:
-    return f'{value:.4g}', f'{low:.4g} to {high:.4g}', unit

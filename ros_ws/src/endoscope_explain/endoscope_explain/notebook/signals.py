@@ -14,8 +14,9 @@ from endoscope_bags import open_bag
 from endoscope_bags.errors import MissingTopicError
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import EndoscopeError, nearest
-from endoscope_explain.notebook.drawing import OUTSIDE, embedded, html_table, table
+from endoscope_explain.notebook.drawing import OUTSIDE, embedded, html_table
 from endoscope_explain.recording.series import MOTOR, WIRES
+from endoscope_explain.report.columns import table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,6 +12,7 @@ from endoscope_explain.explanation import (
     NominalEstimate,
     UnknownTerm,
 )
+from endoscope_explain.tolerance import tolerance
 
 SCHEMA = 1
 
@@ -38,7 +39,7 @@ def report_mapping(case: ExplainedCase) -> dict[str, Any]:
         'where': [_place(place) for place in case.places],
         'effects': [_effect(effect) for effect in case.effects],
         'parameters': {
-            joint: {name: _nominal(e) for name, e in estimates.items()}
+            joint: {name: _nominal(name, e, case.band) for name, e in estimates.items()}
             for joint, estimates in case.explanation.parameters.items()
         },
         'fit': _ladder(case),
@@ -60,7 +61,10 @@ def _place(place: Place) -> dict[str, Any]:
 
 
 def _effect(effect: NamedEffect) -> dict[str, Any]:
-    bounds = _bounds(effect.id)
+    known = CATALOGUE[effect.id].parameters if effect.id in CATALOGUE else ()
+    bounds = {p.name: (p.low, p.high) for p in known}
+    # What chooses a form is no number; plant.yaml has it.
+    switches = {p.name for p in known if p.is_switch}
     return {
         'id': effect.id,
         'joint': effect.joint,
@@ -71,17 +75,11 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         'parameters': {
             name: _estimate(e, f'{effect.id}.{name}', bounds.get(name))
             for name, e in effect.parameters.items()
+            if name not in switches
         },
         'alternatives': list(effect.alternatives),
         'evidence': {k: float(v) for k, v in effect.evidence.items() if math.isfinite(v)},
     }
-
-
-def _bounds(effect_id: str) -> dict[str, tuple[float, float]]:
-    definition = CATALOGUE.get(effect_id)
-    if definition is None:
-        return {}
-    return {p.name: (p.low, p.high) for p in definition.parameters}
 
 
 def _estimate(
@@ -100,11 +98,12 @@ def _estimate(
     }
 
 
-def _nominal(estimate: NominalEstimate) -> dict[str, Any]:
+def _nominal(name: str, estimate: NominalEstimate, band: float) -> dict[str, Any]:
+    low, high = tolerance(name, estimate.nominal, band)
     return {
         'nominal': _finite(estimate.nominal, 'nominal'),
         **_estimate(estimate, 'parameter'),
-        'in_band': estimate.in_band,
+        'in_band': low <= estimate.value <= high,
     }
 
 

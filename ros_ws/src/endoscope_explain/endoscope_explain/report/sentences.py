@@ -1,9 +1,12 @@
-"""The verdict in one sentence."""
+"""What was found, in sentences of at most twenty words."""
+
+from collections.abc import Sequence
 
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.case import ExplainedCase, Ladder
+from endoscope_explain.case import ExplainedCase, Place
 from endoscope_explain.combine import changed_parameters
-from endoscope_explain.explanation import NamedEffect, Verdict
+from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
+from endoscope_explain.report.numbers import PLANTS, digits, form, in_degrees, judged
 
 HEADLINES = {
     Verdict.CONSISTENT: 'Simulation and recording agree',
@@ -14,75 +17,147 @@ HEADLINES = {
     Verdict.UNKNOWN_PHYSICS: 'Physics outside the catalogue',
     Verdict.INSUFFICIENT_DATA: 'The recording cannot tell',
 }
-
-LEAST_EXPLAINED = 0.05
-"""A formula that takes away less of the misfit than this is not offered as what acts."""
-
-
-def worst_ratio(ladder: Ladder, rung: str) -> float:
-    """Return the largest rmse / noise of any signal on a rung."""
-    return max(fit.ratio for fit in ladder[rung].values())
+EVIDENCE = {
+    'gain': 'log evidence that it adds, in nats',
+    'p_value': 'share of rigs without it in which as much is found',
+    'probability': 'that it is there',
+    'margin': 'score lost without it, in nats',
+    'gap': 'score lost by the best rival in its place, in nats',
+    'explained': 'share of the excess misfit that is gone with all that was found',
+    'count': 'samples that show it',
+    'gaps': 'number of gaps',
+    'missing_s': 'seconds without samples',
+    'longest_s': 'longest stretch in seconds',
+    'worst_s': 'largest step back in seconds',
+    'z': 'standard deviations from zero',
+    'factor': 'reading of one SI unit',
+    'per_second': 'stamps of one second',
+}
+"""What each number of an effect's evidence is."""
+LEAST_SHARE = 0.5
+"""A formula that does less of what the function does than this is no help."""
+MOST_NAMED = 2
 
 
 def verdict_sentence(case: ExplainedCase) -> str:
-    """Say in one sentence what was found and how much better the improved plant predicts."""
+    """Say in one sentence what was found."""
     if case.verdict is Verdict.INSUFFICIENT_DATA:
         return 'The rig moves too little, or too little was recorded, to tell causes apart.'
     if case.audit.unusable:
-        return ' '.join(f'{f.text}; {f.remedy}.' for f in case.audit.faults())
-    before = worst_ratio(case.ladder, 'nominal')
-    after = worst_ratio(case.ladder, 'augmented')
-    better = (
-        f'with that, the worst signal is {_times(after)} its noise on held-out data, '
-        f'before {_times(before)}'
-    )
-    named = '; '.join(_named(effect) for effect in case.effects)
+        return f'{_capital(case.audit.faults()[0].text)}.'
     if case.verdict is Verdict.CONSISTENT:
-        return (
-            f'Nothing is left out and no parameter is beyond its tolerance: what remains is '
-            f'{_times(after)} the noise.'
-        )
+        return f'The described plant predicts the recording of {_all(case.recording.joints)}.'
     if case.verdict is Verdict.PARAMETERS_DIFFER:
-        return f'{_differing(case)}; {better}.'
+        return _differing(case)
     if case.verdict is Verdict.UNKNOWN_PHYSICS:
-        return _unknown(case, better)
-    if not case.effects:
-        faults = '; '.join(f.text for f in case.audit.faults())
-        return f'{faults}.'
-    return f'{named}; {better}.'
+        return _unknown(case)
+    if case.effects:
+        named = [f'{e.id} on {e.joint} ({_percent(e)})' for e in case.effects[:MOST_NAMED]]
+        more = len(case.effects) - len(named)
+        named += [f'{more} more'] if more else []
+        missing = case.verdict is Verdict.MISSING_PHYSICS
+        begin = 'The simulation leaves out' if missing else 'The recording shows'
+        return f'{begin} {_all(named)}.'
+    return f'{_capital(case.audit.faults()[0].text)}.'
 
 
-def _named(effect: NamedEffect) -> str:
+def physics_of(effect: NamedEffect) -> str:
+    """What an effect does, and in which form."""
     definition = CATALOGUE.get(effect.id)
     physics = definition.physics.rstrip('.') if definition else effect.id.replace('_', ' ')
-    return f'{physics} ({effect.id} on {effect.joint}, {100 * effect.probability:.0f} %)'
+    said = form(effect)
+    return f'{physics}.' + (f' Here: {", ".join(said)}.' if said else '')
+
+
+def where(place: Place) -> str:
+    """Where a mismatch shows: in which state of the rig, or in which signals."""
+    how = place.regime if place.shares else ' and '.join(map(plain, place.signals))
+    return f'{place.stage} of {place.joint}, {how}'
+
+
+def differing(case: ExplainedCase) -> dict[tuple[str, str], NominalEstimate]:
+    """Parameters that changed, by joint and name, the largest change of each joint first."""
+    return {
+        (joint, name): e
+        for joint, estimates in case.explanation.parameters.items()
+        for name, e in changed_parameters(estimates).items()
+    }
+
+
+def before_and_after(case: ExplainedCase) -> str:
+    """Say how well the worst signal is predicted before and after; empty where nothing is."""
+    plants = judged(case, case.ladder)
+    if not plants.get('nominal'):
+        return ''
+    signal, before = max(plants['nominal'].items(), key=lambda item: item[1].ratio)
+    best = 'augmented' if 'augmented' in plants else 'refitted'
+    after = plants[best][signal].ratio if best in plants else before.ratio
+    return (
+        f'{plain(signal)} is off by {digits(before.ratio)} times its noise with the described '
+        f'plant, by {digits(after)} times with the {PLANTS[best]} one.'
+    )
+
+
+def plain(signal: str) -> str:
+    """A signal's name as a person writes it."""
+    return signal.replace('/measured_js', '')
+
+
+def next_step(case: ExplainedCase) -> str:
+    """Say what to do next."""
+    if case.verdict is Verdict.INSUFFICIENT_DATA:
+        return 'Record at least 10 s in which the motors move both ways, such as a calibration.'
+    if case.audit.unusable:
+        return f'{_capital(case.audit.faults()[0].remedy)}.'
+    if case.next_experiment is not None:
+        rivals = _all(case.next_experiment.separates)
+        return f'Play next_experiment.csv on the console: it tells {rivals} apart.'
+    doubtful = next((e for e in case.effects if e.alternatives), None)
+    if doubtful is not None:
+        return (
+            f'Run again without --quick for the motion that tells {doubtful.id} from '
+            f'{doubtful.alternatives[0]}.'
+        )
+    if case.verdict is Verdict.CONSISTENT:
+        return 'Go on with the described plant.'
+    if case.verdict is Verdict.SENSOR_FAULT:
+        return 'Mend or calibrate the sensor, and record again.'
+    if case.verdict is Verdict.RECORDING_FAULT and case.audit.faults():
+        return 'Mend the recording, or go on: nothing was judged where it is wrong.'
+    if not case.validation:
+        return 'Judge plant.yaml on a second recording: give one with --validate.'
+    return 'Go on with plant.yaml.'
 
 
 def _differing(case: ExplainedCase) -> str:
-    apart = [
-        f'{name} of {joint} is {e.value:.3g} instead of {e.nominal:.3g} {e.unit}'.rstrip(' -')
-        for joint, estimates in case.explanation.parameters.items()
-        for name, e in changed_parameters(estimates).items()
-    ]
-    return '; '.join(apart) if apart else 'Parameters differ within their tolerance'
-
-
-def _unknown(case: ExplainedCase, better: str) -> str:
-    term = case.explanation.unknown
-    if term is None:
-        return f'A significant mismatch remains that no effect of the catalogue explains; {better}.'
-    if term.explained < LEAST_EXPLAINED:
-        return (
-            f'A significant mismatch of {term.joint} remains that neither an effect of the '
-            f'catalogue nor a function of one state explains; {better}.'
-        )
-    what = f'{term.what[0].lower()}{term.what[1:]}'
-    siblings = f', nearest to {" and ".join(term.siblings[:2])}' if term.siblings else ''
+    changed = differing(case)
+    if not changed:
+        return 'Parameters differ within their tolerance.'
+    (joint, name), e = next(iter(changed.items()))
+    name, unit, factor = in_degrees(name, e.unit)
+    more = f', and {len(changed) - 1} more differ' if len(changed) > 1 else ''
     return (
-        f'No effect of the catalogue explains the mismatch of {term.joint}; {what} accounts for '
-        f'{100 * term.explained:.0f} % of it{siblings}; {better}.'
+        f'{name} of {joint} is {digits(factor * e.value)} instead of {digits(factor * e.nominal)}'
+        f'{f" {unit}" if unit else ""}{more}.'
     )
 
 
-def _times(ratio: float) -> str:
-    return f'{ratio:.2f} times' if ratio < 10 else f'{ratio:.0f} times'
+def _unknown(case: ExplainedCase) -> str:
+    term = case.explanation.unknown
+    if term is None or not term.helps:
+        joint = case.places[0].joint if case.places else case.recording.joints[0]
+        return f'Neither an effect of the catalogue nor a function of one state explains {joint}.'
+    return f'Missing on {term.joint}: {term.what[0].lower()}{term.what[1:]}.'
+
+
+def _percent(effect: NamedEffect) -> str:
+    return f'{100 * effect.probability:.0f} %'
+
+
+def _all(names: Sequence[str]) -> str:
+    return ' and '.join([', '.join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+
+
+def _capital(text: str) -> str:
+    # The name of a signal stays as it is.
+    return text if '/' in text.split(maxsplit=1)[0] else text[:1].upper() + text[1:]

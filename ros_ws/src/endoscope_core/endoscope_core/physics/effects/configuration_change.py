@@ -17,7 +17,9 @@ EFFECT = Effect(
         Parameter('time_s', 's', 0.0, 3600.0, 15.0, starts=onset.STARTS, comparable=True),
         Parameter('factor', '-', 0.1, 8.0, 1.6, off=1.0, starts=(1.4,)),
         Parameter('duration_s', 's', 0.0, 5.0, 0.0, starts=(0.05,)),
-        Parameter('smooth', '-', 0.0, 1.0, 0.0, counted=True),
+        Parameter(
+            'smooth', '-', 0.0, 1.0, 0.0, counted=True, words=('changes evenly', 'changes smoothly')
+        ),
     ),
     traits=Traits(depends_on_time=True, families=('exponent_of_time',)),
 )

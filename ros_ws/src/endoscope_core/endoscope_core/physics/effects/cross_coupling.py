@@ -9,8 +9,7 @@ EFFECT = Effect(
     'cross_coupling',
     Stage.JOINT,
     60,
-    physics='The other bending joint moves this one: through the elastic section, or because its '
-    "bending changes the length of this joint's wires.",
+    physics='The other bending joint moves this one, through the elastic section or its wires.',
     equation='tau = moment_per_rad q_other + moment_per_rad2 q_other^2; w(Phi) = +-joint_radius '
     '(q - wire_per_rad q_other)',
     source='Tsai, Robot Analysis, Wiley 1999, ch. 7 (tendon routing); Camarillo et al., IEEE '

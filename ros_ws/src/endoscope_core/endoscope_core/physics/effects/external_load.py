@@ -23,7 +23,9 @@ EFFECT = Effect(
         ),
         Parameter('time_s', 's', 0.0, 3600.0, 15.0, starts=STARTS, comparable=True),
         Parameter('duration_s', 's', 0.0, 5.0, 0.0, starts=(0.05,)),
-        Parameter('smooth', '-', 0.0, 1.0, 0.0, counted=True),
+        Parameter(
+            'smooth', '-', 0.0, 1.0, 0.0, counted=True, words=('changes evenly', 'changes smoothly')
+        ),
         Parameter('hold_s', 's', 0.02, EVER, EVER, starts=(EVER, 2.0)),
         Parameter('period_s', 's', 0.04, EVER, EVER),
     ),

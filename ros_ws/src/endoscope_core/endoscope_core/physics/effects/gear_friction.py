@@ -10,8 +10,8 @@ EFFECT = Effect(
     'gear_friction',
     Stage.ACTUATOR,
     70,
-    physics="Friction of gear and motor: the motor's effort takes it on with the sign of its "
-    'speed; nothing behind the motor feels it.',
+    physics="Friction of gear and motor: the motor's effort takes it on, and nothing behind the "
+    'motor feels it.',
     equation="effort = tau + torque_nm tanh(m' / speed_rad_per_s) + viscous m'",
     source='Coulomb friction smoothed by tanh, with a viscous part: Andersson, Soderberg, '
     'Bjorklund, Tribology International 40(4), 2007',

@@ -13,7 +13,15 @@ EFFECT = Effect(
     source='VDI/VDE 2638, characteristics of force transducers (crosstalk)',
     parameters=(
         Parameter('share', '-', -0.9, 0.9, 0.1, off=0.0, starts=(0.05,)),
-        Parameter('wire', '-', 0.0, 2.0, 0.0, choices=(0.0, 1.0, 2.0)),
+        Parameter(
+            'wire',
+            '-',
+            0.0,
+            2.0,
+            0.0,
+            choices=(0.0, 1.0, 2.0),
+            words=('the cell of the positive wire', 'the cell of the negative wire', 'both cells'),
+        ),
     ),
     traits=Traits(families=('load_cell_pos_of_other_wire', 'load_cell_neg_of_other_wire')),
 )

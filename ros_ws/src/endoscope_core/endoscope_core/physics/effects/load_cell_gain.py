@@ -13,7 +13,15 @@ EFFECT = Effect(
     source='VDI/VDE 2638, characteristics of force transducers (gain error)',
     parameters=(
         Parameter('gain', '-', 0.2, 3.0, 1.15, off=1.0, starts=(1.05,), comparable=True),
-        Parameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
+        Parameter(
+            'wire',
+            '-',
+            0.0,
+            1.0,
+            0.0,
+            choices=(0.0, 1.0),
+            words=('the cell of the positive wire', 'the cell of the negative wire'),
+        ),
     ),
     traits=Traits(families=('load_cell_pos_of_tension', 'load_cell_neg_of_tension')),
 )

@@ -15,7 +15,15 @@ EFFECT = Effect(
         Parameter(
             'limit_n', 'N', 0.1, 500.0, 7.0, off=500.0, starts=(5.5, 7.0, 9.0), comparable=True
         ),
-        Parameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
+        Parameter(
+            'wire',
+            '-',
+            0.0,
+            1.0,
+            0.0,
+            choices=(0.0, 1.0),
+            words=('the cell of the positive wire', 'the cell of the negative wire'),
+        ),
     ),
     traits=Traits(symptom=Symptom.CLIPPED_TENSION),
 )

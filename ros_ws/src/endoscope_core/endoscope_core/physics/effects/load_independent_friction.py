@@ -9,8 +9,8 @@ EFFECT = Effect(
     'load_independent_friction',
     Stage.TRANSMISSION,
     100,
-    physics="A part of the sheath's friction does not grow with the tension: seals, lubricant, "
-    'normal force that a slack wire has too.',
+    physics="A part of the sheath's friction does not grow with the tension: seals, lubricant, a "
+    "slack wire's own pressure.",
     equation='dT/dphi = -+(T + force_n / Phi) where the wire slides: force_n over the whole sheath',
     source='Derjaguin, Z. Phys. 88, 1934 (mu (N + N0)); around a capstan: Jung, Pan, Kang, Mech. '
     'Mach. Theory 43(6), 2008 (friction not proportional to the normal force)',

@@ -27,7 +27,15 @@ EFFECT = Effect(
             starts=(0.2, 0.4, 0.7, 1.5),
             comparable=True,
         ),
-        Parameter('of_command', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
+        Parameter(
+            'of_command',
+            '-',
+            0.0,
+            1.0,
+            0.0,
+            choices=(0.0, 1.0),
+            words=('the servo saturates', 'the command is slewed'),
+        ),
     ),
     traits=Traits(families=('servo_error_of_error',)),
 )

@@ -19,7 +19,15 @@ EFFECT = Effect(
     parameters=(
         Parameter('time_s', 's', 0.0, 3600.0, 5.0, comparable=True),
         Parameter('duration_s', 's', 0.0, 600.0, 0.5, off=0.0),
-        Parameter('topic', '-', 0.0, 2.0, 2.0, choices=(0.0, 1.0, 2.0)),
+        Parameter(
+            'topic',
+            '-',
+            0.0,
+            2.0,
+            2.0,
+            choices=(0.0, 1.0, 2.0),
+            words=('samples of the motors', 'samples of the wires', 'samples of the tracker'),
+        ),
     ),
     traits=Traits(audited=True, symptom=Symptom.MISSING_SAMPLES),
 )

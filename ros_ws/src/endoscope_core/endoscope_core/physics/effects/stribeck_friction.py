@@ -17,7 +17,15 @@ EFFECT = Effect(
     parameters=(
         Parameter('rise', '-', 0.0, 3.0, 0.5, off=0.0, starts=(0.4,)),
         Parameter('stribeck_speed', 'm/s', 1e-5, 2e-2, 1e-3, starts=(3e-4, 1e-3, 3e-3)),
-        Parameter('tail', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0)),
+        Parameter(
+            'tail',
+            '-',
+            0.0,
+            1.0,
+            0.0,
+            choices=(0.0, 1.0),
+            words=('falls exponentially with the speed', 'falls with a long tail'),
+        ),
     ),
     traits=Traits(rugged=True, families=('exponent_of_speed',)),
 )

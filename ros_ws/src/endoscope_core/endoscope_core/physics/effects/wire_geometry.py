@@ -9,8 +9,8 @@ EFFECT = Effect(
     'wire_geometry',
     Stage.TRANSMISSION,
     110,
-    physics='One wire gives more than the other takes: the lengths of both in a section of hinged '
-    'rings have a part with the cosine of the angle, which is the same for both.',
+    physics='One wire gives more than the other takes: both lengths have a part with the cosine of '
+    'the angle.',
     equation='w(0) = +-r m - asymmetry (r m)^2 / r, r = pulley_radius; a section of n hinges whose '
     'wires pass them at a distance d and a height h takes +-2 n d sin(q / 2 n) and gives '
     '2 n h (1 - cos(q / 2 n))',

@@ -2,12 +2,14 @@
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from endoscope_explain.predicted_signals import RecordedView, SignalView
 from endoscope_explain.report.figures.style import (
     RUNG_COLOUR,
+    RUNG_STYLE,
     RUNG_TITLE,
     STYLE,
     svg,
@@ -17,7 +19,6 @@ from endoscope_explain.report.figures.style import (
 Array = NDArray[np.float64]
 
 PASSAGE_S = 8.0
-SHOWN = ('nominal', 'augmented')
 
 
 def telling_passage(recorded: RecordedView, joint: str) -> tuple[float, float]:
@@ -79,15 +80,7 @@ def loops_figure(
             time = one.time[inside]
             angle = np.degrees(np.interp(time, *command))
             for name, values, width in _curves(one, inside):
-                x, y = thinned(angle, values)
-                axis.plot(
-                    x,
-                    y,
-                    color=RUNG_COLOUR[name],
-                    lw=width,
-                    label=RUNG_TITLE[name],
-                    zorder=1 if name == 'measured' else 2,
-                )
+                _draw(axis, angle, name, values, width)
             axis.set_title(_title(one))
             axis.set_xlabel('command (deg)')
         figure.legend(
@@ -97,28 +90,41 @@ def loops_figure(
 
 
 def signals_figure(recorded: RecordedView, joint: str, passage: tuple[float, float]) -> str:
-    """Plot angle and tensions over time, measured and predicted, in a passage."""
+    """Plot angle and tensions over time, measured and predicted, and what each plant misses."""
     views = _shown(recorded, joint)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 1.5 * len(views) + 0.4), layout='constrained')
-        axes = figure.subplots(len(views), 1, sharex=True, squeeze=False)[:, 0]
-        for axis, one in zip(axes, views, strict=True):
+        axes = figure.subplots(len(views), 2, sharex=True, squeeze=False, width_ratios=(1.6, 1.0))
+        for (axis, missed), one in zip(axes, views, strict=True):
             inside = (one.time >= passage[0]) & (one.time <= passage[1])
-            for name, values, width in _curves(one, inside):
-                x, y = thinned(one.time[inside], values)
-                axis.plot(
-                    x,
-                    y,
-                    color=RUNG_COLOUR[name],
-                    lw=width,
-                    label=RUNG_TITLE[name],
-                    zorder=1 if name == 'measured' else 2,
-                )
+            curves = _curves(one, inside)
+            for name, values, width in curves:
+                _draw(axis, one.time[inside], name, values, width)
+                if name != 'measured':
+                    _draw(missed, one.time[inside], name, curves[0][1] - values, width)
             axis.set_title(_title(one))
-        axes[0].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8)
-        axes[-1].set_xlabel('time (s)')
-        axes[-1].set_xlim(passage)
+            missed.set_title('measured - predicted')
+        axes[0, 0].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8)
+        for axis in axes[-1]:
+            axis.set_xlabel('time (s)')
+            axis.set_xlim(passage)
         return svg(figure)
+
+
+def _draw(axis: Axes, across: Array, name: str, values: Array, width: float) -> None:
+    axis.plot(
+        *thinned(across, values),
+        RUNG_STYLE[name],
+        color=RUNG_COLOUR[name],
+        lw=width,
+        label=RUNG_TITLE[name],
+        zorder=1 if name == 'measured' else 2,
+    )
+
+
+def shown_plants(one: SignalView) -> tuple[str, ...]:
+    """The described plant and the best one, once where they are the same."""
+    return tuple(dict.fromkeys((next(iter(one.predicted)), list(one.predicted)[-1])))
 
 
 def _shown(recorded: RecordedView, joint: str) -> list[SignalView]:
@@ -130,9 +136,7 @@ def _shown(recorded: RecordedView, joint: str) -> list[SignalView]:
 def _curves(one: SignalView, inside: NDArray[np.bool_]) -> list[tuple[str, Array, float]]:
     convert = np.degrees if one.quantity == 'bending' else np.asarray
     curves = [('measured', convert(one.measured[inside]), 2.2)]
-    curves += [
-        (name, convert(one.predicted[name][inside]), 1.0) for name in SHOWN if name in one.predicted
-    ]
+    curves += [(name, convert(one.predicted[name][inside]), 1.0) for name in shown_plants(one)]
     return curves
 
 

@@ -7,6 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from endoscope_explain.report.numbers import MODELS
+
 Array = NDArray[np.float64]
 
 INK = '#1f2933'
@@ -21,14 +23,9 @@ RUNG_COLOUR = {
     'gaussian_process': '#8a6fb0',
     'neural_network': '#b08d2f',
 }
-RUNG_TITLE = {
-    'measured': 'measured',
-    'nominal': 'nominal',
-    'refitted': 'parameters refitted',
-    'augmented': 'with what was left out',
-    'gaussian_process': 'Gaussian process (black box)',
-    'neural_network': 'neural network (black box)',
-}
+RUNG_STYLE = {'measured': '-', 'nominal': '-', 'refitted': '--', 'augmented': '-.'}
+"""Dashes let a curve that nearly coincides with another one be seen."""
+RUNG_TITLE = {'measured': 'measured', **MODELS}
 MOST_POINTS = 1200
 
 STYLE: dict[Any, Any] = {

@@ -15,6 +15,7 @@ from endoscope_explain.report.figures.style import (
     GUILTY,
     INK,
     RUNG_COLOUR,
+    RUNG_STYLE,
     RUNG_TITLE,
     SHADE,
     STYLE,
@@ -23,6 +24,9 @@ from endoscope_explain.report.figures.style import (
 )
 
 Array = NDArray[np.float64]
+
+LEAST = 0.5
+"""What is less than this share of the noise is drawn here."""
 
 
 def timeline_figure(
@@ -63,7 +67,13 @@ def timeline_figure(
         centres, levels = _misfit(views)
         for name, level in levels.items():
             misfit.step(
-                centres, level, where='mid', color=RUNG_COLOUR[name], lw=1.1, label=RUNG_TITLE[name]
+                centres,
+                np.maximum(level, LEAST),
+                RUNG_STYLE[name],
+                where='mid',
+                color=RUNG_COLOUR[name],
+                lw=1.1,
+                label=RUNG_TITLE[name],
             )
         misfit.axhline(1.0, color=INK, lw=0.8, ls=':')
         misfit.annotate(
@@ -76,11 +86,11 @@ def timeline_figure(
             ha='right',
         )
         misfit.set_yscale('log')
-        misfit.set_ylim(0.5, max(10.0, 2.0 * float(np.nanmax(levels['nominal']))))
+        misfit.set_ylim(0.9 * LEAST, max(10.0, 2.0 * float(np.nanmax(levels['nominal']))))
         misfit.set_ylabel('misfit / noise')
         misfit.set_xlabel('time (s)')
-        fitted = '; shaded: what was left out shows' if len(levels) > 1 else ''
-        misfit.set_title(f'Misfit of its signals{fitted}')
+        marked = '; shaded: where it shows' if any(place.intervals for place in places) else ''
+        misfit.set_title(f'Misfit of its signals{marked}')
         misfit.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8)
         misfit.set_xlim(0.0, float(bending.time[-1]))
         return svg(figure)

@@ -1,0 +1,91 @@
+"""What a long command is doing: a bar in a terminal, else a line for each step."""
+
+import shutil
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import Self, TextIO
+
+WIDTH = 20
+REDRAWN_S = 1.0
+
+
+class ProgressLine:
+    """A bar of one line that says which step is under way, and for how long already.
+
+    Parameters
+    ----------
+    steps : int
+        How many steps there are, about: a bar is full only when all is done.
+    first : str
+        The step that begins at once. It is no line where there is no bar: bad input is refused in
+        it, with one line alone.
+    stream : TextIO, optional
+        Where to write; stderr if none is given. Where it is no terminal, each step is a line.
+    """
+
+    def __init__(self, steps: int, first: str, stream: TextIO | None = None) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._steps = steps
+        self._done = 0
+        self._step = first
+        self._begun = time.monotonic()
+        self._ended = threading.Event()
+        self._lock = threading.Lock()
+        self._shows = self._stream.isatty()
+        self._clock = threading.Thread(target=self._redraw, daemon=True)
+
+    def __enter__(self) -> Self:
+        """Start the clock."""
+        if self._shows:
+            self._draw()
+            self._clock.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Take the bar away."""
+        self._ended.set()
+        if self._shows:
+            self._clock.join()
+            self._write('\r\x1b[K')
+
+    def step(self, text: str) -> None:
+        """Say which step begins; what the audit finds is a line of its own."""
+        with self._lock:
+            remark = text.startswith(('note:', 'audit:'))
+            if not remark:
+                self._done += 1
+                self._step = text
+            if remark or not self._shows:
+                self._write(f'\r\x1b[K{text}\n' if self._shows else f'{text}\n')
+            if self._shows:
+                self._draw()
+
+    def print(self, text: str, file: TextIO) -> None:
+        """Print what was found above the bar."""
+        with self._lock:
+            if self._shows:
+                self._write('\r\x1b[K')
+            print(text, file=file, flush=True)
+
+    def _redraw(self) -> None:
+        while not self._ended.wait(REDRAWN_S):
+            with self._lock:
+                self._draw()
+
+    def _draw(self) -> None:
+        share = min(self._done / self._steps, 1.0 - 1.0 / WIDTH)
+        full = round(WIDTH * share)
+        elapsed = time.monotonic() - self._begun
+        line = f'[{"#" * full}{"." * (WIDTH - full)}] {elapsed:.0f} s  {self._step}'
+        self._write(f'\r\x1b[K{line[: shutil.get_terminal_size().columns - 1]}')
+
+    def _write(self, text: str) -> None:
+        self._stream.write(text)
+        self._stream.flush()

@@ -1,0 +1,47 @@
+"""What a long command says of its progress."""
+
+import io
+
+from endoscope_bringup.progress_line import ProgressLine
+
+
+class Terminal(io.StringIO):
+    """A stream that a person looks at."""
+
+    def isatty(self):
+        return True
+
+
+def steps(stream):
+    found = io.StringIO()
+    with ProgressLine(4, 'reading', stream) as progress:
+        progress.step('refitting')
+        progress.step('audit: a remark')
+        progress.step('searching')
+        progress.print('found', file=found)
+    return stream.getvalue(), found.getvalue()
+
+
+def test_without_a_terminal_each_step_is_a_line():
+    said, found = steps(io.StringIO())
+    assert said == 'refitting\naudit: a remark\nsearching\n'
+    assert found == 'found\n'
+
+
+def test_in_a_terminal_a_bar_says_what_is_done_and_goes():
+    said, found = steps(Terminal())
+    drawn = said.split('\r\x1b[K')
+    assert '[....................] 0 s  reading' in drawn
+    assert '[#####...............] 0 s  refitting' in drawn
+    assert 'audit: a remark\n' in drawn
+    assert '[##########..........] 0 s  searching' in drawn
+    assert drawn[-1] == ''
+    assert found == 'found\n'
+
+
+def test_a_bar_is_full_only_when_all_is_done():
+    terminal = Terminal()
+    with ProgressLine(1, 'reading', terminal) as progress:
+        for name in 'abcd':
+            progress.step(name)
+    assert '#' * 20 not in terminal.getvalue()

@@ -1,0 +1,58 @@
+"""What a person reads in the terminal: the finding, its place, numbers, fits and the next step."""
+
+from endoscope_explain.case import ExplainedCase
+from endoscope_explain.explanation import Verdict
+from endoscope_explain.report.columns import table
+from endoscope_explain.report.numbers import PLANTS, digits, judged, measurable, shown
+from endoscope_explain.report.sentences import (
+    differing,
+    next_step,
+    physics_of,
+    plain,
+    verdict_sentence,
+    where,
+)
+
+
+def told(case: ExplainedCase) -> str:
+    """Say what was found.
+
+    Parameters
+    ----------
+    case : ExplainedCase
+
+    Returns
+    -------
+    str
+        Lines; the first one is the verdict's sentence.
+    """
+    lines = [verdict_sentence(case)]
+    for effect in case.effects:
+        lines.append(f'  {effect.id}: {physics_of(effect)}')
+        lines += [f'    {shown(name, e)}' for name, e in measurable(effect).items()]
+    if case.verdict is Verdict.PARAMETERS_DIFFER:
+        for (joint, name), e in differing(case).items():
+            lines.append(f'  {joint}: {shown(name, e)}')
+    term = case.explanation.unknown
+    if term is not None and term.helps:
+        lines.append(f'  It explains {100 * term.explained:.0f} % of the excess misfit.')
+    if not case.audit.unusable:
+        lines += [f'Where: {where(place)}.' for place in case.places]
+    fits = fits_table(case)
+    if fits:
+        head, rows = fits
+        lines += table(('rmse / noise', *head[1:]), rows).splitlines()
+    lines.append(f'Next: {next_step(case)}')
+    return '\n'.join(lines)
+
+
+def fits_table(case: ExplainedCase) -> tuple[tuple[str, ...], list[tuple[str, ...]]] | None:
+    """Misfit over noise of each signal by each plant: heads and rows; None where none was made."""
+    plants = {name: fits for name, fits in judged(case, case.ladder).items() if name in PLANTS}
+    if not plants.get('nominal'):
+        return None
+    rows = [
+        (plain(signal), *(digits(fits[signal].ratio) for fits in plants.values()))
+        for signal in plants['nominal']
+    ]
+    return ('signal', *(PLANTS[name] for name in plants)), rows

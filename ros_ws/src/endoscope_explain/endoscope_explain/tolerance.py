@@ -1,0 +1,26 @@
+"""By how much a rig may differ from its description: one definition for verdict, page and file."""
+
+from endoscope_explain.fit.free_parameters import BAND, FORM_SPREAD
+from endoscope_explain.fit.intervals import NINETY_PERCENT
+
+
+def tolerance(name: str, described: float, band: float = BAND) -> tuple[float, float]:
+    """Lowest and highest value of a nominal parameter that needs no explanation.
+
+    Parameters
+    ----------
+    name : str
+    described : float
+        Its value in the plant file.
+    band : float
+        Share by which parameters may differ: they may be larger, and smaller, by the factor
+        `1 + band`. What describes a form may differ by 90 % of what healthy rigs do.
+
+    Returns
+    -------
+    low, high : float
+    """
+    if name in FORM_SPREAD:
+        reach = NINETY_PERCENT * FORM_SPREAD[name]
+        return described - reach, described + reach
+    return described / (1.0 + band), described * (1.0 + band)
