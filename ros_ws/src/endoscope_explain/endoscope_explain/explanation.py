@@ -123,8 +123,9 @@ class Candidate:
     ----------
     joint : str
     effects : tuple of str
+        And places of functions.
     score : float
-        Penalised half deviance in noise units; smaller is better.
+        Logarithm of the evidence that it lacks against no effect, in nats; smaller is better.
     misfit : float
         Mean squared residual in noise units over all channels; 1 is noise alone.
     beyond_band : bool

@@ -17,6 +17,7 @@ from endoscope_explain.explanation import (
     NominalEstimate,
     Verdict,
 )
+from endoscope_explain.fit.tolerance import tolerance
 from endoscope_explain.predicted_signals import rung, view
 from endoscope_explain.recording import Series
 from endoscope_explain.report.chain_drawing import STAGES, chain_svg
@@ -30,7 +31,6 @@ from endoscope_explain.report.sentences import (
     verdict_sentence,
 )
 from endoscope_explain.report.terminal import told
-from endoscope_explain.tolerance import tolerance
 
 PLANT = PlantDescription()
 

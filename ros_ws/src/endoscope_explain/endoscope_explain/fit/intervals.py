@@ -14,12 +14,12 @@ from scipy.stats import t
 from endoscope_core.physics.effect import Effect
 from endoscope_explain.explanation import Estimate, NominalEstimate
 from endoscope_explain.fit.evidence import weights
-from endoscope_explain.fit.free_parameters import BAND, COEFFICIENT, FITTED_NOMINAL, FORM_SPREAD
+from endoscope_explain.fit.free_parameters import COEFFICIENT, FITTED_NOMINAL
 from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.tolerance import NINETY_PERCENT, tolerance
 
 Array = NDArray[np.float64]
 
-NINETY_PERCENT = 1.645
 DEGREES = 19
 """Of freedom of what moves the numbers: rigs of another form that were fitted."""
 
@@ -108,9 +108,8 @@ def nominal_estimates(
 
 
 def _in_band(name: str, value: float, described: float) -> bool:
-    if name in FORM_SPREAD:
-        return abs(value - described) <= NINETY_PERCENT * FORM_SPREAD[name]
-    return bool(abs(np.log(value / described)) <= np.log1p(BAND))
+    low, high = tolerance(name, described)
+    return low <= value <= high
 
 
 def effect_estimates(fit: Fit, first: int, units: dict[str, str]) -> dict[str, Estimate]:

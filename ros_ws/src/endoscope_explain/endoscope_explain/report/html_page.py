@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.case import ExplainedCase, Ladder, Place
 from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
+from endoscope_explain.fit.tolerance import tolerance
 from endoscope_explain.fit.whiteness import slips
 from endoscope_explain.predicted_signals import RecordedView, view
 from endoscope_explain.recording.signals import gear
-from endoscope_explain.repeated_motion import motion_repeats
 from endoscope_explain.report.chain_drawing import chain_svg
 from endoscope_explain.report.figures.experiment import experiment_figure, unknown_figure
 from endoscope_explain.report.figures.ladder import ladder_figure
@@ -46,7 +46,7 @@ from endoscope_explain.report.sentences import (
     plain,
     verdict_sentence,
 )
-from endoscope_explain.tolerance import tolerance
+from endoscope_explain.search.repeated_motion import motion_repeats
 
 Array = NDArray[np.float64]
 

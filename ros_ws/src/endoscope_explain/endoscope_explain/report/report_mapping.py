@@ -12,7 +12,7 @@ from endoscope_explain.explanation import (
     NominalEstimate,
     UnknownTerm,
 )
-from endoscope_explain.tolerance import tolerance
+from endoscope_explain.fit.tolerance import tolerance
 
 SCHEMA = 1
 

@@ -1,7 +1,9 @@
 """By how much a rig may differ from its description: one definition for verdict, page and file."""
 
 from endoscope_explain.fit.free_parameters import BAND, FORM_SPREAD
-from endoscope_explain.fit.intervals import NINETY_PERCENT
+
+NINETY_PERCENT = 1.645
+"""Standard deviations that hold 90 % of a normal distribution, either way."""
 
 
 def tolerance(name: str, described: float, band: float = BAND) -> tuple[float, float]:
