@@ -2,20 +2,20 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.decide.decision import Decision, MissingTerm, share_explained, with_form
+from endoscope_explain.decide.decision import Decision, MissingTerm, decide, share_explained
 from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.free_parameters import FreeParameter
 from endoscope_explain.fit.model import Fit, JointModel, fit, without_effect
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate
-from endoscope_explain.search.levels import JointSearch
-from endoscope_explain.search.refit import composition
+from endoscope_explain.search.levels import JointSearch, Level, search
+from endoscope_explain.search.refit import Composition, composition
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -77,20 +77,37 @@ def explained_by(
     Returns
     -------
     (JointSearch, Decision)
-        Nothing was searched; each effect gains what the joint loses without it.
+        Each effect gains what the joint loses without it. One term more is searched only where
+        they leave more than another form would.
     """
     nominal = composition((), anchors[0])
-    nothing = JointSearch(nominal, ())
-    if not given.effects:
-        found, adequate = with_form(nominal.fit, jobs)
-        return nothing, Decision(replace(nominal, fit=found), (), adequate, 1.0)
-    model = JointModel(anchors[0].model.observation, given.base, given.flags, given.free)
-    found, adequate = with_form(settled(model, given.theta), jobs)
-    whole = composition(tuple(Candidate(CATALOGUE[each]) for each in given.effects), found)
-    lesser = [without_effect(found, effect_id) for effect_id in given.effects]
+    found = anchors[0]
+    terms: tuple[Candidate, ...] = ()
+    missing: tuple[MissingTerm, ...] = ()
+    if given.effects:
+        model = JointModel(anchors[0].model.observation, given.base, given.flags, given.free)
+        found = settled(model, given.theta)
+        terms = tuple(Candidate(CATALOGUE[each]) for each in given.effects)
+        missing = _needed(composition(terms, found), given.effects, jobs)
+    beside = decide(JointSearch(composition((), found), ()), jobs)
+    tried: tuple[Level, ...] = ()
+    if not beside.adequate:
+        tried = search((found, found), jobs, 1).levels
+        beside = decide(JointSearch(composition((), found), tried), jobs)
+    chosen = composition((*terms, *beside.chosen.terms), beside.chosen.fit)
+    return JointSearch(nominal, tried), Decision(
+        chosen,
+        (*missing, *beside.missing),
+        beside.adequate,
+        share_explained(nominal, chosen),
+    )
+
+
+def _needed(whole: Composition, effects: tuple[str, ...], jobs: int) -> tuple[MissingTerm, ...]:
+    """Each given effect with what the joint loses without it."""
+    lesser = [without_effect(whole.fit, effect_id) for effect_id in effects]
     fits = parallel_map(lambda less: fit(*less), lesser, jobs)
-    missing = tuple(
+    return tuple(
         MissingTerm(term, term.id, (), whole.evidence - log_evidence(less), 0.0, math.nan, whole)
         for term, less in zip(whole.terms, fits, strict=True)
     )
-    return nothing, Decision(whole, missing, adequate, share_explained(nominal, whole))

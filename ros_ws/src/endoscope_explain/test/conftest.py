@@ -92,7 +92,7 @@ def stribeck_case(stribeck_recording):
         definition.source,
         {name: Estimate(v, 0.9 * v, 1.1 * v, '-') for name, v in EXPLAINED.parameters.items()},
         ('viscous_friction',),
-        {'margin': 120.0},
+        {'gain': 120.0},
     )
     parameters = {
         joint: {'capstan_exponent': NominalEstimate(0.9, 0.88, 0.92, '-', 0.9, True)}

@@ -113,7 +113,7 @@ def test_a_page_says_what_was_left_out_and_where(page):
     text = text_of(page)
     assert 'The simulation leaves out stribeck_friction on bend_x (97 %).' in text
     assert 'cannot tell it from viscous_friction' in text
-    assert 'margin 120 (score lost without it, in nats)' in text
+    assert 'gain 120 (log evidence that it adds, in nats)' in text
 
 
 def test_a_page_lists_all_that_was_tried(page):
