@@ -82,9 +82,8 @@ def named(
 
 def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
     definition = CATALOGUE[term.name]
-    assert term.formula is not None
     modelled = term.name in decision.chosen.effects
-    numbers = decision.chosen.fit if modelled else term.formula.fit
+    fitted = decision.chosen if modelled else term.formula
     return NamedEffect(
         term.name,
         joint,
@@ -92,8 +91,10 @@ def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
         term.probability,
         definition.equation,
         definition.source,
-        effect_estimates(
-            numbers,
+        {}
+        if fitted is None
+        else effect_estimates(
+            fitted.fit,
             definition.first_parameter,
             {p.name: p.unit for p in definition.parameters},
         ),
@@ -213,7 +214,7 @@ def missing_function(decisions: list[Decision]) -> UnknownTerm | None:
     if not found:
         return None
     _, decision, term = max(found, key=lambda each: each[0])
-    siblings = () if term.formula is None else (term.name,)
+    siblings = (term.name,) if term.is_known else ()
     return unknown_term(decision.chosen, term.term, decision.explained, term.alternatives, siblings)
 
 

@@ -69,11 +69,14 @@ class Judgement:
 def statements(said: Explanation) -> tuple[Statement, ...]:
     """What an explanation says is missing, in its order; each name once.
 
-    The unknown term is the headline where the verdict says so, else it comes last.
+    The unknown term is the headline where the verdict says so, else it comes last; the function by
+    which a named effect is modelled says no more than the name.
     """
     found = [Statement(e.id, e.joint, e.stage, e.alternatives) for e in said.effects]
-    if said.unknown is not None:
-        term = said.unknown
+    term = said.unknown
+    if term is not None and not any(
+        e.joint == term.joint and e.id in term.siblings for e in said.effects
+    ):
         unknown = Statement(term.place, term.joint, term.stage, term.rivals)
         place = 0 if said.verdict is Verdict.UNKNOWN_PHYSICS else len(found)
         found.insert(place, unknown)

@@ -46,7 +46,7 @@ class MissingTerm:
     p_value : float
         Chance that a rig of another form, in which nothing is missing, shows as much.
     formula : Composition or None
-        With the formula of `name` that comes nearest.
+        With the formula of `name`, where it was fitted.
     """
 
     term: Candidate
@@ -151,7 +151,7 @@ def _missing(level: Level, best: Composition) -> MissingTerm:
     last = best.terms[-1]
     formulas = [c for c in level.at_the_place_of(best) if not c.terms[-1].is_function]
     formula = best if not last.is_function else (formulas[0] if formulas else None)
-    name = last.id if formula is None else formula.terms[-1].id
+    name = _name(level, best)
     gain = level.gain(best)
     others = [
         (level.gain(each), _name(level, each))
@@ -167,12 +167,18 @@ def _missing(level: Level, best: Composition) -> MissingTerm:
 
 
 def _name(level: Level, one: Composition) -> str:
-    """The effect whose physics the last term of a composition is, or its place."""
+    """The effect whose physics the last term of a composition is, or its place.
+
+    At the place of a function it is the effect whose formula comes nearest, or the only one there.
+    """
     last = one.terms[-1]
     if not last.is_function:
         return last.id
     formulas = [c for c in level.at_the_place_of(one) if not c.terms[-1].is_function]
-    return formulas[0].terms[-1].id if formulas else last.id
+    if formulas:
+        return formulas[0].terms[-1].id
+    there = [e.id for e in CATALOGUE.values() if last.id in e.traits.families]
+    return there[0] if len(there) == 1 else last.id
 
 
 def _named_as_chosen(

@@ -71,6 +71,14 @@ class Family:
         assert found is not None
         return found.scaled(size / np.sqrt(np.mean(np.sum(found.basis**2, axis=1))))
 
+    def details(self, generator: np.random.Generator) -> Array:
+        """A function (NODES,) that varies faster than these do, drawn as they are."""
+        count, length = self.basis.shape[1], LENGTH * COEFFICIENTS / self.basis.shape[1]
+        finer = self.finer(min(2 * count, NODES), 0.5 * length).basis
+        drawn = finer @ generator.normal(size=finer.shape[1])
+        span, _ = np.linalg.qr(self.basis)
+        return np.asarray(drawn - span @ (span.T @ drawn))
+
     def scaled(self, amplitude: float) -> 'Family':
         """The same functions, larger by a factor."""
         return Family(self.place, self.low, self.high, amplitude * self.basis)

@@ -1,8 +1,9 @@
 """Rigs of another form than the fitted one: what a simulation of the wrong form leaves.
 
 A fit's misfit is mostly an error of form, not noise: friction along a real sheath has a finer
-profile than the few terms that are fitted. Rigs are simulated at the fitted numbers with a profile
-drawn anew beyond those terms, and the model is fitted to each of them. What that leaves, and by how
+profile than the few terms that are fitted, and a law has finer details than the function that was
+found for it. Rigs are simulated at the fitted numbers with a profile drawn anew beyond those terms
+and functions with details, and the model is fitted to each of them. What that leaves, and by how
 much it moves the numbers, is what form alone does (a parametric bootstrap over forms: Efron,
 Tibshirani, An Introduction to the Bootstrap, 1993, ch. 21).
 """
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.physics.functions.interpolation import NODES, VALUES
 from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
 from endoscope_explain.fit.evidence import weights
 from endoscope_explain.fit.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
@@ -67,17 +69,23 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
     weight = weights(model.observation, found.residuals)
     finer = slice(FRICTION_PROFILE + len(FRICTION_PROFILE_NAMES), FRICTION_PROFILE + PROFILE_TERMS)
     size = FORM_SPREAD[FRICTION_PROFILE_NAMES[0]]
-    draws = size * np.random.default_rng(_SEED).normal(size=(count, finer.stop - finer.start))
+    generator = np.random.default_rng(_SEED)
 
-    def fitted(draw: Array) -> tuple[Array, Array]:
+    def drawn() -> Array:
         rig = parameters.copy()
-        rig[finer] = draw
+        rig[finer] = size * generator.normal(size=finer.stop - finer.start)
+        for family in model.families:
+            first = family.place.first_parameter + VALUES
+            rig[first : first + NODES] += family.details(generator)
+        return rig
+
+    def fitted(rig: Array) -> tuple[Array, Array]:
         outputs = simulate_joint(model.observation, rig, model.flags)
         seen = replace(model, observation=_reading(model.observation, outputs), free=free)
         near = glance(seen, found.theta, found.jacobian, STEPS, weight)
         return near.residuals, near.theta - found.theta
 
-    results = parallel_map(fitted, list(draws), jobs)
+    results = parallel_map(fitted, [drawn() for _ in range(count)], jobs)
     return OtherForms(
         np.stack([residuals for residuals, _ in results], axis=1),
         np.stack([moved for _, moved in results], axis=1),
