@@ -81,7 +81,7 @@ def explain_recording(
     """
     begun = time.monotonic()
     tell = progress or (lambda _: None)
-    observations = with_held_noise(observe(recording, plant))
+    observations = tuple(o for o in with_held_noise(observe(recording, plant)) if o.channels)
     if not _is_enough(observations):
         return Explanation.without_fit(Verdict.INSUFFICIENT_DATA, plant)
     tell('refitting the nominal plant')
@@ -151,8 +151,11 @@ def _healthy(
     packed = {o.joint: packed_joint(plant, o.joint) for o in before}
 
     def described(anchors: tuple[Fit, Fit]) -> Composition:
-        tried = search(anchors, jobs, 1, left_out).tried()
-        return max(tried, key=lambda c: c.evidence)
+        tried = search(anchors, jobs, 1, left_out)
+        found = [level.best for level in tried.levels if level.is_found]
+        # What depends on time was the first recording's own.
+        lasting = [c for c in found if not any(t.term.traits.depends_on_time for t in c.terms)]
+        return lasting[0] if lasting else tried.nominal
 
     healthy = [described(pair) for pair in all_anchors(before, packed, jobs, band)]
     by_joint = {c.fit.model.observation.joint: c for c in healthy}

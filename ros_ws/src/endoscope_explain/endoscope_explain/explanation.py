@@ -170,7 +170,7 @@ class UnknownTerm:
     explained : float
         Share of the excess misfit that the function removes.
     rivals : tuple of str
-        Other places whose function has more than half of its gain, best first.
+        Other names that the recording does not tell from it, nearest first.
     siblings : tuple of str
         Nearest effects of the catalogue, nearest first.
     """

@@ -92,7 +92,7 @@ def explained_by(
     beside = decide(JointSearch(composition((), found), ()), jobs)
     tried: tuple[Level, ...] = ()
     if not beside.adequate:
-        tried = search((found, found), jobs, 1).levels
+        tried = search((found,), jobs, 1).levels
         beside = decide(JointSearch(composition((), found), tried), jobs)
     chosen = composition((*terms, *beside.chosen.terms), beside.chosen.fit)
     return JointSearch(nominal, tried), Decision(

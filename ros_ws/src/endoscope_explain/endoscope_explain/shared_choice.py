@@ -80,7 +80,7 @@ class SharedChoice:
         for before, after in zip(self.recordings, other.recordings, strict=True):
             behind = background(before[0])
             ways = directions(behind, _effects(before[0]), jobs)
-            total = total + null_gains(behind, ways, after[0], jobs)
+            total = total + null_gains(behind, ways, after[0], jobs)[0]
         return total
 
     def leaves_noise(self) -> bool:
@@ -107,7 +107,7 @@ def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
     for variant in sorted(looks, key=lambda v: _logarithm_of_costs(choice, looks[v])):
         variants.setdefault(variant[0], variant)
     promising = list(variants.values())[: POLISHED if choice.effects else POLISHED_FIRST]
-    begun = [_begun(choice, variant[0], looks[variant]) for variant in promising]
+    begun = [_begun(choice, looks[variant]) for variant in promising]
     fitted = _side_by_side(begun, jobs, rough=True)
     return sorted(
         (
@@ -168,7 +168,7 @@ def _cost(found: Fit) -> float:
     return found.model.cost(weighted, found.theta)
 
 
-def _begun(choice: SharedChoice, effect_id: str, looks: list[Look | None]) -> Begun:
+def _begun(choice: SharedChoice, looks: list[Look | None]) -> Begun:
     """Models of all recordings with one more effect, and where their fit begins.
 
     A recording that has no use for the effect stays without it.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.fit.evidence import mean_squares, misfit
+from endoscope_explain.fit.evidence import counts, mean_squares, misfit
 from endoscope_explain.fit.intervals import may_be_absent
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.other_forms import other_forms
@@ -101,12 +101,12 @@ def decide(search: JointSearch, jobs: int) -> Decision:
         if not best.terms:
             chosen = best
             break
-        last = best.terms[-1]
-        if not last.is_function and may_be_absent(best.fit, last.term):
+        best = replace(best, fit=with_form(best.fit, jobs)[0])
+        if any(not t.is_function and may_be_absent(best.fit, t.term) for t in best.terms):
             break
         chosen = best
-        missing = (*missing[: len(best.terms) - 1], _missing(level, best))
-    missing = _named_as_chosen(search, chosen, missing)
+        missing = (*missing[: len(best.terms) - 1], _missing(level, best, jobs))
+    missing = _named_as_chosen(search, chosen, missing, jobs)
     fit, adequate = with_form(chosen.fit, jobs)
     explained = share_explained(search.nominal, chosen)
     return Decision(replace(chosen, fit=fit), missing, adequate, explained)
@@ -141,26 +141,31 @@ def with_form(found: Fit, jobs: int) -> tuple[Fit, bool]:
     left = np.maximum(mean_squares(observation, found.residuals) - 1.0, 0.0)
     drawn = np.stack([mean_squares(observation, r) for r in forms.residuals.T])
     adequate = bool(np.all(np.sqrt(1.0 + left) <= BEYOND_FORM * np.sqrt(1.0 + drawn.max(axis=0))))
-    # As large as makes it leave what is left, channel by channel where that is most.
-    scale = np.sqrt(np.sum(left) / np.maximum(np.sum(drawn, axis=1), 1e-12))
-    moved = np.sqrt(np.mean((forms.moved * scale) ** 2, axis=1))
+    # An error of form moves numbers the further the more of it there is.
+    size = counts(observation) / (1.0 + left)
+    scale = np.sum(size * left) / max(float(np.sum(size * drawn.mean(axis=0))), 1e-12)
+    moved = np.sqrt(scale * np.mean(forms.moved**2, axis=1))
     return replace(found, moved_by_form=moved), adequate
 
 
-def _missing(level: Level, best: Composition) -> MissingTerm:
+def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
     last = best.terms[-1]
     formulas = [c for c in level.at_the_place_of(best) if not c.terms[-1].is_function]
     formula = best if not last.is_function else (formulas[0] if formulas else None)
     name = _name(level, best)
     gain = level.gain(best)
+    beside = [t.id for t in best.terms[:-1]]
     others = [
-        (level.gain(each), _name(level, each))
+        each
         for each in level.found
-        if each.terms and _name(level, each) != name
+        if each.terms and [t.id for t in each.terms[:-1]] == beside and _name(level, each) != name
     ]
-    rivals = {each.terms[-1].id: _name(level, each) for each in level.rivals() if each.terms}
-    alternatives = tuple(dict.fromkeys(n for n in rivals.values() if n != name))
-    best_other = max((other for other, _ in others), default=0.0)
+    rivals = level.rivals()
+    near = [_name(level, each) for each in others if any(each is rival for rival in rivals)]
+    alternatives = tuple(dict.fromkeys(near))
+    best_other = max((level.gain(each) for each in others), default=0.0)
+    if formula is not None and formula is not best:
+        formula = replace(formula, fit=with_form(formula.fit, jobs)[0])
     return MissingTerm(
         last, name, alternatives, gain, max(best_other, 0.0) / gain, level.p_value, formula
     )
@@ -182,7 +187,7 @@ def _name(level: Level, one: Composition) -> str:
 
 
 def _named_as_chosen(
-    search: JointSearch, chosen: Composition, missing: tuple[MissingTerm, ...]
+    search: JointSearch, chosen: Composition, missing: tuple[MissingTerm, ...], jobs: int
 ) -> tuple[MissingTerm, ...]:
     """The missing terms as chosen: a rival of the first one may have led to a better two."""
     named = []
@@ -192,5 +197,5 @@ def _named_as_chosen(
             continue
         level = search.levels[position]
         own = [c for c in level.found if c.terms and c.terms[-1].id == term.id]
-        named.append(_missing(level, own[0]))
+        named.append(_missing(level, own[0], jobs))
     return tuple(named)

@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 COEFFICIENTS = 7
 LENGTH = 0.25
 """Of the process, as a share of the range."""
+LEAST_PART = 1e-9
+"""Share of the largest eigenvalue below which one is rounding."""
 LEAST_RANGE = 1e-6
 """Share of a place's own range below which a state has not moved."""
 
@@ -59,7 +61,10 @@ class Family:
 
     def values(self, coefficients: Array) -> Array:
         """Values (NODES,) at the nodes, within what the place allows."""
-        values = self.basis @ coefficients
+        return self.within(self.basis @ coefficients)
+
+    def within(self, values: Array) -> Array:
+        """Values (NODES,) cut to what the place allows."""
         if self.place.never_negative:
             values = np.maximum(values, 0.0)
         return np.clip(values, -self.place.largest, self.place.largest)
@@ -117,8 +122,10 @@ def family_at(
         mirrored = _matern((side[:, None] - (1.0 - side[None, :])) / length)
         covariance += mirrored if place.shape is Shape.EVEN else -mirrored
     sizes, vectors = np.linalg.eigh(covariance)
-    largest = np.argsort(sizes)[::-1][:count]
-    return Family(place, low, high, vectors[:, largest] * np.sqrt(sizes[largest]))
+    largest = [k for k in np.argsort(sizes)[::-1][:count] if sizes[k] > LEAST_PART * sizes.max()]
+    # What an eigenvector's sign is depends on the library; a drag grows with the first of them.
+    signs = np.where(vectors[:, largest].sum(axis=0) < 0.0, -1.0, 1.0)
+    return Family(place, low, high, vectors[:, largest] * signs * np.sqrt(sizes[largest]))
 
 
 def visited_ranges(

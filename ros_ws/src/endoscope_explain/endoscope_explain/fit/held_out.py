@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.explanation import ChannelFit
+from endoscope_explain.fit.evidence import weights
 from endoscope_explain.fit.model import Fit, fit
 from endoscope_explain.observation import JointObservation
 
@@ -66,7 +67,7 @@ def _held_out(final: Fit) -> tuple[Mask, Array]:
     again = fit(
         final.model,
         final.theta,
-        weight=used.astype(float),
+        weight=used * weights(final.model.observation, final.residuals),
         iterations=REFIT_STEPS,
         known_jacobian=final.jacobian,
     )

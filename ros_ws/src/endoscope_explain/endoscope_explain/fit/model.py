@@ -100,7 +100,10 @@ class JointModel:
 
     def residuals(self, theta: Array) -> Array:
         """Residuals in noise units, all channels in a row."""
-        parameters, lead = self.packed(theta)
+        return self.residuals_of(*self.packed(theta))
+
+    def residuals_of(self, parameters: Array, lead: float) -> Array:
+        """Residuals (size,) in noise units of packed parameters and a reading lead."""
         skew = parameters[CLOCK_RATE.first_parameter] if self.flags[CLOCK_RATE.flag] else 0.0
         outputs = simulate_joint(self.observation, parameters, self.flags)
         found = residuals(self.observation, outputs, lead, skew)
@@ -266,7 +269,7 @@ def glance(
     start : array (n,)
     known_jacobian : array (size, n)
     steps : int
-        Simulations, at most.
+        Of the fit, at most: a simulation each.
     weight : array (size,), optional
         Factors on the residuals.
 

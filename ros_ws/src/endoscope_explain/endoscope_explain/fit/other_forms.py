@@ -18,13 +18,12 @@ from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
 from endoscope_explain.fit.evidence import weights
 from endoscope_explain.fit.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
 from endoscope_explain.fit.model import Fit, glance
-from endoscope_explain.fit.simulated_joint import simulate_joint
 from endoscope_explain.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 
 Array = NDArray[np.float64]
 
-STEPS = 3
+STEPS = 8
 """Simulations in which the model is fitted to a rig of another form, whose numbers are its own."""
 _SEED = 7
 
@@ -61,7 +60,7 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
     OtherForms
     """
     model = found.model.on_coarse_ticks()
-    parameters, _ = model.packed(found.theta)
+    parameters, lead = model.packed(found.theta)
     # The fitted numbers are these rigs' own: there is nothing that would draw a fit elsewhere.
     free = tuple(
         replace(item, mean=float(t)) for item, t in zip(model.free, found.theta, strict=True)
@@ -73,15 +72,16 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
 
     def drawn() -> Array:
         rig = parameters.copy()
-        rig[finer] = size * generator.normal(size=finer.stop - finer.start)
+        rig[finer] += size * generator.normal(size=finer.stop - finer.start)
         for family in model.families:
             first = family.place.first_parameter + VALUES
-            rig[first : first + NODES] += family.details(generator)
+            detailed = rig[first : first + NODES] + family.details(generator)
+            rig[first : first + NODES] = family.within(detailed)
         return rig
 
     def fitted(rig: Array) -> tuple[Array, Array]:
-        outputs = simulate_joint(model.observation, rig, model.flags)
-        seen = replace(model, observation=_reading(model.observation, outputs), free=free)
+        readings = _reading(model.observation, model.residuals_of(rig, lead))
+        seen = replace(model, observation=readings, free=free)
         near = glance(seen, found.theta, found.jacobian, STEPS, weight)
         return near.residuals, near.theta - found.theta
 
@@ -92,7 +92,10 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
     )
 
 
-def _reading(observation: JointObservation, outputs: Array) -> JointObservation:
-    """The same sensors without noise on other outputs."""
-    channels = tuple(replace(c, value=c.predicted(outputs)) for c in observation.channels)
+def _reading(observation: JointObservation, residuals: Array) -> JointObservation:
+    """The sensors as they would read without noise where a simulation leaves these residuals."""
+    channels = tuple(
+        replace(c, value=c.value + residuals[part] * c.noise)
+        for c, part in zip(observation.channels, observation.slices(), strict=True)
+    )
     return replace(observation, channels=channels)

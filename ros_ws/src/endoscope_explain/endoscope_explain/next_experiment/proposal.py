@@ -123,7 +123,11 @@ def rival_plant(
     ranked = promises(behind, directions(behind, terms, 1))
     if not ranked:
         return None
-    spec = EffectSpec(rival, effect.joint, dict(ranked[0].candidate.start))
+    packed = ranked[0].candidate.added_to(behind.fit.model).base
+    definition = CATALOGUE[rival]
+    values = packed[list(definition.places)].tolist()
+    names = [p.name for p in definition.parameters]
+    spec = EffectSpec(rival, effect.joint, dict(zip(names, values, strict=True)))
     candidate = replace(bare, effects=(*others, spec))
     return with_fit(candidate, effect.joint, refit(candidate, observation, 0.2, 6))
 

@@ -11,9 +11,9 @@ from endoscope_core.physics.description import TermSpec
 from endoscope_core.physics.functions.expression import evaluate
 from endoscope_core.physics.functions.place import Shape
 from endoscope_core.physics.functions.term import tabulated
-from endoscope_explain.fit.evidence import weights
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COORDINATE
+from endoscope_explain.fit.intervals import covariance
 from endoscope_explain.fit.model import Fit
 
 Array = NDArray[np.float64]
@@ -71,17 +71,13 @@ def fitted_function(found: Fit, place_id: str) -> FittedFunction:
     """The function that a fit has at a place."""
     model = found.model
     which = [family.place.id for family in model.families].index(place_id)
-    weight = weights(model.observation, found.residuals)
-    weighted = found.jacobian * weight[:, None]
-    precision = weighted.T @ weighted + np.diag(model.prior_weight() ** 2)
-    precision += 1e-9 * np.diag(np.maximum(np.diag(precision), 1e-12))
     own = model.places_of_coefficients()[which]
-    covariance = np.linalg.inv(precision)[np.ix_(own, own)] * COORDINATE**2
+    spread = covariance(found)[np.ix_(own, own)] * COORDINATE**2
     return FittedFunction(
         model.observation.joint,
         model.families[which],
         model.coefficients(found.theta)[which],
-        covariance,
+        spread,
         len(found.residuals),
     )
 

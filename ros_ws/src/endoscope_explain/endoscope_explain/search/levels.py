@@ -6,7 +6,7 @@ through the same screen, say how much evidence there is where nothing is missing
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +46,6 @@ FORMS = 39
 """Rigs of another form: enough to say that 1 in 40 would show as much."""
 FALSE_ALARMS = 0.05
 """Chance that rigs of another form would show as much, above which no term is added."""
-AS_GOOD = 0.9
-"""Share of the rigs of another form that gain less than a formula may lose against a function."""
 LOOKED_AT, POLISHED = 10, 4
 """Terms that get a first fit and a full one: in the study the truth was among the first three of
 the screen in 46 cases of 48, and among the first five in 47."""
@@ -58,6 +56,7 @@ SETTLED = 2
 PARENTS = 2
 """Compositions that are added to."""
 _SEED = 11
+_TINY = 1e-12
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,9 @@ class Level:
     found : tuple of Composition
         Best first.
     null : array (B,)
-        Gains of the best term on rigs of another form, in which nothing is missing.
+        Gains of the best term on rigs of another form that are off as much as the recording is.
+    doubt : array (B,)
+        The same where they are off by as much as the best composition leaves.
     predicts : bool
         Whether the best one predicts blocks that it has not seen better than its parent.
     """
@@ -79,6 +80,7 @@ class Level:
     parent: Composition
     found: tuple[Composition, ...]
     null: Array = field(repr=False)
+    doubt: Array = field(repr=False)
     predicts: bool = True
 
     def gain(self, one: Composition) -> float:
@@ -87,14 +89,24 @@ class Level:
 
     @property
     def best(self) -> Composition:
-        """The composition to go on with: a formula where it loses no more than form is worth."""
+        """The composition to go on with.
+
+        Other numbers, and then a formula, stand where they lose no more than form is worth.
+        """
         top = self.found[0]
+        for each in self.found:
+            if not each.terms and top.evidence - each.evidence <= self.form_is_worth():
+                return each
         if top.terms and top.terms[-1].is_function:
             for each in self.at_the_place_of(top):
                 lost = top.evidence - each.evidence
-                if not each.terms[-1].is_function and lost <= np.quantile(self.null, AS_GOOD):
+                if not each.terms[-1].is_function and lost <= self.form_is_worth():
                     return each
         return top
+
+    def form_is_worth(self) -> float:
+        """Evidence by which an error of form as large as what is left may mislead."""
+        return max(float(np.quantile(self.doubt, 1.0 - FALSE_ALARMS)), 0.0)
 
     def at_the_place_of(self, one: Composition) -> tuple[Composition, ...]:
         """Compositions whose last term is at the same place, beside the same other terms."""
@@ -112,7 +124,7 @@ class Level:
         """Chance that a rig of another form shows as much as the best composition does."""
         if not self.found:
             return 1.0
-        as_much = int(np.sum(self.null >= self.gain(self.found[0])))
+        as_much = int(np.sum(self.null >= self.gain(self.best)))
         return (1.0 + as_much) / (1.0 + len(self.null))
 
     @property
@@ -129,7 +141,7 @@ class Level:
 
     def rivals(self) -> tuple[Composition, ...]:
         """Compositions beside the best one that are behind by no more than form may be worth."""
-        least = self.found[0].evidence - np.quantile(self.null, 1.0 - FALSE_ALARMS)
+        least = self.found[0].evidence - self.form_is_worth()
         return tuple(c for c in self.found if c is not self.best and c.evidence >= least)
 
 
@@ -154,7 +166,7 @@ class JointSearch:
 
 
 def search(
-    anchors: tuple[Fit, Fit],
+    anchors: tuple[Fit, ...],
     jobs: int,
     depth: int = MOST_EFFECTS,
     left_out: tuple[str, ...] = (),
@@ -163,8 +175,8 @@ def search(
 
     Parameters
     ----------
-    anchors : (Fit, Fit)
-        Nominal plant refitted, and as described.
+    anchors : tuple of Fit
+        Nominal plant refitted, and as described if given.
     jobs : int
         Tasks side by side.
     depth : int
@@ -177,7 +189,10 @@ def search(
     JointSearch
     """
     nominal = composition((), anchors[0])
-    parents: list[tuple[Composition, tuple[Fit, ...]]] = [(nominal, anchors)]
+    if not is_noise(nominal.fit):
+        # What only the numbers are still worth is no gain of a term.
+        nominal = until_it_stands(until_it_stands(nominal))
+    parents: list[tuple[Composition, tuple[Fit, ...]]] = [(nominal, (nominal.fit, *anchors[1:]))]
     levels: list[Level] = []
     while len(levels) < depth and not is_noise(parents[0][0].fit):
         level = _level(parents, jobs, left_out)
@@ -197,18 +212,18 @@ def _level(
     grown = [_grown(parent, anchors, jobs, left_out) for parent, anchors in parents]
     found = [each for _, _, compositions in grown for each in compositions]
     if not first.terms and leans(first.fit):
-        found.append(composition((), with_any_numbers(first.fit)))
+        found.append(until_it_stands(composition((), with_any_numbers(first.fit))))
     best: dict[frozenset[tuple[str, tuple[float, ...]]], Composition] = {}
     for each in sorted(found, key=lambda c: -c.evidence):
         best.setdefault(frozenset(term.variant for term in each.terms), each)
     ranked = tuple(best.values())
     if not ranked:
-        return Level(first, (), np.zeros(0))
+        return Level(first, (), np.zeros(0), np.zeros(0))
     if not is_noise(ranked[0].fit):
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     behind, ways, _ = grown[0]
-    null = null_gains(behind, ways, ranked[0].fit, jobs)
-    return Level(first, ranked, null, predicts_better(ranked[0].fit, first.fit))
+    level = Level(first, ranked, *null_gains(behind, ways, ranked[0].fit, jobs))
+    return replace(level, predicts=predicts_better(level.best.fit, first.fit))
 
 
 def _grown(
@@ -223,11 +238,18 @@ def _grown(
     grown.sort(key=lambda c: -c.evidence)
     if grown and not is_noise(grown[0].fit):
         grown = _with_finer_functions(grown, behind, jobs)
-    settled = [c for c in grown[SETTLED:] if c.terms[-1].shares_place(grown[0].terms[-1])] + grown[
-        :SETTLED
-    ]
-    rest = [c for c in grown if all(c is not each for each in settled)]
-    return behind, ways, parallel_map(until_it_stands, settled, jobs) + rest
+    return behind, ways, _settled(grown, jobs)
+
+
+def _settled(grown: list[Composition], jobs: int) -> list[Composition]:
+    """The best compositions, and those at the place of the best, fitted until they stand."""
+    waiting, settled = list(grown), list[Composition]()
+    while waiting and waiting[0] is max([*settled, *waiting], key=lambda c: c.evidence):
+        now = waiting[:SETTLED]
+        now += [c for c in waiting[SETTLED:] if c.terms[-1].shares_place(now[0].terms[-1])]
+        waiting = [c for c in waiting if all(c is not each for each in now)]
+        settled += parallel_map(until_it_stands, now, jobs)
+    return [*settled, *waiting]
 
 
 def _with_finer_functions(
@@ -269,11 +291,10 @@ def _worth_a_fit(looks: list[Look]) -> list[Look]:
     ]
 
 
-def null_gains(behind: Background, ways: tuple[Directions, ...], best: Fit, jobs: int) -> Array:
-    """Gains (B,) of the best term on rigs of another form, in which nothing is missing.
-
-    Their misfit is as large as makes what the best term leaves of it as much as was left of the
-    recording's: an error of form that nobody can see is no reason for doubt.
+def null_gains(
+    behind: Background, ways: tuple[Directions, ...], best: Fit, jobs: int
+) -> tuple[Array, Array]:
+    """Gains of the best term on rigs of another form, in which nothing is missing.
 
     Parameters
     ----------
@@ -285,7 +306,15 @@ def null_gains(behind: Background, ways: tuple[Directions, ...], best: Fit, jobs
         With the term that explains most.
     jobs : int
         Tasks side by side.
+
+    Returns
+    -------
+    (array (B,), array (B,))
+        Where the rigs are off by as much as the recording is, all of it form; and where the best
+        term leaves as much of them as it does of the recording.
     """
+    if not ways:
+        return np.zeros(FORMS), np.zeros(FORMS)
     found, observation = behind.fit, behind.fit.model.observation
     forms = other_forms(found, FORMS, jobs).residuals * behind.weight[:, None]
     left = behind.left(forms)
@@ -300,10 +329,12 @@ def null_gains(behind: Background, ways: tuple[Directions, ...], best: Fit, jobs
     winner = np.argmax(alone.values, axis=0)
     rest = np.sum(alone.left[winner, np.arange(FORMS)] * number, axis=1)
     whole = np.sum(left**2, axis=0)
-    tiny = 1e-12
-    scale = np.minimum(
-        np.sqrt(above_noise(best.residuals) / np.maximum(rest, tiny)),
-        np.sqrt(above_noise(found.residuals) / np.maximum(whole, tiny)),
-    )
+    as_off = np.sqrt(above_noise(found.residuals) / np.maximum(whole, _TINY))
+    as_left = np.sqrt(above_noise(best.residuals) / np.maximum(rest, _TINY))
     noise = np.random.default_rng(_SEED).normal(size=left.shape) * behind.weight[:, None]
-    return np.asarray(np.max(gains(behind, ways, scale * left + behind.left(noise)).values, axis=0))
+    noise = behind.left(noise)
+
+    def best_of(scale: Array) -> Array:
+        return np.asarray(np.max(gains(behind, ways, scale * left + noise).values, axis=0))
+
+    return best_of(as_off), best_of(np.minimum(as_left, as_off))

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from endoscope_explain.fit.evidence import counts, log_likelihood, weights
 from endoscope_explain.fit.model import Fit, JointModel
-from endoscope_explain.fit.simulated_joint import residuals as misfit_of
-from endoscope_explain.fit.simulated_joint import simulate_joint
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate, mirrored
 
@@ -89,7 +87,7 @@ def background(found: Fit) -> Background:
     slopes = found.jacobian * weight[:, None]
     span, _ = np.linalg.qr(np.vstack([slopes, np.diag(model.prior_weight())]))
     coarse = model.on_coarse_ticks()
-    return Background(found, weight, span, coarse, _simulated(coarse, found.theta))
+    return Background(found, weight, span, coarse, coarse.residuals(found.theta))
 
 
 @dataclass(frozen=True)
@@ -129,7 +127,7 @@ def directions(
 def _directions(behind: Background, term: Candidate) -> Directions | None:
     if term.family is None:
         model = term.added_to(behind.coarse)
-        moved = _simulated(model, model.begun_at(behind.fit.theta)) - behind.at
+        moved = model.residuals(model.begun_at(behind.fit.theta)) - behind.at
         columns = behind.left((moved * behind.weight)[:, None])
         return Directions(term, columns) if float(np.sum(columns**2)) > _NOTHING else None
     trial = replace(term, family=term.family.scaled(_TRIAL * term.family.place.largest))
@@ -140,7 +138,7 @@ def _directions(behind: Background, term: Candidate) -> Directions | None:
     for k, place in enumerate(places):
         moved = begun.copy()
         moved[place] = 1.0 / model.free[place].unit
-        answers[:, k] = (_simulated(model, moved) - behind.at) * behind.weight
+        answers[:, k] = (model.residuals(moved) - behind.at) * behind.weight
     size = _relative_size(behind, answers)
     if size <= 0.0:
         return None
@@ -148,13 +146,6 @@ def _directions(behind: Background, term: Candidate) -> Directions | None:
     assert trial.family is not None
     scaled = replace(term, family=trial.family.scaled(amplitude))
     return Directions(scaled, behind.left(amplitude * answers))
-
-
-def _simulated(model: JointModel, theta: Array) -> Array:
-    parameters, lead = model.packed(theta)
-    return misfit_of(
-        model.observation, simulate_joint(model.observation, parameters, model.flags), lead
-    )
 
 
 def _relative_size(behind: Background, answers: Array) -> float:

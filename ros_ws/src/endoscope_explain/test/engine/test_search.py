@@ -136,6 +136,7 @@ def test_a_law_whose_formula_is_left_out_is_named_by_its_place(anchors):
     decision = decide(tried, 2)
     term = decision.missing[0]
     assert term.term.id == 'exponent_of_speed'
+    assert term.name in ('viscous_friction', 'exponent_of_speed')
     assert decision.explained > 0.95
 
 
@@ -153,7 +154,8 @@ def _level(evidences, null):
     }
     found = [_composition(value, terms[name]) for name, value in evidences.items()]
     found.sort(key=lambda c: -c.evidence)
-    return Level(_composition(0.0), tuple(found), np.asarray(null, dtype=float))
+    null = np.asarray(null, dtype=float)
+    return Level(_composition(0.0), tuple(found), null, null)
 
 
 def test_a_formula_is_taken_where_it_loses_no_more_than_form_is_worth():
@@ -169,6 +171,23 @@ def test_rivals_are_those_behind_by_no_more_than_form_is_worth():
     far = _level({'gravity': 500.0, 'tracker_delay': 300.0}, null)
     assert [c.terms[0].id for c in near.rivals()] == ['tracker_delay']
     assert far.rivals() == ()
+
+
+def test_other_numbers_stand_where_a_term_does_hardly_more():
+    near = _level({'gravity': 500.0}, np.linspace(0.0, 50.0, 39))
+    numbers = _composition(470.0)
+    assert replace(near, found=(*near.found, numbers)).best is numbers
+    far = _composition(300.0)
+    assert replace(near, found=(*near.found, far)).best is near.found[0]
+
+
+def test_a_finer_sheath_alone_is_not_named(one_joint):
+    """A rig whose friction has a profile finer than the fitted one lacks no physics."""
+    plant = one_joint.rig()
+    true = one_joint.rig(friction_profile=(0.0, 0.2, -0.1, 0.5, -0.4, 0.3))
+    (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
+    tried = search(nominal_anchors(observation, *packed_joint(plant, 'bend_x')), 2)
+    assert decide(tried, 2).missing == ()
 
 
 def test_nothing_is_found_that_another_form_shows_as_well():
