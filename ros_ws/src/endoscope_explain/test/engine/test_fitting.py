@@ -35,11 +35,10 @@ def evenly(found):
 
 def test_a_load_that_was_dated_seconds_late_is_dated_again(one_joint):
     refitted, _ = anchors(one_joint, ('external_load', {'moment_nm': 0.0008, 'time_s': 3.2}))
-    model = with_effect(refitted.model, LOAD, {'moment_nm': 0.0006, 'time_s': 6.0})
-    late = fit(model, model.begun_at(refitted.theta), iterations=10)
+    model = with_effect(refitted.model, LOAD, {'moment_nm': 0.0006, 'time_s': 8.0})
+    late = fit(model, model.begun_at(refitted.theta), iterations=0)
     again = out_of_valleys(late, evenly(late))
     dated, _ = again.model.packed(again.theta)
-    assert abs(late.model.packed(late.theta)[0][LOAD.first_parameter + 1] - 3.2) > 0.5
     assert dated[LOAD.first_parameter + 1] == pytest.approx(3.2, abs=0.05)
     assert dated[LOAD.first_parameter] == pytest.approx(0.0008, rel=0.03)
 
