@@ -20,6 +20,18 @@ HOUSE: list[tuple[str, set[str]]] = [
 ]
 """Packages in their order, each with those before it that it and its tests may import."""
 
+ROOMS = {
+    room: k
+    for k, room in enumerate(
+        (
+            *('explanation', 'parallel', 'recording', 'observe', 'audit', 'simulation', 'fit'),
+            *('search', 'decide', 'case', 'locate', 'compare', 'design', 'explain_recording'),
+            *('pipeline', 'shared_physics', 'report', 'many_bags', 'notebook', '__init__'),
+        )
+    )
+}
+"""Rooms of `explain` in their order: one imports only rooms before it."""
+
 
 def _trees(folder: Path) -> Iterator[tuple[Path, ast.Module]]:
     for path in sorted(folder.rglob('*.py')):
@@ -62,6 +74,28 @@ def test_a_package_imports_only_packages_before_it(name: str, before: set[str]) 
         if (beyond := set(_imported(tree)) - before - {name})
     }
     assert found == {}
+
+
+def _rooms_imported(tree: ast.Module) -> Iterator[str]:
+    """Yield the rooms of `explain` that a file imports from."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            package, *rest = node.module.split('.')
+            if package == 'endoscope_explain':
+                yield from rest[:1] or [alias.name for alias in node.names]
+
+
+def test_a_room_of_explain_imports_only_rooms_before_it() -> None:
+    inside = SOURCES / 'endoscope_explain' / 'endoscope_explain'
+    there, beyond = set(), {}
+    for path, tree in _trees(inside):
+        room = (SOURCES / path).relative_to(inside).parts[0].removesuffix('.py')
+        there.add(room)
+        later = {name for name in _rooms_imported(tree) if ROOMS.get(name, -1) > ROOMS[room]}
+        if later:
+            beyond[str(path)] = later
+    assert beyond == {}
+    assert there == set(ROOMS)
 
 
 def test_the_engine_names_no_effect() -> None:

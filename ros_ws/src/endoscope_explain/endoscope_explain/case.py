@@ -7,7 +7,6 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport
 from endoscope_explain.explanation import ChannelFit, Explanation, NamedEffect, Verdict
 from endoscope_explain.fit.free_parameters import BAND
-from endoscope_explain.locate.chain_cut import ChainCut
 from endoscope_explain.recording import Recording
 
 Ladder = Mapping[str, Mapping[str, ChannelFit]]
@@ -101,6 +100,29 @@ class Provenance:
     version: str
     command: str
     date: str
+
+
+@dataclass(frozen=True)
+class ChainCut:
+    """Misfit of wires and tip of one joint, in noise units (rms).
+
+    Attributes
+    ----------
+    joint : str
+    by_command : float
+        Driven by the command, through the simulated servo.
+    by_motor : float
+        Driven by the measured shaft.
+    """
+
+    joint: str
+    by_command: float
+    by_motor: float
+
+    @property
+    def before_the_motor(self) -> bool:
+        """Whether what is wrong lies before the motor's encoder."""
+        return self.by_motor < 0.5 * self.by_command
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.baseline import against_baseline
-from endoscope_explain.conclusions import (
+from endoscope_explain.decide.conclusions import (
     NOMINAL_UNITS,
     candidates,
     ladder,
@@ -18,15 +17,16 @@ from endoscope_explain.conclusions import (
     verdict_of,
 )
 from endoscope_explain.decide.decision import Decision, decide
+from endoscope_explain.decide.given_physics import GivenJoints, explained_by
 from endoscope_explain.explanation import Explanation, Verdict
+from endoscope_explain.fit.baseline import against_baseline
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.intervals import nominal_estimates
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import all_anchors, anchored, simulated_bending
 from endoscope_explain.fit.simulated_joint import packed_joint
-from endoscope_explain.given_physics import GivenJoints, explained_by
-from endoscope_explain.held_noise import with_held_noise
-from endoscope_explain.observation import JointObservation, couple, observe
+from endoscope_explain.observe.held_noise import with_held_noise
+from endoscope_explain.observe.observation import JointObservation, couple, observe
 from endoscope_explain.recording import Recording
 from endoscope_explain.search.levels import MOST_EFFECTS, JointSearch, search
 from endoscope_explain.search.refit import Composition

@@ -16,7 +16,7 @@ from endoscope_core.worker_pool import worker_pool
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
-from endoscope_explain.provenance import provenance
+from endoscope_explain.report.provenance import provenance
 from endoscope_explain.report.terminal import told
 from endoscope_explain.report.writing import REPORT_HTML, REPORT_JSON, write_report
 from endoscope_explain.shared_physics import physics_of_all

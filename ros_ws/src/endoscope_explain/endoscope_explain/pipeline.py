@@ -10,21 +10,21 @@ from threadpoolctl import threadpool_limits
 from endoscope_bags.errors import BagError
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport, audit_recording
-from endoscope_explain.case import ExplainedCase, NextExperiment, Place
-from endoscope_explain.combine import combined_effects, combined_verdict, improved_plant
+from endoscope_explain.case import ChainCut, ExplainedCase, NextExperiment, Place
+from endoscope_explain.compare.ladder import ladders
+from endoscope_explain.decide.combine import combined_effects, combined_verdict, improved_plant
+from endoscope_explain.decide.given_physics import GivenJoints
+from endoscope_explain.design.proposal import propose
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.free_parameters import BAND
-from endoscope_explain.given_physics import GivenJoints
-from endoscope_explain.isolated_samples import with_isolated_marked
-from endoscope_explain.ladder import ladders
-from endoscope_explain.locate.chain_cut import ChainCut, cut_at_motor
+from endoscope_explain.fit.isolated_samples import with_isolated_marked
+from endoscope_explain.locate.chain_cut import cut_at_motor
 from endoscope_explain.locate.locating import (
     locate_effects,
     locate_findings,
     locate_parameters,
     locate_unknown,
 )
-from endoscope_explain.next_experiment.proposal import propose
 from endoscope_explain.recording import (
     Recording,
     recording_from_bag,

@@ -11,11 +11,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.decide.given_physics import GivenJoints, GivenPhysics, without_recording
 from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.fit.pooled import told_alone
-from endoscope_explain.given_physics import GivenJoints, GivenPhysics, without_recording
-from endoscope_explain.held_noise import with_held_noise
-from endoscope_explain.observation import observe
+from endoscope_explain.observe.held_noise import with_held_noise
+from endoscope_explain.observe.observation import observe
 from endoscope_explain.pipeline import (
     JointsDifferError,
     Sources,
@@ -23,7 +23,7 @@ from endoscope_explain.pipeline import (
     require_as_named,
 )
 from endoscope_explain.search.levels import FALSE_ALARMS
-from endoscope_explain.shared_choice import (
+from endoscope_explain.search.shared_choice import (
     Anchors,
     SharedChoice,
     settled_together,

@@ -20,8 +20,8 @@ from endoscope_explain.explanation import (
     UnknownTerm,
     Verdict,
 )
+from endoscope_explain.observe.predicted_signals import rung, view
 from endoscope_explain.pipeline import Inputs, explain_case
-from endoscope_explain.predicted_signals import rung, view
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.signals import gear
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from endoscope_explain.black_box.features import PLAY_WIDTHS, motion_features
-from endoscope_explain.black_box.regressors import GaussianProcess, NeuralNetwork, training
+from endoscope_explain.compare.black_box.features import PLAY_WIDTHS, motion_features
+from endoscope_explain.compare.black_box.regressors import GaussianProcess, NeuralNetwork, training
+from endoscope_explain.compare.ladder import ladders
 from endoscope_explain.fit.held_out import fitted_at, judged_at
-from endoscope_explain.ladder import ladders
 
 
 @pytest.mark.parametrize('kind', [GaussianProcess, NeuralNetwork])

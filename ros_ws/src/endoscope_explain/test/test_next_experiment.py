@@ -5,11 +5,11 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.design.distance import distance
+from endoscope_explain.design.imagined import imagine, is_safe
+from endoscope_explain.design.proposal import propose
+from endoscope_explain.design.waveforms import family
 from endoscope_explain.explanation import NamedEffect
-from endoscope_explain.next_experiment.distance import distance
-from endoscope_explain.next_experiment.imagined import imagine, is_safe
-from endoscope_explain.next_experiment.proposal import propose
-from endoscope_explain.next_experiment.waveforms import family
 
 PLANT = PlantDescription()
 RIVALLED = NamedEffect(

@@ -18,7 +18,7 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit.tolerance import tolerance
-from endoscope_explain.predicted_signals import rung, view
+from endoscope_explain.observe.predicted_signals import rung, view
 from endoscope_explain.recording import Series
 from endoscope_explain.report.chain_drawing import STAGES, chain_svg
 from endoscope_explain.report.html_page import html_page

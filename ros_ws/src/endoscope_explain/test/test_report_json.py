@@ -10,7 +10,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.plant_file import load_plant
 from endoscope_explain.audit import AuditReport, Finding, Severity
 from endoscope_explain.case import NextExperiment
-from endoscope_explain.combine import combined_effects, combined_verdict
+from endoscope_explain.decide.combine import combined_effects, combined_verdict
 from endoscope_explain.explanation import Estimate, NominalEstimate, Verdict
 from endoscope_explain.report.report_mapping import report_mapping
 from endoscope_explain.report.writing import write_report

@@ -9,7 +9,7 @@ from endoscope_core.physics import load_plant
 from endoscope_explain.fit.free_parameters import BAND, FORM_SPREAD
 from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.fit.whiteness import worst_against_raw_noise
-from endoscope_explain.observation import observe
+from endoscope_explain.observe.observation import observe
 from endoscope_explain.recording import recording_from_bag
 
 SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.observation import JointObservation
+from endoscope_explain.observe.observation import JointObservation
 
 Array = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from endoscope_core.physics.layout import (
     OUT_TENSION_B,
     PULLEY_RADIUS,
 )
-from endoscope_explain.observation import JointObservation
+from endoscope_explain.observe.observation import JointObservation
 
 Array = NDArray[np.float64]
 

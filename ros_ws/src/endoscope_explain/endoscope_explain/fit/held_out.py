@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.fit.evidence import weights
 from endoscope_explain.fit.model import Fit, fit
-from endoscope_explain.observation import JointObservation
+from endoscope_explain.observe.observation import JointObservation
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -13,7 +13,7 @@ from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
 from endoscope_explain.fit.simulated_joint import residuals, simulate_joint
 from endoscope_explain.fit.solver import STEP, Effort, Renewal, minimise
-from endoscope_explain.observation import JointObservation
+from endoscope_explain.observe.observation import JointObservation
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -13,11 +13,11 @@ from endoscope_explain.fit.free_parameters import (
     FreeParameter,
     nominal_parameters,
 )
+from endoscope_explain.fit.isolated_samples import without_isolated
 from endoscope_explain.fit.model import Fit, JointModel, fit, jacobian
 from endoscope_explain.fit.simulated_joint import packed_joint, simulate_joint
 from endoscope_explain.fit.whiteness import is_noise
-from endoscope_explain.isolated_samples import without_isolated
-from endoscope_explain.observation import JointObservation, couple
+from endoscope_explain.observe.observation import JointObservation, couple
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording
 

@@ -18,7 +18,7 @@ from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
 from endoscope_explain.fit.evidence import weights
 from endoscope_explain.fit.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
 from endoscope_explain.fit.model import Fit, glance
-from endoscope_explain.observation import JointObservation
+from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from endoscope_core.physics.layout import (
     PROFILE_TERMS,
 )
 from endoscope_core.physics.packing import pack, rest_state
-from endoscope_explain.observation import TICK, JointObservation
+from endoscope_explain.observe.observation import TICK, JointObservation
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

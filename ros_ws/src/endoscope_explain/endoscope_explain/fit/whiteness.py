@@ -3,7 +3,7 @@
 import numpy as np
 
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.observation import JointObservation
+from endoscope_explain.observe.observation import JointObservation
 
 BLOCK = 50
 """Samples of a block whose mean tells slow misfit that single samples hide."""

@@ -1,16 +1,15 @@
 """Cut the chain at the motor: drive what lies behind it with the measured shaft."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import IN_MOTOR
+from endoscope_explain.case import ChainCut
 from endoscope_explain.fit.simulated_joint import simulate_joint
-from endoscope_explain.observation import TICK, JointObservation, observe
-from endoscope_explain.predicted_signals import packed_rig, reading_lead, simulate_rig
+from endoscope_explain.observe.observation import TICK, JointObservation, observe
+from endoscope_explain.observe.predicted_signals import packed_rig, reading_lead, simulate_rig
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
@@ -18,29 +17,6 @@ Array = NDArray[np.float64]
 SMOOTHED_S = 0.021
 """Window over which the encoder's steps are smoothed: shorter than the servo's answer."""
 BEHIND = ('tension', 'bending')
-
-
-@dataclass(frozen=True)
-class ChainCut:
-    """Misfit of wires and tip of one joint, in noise units (rms).
-
-    Attributes
-    ----------
-    joint : str
-    by_command : float
-        Driven by the command, through the simulated servo.
-    by_motor : float
-        Driven by the measured shaft.
-    """
-
-    joint: str
-    by_command: float
-    by_motor: float
-
-    @property
-    def before_the_motor(self) -> bool:
-        """Whether what is wrong lies before the motor's encoder."""
-        return self.by_motor < 0.5 * self.by_command
 
 
 def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCut, ...]:

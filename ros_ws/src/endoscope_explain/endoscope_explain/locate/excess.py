@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.predicted_signals import SignalView
+from endoscope_explain.observe.predicted_signals import SignalView
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport, Finding
 from endoscope_explain.case import Place
-from endoscope_explain.combine import changed_parameters
+from endoscope_explain.decide.combine import changed_parameters
 from endoscope_explain.explanation import Explanation, NamedEffect
 from endoscope_explain.fit.free_parameters import FRICTION_PROFILE_NAMES
 from endoscope_explain.locate.band import band_hz
@@ -14,7 +14,7 @@ from endoscope_explain.locate.conditions import conditions, drive
 from endoscope_explain.locate.excess import SignalExcess, excess_between, shares
 from endoscope_explain.locate.regime import regime_in_words
 from endoscope_explain.locate.time_windows import intervals, onset
-from endoscope_explain.predicted_signals import view
+from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.recording import Recording
 
 STAGE_OF_PARAMETER = {

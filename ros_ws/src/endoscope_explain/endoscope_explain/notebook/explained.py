@@ -14,7 +14,7 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explanation import NamedEffect, NominalEstimate
 from endoscope_explain.notebook.drawing import OUTSIDE, embedded, html_table
-from endoscope_explain.predicted_signals import RecordedView, view
+from endoscope_explain.observe.predicted_signals import RecordedView, view
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.numbers import PLANTS, Shown, measurable, shown
 from endoscope_explain.report.report_mapping import report_mapping

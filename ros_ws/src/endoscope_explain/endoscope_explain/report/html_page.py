@@ -12,7 +12,7 @@ from endoscope_explain.case import ExplainedCase, Ladder, Place
 from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
 from endoscope_explain.fit.tolerance import tolerance
 from endoscope_explain.fit.whiteness import slips
-from endoscope_explain.predicted_signals import RecordedView, view
+from endoscope_explain.observe.predicted_signals import RecordedView, view
 from endoscope_explain.recording.signals import gear
 from endoscope_explain.report.chain_drawing import chain_svg
 from endoscope_explain.report.figures.experiment import experiment_figure, unknown_figure

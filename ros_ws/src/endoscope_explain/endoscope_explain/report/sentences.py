@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.case import ExplainedCase, Place
-from endoscope_explain.combine import changed_parameters
+from endoscope_explain.decide.combine import changed_parameters
 from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
 from endoscope_explain.report.numbers import PLANTS, digits, form, in_degrees, judged
 

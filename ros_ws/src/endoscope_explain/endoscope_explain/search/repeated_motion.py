@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.layout import IN_COMMAND
-from endoscope_explain.observation import TICK, JointObservation
+from endoscope_explain.observe.observation import TICK, JointObservation
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from endoscope_explain.fit.nominal import nominal_anchors
 from endoscope_explain.fit.other_forms import other_forms
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.fit.valleys import out_of_valleys
-from endoscope_explain.observation import observe
+from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.candidate import with_effect
 
 LOAD = CATALOGUE['external_load']

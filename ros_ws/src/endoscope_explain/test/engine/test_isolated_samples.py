@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from endoscope_core.physics.description import PlantDescription
+from endoscope_explain.fit.isolated_samples import with_isolated_marked, without_isolated
 from endoscope_explain.fit.nominal import all_anchors
 from endoscope_explain.fit.simulated_joint import packed_joint
-from endoscope_explain.isolated_samples import with_isolated_marked, without_isolated
-from endoscope_explain.observation import observe
+from endoscope_explain.observe.observation import observe
 
 PLANT = PlantDescription()
 SPIKES = [40, 44, 159]

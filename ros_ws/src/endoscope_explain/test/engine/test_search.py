@@ -12,7 +12,7 @@ from endoscope_explain.decide.decision import decide
 from endoscope_explain.fit.nominal import nominal_anchors
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.fit.whiteness import is_noise
-from endoscope_explain.observation import observe
+from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.candidate import Candidate, candidates, starting_points
 from endoscope_explain.search.levels import Level, search
 from endoscope_explain.search.refit import Composition

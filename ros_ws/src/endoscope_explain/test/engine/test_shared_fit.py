@@ -10,7 +10,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.fit.model import fit
 from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.fit.pooled import SPREAD, fit_together, told_alone, with_common_numbers
-from endoscope_explain.observation import observe
+from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.candidate import with_effect
 
 GAIN = 0.9

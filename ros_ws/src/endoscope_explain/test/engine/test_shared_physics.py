@@ -4,11 +4,11 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.decide.given_physics import without_recording
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.fit.model import fit
 from endoscope_explain.fit.nominal import anchored
-from endoscope_explain.given_physics import without_recording
-from endoscope_explain.observation import observe
+from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.candidate import with_effect
 from endoscope_explain.shared_physics import shared_effects
 

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from endoscope_explain.predicted_signals import RecordedView, SignalView
+from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
 from endoscope_explain.report.figures.style import (
     RUNG_COLOUR,
     RUNG_STYLE,

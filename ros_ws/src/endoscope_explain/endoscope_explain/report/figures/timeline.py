@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from endoscope_explain.case import Place
 from endoscope_explain.locate.time_windows import WINDOW_S
-from endoscope_explain.predicted_signals import RecordedView, SignalView
+from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
 from endoscope_explain.report.figures.style import (
     GUILTY,
     INK,

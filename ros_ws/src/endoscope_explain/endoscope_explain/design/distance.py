@@ -10,7 +10,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
 from endoscope_explain.fit.model import Fit, JointModel, fit
 from endoscope_explain.fit.simulated_joint import joint_of, packed_joint
-from endoscope_explain.observation import JointObservation, observe
+from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.observation import TICK, Channel, JointObservation
+from endoscope_explain.observe.observation import TICK, Channel, JointObservation
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.black_box.rungs import Exam, black_box_rungs
 from endoscope_explain.case import Ladder
+from endoscope_explain.compare.black_box.rungs import Exam, black_box_rungs
 from endoscope_explain.explanation import ChannelFit, Explanation
 from endoscope_explain.fit.held_out import fitted_at, judged_at
-from endoscope_explain.predicted_signals import rung, view
+from endoscope_explain.observe.predicted_signals import rung, view
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ from scipy.ndimage import median_filter
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.observation import Channel, JointObservation
-from endoscope_explain.predicted_signals import view
+from endoscope_explain.observe.observation import Channel, JointObservation
+from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.recording import Recording
 from endoscope_explain.recording.signals import signal_name
 

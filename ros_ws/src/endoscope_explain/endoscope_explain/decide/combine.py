@@ -7,7 +7,7 @@ from dataclasses import replace
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import AuditReport, Finding
-from endoscope_explain.conclusions import has_changed
+from endoscope_explain.decide.conclusions import has_changed
 from endoscope_explain.explanation import Explanation, NamedEffect, NominalEstimate, Verdict
 from endoscope_explain.fit.free_parameters import FORM_SPREAD
 

@@ -22,7 +22,7 @@ from endoscope_explain.fit.held_out import held_out_fit, held_out_masks, on_samp
 from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.simulated_joint import joint_of
-from endoscope_explain.observation import JointObservation
+from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.candidate import Candidate as Term
 from endoscope_explain.search.formula import fitted_function, nearest_formula
 from endoscope_explain.search.levels import JointSearch

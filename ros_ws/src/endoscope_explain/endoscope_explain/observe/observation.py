@@ -24,9 +24,9 @@ from endoscope_core.physics.layout import (
     OUT_TENSION_B,
 )
 from endoscope_core.physics.on_stamps import hold_on_ticks
+from endoscope_explain.observe.unresolved import fast_scatter
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.signals import QUANTITY_UNITS, signal_name
-from endoscope_explain.unresolved import fast_scatter
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -16,11 +16,11 @@ from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_explain.case import NextExperiment
+from endoscope_explain.design.distance import distance, refit, with_fit
+from endoscope_explain.design.imagined import imagine, is_safe
+from endoscope_explain.design.waveforms import Waveform, family
 from endoscope_explain.explanation import NamedEffect
-from endoscope_explain.next_experiment.distance import distance, refit, with_fit
-from endoscope_explain.next_experiment.imagined import imagine, is_safe
-from endoscope_explain.next_experiment.waveforms import Waveform, family
-from endoscope_explain.observation import observe
+from endoscope_explain.observe.observation import observe
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording
 from endoscope_explain.recording.signals import gear

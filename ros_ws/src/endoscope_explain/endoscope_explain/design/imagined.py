@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.simulator import simulate
-from endoscope_explain.next_experiment.waveforms import Waveform
-from endoscope_explain.observation import TICK
+from endoscope_explain.design.waveforms import Waveform
+from endoscope_explain.observe.observation import TICK
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.signals import gear
 

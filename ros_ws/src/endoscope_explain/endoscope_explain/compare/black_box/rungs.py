@@ -6,16 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.black_box.features import motion_features
-from endoscope_explain.black_box.regressors import (
+from endoscope_explain.compare.black_box.features import motion_features
+from endoscope_explain.compare.black_box.regressors import (
     GaussianProcess,
     NeuralNetwork,
     Regressor,
     training,
 )
 from endoscope_explain.explanation import ChannelFit
+from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.predicted_signals import RecordedView, SignalView
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.observation import Channel, JointObservation
+from endoscope_explain.observe.observation import Channel, JointObservation
 
 Array = NDArray[np.float64]
 

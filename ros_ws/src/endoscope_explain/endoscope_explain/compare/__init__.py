@@ -1,0 +1,1 @@
+"""How well each plant and each black box does on data that no fit has seen."""

@@ -1,0 +1,1 @@
+"""What is compared: readings on the analysis grid, their noise, and what a plant predicts."""
