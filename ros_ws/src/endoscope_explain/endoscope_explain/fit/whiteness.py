@@ -11,8 +11,8 @@ LIMIT = 5.0
 """Standard deviations of the noise's own scatter that a mean square may exceed."""
 NOTABLE = 0.1
 """Share of a wire's samples with more scatter than noise from which on it is said to slip."""
-WHITE = frozenset({'tension', 'bending'})
-"""Quantities whose noise is white; rounding errors of the others are not."""
+WHITE = frozenset({'tension', 'bending', 'shaft_effort'})
+"""Quantities whose noise is white; the rounding error of the encoder is not."""
 
 
 def excess(fit: Fit) -> dict[str, float]:
@@ -35,20 +35,6 @@ def excess(fit: Fit) -> dict[str, float]:
 def is_noise(fit: Fit) -> bool:
     """Return whether no white channel shows more than noise."""
     return all(z < LIMIT for z in excess(fit).values())
-
-
-def worst_against_raw_noise(fit: Fit) -> float:
-    """Largest rmse over noise of any wire or angle, as single raw samples would show it.
-
-    Averages over an analysis period show errors that no raw sample would.
-    """
-    observation = fit.model.observation
-    worst = 0.0
-    for channel, part in zip(observation.channels, observation.slices(), strict=True):
-        if channel.quantity in WHITE:
-            above = float(np.mean(fit.residuals[part] ** 2)) - 1.0
-            worst = max(worst, np.sqrt(max(1.0 + above / float(np.mean(channel.count)), 0.0)))
-    return float(worst)
 
 
 def slips(observation: JointObservation) -> bool:

@@ -22,6 +22,7 @@ from endoscope_explain.search.candidate import Candidate, candidates
 from endoscope_explain.search.refit import (
     Composition,
     Look,
+    begun_beside,
     by_fine_derivatives,
     composition,
     look,
@@ -238,6 +239,7 @@ def _grown(
     grown.sort(key=lambda c: -c.evidence)
     if grown and not is_noise(grown[0].fit):
         grown = _with_finer_functions(grown, behind, jobs)
+        grown = _with_their_formulas(grown, parent, behind, [way.candidate for way in ways], jobs)
     return behind, ways, _settled(grown, jobs)
 
 
@@ -260,6 +262,37 @@ def _with_finer_functions(
     rest = [c for c in grown if all(c is not each for each in functions)]
     finer = parallel_map(lambda c: refined(c, behind.fit, behind.offset), functions, jobs)
     return sorted([*finer, *rest], key=lambda c: -c.evidence)
+
+
+def _with_their_formulas(
+    grown: list[Composition],
+    parent: Composition,
+    behind: Background,
+    terms: list[Candidate],
+    jobs: int,
+) -> list[Composition]:
+    """Compositions, best first, with formulas fitted from the numbers that functions leave.
+
+    What is missing bends the other numbers, and a formula far from linear, begun beside bent ones,
+    ends anywhere. The function at its place has set them straight.
+    """
+    tasks: list[tuple[Composition, list[Candidate]]] = []
+    for function in (c for c in grown if c.terms[-1].is_function):
+        starts: dict[str, list[Candidate]] = {}
+        for term in terms:
+            if not term.is_function and term.shares_place(function.terms[-1]):
+                starts.setdefault(term.id, []).append(term)
+        tasks += [(function, own) for own in starts.values()]
+
+    def fitted(task: tuple[Composition, list[Candidate]]) -> Composition:
+        function, own = task
+        return polish(begun_beside(function.fit, parent.fit, own, behind.offset), parent)
+
+    more = parallel_map(fitted, tasks, jobs)
+    best: dict[tuple[str, tuple[float, ...]], Composition] = {}
+    for each in sorted([*grown, *more], key=lambda c: -c.evidence):
+        best.setdefault(each.terms[-1].variant, each)
+    return list(best.values())
 
 
 def _most_promising(ranked: list[Promised]) -> list[Candidate]:

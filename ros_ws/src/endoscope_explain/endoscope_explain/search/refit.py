@@ -5,6 +5,7 @@ corrected by Broyden's rank-one update (Broyden, Math. Comp. 19, 1965), so that 
 about ten simulations instead of a hundred.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -105,6 +106,37 @@ def look(anchors: tuple[Fit, ...], candidate: Candidate, offset: Array) -> Look:
         found = glance(coarse, theta, derivative, LOOK_STEPS, weight)
         if best is None or found.cost < best.cost:
             best = Look(candidate, model, coarse, found.theta, found.cost)
+    assert best is not None
+    return best
+
+
+def begun_beside(function: Fit, without: Fit, starts: Sequence[Candidate], offset: Array) -> Look:
+    """The start of a formula that leaves least beside the numbers of a fit with a function.
+
+    Parameters
+    ----------
+    function : Fit
+        With the function at the formula's place.
+    without : Fit
+        The fit to which either is added.
+    starts : sequence of Candidate
+        One effect at its starting points.
+    offset : array (size,)
+        As for `look`.
+
+    Returns
+    -------
+    Look
+    """
+    weight = weights(function.model.observation, without.residuals)
+    best: Look | None = None
+    for candidate in starts:
+        model = candidate.added_to(without.model)
+        coarse = model.on_coarse_ticks(offset)
+        theta = model.begun_at(function.theta[: len(without.theta)])
+        cost = coarse.cost(weight * coarse.residuals(theta), theta)
+        if best is None or cost < best.cost:
+            best = Look(candidate, model, coarse, theta, cost)
     assert best is not None
     return best
 
