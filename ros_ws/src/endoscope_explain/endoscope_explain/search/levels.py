@@ -233,6 +233,12 @@ def _grown(
     behind = background(parent.fit)
     ways = directions(behind, candidates(parent.fit, left_out), jobs)
     likely = _most_promising(promises(behind, ways))
+    for described in anchors[1:]:
+        # What is missing has bent the fitted numbers, but not the described ones.
+        unbent = background(described)
+        terms = tuple(way.candidate for way in ways)
+        more = _most_promising(promises(unbent, directions(unbent, terms, jobs)))
+        likely += [term for term in more if term.variant not in {t.variant for t in likely}]
     looks = parallel_map(lambda term: look(anchors, term, behind.offset), likely, jobs)
     chosen = _worth_a_fit(looks)
     grown = parallel_map(lambda seen: polish(seen, parent), chosen, jobs)
