@@ -4,9 +4,11 @@ import os
 import signal
 import subprocess
 import termios
+import time
 
 import numpy as np
 import pytest
+import rclpy
 from operated_graph import ENDOSCOPE, OperatedGraph, Typist, plain, told
 from sensor_msgs.msg import Joy
 
@@ -27,10 +29,28 @@ def running(tmp_path_factory):
         yield graph
 
 
+def is_seen_from_outside(graph, name):
+    """Whether a program that begins now finds a node: an old one may remember it for ever."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=graph.domain)
+    try:
+        asking = rclpy.create_node('asking', context=context)
+        time.sleep(1.0)
+        return name in asking.get_node_names()
+    finally:
+        rclpy.shutdown(context=context)
+
+
 @pytest.fixture
 def graph(running):
     # A handle that was killed is missed by the middleware in its own time.
-    running.until(lambda: 'teleop' not in running.probe.get_node_names(), 'the end of teleop')
+    running.until(
+        lambda: (
+            'teleop' not in running.probe.get_node_names()
+            or not is_seen_from_outside(running, 'teleop')
+        ),
+        'the end of teleop',
+    )
     running.command('disable')
     running.set('console', source='none', scale=1.0)
     running.clutches.clear()
