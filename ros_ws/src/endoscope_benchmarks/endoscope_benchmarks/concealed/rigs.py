@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from endoscope_core.physics import JointParameters, PlantDescription, SensorParameters
 from endoscope_core.physics.family import shipped_family
 from endoscope_core.physics.layout import PROFILE_TERMS
+from endoscope_explain.fit.free_parameters import SCALED_NOMINAL
 
 Array = NDArray[np.float64]
 
@@ -25,17 +26,6 @@ UNEVENNESS = 0.3
 TIGHTENING, REST_ANGLE, SPREAD = 0.15, 0.03, 0.25
 """Half-widths of the difference of the pretension's profile, of the joint's rest angle in rad and
 of the spread of its pre-sliding."""
-_SCALED = (
-    'pretension',
-    'wire_stiffness',
-    'capstan_exponent',
-    'joint_stiffness',
-    'joint_friction',
-    'joint_presliding',
-    'joint_damping',
-    'motor_bandwidth',
-    'motor_damping_ratio',
-)
 
 
 def described_rig(generator: np.random.Generator, joints: int) -> PlantDescription:
@@ -58,7 +48,7 @@ def true_rig(
     """
     joints = {}
     for name, joint in described.joints.items():
-        keys = (*_SCALED, 'pulley_radius', 'joint_radius') if drilled else _SCALED
+        keys = (*SCALED_NOMINAL, 'pulley_radius', 'joint_radius') if drilled else SCALED_NOMINAL
         factors = {
             key: 1.0 + (DRILLED if key.endswith('radius') else OFF) * generator.uniform(-1.0, 1.0)
             for key in keys
@@ -108,7 +98,7 @@ def spreads(joint: JointParameters) -> dict[str, float]:
     """Rms by which each number of a rig differs from its description; `friction_profile_1`..."""
     uniform = 1.0 / math.sqrt(3.0)
     return {
-        **{key: OFF * uniform * getattr(joint, key) for key in _SCALED},
+        **{key: OFF * uniform * getattr(joint, key) for key in SCALED_NOMINAL},
         'pretension_profile': -TIGHTENING * uniform,
         'joint_rest_angle': REST_ANGLE * uniform,
         'joint_presliding_spread': SPREAD * uniform,

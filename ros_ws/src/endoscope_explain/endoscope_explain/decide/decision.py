@@ -94,6 +94,7 @@ def decide(search: JointSearch, jobs: int) -> Decision:
     """Choose a composition, name its terms and their rivals, and judge whether it is adequate."""
     chosen: Composition = search.nominal
     missing: tuple[MissingTerm, ...] = ()
+    judged: tuple[Fit, bool] | None = None
     for level in search.levels:
         if not level.is_found:
             break
@@ -101,13 +102,14 @@ def decide(search: JointSearch, jobs: int) -> Decision:
         if not best.terms:
             chosen = best
             break
-        best = replace(best, fit=with_form(best.fit, jobs)[0])
+        formed = with_form(best.fit, jobs)
+        best = replace(best, fit=formed[0])
         if any(not t.is_function and may_be_absent(best.fit, t.term) for t in best.terms):
             break
-        chosen = best
+        chosen, judged = best, formed
         missing = (*missing[: len(best.terms) - 1], _missing(level, best, jobs))
     missing = _named_as_chosen(search, chosen, missing, jobs)
-    fit, adequate = with_form(chosen.fit, jobs)
+    fit, adequate = judged or with_form(chosen.fit, jobs)
     explained = share_explained(search.nominal, chosen)
     return Decision(replace(chosen, fit=fit), missing, adequate, explained)
 

@@ -2,6 +2,7 @@
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
+from endoscope_core.physics.effects.cells import ONE_CELL
 from endoscope_core.physics.hooks import LOAD_CELL, hook
 
 EFFECT = Effect(
@@ -13,15 +14,7 @@ EFFECT = Effect(
     source='VDI/VDE 2638, characteristics of force transducers (zero drift)',
     parameters=(
         Parameter('rate_n_per_s', 'N/s', -1.0, 1.0, 0.05, off=0.0, starts=(0.02,), comparable=True),
-        Parameter(
-            'wire',
-            '-',
-            0.0,
-            1.0,
-            0.0,
-            choices=(0.0, 1.0),
-            words=('the cell of the positive wire', 'the cell of the negative wire'),
-        ),
+        ONE_CELL,
     ),
     traits=Traits(
         depends_on_time=True, families=('load_cell_pos_of_time', 'load_cell_neg_of_time')

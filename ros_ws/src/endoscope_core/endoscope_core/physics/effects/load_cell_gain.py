@@ -2,6 +2,7 @@
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
+from endoscope_core.physics.effects.cells import ONE_CELL
 from endoscope_core.physics.hooks import LOAD_CELL, hook
 
 EFFECT = Effect(
@@ -13,15 +14,7 @@ EFFECT = Effect(
     source='VDI/VDE 2638, characteristics of force transducers (gain error)',
     parameters=(
         Parameter('gain', '-', 0.2, 3.0, 1.15, off=1.0, starts=(1.05,), comparable=True),
-        Parameter(
-            'wire',
-            '-',
-            0.0,
-            1.0,
-            0.0,
-            choices=(0.0, 1.0),
-            words=('the cell of the positive wire', 'the cell of the negative wire'),
-        ),
+        ONE_CELL,
     ),
     traits=Traits(families=('load_cell_pos_of_tension', 'load_cell_neg_of_tension')),
 )

@@ -2,6 +2,7 @@
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Symptom, Traits
+from endoscope_core.physics.effects.cells import ONE_CELL
 from endoscope_core.physics.hooks import LOAD_CELL, hook
 
 EFFECT = Effect(
@@ -15,15 +16,7 @@ EFFECT = Effect(
         Parameter(
             'limit_n', 'N', 0.1, 500.0, 7.0, off=500.0, starts=(5.5, 7.0, 9.0), comparable=True
         ),
-        Parameter(
-            'wire',
-            '-',
-            0.0,
-            1.0,
-            0.0,
-            choices=(0.0, 1.0),
-            words=('the cell of the positive wire', 'the cell of the negative wire'),
-        ),
+        ONE_CELL,
     ),
     traits=Traits(symptom=Symptom.CLIPPED_TENSION),
 )
