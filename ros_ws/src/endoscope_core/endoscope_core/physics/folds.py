@@ -8,12 +8,15 @@ holds the compiled cache. The functions of all places are the same few compiled 
 
 import importlib.util
 import sys
+from collections.abc import Iterable
 from types import ModuleType
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.compiled_cache import SOURCES, cache_folder
+from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_core.physics.functions.places import KEPT_UP
 from endoscope_core.physics.functions.summation import MOST, ROWS
 from endoscope_core.physics.hooks import HOOKS, LINKS, Fold, Function, Hook
 
@@ -33,14 +36,16 @@ def source() -> str:
         for effect, function in links:
             name = f'{effect.id}_{function.__name__}'
             imports.append(f'from {function.__module__} import {function.__name__} as {name}')
-            names.append((effect.flag, name))
+            names.append((effect, name))
         functions.append(_function(hook, names))
         if any(places[0].hook is hook for _, places in ROWS):
             functions.append(_functions(hook))
+    follow = [place for place in FUNCTIONS.values() if place.at in KEPT_UP]
+    functions.append(_test('functions_follow', follow))
     return '\n'.join(imports) + '\n' + ''.join(functions)
 
 
-def _function(hook: Hook, links: list[tuple[int, str]]) -> str:
+def _function(hook: Hook, links: list[tuple[Effect, str]]) -> str:
     results = [f'r{i}' for i in range(hook.results)]
     given = ', '.join(results)
     parts = [f'd{i}' for i in range(hook.results)]
@@ -48,9 +53,9 @@ def _function(hook: Hook, links: list[tuple[int, str]]) -> str:
     lines = [f'\n\n@compiled\ndef {hook.name}(on, {hook.arguments}):']
     if start is not None:
         lines += [f'    {name} = {start}' for name in results]
-    for flag, name in links:
+    for effect, name in links:
         call = f'{name}({hook.arguments})'
-        lines.append(f'    if on[{flag}]:')
+        lines.append(f'    if on[{effect.flag}]:')
         if hook.fold is Fold.THROUGH:
             lines.append(f'        {hook.value} = {call}')
         elif hook.fold is Fold.LEAST:
@@ -67,30 +72,36 @@ def _function(hook: Hook, links: list[tuple[int, str]]) -> str:
         lines.append(f'    return {given}')
     elif not links:
         lines.append('    pass')
-    tests = ' or '.join(f'on[{flag}]' for flag, _ in links) or 'False'
-    lines.append(f'\n\n@compiled\ndef {hook.name}_acts(on):\n    return {tests}')
-    return '\n'.join(lines) + '\n'
+    return '\n'.join(lines) + '\n' + _test(f'{hook.name}_acts', [effect for effect, _ in links])
 
 
 def _functions(hook: Hook) -> str:
     """Source of a function that adds up those of a hook's places."""
     lines = [f'\n\n@compiled\ndef {hook.name}_functions(on, {hook.arguments}):']
     lines.append('    r0, r1 = 0.0, 0.0')
-    for number, places in ROWS:
-        if places[0].hook is not hook:
-            continue
+    rows = [(number, places) for number, places in ROWS if places[0].hook is hook]
+    for number, places in rows:
         arguments = [place.at for place in places] + ['0.0'] * (MOST - len(places))
         given = f'on, p, {float(number)}, {float(len(places))}, {", ".join(arguments)}'
-        indent = '    '
-        if places[0].only:
-            lines.append(f'    if {places[0].only}:')
-            indent = '        '
-        lines.append(f'{indent}value, slope = sum_of_functions({given})')
-        lines.append(f'{indent}r0 += {places[0].sign or "1.0"} * value')
+        only = f'{places[0].only} and ' if places[0].only else ''
+        lines.append(f'    if {only}({_any_of(places)}):')
+        lines.append(f'        value, slope = sum_of_functions({given})')
+        lines.append(f'        r0 += {places[0].sign or "1.0"} * value')
         if places[0].by_step:
-            lines.append(f'{indent}r1 -= {places[0].by_step} * slope')
+            lines.append(f'        r1 -= {places[0].by_step} * slope')
     given = 'math.exp(r0)' if hook.fold is Fold.FACTORS else 'r0'
-    return '\n'.join([*lines, f'    return {given}' + (', r1' if hook.results == 2 else '')]) + '\n'
+    lines.append(f'    return {given}' + (', r1' if hook.results == 2 else ''))
+    whole = [place for _, places in rows for place in places]
+    return '\n'.join(lines) + '\n' + _test(f'{hook.name}_functions_act', whole)
+
+
+def _test(name: str, terms: Iterable[Effect]) -> str:
+    """Source of a function that tells whether any of some terms is on."""
+    return f'\n\n@compiled\ndef {name}(on):\n    return {_any_of(terms)}\n'
+
+
+def _any_of(terms: Iterable[Effect]) -> str:
+    return ' or '.join(f'on[{term.flag}]' for term in terms) or 'False'
 
 
 def _module() -> ModuleType:
@@ -130,4 +141,19 @@ def sum_of(hook: Hook) -> Function:
     added.
     """
     function: Function = getattr(_MODULE, f'{hook.name}_functions')
+    return function
+
+
+def some_of(hook: Hook) -> Function:
+    """Compiled function of the flags that tells whether a hook's places have any function.
+
+    It belongs behind `functions_act`.
+    """
+    function: Function = getattr(_MODULE, f'{hook.name}_functions_act')
+    return function
+
+
+def follow() -> Function:
+    """Compiled function of the flags: whether functions depend on the states `KEPT_UP`."""
+    function: Function = _MODULE.functions_follow
     return function

@@ -8,7 +8,7 @@ import math
 
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics import hooks
-from endoscope_core.physics.folds import acting, folded, sum_of
+from endoscope_core.physics.folds import acting, folded, some_of, sum_of
 from endoscope_core.physics.functions.acting import functions_act
 from endoscope_core.physics.layout import (
     ELEMENTS,
@@ -39,7 +39,7 @@ stiffness_factor, stiffness_varies = folded(hooks.STIFFNESS), acting(hooks.STIFF
 load_functions = sum_of(hooks.LOAD)
 film_functions = sum_of(hooks.FILM_DRAG)
 end_functions = sum_of(hooks.END_LENGTH)
-stiffness_functions = sum_of(hooks.STIFFNESS)
+stiffness_functions, stiffness_has_some = sum_of(hooks.STIFFNESS), some_of(hooks.STIFFNESS)
 friction_functions = sum_of(hooks.JOINT_FRICTION)
 
 _TRIES = 100
@@ -58,7 +58,7 @@ def stiffness_on_the_way(
     tension would leak away with every cycle.
     """
     stiffness = p[WIRE_STIFFNESS]
-    if functions_act(on):
+    if functions_act(on) and stiffness_has_some(on):
         return _stiffness_of_functions(x, wire, table, p, on, way)
     if not stiffness_varies(on):
         return stiffness

@@ -9,7 +9,7 @@ import numpy as np
 
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics import hooks
-from endoscope_core.physics.folds import acting, folded, sum_of
+from endoscope_core.physics.folds import acting, folded, follow, some_of, sum_of
 from endoscope_core.physics.functions.acting import functions_act
 from endoscope_core.physics.joint import bend, stiffness_on_the_way
 from endoscope_core.physics.layout import (
@@ -100,11 +100,12 @@ command_functions = sum_of(hooks.COMMAND)
 error_functions = sum_of(hooks.SERVO_ERROR)
 pulley_functions = sum_of(hooks.PULLEY_ANGLE)
 travel_functions = sum_of(hooks.TRAVEL_OF)
-exponent_functions = sum_of(hooks.EXPONENT)
-length_functions = sum_of(hooks.LENGTH)
+exponent_functions, exponent_has_some = sum_of(hooks.EXPONENT), some_of(hooks.EXPONENT)
+length_functions, length_has_some = sum_of(hooks.LENGTH), some_of(hooks.LENGTH)
 effort_functions = sum_of(hooks.EFFORT)
 tracker_functions = sum_of(hooks.TRACKER)
 load_cell_functions = sum_of(hooks.LOAD_CELL)
+functions_follow = follow()
 
 _SHAFT_ANGLES = np.array(SLOTS.shaft_angles)
 _STEPS_TO_START = 64
@@ -154,12 +155,12 @@ def settle(
     x[REST_TENSION] = mean_tension(x, WIRE_A, table) - x[FLOOR]
     steps = _STEPS_TO_START if shaft != 0.0 else 1
     for k in range(1, steps + 1):
-        if length_varies(on) or functions_act(on):
+        if length_varies(on) or (functions_act(on) and length_has_some(on)):
             _grow(x, table, p, on, 0.0)
         x[MOTOR] = shaft * k / steps
         _wind_up(x, table, p, on, x[MOTOR])
         bend(x, table, p, on, 0.0, 0.0, -0.5 * _SETTLING_TICK, _SETTLING_TICK)
-        if functions_act(on):
+        if functions_act(on) and functions_follow(on):
             _keep_up(x, table, 0.0)
     for wire in range(2):
         x[FILM + wire] = 0.0
@@ -386,9 +387,9 @@ def advance_tick(
         speed = (shaft - x[MOTOR]) / tick
     x[MOTOR], x[MOTOR_SPEED] = shaft, speed
 
-    if exponent_varies(on) or functions_act(on):
+    if exponent_varies(on) or (functions_act(on) and exponent_has_some(on)):
         _change_friction(x, sheath, p, on, abs(x[WINDING_SPEED]), time, tick)
-    if length_varies(on) or functions_act(on):
+    if length_varies(on) or (functions_act(on) and length_has_some(on)):
         _grow(x, table, p, on, time)
     way = _wind_up(x, table, p, on, shaft)
     x[WINDING_SPEED] = way / tick
@@ -399,7 +400,7 @@ def advance_tick(
         load_a = mean_tension(x, WIRE_A, table) - x[FLOOR]
         load_b = mean_tension(x, WIRE_B, table) - x[FLOOR]
         advance(on, p, x, load_a, load_b, time, tick)
-    if functions_act(on):
+    if functions_act(on) and functions_follow(on):
         _keep_up(x, table, tick)
 
 

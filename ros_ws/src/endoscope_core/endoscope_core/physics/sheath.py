@@ -222,8 +222,14 @@ def move(x: Array, wire: int, table: Array, end: int, force: float, floor: float
 def mean_tension(x: Array, wire: int, table: Array) -> float:
     """Mean tension of a wire in N: its stiffness times its stretch."""
     mean = 0.0
-    for i in range(table.shape[1]):
-        mean += table[WEIGHT, i] * node_tension(x, wire, table, i)
+    for end in range(2):
+        count = int(x[wire + COUNT + end])
+        if count > 0:
+            shape = int(x[wire + SHAPE + end])
+            mean += x[wire + AMPLITUDE + end] * _weight_behind(table, shape, end, count)
+    stuck = table.shape[1] - int(x[wire + COUNT + JOINT_END])
+    for i in range(int(x[wire + COUNT]), stuck):
+        mean += table[WEIGHT, i] * x[wire + NODES + i]
     return mean
 
 

@@ -53,6 +53,9 @@ CYCLE = Argument('t', 'time since the start, one cycle of it', 's', 0.0, 4.0)
 CYCLE_OF_SHAFT = Argument('m', "the shaft's angle, one cycle of it", 'rad', 0.0, math.pi / 6.0)
 
 _OWN_ANGLE, _OTHER = f'x[{JOINT}]', f'x[{OTHER}]'
+_BOTH, _DIFFERENCE, _PATH = f'x[{MEAN_TENSION}]', f'x[{TENSION_DIFFERENCE}]', f'x[{PATH}]'
+KEPT_UP = (_BOTH, _DIFFERENCE, _PATH)
+"""Arguments that nothing but functions depends on."""
 
 
 def _actuator() -> None:
@@ -77,7 +80,7 @@ def _actuator() -> None:
     )  # fmt: skip
     place(
         'pulley_of_tension', of, PULLEY_ANGLE, what,
-        DIFFERENCE, 'rad', 0.5, at=f'x[{TENSION_DIFFERENCE}]', from_zero=True,
+        DIFFERENCE, 'rad', 0.5, at=_DIFFERENCE, from_zero=True,
     )  # fmt: skip
     place(
         'effort_of_speed', of, EFFORT, "What is added to the motor's torque as the servo reads it",
@@ -93,11 +96,11 @@ def _transmission() -> None:
     place('exponent_of_angle', of, EXPONENT, what, ANGLE, '-', 3.0, at=_OWN_ANGLE)
     place('exponent_of_other_angle', of, EXPONENT, what, OTHER_ANGLE, '-', 3.0, at=_OTHER)
     place(
-        'exponent_of_tension', of, EXPONENT, what, BOTH_TENSIONS, '-', 3.0, at=f'x[{MEAN_TENSION}]'
+        'exponent_of_tension', of, EXPONENT, what, BOTH_TENSIONS, '-', 3.0, at=_BOTH
     )
     place(
         'exponent_of_distance', of, EXPONENT, what,
-        DISTANCE, '-', 3.0, at=f'x[{PATH}]', depends_on_time=True,
+        DISTANCE, '-', 3.0, at=_PATH, depends_on_time=True,
     )  # fmt: skip
     place(
         'film_drag_of_speed', of, FILM_DRAG, 'Drag of the whole sheath on a wire by its speed',
