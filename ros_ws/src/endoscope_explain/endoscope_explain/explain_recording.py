@@ -128,7 +128,8 @@ def explain_recording(
         candidates(observations, searches),
         missing_function(decisions),
         all(d.adequate for d in decisions),
-        {f'explained_{o.joint}': d.explained for o, d in pairs},
+        {f'explained_{o.joint}': d.explained for o, d in pairs}
+        | {f'beyond_form_{o.joint}': d.beyond_form for o, d in pairs},
         baseline is not None,
         time.monotonic() - begun,
     )

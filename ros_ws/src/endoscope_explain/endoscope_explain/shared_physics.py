@@ -7,7 +7,6 @@ same misfit; the effects are therefore chosen by the sum of the evidence, and fi
 
 from collections.abc import Callable, Mapping, Sequence
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.physics.effects import CATALOGUE
@@ -136,7 +135,7 @@ def _searched(
         if not beam:
             break
         gain = best.gain_of(beam[0])
-        if np.mean(best.form_gains_of(beam[0], jobs) >= gain) > FALSE_ALARMS:
+        if best.null_of(beam[0], jobs).p_value > FALSE_ALARMS:
             break
         tell(f'{nominal.joint}: {_listed(beam[0])}, better by {gain:.0f} nats')
         best = beam[0]

@@ -192,9 +192,10 @@ def visited(
     joint : str
     """
     names = plant.joint_names()
-    if not plant.terms:
-        # Some states are kept only where a place has a function.
-        plant = replace(plant, terms=(TermSpec(joint, 'tracker_of_time', '0*t'),))
+    distance = TermSpec(joint, 'exponent_of_distance', '0*d')
+    if all((term.joint, term.place) != (joint, distance.place) for term in plant.terms):
+        # Some states are kept only where a function depends on one of them.
+        plant = replace(plant, terms=(*plant.terms, distance))
     parameters, flags = pack(plant)
     inputs = np.zeros((len(names), len(command), INPUTS))
     inputs[:, :, IN_COMMAND] = command.T

@@ -116,6 +116,11 @@ def judged(
     )
 
 
+def is_of(name: str, joint: str, law: Law) -> bool:
+    """Whether an effect or place on a joint is what a law is called."""
+    return _names(Statement(name, joint, ''), law)
+
+
 def _names(said: Statement, law: Law) -> bool:
     if law.joint not in ('', said.joint):
         return False

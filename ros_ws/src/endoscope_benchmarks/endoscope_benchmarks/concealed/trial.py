@@ -9,13 +9,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from endoscope_benchmarks.concealed.case import Case
-from endoscope_benchmarks.concealed.judge import Judgement, judged, statements
+from endoscope_benchmarks.concealed.judge import Judgement, is_of, judged, statements
 from endoscope_benchmarks.concealed.readings import misfit
 from endoscope_benchmarks.concealed.strata import drawn_case
 from endoscope_benchmarks.concealed.strength import left
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.explain_recording import explain_recording
-from endoscope_explain.explanation import Explanation
+from endoscope_explain.explanation import Estimate, Explanation
 
 GOOD = 1.3
 """Rmse over noise up to which a second recording is predicted."""
@@ -53,6 +53,14 @@ class Row:
         Misfit of the second recording over noise, of the worst signal.
     seconds : float
         That explaining took.
+    truth_share : float
+        Gain of the truth over that of the best term; NaN where it is not one.
+    beyond_form : float
+        What is left over what rigs of another form leave, of the worst joint.
+    rival : float
+        Gain of the best other name over that of the first one; NaN where none is said.
+    errors : tuple of float
+        Error of each number over what its interval allows on that side.
     """
 
     stratum: str
@@ -77,6 +85,10 @@ class Row:
     refitted: float
     augmented: float
     seconds: float
+    truth_share: float = math.nan
+    beyond_form: float = math.nan
+    rival: float = math.nan
+    errors: tuple[float, ...] = ()
 
     def line(self) -> str:
         """The case in one line."""
@@ -107,7 +119,7 @@ def explained(stratum: str, seed: int) -> Row:
         )
         seconds = time.monotonic() - begun
     names = statements(said)
-    held = [low <= true <= high for true, low, high in _numbers(case, said)]
+    errors = [_error(*number) for number in _numbers(case, said)]
     judgement = judged(case.laws, names, case.also)
     nominal, refitted, augmented = (
         misfit(plant, case.second, case.described.sensors)
@@ -123,32 +135,59 @@ def explained(stratum: str, seed: int) -> Row:
         str(said.verdict),
         tuple(f'{each.name}@{each.joint}' for each in names),
         probability=said.effects[0].probability if said.effects else math.nan,
-        held=sum(held),
-        intervals=len(held),
+        held=sum(error <= 1.0 for error in errors),
+        intervals=len(errors),
         nominal=nominal,
         refitted=refitted,
         augmented=augmented,
         seconds=seconds,
+        truth_share=_truth_share(case, said),
+        beyond_form=max(
+            (v for key, v in said.adequacy.items() if key.startswith('beyond_form_')),
+            default=math.nan,
+        ),
+        rival=said.effects[0].evidence['rival'] if said.effects else math.nan,
+        errors=tuple(errors),
         **vars(judgement),
     )
 
 
-def _numbers(case: Case, said: Explanation) -> Iterator[tuple[float, float, float]]:
-    """True value of each number that is given, and its interval."""
+def _truth_share(case: Case, said: Explanation) -> float:
+    """What the law would have gained as the only term, over what the best one gained."""
+    if len(case.laws) != 1:
+        return math.nan
+    shares = []
+    for joint in {each.joint for each in said.candidates}:
+        alone = [c for c in said.candidates if c.joint == joint and len(c.effects) == 1]
+        true = [c for c in alone if is_of(c.effects[0], joint, case.laws[0])]
+        best = max((-c.score for c in alone), default=0.0)
+        if best > 0.0 and case.laws[0].joint in ('', joint):
+            shares.append(max((-c.score for c in true), default=0.0) / best)
+    return max(shares, default=math.nan)
+
+
+def _error(true: float, found: Estimate) -> float:
+    """Error over what the interval allows on that side."""
+    allowed = found.high - found.value if true > found.value else found.value - found.low
+    off = abs(true - found.value)
+    return off / allowed if allowed > 0.0 else (0.0 if off == 0.0 else math.inf)
+
+
+def _numbers(case: Case, said: Explanation) -> Iterator[tuple[float, Estimate]]:
+    """True value of each number that is given, and its estimate."""
     for joint, estimates in said.parameters.items():
         true = case.true.joints[joint]
         for name, estimate in estimates.items():
             term = name.removeprefix('friction_profile_')
             terms = (*true.friction_profile, 0.0, 0.0, 0.0, 0.0)
             value = getattr(true, name) if term == name else terms[int(term) - 1]
-            yield value, estimate.low, estimate.high
+            yield value, estimate
     for effect in said.effects:
         for spec in case.true.effects:
             if (spec.id, spec.joint) == (effect.id, effect.joint):
                 for each in CATALOGUE[spec.id].parameters:
                     if each.comparable and each.name in effect.parameters:
-                        found = effect.parameters[each.name]
-                        yield spec.parameters[each.name], found.low, found.high
+                        yield spec.parameters[each.name], effect.parameters[each.name]
 
 
 def failed(stratum: str, seed: int, error: BaseException) -> Row:

@@ -1,11 +1,13 @@
 """From what was tried on one joint to what is said about it."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.criteria import BEYOND_FORM, RIVALLED, SURE
 from endoscope_explain.fit.evidence import counts, mean_squares, misfit
 from endoscope_explain.fit.intervals import may_be_absent
 from endoscope_explain.fit.model import Fit
@@ -19,12 +21,6 @@ Array = NDArray[np.float64]
 
 FORMS = 19
 """Rigs of another form that say what is left where nothing is missing, and how far numbers move."""
-BEYOND_FORM = 1.5
-"""Factor on what the worst of these rigs leaves up to which an explanation is adequate: in a study
-of rigs of other forms 38 of 40 names were right below it, and 6 of 8 above it."""
-SURE, RIVALLED = 27.0 / 28.0, 46.0 / 48.0
-"""Share of names without a rival that were right in that study, and of sets of rivals that held the
-truth."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,7 @@ class MissingTerm:
     rival : float
         Share of that which the best other name brings.
     p_value : float
-        Chance that a rig of another form, in which nothing is missing, shows as much.
+        Chance that a rig in which nothing is missing shows as much.
     formula : Composition or None
         With the formula of `name`, where it was fitted.
     """
@@ -64,8 +60,8 @@ class MissingTerm:
 
     @property
     def probability(self) -> float:
-        """That the name is right."""
-        return RIVALLED / (1.0 + len(self.alternatives)) if self.alternatives else SURE
+        """That the name is right, given how near the best other one comes."""
+        return 1.0 / (1.0 + math.exp(-(SURE - RIVALLED * self.rival)))
 
 
 @dataclass(frozen=True)
@@ -78,23 +74,29 @@ class Decision:
         The joint with what is missing; the nominal plant where nothing is.
     missing : tuple of MissingTerm
         In the order in which they were found.
-    adequate : bool
-        Whether the chosen plant leaves noise, or no more than another form would.
+    beyond_form : float
+        What the chosen plant leaves of the worst channel, over what the worst rig of another form
+        leaves; 0 where it leaves noise.
     explained : float
         Share of the excess misfit that the terms remove; 1 where there was none.
     """
 
     chosen: Composition
     missing: tuple[MissingTerm, ...]
-    adequate: bool
+    beyond_form: float
     explained: float
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the chosen plant leaves noise, or no more than another form would."""
+        return self.beyond_form <= BEYOND_FORM
 
 
 def decide(search: JointSearch, jobs: int) -> Decision:
     """Choose a composition, name its terms and their rivals, and judge whether it is adequate."""
     chosen: Composition = search.nominal
     missing: tuple[MissingTerm, ...] = ()
-    judged: tuple[Fit, bool] | None = None
+    judged: tuple[Fit, float] | None = None
     for level in search.levels:
         if not level.is_found:
             break
@@ -109,9 +111,9 @@ def decide(search: JointSearch, jobs: int) -> Decision:
         chosen, judged = best, formed
         missing = (*missing[: len(best.terms) - 1], _missing(level, best, jobs))
     missing = _named_as_chosen(search, chosen, missing, jobs)
-    fit, adequate = judged or with_form(chosen.fit, jobs)
+    fit, beyond_form = judged or with_form(chosen.fit, jobs)
     explained = share_explained(search.nominal, chosen)
-    return Decision(replace(chosen, fit=fit), missing, adequate, explained)
+    return Decision(replace(chosen, fit=fit), missing, beyond_form, explained)
 
 
 def share_explained(nominal: Composition, chosen: Composition) -> float:
@@ -121,7 +123,7 @@ def share_explained(nominal: Composition, chosen: Composition) -> float:
     return 1.0 if above <= 0.0 else float(np.clip((before - after) / above, 0.0, 1.0))
 
 
-def with_form(found: Fit, jobs: int) -> tuple[Fit, bool]:
+def with_form(found: Fit, jobs: int) -> tuple[Fit, float]:
     """What an error of form does to a fit, and whether it may be all that is left.
 
     Parameters
@@ -132,22 +134,21 @@ def with_form(found: Fit, jobs: int) -> tuple[Fit, bool]:
 
     Returns
     -------
-    (Fit, bool)
-        The fit with what its numbers are moved by; whether it leaves no more than rigs of another
-        form do.
+    (Fit, float)
+        The fit with what its numbers are moved by; see `Decision.beyond_form`.
     """
     if is_noise(found):
-        return found, True
+        return found, 0.0
     forms = other_forms(found, FORMS, jobs)
     observation = found.model.observation
     left = np.maximum(mean_squares(observation, found.residuals) - 1.0, 0.0)
     drawn = np.stack([mean_squares(observation, r) for r in forms.residuals.T])
-    adequate = bool(np.all(np.sqrt(1.0 + left) <= BEYOND_FORM * np.sqrt(1.0 + drawn.max(axis=0))))
+    beyond = float(np.max(np.sqrt((1.0 + left) / (1.0 + drawn.max(axis=0)))))
     # An error of form moves numbers the further the more of it there is.
     size = counts(observation) / (1.0 + left)
     scale = np.sum(size * left) / max(float(np.sum(size * drawn.mean(axis=0))), 1e-12)
     moved = np.sqrt(scale * np.mean(forms.moved**2, axis=1))
-    return replace(found, moved_by_form=moved), adequate
+    return replace(found, moved_by_form=moved), beyond
 
 
 def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
@@ -169,7 +170,7 @@ def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
     if formula is not None and formula is not best:
         formula = replace(formula, fit=with_form(formula.fit, jobs)[0])
     return MissingTerm(
-        last, name, alternatives, gain, max(best_other, 0.0) / gain, level.p_value, formula
+        last, name, alternatives, gain, max(best_other, 0.0) / gain, level.null.p_value, formula
     )
 
 

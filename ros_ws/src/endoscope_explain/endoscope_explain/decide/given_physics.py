@@ -98,7 +98,7 @@ def explained_by(
     return JointSearch(nominal, tried), Decision(
         chosen,
         (*missing, *beside.missing),
-        beside.adequate,
+        beside.beyond_form,
         share_explained(nominal, chosen),
     )
 

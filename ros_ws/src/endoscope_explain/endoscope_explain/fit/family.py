@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 COEFFICIENTS = 7
 LENGTH = 0.25
-"""Of the process, as a share of the range."""
+"""Of the process with so many coefficients, as a share of the range."""
 LEAST_PART = 1e-9
 """Share of the largest eigenvalue below which one is rounding."""
 LEAST_RANGE = 1e-6
@@ -69,17 +69,23 @@ class Family:
             values = np.maximum(values, 0.0)
         return np.clip(values, -self.place.largest, self.place.largest)
 
-    def finer(self, count: int, length: float) -> 'Family':
-        """Functions at the same place, of the same size, that vary over a shorter length."""
+    def finer(self, count: int, visited: tuple[float, float] | None = None) -> 'Family':
+        """Functions at the same place, of the same size, with more coefficients.
+
+        Parameters
+        ----------
+        count : int
+        visited : (float, float), optional
+            Their range, if it is another one.
+        """
         size = np.sqrt(np.mean(np.sum(self.basis**2, axis=1)))
-        found = family_at(self.place, (self.low, self.high), count, length)
+        found = family_at(self.place, visited or (self.low, self.high), count)
         assert found is not None
         return found.scaled(size / np.sqrt(np.mean(np.sum(found.basis**2, axis=1))))
 
     def details(self, generator: np.random.Generator) -> Array:
         """A function (NODES,) that varies faster than these do, drawn as they are."""
-        count, length = self.basis.shape[1], LENGTH * COEFFICIENTS / self.basis.shape[1]
-        finer = self.finer(min(2 * count, NODES), 0.5 * length).basis
+        finer = self.finer(min(2 * self.basis.shape[1], NODES)).basis
         drawn = finer @ generator.normal(size=finer.shape[1])
         span, _ = np.linalg.qr(self.basis)
         return np.asarray(drawn - span @ (span.T @ drawn))
@@ -93,7 +99,6 @@ def family_at(
     place: Place,
     visited: tuple[float, float],
     count: int = COEFFICIENTS,
-    length: float = LENGTH,
 ) -> Family | None:
     """Functions of unit variance over the visited range; None where the state did not move.
 
@@ -102,9 +107,7 @@ def family_at(
     place : Place
     visited : (float, float)
     count : int
-        Coefficients.
-    length : float
-        Over which they vary, as a share of the range.
+        Coefficients: the more there are, the shorter the length over which the functions vary.
 
     Returns
     -------
@@ -116,7 +119,7 @@ def family_at(
         low = -high
     if high - low <= LEAST_RANGE * (place.argument.high - place.argument.low):
         return None
-    side = np.linspace(0.0, 1.0, NODES)
+    side, length = np.linspace(0.0, 1.0, NODES), LENGTH * COEFFICIENTS / count
     covariance = _matern((side[:, None] - side[None, :]) / length)
     if place.shape in (Shape.ODD, Shape.EVEN):
         mirrored = _matern((side[:, None] - (1.0 - side[None, :])) / length)

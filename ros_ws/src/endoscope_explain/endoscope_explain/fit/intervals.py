@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from endoscope_core.physics.effect import Effect
+from endoscope_explain.criteria import REACH
 from endoscope_explain.explanation import Estimate, NominalEstimate
 from endoscope_explain.fit.evidence import weights
 from endoscope_explain.fit.free_parameters import COEFFICIENT, FITTED_NOMINAL
@@ -59,6 +60,7 @@ def intervals(fit: Fit) -> Intervals:
     reach = NINETY_PERCENT * np.sqrt(np.diag(covariance(fit)))[kept]
     if fit.moved_by_form is not None:
         reach = np.hypot(reach, t.ppf(0.95, DEGREES) * fit.moved_by_form[kept])
+    reach *= REACH
 
     def values(coordinates: Array) -> Array:
         return np.array([item.value(c) for item, c in zip(free, coordinates, strict=True)])

@@ -5,11 +5,13 @@ it acts on simulated readings just the same); the tracker is taken at its own st
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from endoscope_core.physics.description import PlantDescription, SensorParameters
 from endoscope_core.physics.layout import (
@@ -76,14 +78,28 @@ class Channel:
         the device's clock runs fast.
         """
         column = outputs[:, self.output]
-        tick, share = self.tick, self.share + lead
-        if skew != 0.0:
-            place = np.clip((tick + self.share) / (1.0 + skew) + lead, 0.0, len(column) - 1.001)
-            tick = place.astype(np.int64)
-            share = place - tick
+        if skew == 0.0:
+            read, rise = self._mean_of_ticks
+            rows = column[: read.shape[1]]
+            return np.asarray(read @ rows + lead * (rise @ rows))
+        place = (self.tick + self.share) / (1.0 + skew) + lead
+        place = np.clip(place, 0.0, len(column) - 1.001)
+        tick = place.astype(np.int64)
         left = column[tick]
-        raw = left + share * (column[tick + 1] - left)
+        raw = left + (place - tick) * (column[tick + 1] - left)
         return np.asarray(np.add.reduceat(raw, self.first) / self.count)
+
+    @cached_property
+    def _mean_of_ticks(self) -> tuple[csr_array, csr_array]:
+        """Analysis samples from ticks (M, N), and by how much they rise over a tick."""
+        sample = np.repeat(np.arange(len(self.first)), self.count.astype(np.int64))
+        part = 1.0 / self.count[sample]
+        shape = (len(self.first), int(self.tick.max()) + 2)
+        here = csr_array((part, (sample, self.tick)), shape)
+        after = csr_array((part, (sample, self.tick + 1)), shape)
+        late = csr_array((part * self.share, (sample, self.tick)), shape)
+        next_late = csr_array((part * self.share, (sample, self.tick + 1)), shape)
+        return here - late + next_late, after - here
 
 
 @dataclass(frozen=True)

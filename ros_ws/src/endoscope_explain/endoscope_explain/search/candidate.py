@@ -160,10 +160,15 @@ def mirrored(candidate: Candidate) -> Candidate | None:
     return replace(candidate, start=start) if changed else None
 
 
-def _families(found: Fit, is_tried: Any) -> Iterator[Family]:
+def states_of(found: Fit) -> dict[tuple[str, str], tuple[float, float]]:
+    """Range of each state that a function may depend on, along a fit; see `visited_ranges`."""
     parameters, _ = found.model.packed(found.theta)
     outputs = simulate_joint(found.model.observation, parameters, found.model.flags)
-    ranges = visited_ranges(found.model.observation, parameters, outputs)
+    return visited_ranges(found.model.observation, parameters, outputs)
+
+
+def _families(found: Fit, is_tried: Any) -> Iterator[Family]:
+    ranges = states_of(found)
     for place in FUNCTIONS.values():
         if place.shape is Shape.PERIODIC or not is_tried(place):
             continue

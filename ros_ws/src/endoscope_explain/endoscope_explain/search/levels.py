@@ -1,24 +1,23 @@
 """The search: what one term more explains, as often as that is more than another form could.
 
 At each level all terms are screened by linear algebra, the most promising are fitted in the
-simulator, and the evidence ranks them, functions and formulas alike. Rigs of another form, run
-through the same screen, say how much evidence there is where nothing is missing.
+simulator, and the evidence ranks them, functions and formulas alike. Rigs in which nothing is
+missing, run through the same screen, say how much evidence there is then.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from endoscope_explain.fit.evidence import counts, mean_squares
+from endoscope_explain.criteria import LEAST_SHARE
 from endoscope_explain.fit.held_out import predicts_better
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import leans, with_any_numbers
-from endoscope_explain.fit.other_forms import other_forms
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate, candidates
+from endoscope_explain.search.null_rigs import Null, null_of
 from endoscope_explain.search.refit import (
     Composition,
     Look,
@@ -36,17 +35,13 @@ from endoscope_explain.search.screen import (
     Promised,
     background,
     directions,
-    gains,
     promises,
 )
 
-Array = NDArray[np.float64]
 
 MOST_EFFECTS = 2
-FORMS = 39
-"""Rigs of another form: enough to say that 1 in 40 would show as much."""
 FALSE_ALARMS = 0.05
-"""Chance that rigs of another form would show as much, above which no term is added."""
+"""Chance that rigs in which nothing is missing show as much, above which no term is added."""
 LOOKED_AT, POLISHED = 10, 4
 """Terms that get a first fit and a full one: in the study the truth was among the first three of
 the screen in 46 cases of 48, and among the first five in 47."""
@@ -56,8 +51,6 @@ SETTLED = 2
 """Of these the best ones and those at the place of the best are fitted until they stand."""
 PARENTS = 2
 """Compositions that are added to."""
-_SEED = 11
-_TINY = 1e-12
 
 
 @dataclass(frozen=True)
@@ -70,18 +63,15 @@ class Level:
         The best of those that were added to.
     found : tuple of Composition
         Best first.
-    null : array (B,)
-        Gains of the best term on rigs of another form that are off as much as the recording is.
-    doubt : array (B,)
-        The same where they are off by as much as the best composition leaves.
+    null : Null
+        What is shown where nothing is missing.
     predicts : bool
         Whether the best one predicts blocks that it has not seen better than its parent.
     """
 
     parent: Composition
     found: tuple[Composition, ...]
-    null: Array = field(repr=False)
-    doubt: Array = field(repr=False)
+    null: Null
     predicts: bool = True
 
     def gain(self, one: Composition) -> float:
@@ -107,7 +97,7 @@ class Level:
 
     def form_is_worth(self) -> float:
         """Evidence by which an error of form as large as what is left may mislead."""
-        return max(float(np.quantile(self.doubt, 1.0 - FALSE_ALARMS)), 0.0)
+        return max(float(np.quantile(self.null.doubt, 1.0 - FALSE_ALARMS)), 0.0)
 
     def at_the_place_of(self, one: Composition) -> tuple[Composition, ...]:
         """Compositions whose last term is at the same place, beside the same other terms."""
@@ -121,17 +111,10 @@ class Level:
         )
 
     @property
-    def p_value(self) -> float:
-        """Chance that a rig of another form shows as much as the best composition does."""
-        if not self.found:
-            return 1.0
-        as_much = int(np.sum(self.null >= self.gain(self.best)))
-        return (1.0 + as_much) / (1.0 + len(self.null))
-
-    @property
     def is_found(self) -> bool:
         """Whether something is missing, and found."""
-        return bool(self.found) and self.predicts and self.p_value <= FALSE_ALARMS
+        shown = bool(self.found) and self.null.p_value <= FALSE_ALARMS
+        return shown and self.predicts and self.gain(self.best) > 0.0
 
     def variants(self) -> tuple[Composition, ...]:
         """The best composition's effects acting on something else: beside another they may win."""
@@ -141,9 +124,9 @@ class Level:
         )
 
     def rivals(self) -> tuple[Composition, ...]:
-        """Compositions beside the best one that are behind by no more than form may be worth."""
-        least = self.found[0].evidence - self.form_is_worth()
-        return tuple(c for c in self.found if c is not self.best and c.evidence >= least)
+        """Compositions beside the best one that gain so much that the truth may be among them."""
+        least = LEAST_SHARE * self.gain(self.best)
+        return tuple(c for c in self.found if c is not self.best and self.gain(c) >= least)
 
 
 @dataclass(frozen=True)
@@ -219,11 +202,11 @@ def _level(
         best.setdefault(frozenset(term.variant for term in each.terms), each)
     ranked = tuple(best.values())
     if not ranked:
-        return Level(first, (), np.zeros(0), np.zeros(0))
+        return Level(first, (), Null(0.0, np.zeros(1), np.zeros(1)))
     if not is_noise(ranked[0].fit):
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     behind, ways, _ = grown[0]
-    level = Level(first, ranked, *null_gains(behind, ways, ranked[0].fit, jobs))
+    level = Level(first, ranked, null_of(behind, ways, ranked[0].fit, jobs))
     return replace(level, predicts=predicts_better(level.best.fit, first.fit))
 
 
@@ -328,52 +311,3 @@ def _worth_a_fit(looks: list[Look]) -> list[Look]:
     return chosen + [
         seen for seen in ranked[POLISHED:] if seen.candidate.shares_place(chosen[0].candidate)
     ]
-
-
-def null_gains(
-    behind: Background, ways: tuple[Directions, ...], best: Fit, jobs: int
-) -> tuple[Array, Array]:
-    """Gains of the best term on rigs of another form, in which nothing is missing.
-
-    Parameters
-    ----------
-    behind : Background
-        The fit without the term.
-    ways : tuple of Directions
-        Of all terms.
-    best : Fit
-        With the term that explains most.
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    (array (B,), array (B,))
-        Where the rigs are off by as much as the recording is, all of it form; and where the best
-        term leaves as much of them as it does of the recording.
-    """
-    if not ways:
-        return np.zeros(FORMS), np.zeros(FORMS)
-    found, observation = behind.fit, behind.fit.model.observation
-    forms = other_forms(found, FORMS, jobs).residuals * behind.weight[:, None]
-    left = behind.left(forms)
-    number = counts(observation)
-    floor = np.array([behind.weight[part][0] ** 2 for part in observation.slices()])
-
-    def above_noise(residuals: Array) -> float:
-        squares = mean_squares(observation, residuals)
-        return float(np.sum(number * floor * np.maximum(squares - 1.0, 0.0)))
-
-    alone = gains(behind, ways, left)
-    winner = np.argmax(alone.values, axis=0)
-    rest = np.sum(alone.left[winner, np.arange(FORMS)] * number, axis=1)
-    whole = np.sum(left**2, axis=0)
-    as_off = np.sqrt(above_noise(found.residuals) / np.maximum(whole, _TINY))
-    as_left = np.sqrt(above_noise(best.residuals) / np.maximum(rest, _TINY))
-    noise = np.random.default_rng(_SEED).normal(size=left.shape) * behind.weight[:, None]
-    noise = behind.left(noise)
-
-    def best_of(scale: Array) -> Array:
-        return np.asarray(np.max(gains(behind, ways, scale * left + noise).values, axis=0))
-
-    return best_of(as_off), best_of(np.minimum(as_left, as_off))

@@ -11,18 +11,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.physics.functions.interpolation import NODES
 from endoscope_explain.fit.evidence import log_evidence, weights
+from endoscope_explain.fit.family import COEFFICIENTS
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, fit, glance, jacobian
 from endoscope_explain.fit.valleys import out_of_valleys
-from endoscope_explain.search.candidate import Candidate
+from endoscope_explain.search.candidate import Candidate, states_of
 
 Array = NDArray[np.float64]
 
-FINER = ((14, 0.125), (21, 0.08))
-"""Coefficients of finer functions, and lengths over which they vary, as shares of the range."""
+FINER = (2 * COEFFICIENTS, 4 * COEFFICIENTS, NODES)
+"""Coefficients of finer functions: twice as many each time, up to a value for every node."""
 LOOK_STEPS = 6
-FINE_STEPS = 2
+FINE_STEPS = 8
 ITERATIONS, ROUGH, SETTLED = 25, 1e-2, 1e-4
 """Steps of a fit, at most, and the shares of the cost below which it tells and below which it
 stands."""
@@ -156,10 +158,9 @@ def polish(seen: Look, without: Composition) -> Composition:
         Fitted on coarse ticks; see `until_it_stands`.
     """
     weight = weights(seen.model.observation, without.fit.residuals)
-    found = _twice(seen.coarse, seen.theta, weight)
+    found = _twice(seen.model, seen.coarse.offset, seen.theta, weight)
     found = out_of_valleys(found, weights(seen.model.observation, found.residuals))
-    model = replace(seen.model, base=found.model.base)
-    return composition((*without.terms, seen.candidate), replace(found, model=model))
+    return composition((*without.terms, seen.candidate), _on_fine_ticks(found, seen.model))
 
 
 def refined(one: Composition, without: Fit, offset: Array) -> Composition:
@@ -180,30 +181,45 @@ def refined(one: Composition, without: Fit, offset: Array) -> Composition:
         Fitted on coarse ticks.
     """
     best, term = one, one.terms[-1]
-    for count, length in FINER:
+    for count in FINER:
         assert term.family is not None
-        finer = replace(term, family=term.family.finer(count, length))
+        argument, before = term.family.place.argument, best.fit.model.families[-1]
+        # With what was missing, the joint goes further than it did without.
+        visited = states_of(best.fit)[argument.symbol, argument.unit]
+        finer = replace(term, family=term.family.finer(count, visited))
         assert finer.family is not None
         model = finer.added_to(without.model)
-        values = best.fit.model.families[-1].values(best.fit.model.coefficients(best.fit.theta)[-1])
+        values = before.values(best.fit.model.coefficients(best.fit.theta)[-1])
+        values = np.interp(finer.family.nodes, before.nodes, values)
         near, *_ = np.linalg.lstsq(finer.family.basis, values, rcond=None)
         theta = model.begun_at(best.fit.theta[: len(without.theta)])
         theta[model.places_of_coefficients()[-1]] = near / COORDINATE
         low, high = model.bounds()
         weight = weights(model.observation, best.fit.residuals)
-        found = _twice(model.on_coarse_ticks(offset), np.clip(theta, low, high), weight)
-        again = composition((*one.terms[:-1], finer), replace(found, model=model))
+        found = _twice(model, offset, np.clip(theta, low, high), weight)
+        again = composition((*one.terms[:-1], finer), _on_fine_ticks(found, model))
         if again.evidence <= best.evidence:
             break
-        best = again
+        best, offset = again, found.model.offset
     return best
 
 
-def _twice(model: JointModel, theta: Array, weight: Array) -> Fit:
-    """Fit with channels weighted as given, then by what that leaves."""
-    found = fit(model, theta, weight, ITERATIONS, ROUGH)
-    weight = weights(model.observation, found.residuals)
-    return fit(model, found.theta, weight, ITERATIONS, ROUGH, found.jacobian)
+def _twice(model: JointModel, offset: Array | None, theta: Array, weight: Array) -> Fit:
+    """Fit on coarse ticks with channels weighted as given, then by what that leaves on fine ones.
+
+    What coarse ticks do to the residuals is known for `theta` at first, then for the first fit.
+    """
+    found = fit(model.on_coarse_ticks(offset), theta, weight, ITERATIONS, ROUGH)
+    fine = model.residuals(found.theta)
+    again = model.on_coarse_ticks(fine - model.on_coarse_ticks().residuals(found.theta))
+    weight = weights(model.observation, fine)
+    return fit(again, found.theta, weight, ITERATIONS, ROUGH, found.jacobian)
+
+
+def _on_fine_ticks(found: Fit, model: JointModel) -> Fit:
+    """A fit of a model on coarse ticks with the residuals that it leaves on fine ones."""
+    model = replace(model, base=found.model.base)
+    return replace(found, model=model, residuals=model.residuals(found.theta))
 
 
 def until_it_stands(one: Composition) -> Composition:

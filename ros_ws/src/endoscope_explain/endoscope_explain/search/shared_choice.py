@@ -16,7 +16,7 @@ from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate, candidates
-from endoscope_explain.search.levels import null_gains
+from endoscope_explain.search.null_rigs import Null, null_of
 from endoscope_explain.search.refit import Look, composition, look, polish
 from endoscope_explain.search.repeated_motion import motion_repeats
 from endoscope_explain.search.screen import background, directions, promises
@@ -61,8 +61,8 @@ class SharedChoice:
         """Gain of evidence from this choice to another."""
         return other.total() - self.total()
 
-    def form_gains_of(self, other: 'SharedChoice', jobs: int) -> Array:
-        """Gains (B,) that rigs of another form, in which nothing is missing, would show.
+    def null_of(self, other: 'SharedChoice', jobs: int) -> Null:
+        """What recordings show, all together, and rigs in which nothing more is missing.
 
         Parameters
         ----------
@@ -73,15 +73,19 @@ class SharedChoice:
 
         Returns
         -------
-        array (B,)
-            Of the best effect of each recording.
+        Null
+            Sums over the recordings, each with its own best effect.
         """
-        total: Array = np.zeros(1)
+        found = []
         for before, after in zip(self.recordings, other.recordings, strict=True):
             behind = background(before[0])
             ways = directions(behind, _effects(before[0]), jobs)
-            total = total + null_gains(behind, ways, after[0], jobs)[0]
-        return total
+            found.append(null_of(behind, ways, after[0], jobs))
+        return Null(
+            sum(each.observed for each in found),
+            sum((each.drawn for each in found), np.zeros(1)),
+            sum((each.doubt for each in found), np.zeros(1)),
+        )
 
     def leaves_noise(self) -> bool:
         """Whether nothing is left to explain in any recording."""

@@ -16,6 +16,7 @@ from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.candidate import Candidate, candidates, starting_points
 from endoscope_explain.search.levels import Level, search
+from endoscope_explain.search.null_rigs import Null
 from endoscope_explain.search.refit import Composition
 from endoscope_explain.search.screen import background, directions, gains, promises
 
@@ -156,7 +157,7 @@ def _level(evidences, null):
     found = [_composition(value, terms[name]) for name, value in evidences.items()]
     found.sort(key=lambda c: -c.evidence)
     null = np.asarray(null, dtype=float)
-    return Level(_composition(0.0), tuple(found), null, null)
+    return Level(_composition(0.0), tuple(found), Null(max(evidences.values()), null, null))
 
 
 def test_a_formula_is_taken_where_it_loses_no_more_than_form_is_worth():
@@ -191,9 +192,9 @@ def test_a_finer_sheath_alone_is_not_named(one_joint):
     assert decide(tried, 2).missing == ()
 
 
-def test_nothing_is_found_that_another_form_shows_as_well():
+def test_nothing_is_found_that_rigs_without_it_show_as_well():
     null = np.linspace(0.0, 1000.0, 39)
     assert not _level({'gravity': 500.0}, null).is_found
     assert _level({'gravity': 1001.0}, null).is_found
-    assert _level({'gravity': 1001.0}, null).p_value == pytest.approx(1.0 / 40.0)
+    assert _level({'gravity': 1001.0}, null).null.p_value == pytest.approx(1.0 / 40.0)
     assert not replace(_level({'gravity': 1001.0}, null), predicts=False).is_found

@@ -95,9 +95,7 @@ def _transmission() -> None:
     place('exponent_of_time', of, EXPONENT, what, TIME, '-', 3.0, at='time', depends_on_time=True)
     place('exponent_of_angle', of, EXPONENT, what, ANGLE, '-', 3.0, at=_OWN_ANGLE)
     place('exponent_of_other_angle', of, EXPONENT, what, OTHER_ANGLE, '-', 3.0, at=_OTHER)
-    place(
-        'exponent_of_tension', of, EXPONENT, what, BOTH_TENSIONS, '-', 3.0, at=_BOTH
-    )
+    place('exponent_of_tension', of, EXPONENT, what, BOTH_TENSIONS, '-', 3.0, at=_BOTH)
     place(
         'exponent_of_distance', of, EXPONENT, what,
         DISTANCE, '-', 3.0, at=_PATH, depends_on_time=True,

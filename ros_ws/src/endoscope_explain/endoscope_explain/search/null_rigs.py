@@ -1,0 +1,133 @@
+"""How much rigs show in which nothing is missing: other forms, and sensors whose noise is slow.
+
+The same screen is run over the recording and over rigs that are off by as much as the recording is,
+but for another reason: their sheaths are of another form, or their sensors wander. What share of
+them shows as much is the chance of a false alarm over the whole search (a parametric bootstrap of
+the largest gain: Efron, Tibshirani, An Introduction to the Bootstrap, 1993, ch. 16).
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from endoscope_explain.fit.evidence import counts, mean_squares
+from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.other_forms import other_forms
+from endoscope_explain.fit.whiteness import WHITE
+from endoscope_explain.observe.observation import JointObservation
+from endoscope_explain.search.screen import Background, Directions, gains
+
+Array = NDArray[np.float64]
+
+FORMS, WANDERING = 20, 19
+"""Rigs of another form and rigs whose sensors wander: enough to say that 1 in 40 shows as much."""
+SLOWEST = 0.1
+"""Longest correlation time of noise, as a share of the recording: what is slower is a drift."""
+_SEED = 11
+_TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class Null:
+    """Gains of the best term by the screen, where something may be missing and where nothing is.
+
+    Attributes
+    ----------
+    observed : float
+        On the recording.
+    drawn : array (B,)
+        On rigs in which nothing is missing, off by as much as the recording is.
+    doubt : array (B,)
+        The same where they are off by as much as the best composition leaves.
+    """
+
+    observed: float
+    drawn: Array = field(repr=False)
+    doubt: Array = field(repr=False)
+
+    @property
+    def p_value(self) -> float:
+        """Chance that a rig in which nothing is missing shows as much."""
+        return (1.0 + int(np.sum(self.drawn >= self.observed))) / (1.0 + len(self.drawn))
+
+
+def null_of(behind: Background, ways: tuple[Directions, ...], best: Fit, jobs: int) -> Null:
+    """Run the screen over the recording and over rigs in which nothing is missing.
+
+    Parameters
+    ----------
+    behind : Background
+        The fit without the term.
+    ways : tuple of Directions
+        Of all terms.
+    best : Fit
+        With the term that explains most.
+    jobs : int
+        Tasks side by side.
+
+    Returns
+    -------
+    Null
+    """
+    if not ways:
+        return Null(0.0, np.zeros(1), np.zeros(1))
+    found, observation = behind.fit, behind.fit.model.observation
+    generator = np.random.default_rng(_SEED)
+    own = behind.left(found.residuals * behind.weight)
+    forms = other_forms(found, FORMS, jobs).residuals * behind.weight[:, None]
+    left = behind.left(forms)
+    slow = wandering(observation, WANDERING, generator) * behind.weight[:, None]
+    white = generator.normal(size=(observation.size, FORMS + WANDERING)) * behind.weight[:, None]
+    white = behind.left(white)
+    number = counts(observation)
+    parts = observation.slices()
+    floor = np.array([behind.weight[part][0] ** 2 for part in parts])
+
+    def above_noise(residuals: Array) -> Array:
+        return np.maximum(mean_squares(observation, residuals) - 1.0, 0.0)
+
+    def like(off: Array) -> Array:
+        """Wandering sensors, each by as much as its channel is off."""
+        size = np.concatenate(
+            [np.full(p.stop - p.start, np.sqrt(o)) for p, o in zip(parts, off, strict=True)]
+        )
+        return behind.left(slow * size[:, None])
+
+    alone = gains(behind, ways, left)
+    winner = np.argmax(alone.values, axis=0)
+    rest = np.sum(alone.left[winner, np.arange(FORMS)] * number, axis=1)
+    whole = np.sum(left**2, axis=0)
+    off, remains = above_noise(found.residuals), above_noise(best.residuals)
+    as_off = np.sqrt(np.sum(number * floor * off) / np.maximum(whole, _TINY))
+    as_left = np.sqrt(np.sum(number * floor * remains) / np.maximum(rest, _TINY))
+
+    def largest(residuals: Array) -> Array:
+        return np.asarray(np.max(gains(behind, ways, residuals).values, axis=0))
+
+    return Null(
+        float(largest(own[:, None])[0]),
+        largest(np.hstack([as_off * left, like(off)]) + white),
+        largest(np.hstack([np.minimum(as_left, as_off) * left, like(remains)]) + white),
+    )
+
+
+def wandering(observation: JointObservation, count: int, generator: np.random.Generator) -> Array:
+    """Draw slow noise (size, count) of unit variance for each sensor whose noise is random.
+
+    It is an Ornstein-Uhlenbeck process whose correlation time lies anywhere between that of white
+    noise and `SLOWEST`, evenly in its logarithm.
+    """
+    drawn = np.zeros((observation.size, count))
+    for channel, part in zip(observation.channels, observation.slices(), strict=True):
+        if channel.quantity not in WHITE:
+            continue
+        period = observation.duration / (part.stop - part.start)
+        for b in range(count):
+            lasts = period * (SLOWEST * observation.duration / period) ** generator.uniform()
+            kept = np.exp(-period / lasts)
+            white = generator.normal(size=part.stop - part.start)
+            white[1:] *= np.sqrt(1.0 - kept**2)
+            drawn[part, b] = lfilter([1.0], [1.0, -kept], white)
+    return drawn
