@@ -136,6 +136,25 @@ def test_shafts_start_where_they_are_and_stop_where_they_are():
     assert motion.goal == pytest.approx((0.4, -0.2))
 
 
+def test_a_stream_that_ends_in_motion_leads_no_further_than_it_came():
+    motion = ShaftMotion(COMMANDS, LIMITS)
+    motion.measure((0.0, 0.0))
+    motion.session.hear('', 0)
+    motion.session.hear('session-1', MS)
+    shaft = 0.0
+    for t in range(2, 400):
+        motion.session.hear('session-1', t * MS)
+        if t < 200:
+            assert motion.command('session-1', t * MS, (2e-3 * t, 0.0), (), t * MS) is None
+        last = motion.goal[0]
+        shaft += 0.01 * (motion.turn(t * MS, 1e-3)[0] - shaft)
+        motion.measure((shaft, 0.0))
+        if t > 200:
+            assert motion.goal[0] <= last
+    assert motion.holding
+    assert motion.goal[0] < 0.36
+
+
 def test_what_was_refused_as_too_fast_is_not_made_up_for():
     motion = ShaftMotion(COMMANDS, LIMITS)
     motion.measure((0.0, 0.0))

@@ -33,17 +33,21 @@ TRACKER_EVERY = 25
 
 
 def make_recording(
-    plant: PlantDescription | None = None, duration: float = 12.0, seed: int = 1
+    plant: PlantDescription | None = None,
+    duration: float = 12.0,
+    seed: int = 1,
+    command: np.ndarray | None = None,
 ) -> Recording:
-    """Sensors' readings of a plant whose joints are swept, stepped and held."""
+    """Sensors' readings of a plant under a shaft command, or swept, stepped and held."""
     plant = plant or PlantDescription()
     n = int(duration / TICK)
     time = TICK * np.arange(n)
     joints = plant.joint_names()
     swept = 0.9 * np.sin(1.3 * time)
     stepped = np.where((time % 3.0) < 1.5, 0.5, -0.4)
-    command = np.stack([swept if k == 0 else stepped for k in range(len(joints))], axis=1)
-    command *= gear()
+    if command is None:
+        command = np.stack([swept if k == 0 else stepped for k in range(len(joints))], axis=1)
+        command *= gear()
     truth = simulate(plant, command)
     sensors = SensorModel(plant.sensors, seed)
     tracker = slice(None, None, TRACKER_EVERY)

@@ -81,6 +81,38 @@ def test_a_command_that_begins_late_or_ends_early_is_no_gap(sound):
     assert named(sound.with_series({'command': command.taken(amidst)})) == {}
 
 
+def test_the_pose_that_a_driver_held_in_a_pause_is_what_it_was_sent_to(record):
+    """As the motor driver does 0.1 s after the last command, short of where that had sent it."""
+    time = 1e-3 * np.arange(8000)
+    motion = 0.5 * np.stack([np.sin(4.0 * time), np.sin(3.0 * time)], axis=1)
+    begin, told, end = 2480, 2580, 5000
+    motion[begin:] = motion[begin]
+    pose = record(duration=8.0, command=motion).shaft_position.values[told]
+    assert np.abs(pose - motion[begin]).max() > 0.003
+    motion[told:] = pose
+    motion[end:] += 0.2 * np.sin(2.0 * (time[end:] - time[end]))[:, None]
+    whole = record(duration=8.0, command=motion)
+    heard = whole.command.taken((time <= time[begin]) | (time >= time[end]))
+    report = audit_recording(whole.with_series({'command': heard}), PLANT)
+    assert [(f.id, f.severity) for f in report.findings] == [('held_pose', Severity.NOTE)]
+    of_driver = report.recording.command
+    added = (of_driver.time > time[begin]) & (of_driver.time < time[end])
+    assert of_driver.time[added][0] == pytest.approx(time[told], abs=2e-3)
+    assert of_driver.values[added][-1] == pytest.approx(pose, abs=1e-9)
+    assert of_driver.values[~added] == pytest.approx(heard.values)
+
+
+def test_where_the_last_command_stayed_in_force_no_pose_was_held(record):
+    time = 1e-3 * np.arange(6000)
+    motion = 0.5 * np.stack([np.sin(4.0 * time), np.sin(3.0 * time)], axis=1)
+    motion[2480:] = motion[2480]
+    whole = record(duration=6.0, command=motion)
+    heard = whole.command.taken(time <= time[2480])
+    report = audit_recording(whole.with_series({'command': heard}), PLANT)
+    assert report.findings == ()
+    assert np.array_equal(report.recording.command.time, heard.time)
+
+
 def test_nothing_is_judged_while_the_command_is_unknown(sound):
     command = sound.command
     keep = (command.time < 5.0) | (command.time >= 5.5)

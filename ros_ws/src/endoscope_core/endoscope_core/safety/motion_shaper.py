@@ -1,9 +1,10 @@
 """Bounds position, speed, acceleration and step of a motion, whatever is asked for.
 
-Once its target has been reached, a motion within the bounds passes unchanged and undelayed; any
-other becomes the nearest one that keeps to the bounds.  It is trapezoidal in speed (Biagiotti and
-Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, section 3.2), found tick by
-tick from the target of now, for nothing is known of the next one.
+Once its target has been reached, a motion within the bounds passes unchanged and undelayed, and so
+does one that another shaper has already put at the bounds; any other becomes the nearest one that
+keeps to the bounds.  It is trapezoidal in speed (Biagiotti and Melchiorri, Trajectory Planning for
+Automatic Machines and Robots, 2008, section 3.2), found tick by tick from the target of now, for
+nothing is known of the next one.
 
 The bounds hold for every sequence of targets and periods because of one invariant, ``v**2 / (2 a)``
 left to the end of the range: a joint that brakes with ``a`` from speed ``v`` in periods of any
@@ -14,7 +15,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-# rad: what sums of angles differ by.
+# rad: what sums of angles differ by. A motion that was shaped to these bounds stands on them but
+# for this, and a second shaper that took it for too fast would brake it.
 _ROUNDING = 1e-12
 
 
@@ -184,19 +186,20 @@ class MotionShaper:
         limits = self.limits
         low, high = reach
         change = limits.acceleration * dt
+        rounding = _ROUNDING / dt
         left = before - position
         if abs(left) <= _ROUNDING and low <= goal <= high:
             # As in nearly every call: what keeps to the bounds passes.
             own = (goal - position) / dt
-            room = high - goal if own > 0.0 else goal - low
+            room = _ROUNDING + (high - goal if own > 0.0 else goal - low)
             if (
-                abs(own) <= limits.speed
-                and abs(own - velocity) <= change
+                abs(own) <= limits.speed + rounding
+                and abs(own - velocity) <= change + rounding
                 and own * own <= 2.0 * limits.acceleration * room
             ):
                 return goal, own
         own = (goal - before) / dt
-        if abs(own) > limits.speed:
+        if abs(own) > limits.speed + rounding:
             own, left = 0.0, goal - position
         wanted = own + math.copysign(self._stoppable(abs(left), dt), left)
         wanted = min(wanted, limits.speed, self._stoppable(high - position, dt))

