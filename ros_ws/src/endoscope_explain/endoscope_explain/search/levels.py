@@ -38,7 +38,6 @@ from endoscope_explain.search.screen import (
     promises,
 )
 
-
 MOST_EFFECTS = 2
 FALSE_ALARMS = 0.05
 """Chance that rigs in which nothing is missing show as much, above which no term is added."""

@@ -200,7 +200,9 @@ def refined(one: Composition, without: Fit, offset: Array) -> Composition:
         again = composition((*one.terms[:-1], finer), _on_fine_ticks(found, model))
         if again.evidence <= best.evidence:
             break
-        best, offset = again, found.model.offset
+        best = again
+        if found.model.offset is not None:
+            offset = found.model.offset
     return best
 
 
