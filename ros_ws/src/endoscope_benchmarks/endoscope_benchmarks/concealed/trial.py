@@ -55,6 +55,8 @@ class Row:
         That explaining took.
     truth_share : float
         Gain of the truth over that of the best term; NaN where it is not one.
+    shares : tuple of float
+        The same of each name that was tried, the best first.
     beyond_form : float
         What is left over what rigs of another form leave, of the worst joint.
     rival : float
@@ -86,6 +88,7 @@ class Row:
     augmented: float
     seconds: float
     truth_share: float = math.nan
+    shares: tuple[float, ...] = ()
     beyond_form: float = math.nan
     rival: float = math.nan
     errors: tuple[float, ...] = ()
@@ -121,6 +124,10 @@ def explained(stratum: str, seed: int) -> Row:
     names = statements(said)
     errors = [_error(*number) for number in _numbers(case, said)]
     judgement = judged(case.laws, names, case.also)
+    law = case.laws[0] if len(case.laws) == 1 else None
+    where = (law.joint if law else '') or (names[0].joint if names else '')
+    shares = _shares(said, where)
+    true = [share for name, share in shares.items() if law and is_of(name, where, law)]
     nominal, refitted, augmented = (
         misfit(plant, case.second, case.described.sensors)
         for plant in (said.nominal, said.refitted, said.augmented)
@@ -141,7 +148,8 @@ def explained(stratum: str, seed: int) -> Row:
         refitted=refitted,
         augmented=augmented,
         seconds=seconds,
-        truth_share=_truth_share(case, said),
+        truth_share=max(true, default=0.0) if law and shares else math.nan,
+        shares=tuple(sorted(shares.values(), reverse=True)),
         beyond_form=max(
             (v for key, v in said.adequacy.items() if key.startswith('beyond_form_')),
             default=math.nan,
@@ -152,18 +160,14 @@ def explained(stratum: str, seed: int) -> Row:
     )
 
 
-def _truth_share(case: Case, said: Explanation) -> float:
-    """What the law would have gained as the only term, over what the best one gained."""
-    if len(case.laws) != 1:
-        return math.nan
-    shares = []
-    for joint in {each.joint for each in said.candidates}:
-        alone = [c for c in said.candidates if c.joint == joint and len(c.effects) == 1]
-        true = [c for c in alone if is_of(c.effects[0], joint, case.laws[0])]
-        best = max((-c.score for c in alone), default=0.0)
-        if best > 0.0 and case.laws[0].joint in ('', joint):
-            shares.append(max((-c.score for c in true), default=0.0) / best)
-    return max(shares, default=math.nan)
+def _shares(said: Explanation, joint: str) -> dict[str, float]:
+    """What each name on a joint gains as the only term, over what the best one gains."""
+    gains: dict[str, float] = {}
+    for each in said.candidates:
+        if each.joint == joint and len(each.effects) == 1:
+            gains[each.effects[0]] = max(gains.get(each.effects[0], 0.0), -each.score)
+    best = max(gains.values(), default=0.0)
+    return {name: gain / best for name, gain in gains.items()} if best > 0.0 else {}
 
 
 def _error(true: float, found: Estimate) -> float:
