@@ -24,9 +24,10 @@ ROOMS = {
     room: k
     for k, room in enumerate(
         (
-            *('explanation', 'parallel', 'recording', 'observe', 'audit', 'simulation', 'fit'),
-            *('search', 'decide', 'case', 'locate', 'compare', 'design', 'explain_recording'),
-            *('pipeline', 'shared_physics', 'report', 'many_bags', 'notebook', '__init__'),
+            *('criteria', 'explanation', 'parallel', 'recording', 'observe', 'audit', 'simulation'),
+            *('fit', 'search', 'decide', 'case', 'locate', 'compare', 'design'),
+            *('explain_recording', 'pipeline', 'shared_physics', 'report', 'many_bags'),
+            *('notebook', '__init__'),
         )
     )
 }

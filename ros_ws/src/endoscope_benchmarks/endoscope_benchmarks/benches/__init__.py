@@ -5,6 +5,8 @@ BENCHES: tuple[str, ...] = (
     'recorder',
     'explain',
     'concealed',
+    'criteria',
+    'limits',
     'simulate',
     'calibration_rate',
     'papers',

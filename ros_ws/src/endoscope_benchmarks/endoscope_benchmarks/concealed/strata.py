@@ -71,7 +71,8 @@ def catalogue(
     """One effect in its own formula."""
     effect = _turn(DRAWN, seed)
     rig = _rig(generator, _joints_of(effect), motion)
-    return _finished(generator, seed, rig, *_with_effect(generator, rig, effect, weaker))
+    aims = (weaker * AIM[0], weaker * AIM[1])
+    return _finished(generator, seed, rig, *_with_effect(generator, rig, effect, aims))
 
 
 def leave_a_form_out(generator: Generator, seed: int) -> Case:
@@ -165,6 +166,19 @@ def teleoperation(generator: Generator, seed: int) -> Case:
     return catalogue(generator, seed, motions.teleoperation)
 
 
+def as_strong(effect: str, seed: int, share: float) -> Case:
+    """One effect that moves a given share of the signal, on the same rig for the same seed.
+
+    Raises
+    ------
+    RuntimeError
+        If the effect moves no signal by as much.
+    """
+    generator = np.random.default_rng([len(STRATA), DRAWN.index(effect), seed])
+    rig = _rig(generator, _joints_of(effect))
+    return _finished(generator, seed, rig, *_with_effect(generator, rig, effect, (share, share)))
+
+
 STRATA: dict[str, Callable[[Generator, int], Case]] = {
     'catalogue': catalogue,
     'leave_a_form_out': leave_a_form_out,
@@ -204,7 +218,7 @@ def _rig(
 
 
 def _with_effect(
-    generator: Generator, rig: _Rig, effect_id: str, weaker: float = 1.0
+    generator: Generator, rig: _Rig, effect_id: str, aims: tuple[float, float] = AIM
 ) -> tuple[PlantDescription, Law, float]:
     joint = str(generator.choice(list(rig.true.joints)))
     law = law_of_effect(effect_id, joint)
@@ -219,7 +233,7 @@ def _with_effect(
 
         return added, 1.0
 
-    true, share = _concealed(generator, rig, drawn, weaker * np.array(AIM))
+    true, share = _concealed(generator, rig, drawn, np.array(aims))
     return true, law, share
 
 

@@ -114,7 +114,11 @@ def explained(stratum: str, seed: int) -> Row:
     stratum : str
     seed : int
     """
-    case = drawn_case(stratum, seed)
+    return row_of(drawn_case(stratum, seed))
+
+
+def row_of(case: Case) -> Row:
+    """Explain a case on one core, and judge what is said."""
     with threadpool_limits(1):
         begun = time.monotonic()
         said = explain_recording(
@@ -133,8 +137,8 @@ def explained(stratum: str, seed: int) -> Row:
         for plant in (said.nominal, said.refitted, said.augmented)
     )
     return Row(
-        stratum,
-        seed,
+        case.stratum,
+        case.seed,
         tuple(f'{law.name}@{law.joint or "all"}' for law in case.laws),
         case.note,
         case.moved,

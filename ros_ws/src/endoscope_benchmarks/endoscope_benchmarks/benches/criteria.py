@@ -1,0 +1,44 @@
+"""`endoscope bench criteria`: derive the numbers by which explanations are judged."""
+
+import argparse
+import json
+from pathlib import Path
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `criteria`."""
+    parser = subparsers.add_parser(
+        'criteria',
+        help='derive the numbers by which explanations are judged',
+        description='Reads rows of `endoscope bench concealed --json`, derives the numbers of '
+        'endoscope_explain/criteria.py from them, and prints what half and double of each would '
+        'do.',
+    )
+    parser.add_argument('rows', nargs='+', type=Path, metavar='FILE', help='of rows')
+    parser.add_argument('--write', type=Path, metavar='FILE', help='module to write')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print, and write if asked; return 0."""
+    from endoscope_benchmarks.concealed.criteria import bank_of, derived, sensitivity, source
+    from endoscope_benchmarks.concealed.trial import Row
+    from endoscope_core.atomic_output import write_text
+    from endoscope_core.errors import EndoscopeError
+    from endoscope_explain.criteria import REACH
+
+    rows = [Row(**row) for file in args.rows for row in json.loads(file.read_text())]
+    bank = bank_of(rows, REACH)
+    try:
+        criteria = derived(bank)
+    except ValueError as error:
+        raise EndoscopeError(str(error)) from error
+    seeds = sorted({row.seed for row in rows})
+    strata = ', '.join(dict.fromkeys(row.stratum for row in rows))
+    made_by = (
+        f'`endoscope bench criteria` from {len(rows)} cases of\n'
+        f'`endoscope bench concealed`, seeds {seeds[0]} to {seeds[-1]} of {strata}'
+    )
+    print(sensitivity(bank, criteria))
+    if args.write:
+        write_text(args.write, source(criteria, made_by))
+    return 0

@@ -1,0 +1,43 @@
+"""`endoscope bench limits`: how weak an effect may be and still be named."""
+
+import argparse
+
+from endoscope_benchmarks.benches.concealed import seeds
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `limits`."""
+    parser = subparsers.add_parser(
+        'limits',
+        help='how weak an effect may be and still be named',
+        description='Makes each effect of the catalogue weaker by about a third at a time until it '
+        'is not named on one of some rigs, and prints the last strength at which it was.',
+    )
+    parser.add_argument('--effects', nargs='+', metavar='ID', help='(default: all that are drawn)')
+    parser.add_argument(
+        '--seeds', type=seeds, default=range(1, 4), metavar='A-B', help='of the rigs (1-3)'
+    )
+    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='effects side by side (1)')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a line for each effect; return 0."""
+    from concurrent.futures import as_completed
+
+    from endoscope_benchmarks.concealed.formulas import DRAWN
+    from endoscope_benchmarks.concealed.limits import limit_of
+    from endoscope_core.errors import EndoscopeError
+    from endoscope_core.worker_pool import worker_pool
+
+    for name in args.effects or ():
+        if name not in DRAWN:
+            raise EndoscopeError(f"'{name}' is not drawn; known are {', '.join(DRAWN)}")
+    with worker_pool(args.jobs) as pool:
+        futures = [pool.submit(limit_of, effect, args.seeds) for effect in args.effects or DRAWN]
+        for future in as_completed(futures):
+            found = future.result()
+            named = f'{100.0 * found.share:.2g} %' if found.share == found.share else 'never'
+            weaker = ', '.join(m or 'nothing' for m in found.missed_as) or '-'
+            numbers = '; '.join(found.numbers)
+            print(f'| `{found.effect}` | {named} | {numbers} | {weaker} |', flush=True)
+    return 0
