@@ -4,23 +4,15 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.criteria import BEYOND_FORM, RIVALLED, SURE
-from endoscope_explain.fit.evidence import counts, mean_squares, misfit
+from endoscope_explain.fit.evidence import misfit
 from endoscope_explain.fit.intervals import may_be_absent
-from endoscope_explain.fit.model import Fit
-from endoscope_explain.fit.other_forms import other_forms
-from endoscope_explain.fit.whiteness import is_noise
+from endoscope_explain.fit.other_forms import with_form
 from endoscope_explain.search.candidate import Candidate
 from endoscope_explain.search.levels import JointSearch, Level
 from endoscope_explain.search.refit import Composition
-
-Array = NDArray[np.float64]
-
-FORMS = 19
-"""Rigs of another form that say what is left where nothing is missing, and how far numbers move."""
 
 
 @dataclass(frozen=True)
@@ -74,17 +66,18 @@ class Decision:
         The joint with what is missing; the nominal plant where nothing is.
     missing : tuple of MissingTerm
         In the order in which they were found.
-    beyond_form : float
-        What the chosen plant leaves of the worst channel, over what the worst rig of another form
-        leaves; 0 where it leaves noise.
     explained : float
         Share of the excess misfit that the terms remove; 1 where there was none.
     """
 
     chosen: Composition
     missing: tuple[MissingTerm, ...]
-    beyond_form: float
     explained: float
+
+    @property
+    def beyond_form(self) -> float:
+        """What the chosen plant leaves over what another form leaves; see `Fit`."""
+        return self.chosen.fit.beyond_form or 0.0
 
     @property
     def adequate(self) -> bool:
@@ -96,7 +89,6 @@ def decide(search: JointSearch, jobs: int) -> Decision:
     """Choose a composition, name its terms and their rivals, and judge whether it is adequate."""
     chosen: Composition = search.nominal
     missing: tuple[MissingTerm, ...] = ()
-    judged: tuple[Fit, float] | None = None
     for level in search.levels:
         if not level.is_found:
             break
@@ -104,16 +96,14 @@ def decide(search: JointSearch, jobs: int) -> Decision:
         if not best.terms:
             chosen = best
             break
-        formed = with_form(best.fit, jobs)
-        best = replace(best, fit=formed[0])
+        best = replace(best, fit=with_form(best.fit, jobs))
         if any(not t.is_function and may_be_absent(best.fit, t.term) for t in best.terms):
             break
-        chosen, judged = best, formed
+        chosen = best
         missing = (*missing[: len(best.terms) - 1], _missing(level, best, jobs))
     missing = _named_as_chosen(search, chosen, missing, jobs)
-    fit, beyond_form = judged or with_form(chosen.fit, jobs)
-    explained = share_explained(search.nominal, chosen)
-    return Decision(replace(chosen, fit=fit), missing, beyond_form, explained)
+    chosen = replace(chosen, fit=with_form(chosen.fit, jobs))
+    return Decision(chosen, missing, share_explained(search.nominal, chosen))
 
 
 def share_explained(nominal: Composition, chosen: Composition) -> float:
@@ -121,34 +111,6 @@ def share_explained(nominal: Composition, chosen: Composition) -> float:
     before, after = misfit(nominal.fit).total, misfit(chosen.fit).total
     above = before - nominal.fit.model.observation.size
     return 1.0 if above <= 0.0 else float(np.clip((before - after) / above, 0.0, 1.0))
-
-
-def with_form(found: Fit, jobs: int) -> tuple[Fit, float]:
-    """What an error of form does to a fit, and whether it may be all that is left.
-
-    Parameters
-    ----------
-    found : Fit
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    (Fit, float)
-        The fit with what its numbers are moved by; see `Decision.beyond_form`.
-    """
-    if is_noise(found):
-        return found, 0.0
-    forms = other_forms(found, FORMS, jobs)
-    observation = found.model.observation
-    left = np.maximum(mean_squares(observation, found.residuals) - 1.0, 0.0)
-    drawn = np.stack([mean_squares(observation, r) for r in forms.residuals.T])
-    beyond = float(np.max(np.sqrt((1.0 + left) / (1.0 + drawn.max(axis=0)))))
-    # An error of form moves numbers the further the more of it there is.
-    size = counts(observation) / (1.0 + left)
-    scale = np.sum(size * left) / max(float(np.sum(size * drawn.mean(axis=0))), 1e-12)
-    moved = np.sqrt(scale * np.mean(forms.moved**2, axis=1))
-    return replace(found, moved_by_form=moved), beyond
 
 
 def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
@@ -168,7 +130,7 @@ def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
     alternatives = tuple(dict.fromkeys(near))
     best_other = max((level.gain(each) for each in others), default=0.0)
     if formula is not None and formula is not best:
-        formula = replace(formula, fit=with_form(formula.fit, jobs)[0])
+        formula = replace(formula, fit=with_form(formula.fit, jobs))
     return MissingTerm(
         last, name, alternatives, gain, max(best_other, 0.0) / gain, level.null.p_value, formula
     )

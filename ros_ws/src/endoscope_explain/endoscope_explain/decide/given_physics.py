@@ -95,11 +95,9 @@ def explained_by(
         tried = search((found,), jobs, 1).levels
         beside = decide(JointSearch(composition((), found), tried), jobs)
     chosen = composition((*terms, *beside.chosen.terms), beside.chosen.fit)
+    everything = (*missing, *beside.missing)
     return JointSearch(nominal, tried), Decision(
-        chosen,
-        (*missing, *beside.missing),
-        beside.beyond_form,
-        share_explained(nominal, chosen),
+        chosen, everything, share_explained(nominal, chosen)
     )
 
 

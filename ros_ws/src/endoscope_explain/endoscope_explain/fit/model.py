@@ -157,6 +157,9 @@ class Fit:
         Half weighted squares, prior included.
     moved_by_form : array (n,), optional
         By how much (rms) an error of form as large as what is left moves each coordinate.
+    beyond_form : float, optional
+        What is left of the worst channel over what the worst rig of another form leaves; 0 where
+        noise is left.
     """
 
     model: JointModel
@@ -165,6 +168,7 @@ class Fit:
     jacobian: Array = field(repr=False)
     cost: float
     moved_by_form: Array | None = field(default=None, repr=False)
+    beyond_form: float | None = None
 
 
 def without_effect(found: Fit, effect_id: str) -> tuple[JointModel, Array]:

@@ -11,9 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from endoscope_explain.criteria import LEAST_SHARE
+from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.held_out import predicts_better
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import leans, with_any_numbers
+from endoscope_explain.fit.other_forms import with_form
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate, candidates
@@ -182,9 +184,14 @@ def search(
         levels.append(level)
         if not level.is_found or not level.best.terms:
             break
+        best = replace(level.best, fit=with_form(level.best.fit, jobs))
+        found = tuple(best if c is level.best else c for c in level.found)
+        levels[-1] = level = replace(level, found=found)
+        if best.fit.beyond_form is not None and best.fit.beyond_form <= 1.0:
+            # Rigs of another form, in which nothing more is missing, leave as much.
+            break
         others = [c for c in (*level.variants(), *level.rivals()) if c.terms][: PARENTS - 1]
-        best = [level.best, *(until_it_stands(c) for c in others)]
-        parents = [(each, (each.fit,)) for each in best]
+        parents = [(each, (each.fit,)) for each in (best, *map(until_it_stands, others))]
     return JointSearch(nominal, tuple(levels))
 
 
@@ -218,7 +225,7 @@ def _grown(
     for described in anchors[1:]:
         # What is missing has bent the fitted numbers, but not the described ones.
         unbent = background(described)
-        terms = tuple(way.candidate for way in ways)
+        terms = tuple(way.candidate for way in ways if not way.candidate.is_function)
         more = _most_promising(promises(unbent, directions(unbent, terms, jobs)))
         likely += [term for term in more if term.variant not in {t.variant for t in likely}]
     looks = parallel_map(lambda term: look(anchors, term, behind.offset), likely, jobs)
@@ -246,10 +253,17 @@ def _with_finer_functions(
     grown: list[Composition], behind: Background, jobs: int
 ) -> list[Composition]:
     """Compositions, best first, whose best functions are as fine as there is evidence for."""
-    functions = [c for c in grown if c.terms[-1].is_function][:REFINED]
+    functions = [c for c in _near_the_best(grown, behind) if c.terms[-1].is_function][:REFINED]
     rest = [c for c in grown if all(c is not each for each in functions)]
     finer = parallel_map(lambda c: refined(c, behind.fit, behind.offset), functions, jobs)
     return sorted([*finer, *rest], key=lambda c: -c.evidence)
+
+
+def _near_the_best(grown: list[Composition], behind: Background) -> list[Composition]:
+    """Compositions, best first, that gain so much that the truth may be among them."""
+    without = log_evidence(behind.fit)
+    least = LEAST_SHARE * (grown[0].evidence - without)
+    return [c for c in grown if c.evidence - without >= least]
 
 
 def _with_their_formulas(
@@ -265,7 +279,7 @@ def _with_their_formulas(
     ends anywhere. The function at its place has set them straight.
     """
     tasks: list[tuple[Composition, list[Candidate]]] = []
-    for function in (c for c in grown if c.terms[-1].is_function):
+    for function in (c for c in _near_the_best(grown, behind) if c.terms[-1].is_function):
         starts: dict[str, list[Candidate]] = {}
         for term in terms:
             if not term.is_function and term.shares_place(function.terms[-1]):
