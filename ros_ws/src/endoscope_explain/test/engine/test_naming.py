@@ -54,6 +54,7 @@ def test_a_number_far_from_its_description_is_no_physics(one_joint):
     [
         ('joint_stop', {'angle_rad': 0.2, 'stiffness': 0.1}, Verdict.MISSING_PHYSICS),
         ('load_cell_gain', {'gain': 0.9, 'wire': 1.0}, Verdict.SENSOR_FAULT),
+        ('load_cell_bias', {'bias_n': 0.4, 'wire': 1.0}, Verdict.SENSOR_FAULT),
         ('tracker_delay', {'delay_s': 0.05}, Verdict.SENSOR_FAULT),
     ],
 )
