@@ -108,7 +108,7 @@ def shared_effects(
     given: list[dict[str, GivenPhysics]] = [{} for _ in recordings]
     for joint in recordings[0]:
         nominal = SharedChoice(joint, (), tuple(anchors[joint] for anchors in recordings))
-        chosen = _searched(nominal, most_effects, jobs, tell)
+        chosen = searched(nominal, most_effects, jobs, tell)
         alone = told_alone([anchors[0] for anchors in chosen.recordings])
         for physics, found in zip(given, alone, strict=True):
             own = tuple(e for e in chosen.effects if found.model.flags[CATALOGUE[e].flag])
@@ -116,10 +116,27 @@ def shared_effects(
     return list(given)
 
 
-def _searched(
+def searched(
     nominal: SharedChoice, most_effects: int, jobs: int, tell: Callable[[str], None]
 ) -> SharedChoice:
-    """Add effects one by one to the best few choices: the best single effect may mislead."""
+    """Add effects one by one to the best few choices: the best single effect may mislead.
+
+    Parameters
+    ----------
+    nominal : SharedChoice
+        Without effects.
+    most_effects : int
+        Largest number of them.
+    jobs : int
+        Tasks side by side.
+    tell : callable
+        Told each effect when it is chosen.
+
+    Returns
+    -------
+    SharedChoice
+        With the effects that gain more than another form would.
+    """
     best, beam = nominal, [nominal]
     while len(best.effects) < most_effects:
         if best.leaves_noise():
@@ -136,7 +153,11 @@ def _searched(
         if not beam:
             break
         gain = best.gain_of(beam[0])
-        if np.mean(best.form_gains_of(beam[0], jobs) >= gain) > FALSE_ALARMS:
+        if np.mean(best.form_gains_of(jobs) >= gain) > FALSE_ALARMS:
+            tell(
+                f'{nominal.joint}: {_listed(beam[0])}, better by {gain:.0f} nats: another form '
+                'alone may be worth as much'
+            )
             break
         tell(f'{nominal.joint}: {_listed(beam[0])}, better by {gain:.0f} nats')
         best = beam[0]

@@ -10,16 +10,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.fit.evidence import log_evidence, weights
+from endoscope_explain.fit.evidence import counts, log_evidence, mean_squares, weights
 from endoscope_explain.fit.model import Fit, JointModel
+from endoscope_explain.fit.other_forms import other_forms
 from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate, candidates
-from endoscope_explain.search.levels import null_gains
+from endoscope_explain.search.levels import FORMS
 from endoscope_explain.search.refit import Look, composition, look, polish
 from endoscope_explain.search.repeated_motion import motion_repeats
-from endoscope_explain.search.screen import background, directions, promises
+from endoscope_explain.search.screen import background, directions, gains, promises
 
 Array = NDArray[np.float64]
 Anchors = tuple[Fit, ...]
@@ -34,6 +35,8 @@ STARTS = 2
 """Starting points of an effect that get a cheap fit."""
 POLISHED_FIRST, POLISHED = 6, 3
 """Effects that are fitted to all recordings, beside no other one and beside others."""
+_SEED = 11
+_TINY = 1e-12
 
 
 @dataclass(frozen=True)
@@ -61,31 +64,53 @@ class SharedChoice:
         """Gain of evidence from this choice to another."""
         return other.total() - self.total()
 
-    def form_gains_of(self, other: 'SharedChoice', jobs: int) -> Array:
+    def form_gains_of(self, jobs: int) -> Array:
         """Gains (B,) that rigs of another form, in which nothing is missing, would show.
 
         Parameters
         ----------
-        other : SharedChoice
-            With one effect more.
         jobs : int
             Tasks side by side.
 
         Returns
         -------
         array (B,)
-            Of the best effect of each recording.
+            Of the effect that gains most in all recordings together: one is looked for that serves
+            all of them, and the best of each recording would gain more. Every shape of the tube
+            has a profile of its own, so that what is drawn for one says nothing of another.
         """
-        total: Array = np.zeros(1)
-        for before, after in zip(self.recordings, other.recordings, strict=True):
-            behind = background(before[0])
-            ways = directions(behind, _effects(before[0]), jobs)
-            total = total + null_gains(behind, ways, after[0], jobs)[0]
-        return total
+        order = np.random.default_rng(_SEED)
+        by_recording = [
+            {e: own[shuffled] for e, own in _form_gains(anchors[0], jobs).items()}
+            for anchors in self.recordings
+            for shuffled in [order.permutation(FORMS)]
+        ]
+        everywhere = set.intersection(*(set(gained) for gained in by_recording))
+        if not everywhere:
+            return np.zeros(FORMS)
+        sums = [np.sum([gained[e] for gained in by_recording], axis=0) for e in everywhere]
+        return np.asarray(np.max(sums, axis=0))
 
     def leaves_noise(self) -> bool:
         """Whether nothing is left to explain in any recording."""
         return all(is_noise(anchors[0]) for anchors in self.recordings)
+
+
+def _form_gains(found: Fit, jobs: int) -> dict[str, Array]:
+    """Gains (B,) of each effect on rigs of another form that are off by as much as a fit is."""
+    behind, observation = background(found), found.model.observation
+    left = behind.left(other_forms(found, FORMS, jobs).residuals * behind.weight[:, None])
+    above = np.maximum(mean_squares(observation, found.residuals) - 1.0, 0.0)
+    floor = np.array([behind.weight[part][0] ** 2 for part in observation.slices()])
+    off = float(np.sum(counts(observation) * floor * above))
+    scale = np.sqrt(off / np.maximum(np.sum(left**2, axis=0), _TINY))
+    noise = np.random.default_rng(_SEED).normal(size=left.shape) * behind.weight[:, None]
+    ways = directions(behind, _effects(found), jobs)
+    gained: dict[str, Array] = {}
+    rows = gains(behind, ways, scale * left + behind.left(noise)).values if ways else ()
+    for way, row in zip(ways, rows, strict=True):
+        gained[way.candidate.id] = np.maximum(gained.get(way.candidate.id, row), row)
+    return gained
 
 
 def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
