@@ -108,7 +108,7 @@ def shared_effects(
     given: list[dict[str, GivenPhysics]] = [{} for _ in recordings]
     for joint in recordings[0]:
         nominal = SharedChoice(joint, (), tuple(anchors[joint] for anchors in recordings))
-        chosen = searched(nominal, most_effects, jobs, tell)
+        chosen, _ = searched(nominal, most_effects, jobs, tell)
         alone = told_alone([anchors[0] for anchors in chosen.recordings])
         for physics, found in zip(given, alone, strict=True):
             own = tuple(e for e in chosen.effects if found.model.flags[CATALOGUE[e].flag])
@@ -118,7 +118,7 @@ def shared_effects(
 
 def searched(
     nominal: SharedChoice, most_effects: int, jobs: int, tell: Callable[[str], None]
-) -> SharedChoice:
+) -> tuple[SharedChoice, SharedChoice | None]:
     """Add effects one by one to the best few choices: the best single effect may mislead.
 
     Parameters
@@ -134,8 +134,10 @@ def searched(
 
     Returns
     -------
-    SharedChoice
+    found : SharedChoice
         With the effects that gain more than another form would.
+    refused : SharedChoice or None
+        The best one with an effect more, if another form may gain as much.
     """
     best, beam = nominal, [nominal]
     while len(best.effects) < most_effects:
@@ -153,15 +155,16 @@ def searched(
         if not beam:
             break
         gain = best.gain_of(beam[0])
-        if np.mean(best.form_gains_of(jobs) >= gain) > FALSE_ALARMS:
+        chance = float(np.mean(best.form_gains_of(jobs) >= gain))
+        if chance > FALSE_ALARMS:
             tell(
-                f'{nominal.joint}: {_listed(beam[0])}, better by {gain:.0f} nats: another form '
-                'alone may be worth as much'
+                f'{nominal.joint}: not {_listed(beam[0])}: better by {gain:.0f} nats, as '
+                f'{chance:.0%} of other forms would be'
             )
-            break
+            return best, beam[0]
         tell(f'{nominal.joint}: {_listed(beam[0])}, better by {gain:.0f} nats')
         best = beam[0]
-    return best
+    return best, None
 
 
 def _listed(choice: SharedChoice) -> str:

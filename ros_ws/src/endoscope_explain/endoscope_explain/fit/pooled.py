@@ -1,11 +1,10 @@
 """One fit of several recordings of a rig whose tube is bent differently in each.
 
-What a device is like, and its radii, is one number for all recordings. Wires and
-joint hardly change from one shape
-of the tube to the next: their numbers scatter a little around a common mean, which the data of all
-recordings determine (partial pooling: Gelman, Hill, Data Analysis Using Regression and
-Multilevel/Hierarchical Models, Cambridge University Press 2007, ch. 12). Only what a bent sheath
-does to a wire is each recording's own.
+What a device is like, and its radii, is one number for all recordings. Wires and joint hardly
+change from one shape of the tube to the next: their numbers scatter a little around a common mean,
+which the data of all recordings determine (partial pooling: Gelman, Hill, Data Analysis Using
+Regression and Multilevel/Hierarchical Models, Cambridge University Press 2007, ch. 12). Only what a
+bent sheath does to a wire is each recording's own.
 """
 
 import math

@@ -51,8 +51,7 @@ def chosen(anchors):
 def test_another_form_gains_by_one_effect_for_all_recordings(anchors):
     own = [SharedChoice('bend_x', (), (each['bend_x'],)).form_gains_of(2) for each in anchors]
     both = SharedChoice('bend_x', (), tuple(each['bend_x'] for each in anchors)).form_gains_of(2)
-    assert np.all(both <= own[0] + own[1] + 1e-6)
-    assert np.any(both < own[0] + own[1] - 1.0)
+    assert np.mean(both) < np.mean(own[0]) + np.mean(own[1]) - 1.0
 
 
 def test_what_all_recordings_lack_is_found_and_nothing_else(chosen):
