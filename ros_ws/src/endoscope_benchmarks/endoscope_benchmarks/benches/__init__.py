@@ -5,6 +5,7 @@ BENCHES: tuple[str, ...] = (
     'recorder',
     'explain',
     'concealed',
+    'real',
     'simulate',
     'calibration_rate',
     'papers',
