@@ -44,8 +44,10 @@ def share_seen_before(command: Array, tick: float = TICK) -> float:
     Parameters
     ----------
     command : array (N,)
-        In rad, every `tick` s. Near is within `NEAR_ANGLE` of its range and `NEAR_SPEED` of its
-        largest speed; before is at least `APART_S` and `APART_SHARE` of the recording earlier.
+        In rad. Near is within `NEAR_ANGLE` of its range and `NEAR_SPEED` of its largest speed;
+        before is at least `APART_S` and `APART_SHARE` of the recording earlier.
+    tick : float
+        Time between two of its values in s.
 
     Returns
     -------
