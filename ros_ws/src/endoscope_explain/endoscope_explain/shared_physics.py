@@ -159,7 +159,7 @@ def searched(
         if chance > FALSE_ALARMS:
             tell(
                 f'{nominal.joint}: not {_listed(beam[0])}: better by {gain:.0f} nats, as '
-                f'{chance:.0%} of other forms would be'
+                f'{chance:.1%} of other forms would be'
             )
             return best, beam[0]
         tell(f'{nominal.joint}: {_listed(beam[0])}, better by {gain:.0f} nats')

@@ -121,7 +121,7 @@ def sections(
         ),
         (
             'Another state of the rig, numbers',
-            f'By the effects of the tubes; nats lost without each: {needed}. Alone: {alone}.',
+            f"By the tubes' effects; nats lost without each: {needed}. Alone it names {alone}.",
             ('number', state.told[0].take.name),
             number_rows(of_state),
             (),
