@@ -12,6 +12,7 @@ from endoscope_benchmarks.real.explained import Number, State, Tubes
 from endoscope_benchmarks.real.rig import Told
 from endoscope_benchmarks.real.takes import between_cycles
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.decide.conclusions import NOMINAL_UNITS
 from endoscope_explain.report.figures.style import (
     RUNG_COLOUR,
     RUNG_STYLE,
@@ -24,15 +25,7 @@ from endoscope_explain.report.numbers import digits, in_degrees
 
 PLANTS = ('nominal', 'refitted', 'augmented')
 UNITS = {
-    'pretension': 'N',
-    'wire_stiffness': 'N/m',
-    'joint_stiffness': 'N m/rad',
-    'joint_friction': 'N m',
-    'joint_presliding': 'rad',
-    'joint_damping': 'N m s/rad',
-    'motor_bandwidth': 'rad/s',
-    'joint_rest_angle': 'rad',
-    'joint_radius': 'm',
+    **NOMINAL_UNITS,
     **{f'{e.id}.{p.name}': p.unit for e in CATALOGUE.values() for p in e.parameters},
 }
 

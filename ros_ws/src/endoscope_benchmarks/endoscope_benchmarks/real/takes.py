@@ -138,9 +138,7 @@ def read(path: Path) -> Take:
     # The phase falls back where a program ends; what it counted is in all the other steps.
     step = np.gcd.reduce(steps[steps < np.pi / _PHASE_DIGITS]) * _PHASE_DIGITS
     loop = 0.02275 if columns == 8 else 0.001087
-    time = _clock(table, loop / step)
-    moving = np.flatnonzero(np.diff(table[:, DESIRED]))[-1] + 1
-    table, time = _kept(table, time, int(moving))
+    table, time = _on_a_clock(table, loop / step)
     command, angle, tension = table[:, DESIRED], table[:, 5], None
     if columns == 8:
         angle, tension = table[:, 3], table[:, 4:6]
@@ -162,18 +160,15 @@ def read(path: Path) -> Take:
     )
 
 
-def _clock(table: Array, seconds: float) -> Array:
-    """Seconds of all rows: by phase, and by the rows' own timer once the command stands."""
+def _on_a_clock(table: Array, seconds: float) -> tuple[Array, Array]:
+    """Rows that do not repeat the one before, and their seconds.
+
+    Once the command stands, so does the phase: rows are counted, by what they took before.
+    """
     moving = int(np.flatnonzero(np.diff(table[:, DESIRED]))[-1]) + 1
     time = seconds * table[:, PHASE]
-    rows = np.arange(len(table) - moving)
-    time[moving:] = time[moving - 1] + (rows + 1) * time[moving - 1] / moving
-    return np.asarray(time - time[0])
-
-
-def _kept(table: Array, time: Array, moving: int) -> tuple[Array, Array]:
-    """Rows that do not repeat the one before; all of them once the command stands."""
-    whole = np.column_stack([table, time])
+    time[moving:] = time[moving - 1] * np.arange(moving + 1, len(table) + 1) / moving
+    whole = np.column_stack([table, time - time[0]])
     whole = np.vstack([without_repeats(whole[:moving]), whole[moving:]])
     return whole[:, :-1], whole[:, -1]
 
