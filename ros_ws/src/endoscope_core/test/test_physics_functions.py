@@ -143,6 +143,7 @@ SAME = {
     'cross_coupling': ({'moment_per_rad': 0.0015}, 'load_of_other_angle', '0.0015 * q_other',
                        None),
     'load_cell_gain': ({'gain': 1.15, 'wire': 1.0}, 'load_cell_neg_of_tension', '0.15 * T', None),
+    'load_cell_bias': ({'bias_n': 0.3, 'wire': 1.0}, 'load_cell_neg_of_tension', '0.3', None),
     'load_cell_crosstalk': ({'share': 0.1}, 'load_cell_pos_of_other_wire', '0.1 * T', None),
     'load_cell_drift': ({'rate_n_per_s': 0.05}, 'load_cell_pos_of_time', '0.05 * t', None),
     'tracker_distortion': ({'quadratic': 0.1, 'cubic': -0.2}, 'tracker_of_angle',

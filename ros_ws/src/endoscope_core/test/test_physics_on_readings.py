@@ -43,6 +43,7 @@ def test_one_load_cell_reads_wrong(nominal, wire):
     expected = {
         'load_cell_crosstalk': ({'share': 0.2}, own + 0.2 * neighbour),
         'load_cell_gain': ({'gain': 1.3}, 1.3 * own),
+        'load_cell_bias': ({'bias_n': -0.4}, own - 0.4),
         'load_cell_drift': ({'rate_n_per_s': 0.1}, own + 0.1 * TIME),
         'load_cell_saturation': ({'limit_n': 6.0}, np.minimum(own, 6.0)),
     }

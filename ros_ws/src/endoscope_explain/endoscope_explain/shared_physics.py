@@ -107,7 +107,7 @@ def shared_effects(
     given: list[dict[str, GivenPhysics]] = [{} for _ in recordings]
     for joint in recordings[0]:
         nominal = SharedChoice(joint, (), tuple(anchors[joint] for anchors in recordings))
-        chosen = _searched(nominal, most_effects, jobs, tell)
+        chosen, _ = searched(nominal, most_effects, jobs, tell)
         alone = told_alone([anchors[0] for anchors in chosen.recordings])
         for physics, found in zip(given, alone, strict=True):
             own = tuple(e for e in chosen.effects if found.model.flags[CATALOGUE[e].flag])
@@ -115,10 +115,29 @@ def shared_effects(
     return list(given)
 
 
-def _searched(
+def searched(
     nominal: SharedChoice, most_effects: int, jobs: int, tell: Callable[[str], None]
-) -> SharedChoice:
-    """Add effects one by one to the best few choices: the best single effect may mislead."""
+) -> tuple[SharedChoice, SharedChoice | None]:
+    """Add effects one by one to the best few choices: the best single effect may mislead.
+
+    Parameters
+    ----------
+    nominal : SharedChoice
+        Without effects.
+    most_effects : int
+        Largest number of them.
+    jobs : int
+        Tasks side by side.
+    tell : callable
+        Told each effect when it is chosen.
+
+    Returns
+    -------
+    found : SharedChoice
+        With the effects that gain more than another form would.
+    refused : SharedChoice or None
+        The best one with an effect more, if another form may gain as much.
+    """
     best, beam = nominal, [nominal]
     while len(best.effects) < most_effects:
         if best.leaves_noise():
@@ -135,11 +154,16 @@ def _searched(
         if not beam:
             break
         gain = best.gain_of(beam[0])
-        if best.null_of(beam[0], jobs).p_value > FALSE_ALARMS:
-            break
+        chance = best.null(jobs).p_value
+        if chance > FALSE_ALARMS:
+            tell(
+                f'{nominal.joint}: not {_listed(beam[0])}: better by {gain:.0f} nats, but '
+                f'{chance:.1%} of rigs without it show as much'
+            )
+            return best, beam[0]
         tell(f'{nominal.joint}: {_listed(beam[0])}, better by {gain:.0f} nats')
         best = beam[0]
-    return best
+    return best, None
 
 
 def _listed(choice: SharedChoice) -> str:

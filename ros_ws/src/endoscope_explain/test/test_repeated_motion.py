@@ -30,3 +30,9 @@ def test_one_cycle_is_too_little_and_the_calibration_is_enough():
         < LEAST_SHARE
         < share_seen_before(np.sin(TIME[:9000]))
     )
+
+
+def test_the_share_does_not_depend_on_the_tick():
+    command = np.sin(TIME[:9000])
+    coarse = share_seen_before(command[::5], 5e-3)
+    assert coarse == pytest.approx(share_seen_before(command), abs=0.02)

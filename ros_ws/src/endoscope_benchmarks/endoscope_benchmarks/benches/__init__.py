@@ -7,6 +7,7 @@ BENCHES: tuple[str, ...] = (
     'concealed',
     'criteria',
     'limits',
+    'real',
     'simulate',
     'calibration_rate',
     'papers',

@@ -97,9 +97,7 @@ def real_recordings(folder: Path | None = None) -> list[RealRecording]:
     found = []
     # The tubes are named by their bend; other files of the folder are recordings of another form.
     for path in folder.glob('[0-9]*.txt'):
-        table = np.loadtxt(path, delimiter=',')
-        # Rows repeat each reading of a slower clock.
-        table = table[np.diff(table[:, PHASE], prepend=-1.0) != 0.0]
+        table = without_repeats(np.loadtxt(path, delimiter=','))
         found.append(
             RealRecording(
                 int(path.stem),
@@ -110,6 +108,11 @@ def real_recordings(folder: Path | None = None) -> list[RealRecording]:
             )
         )
     return sorted(found, key=lambda recording: recording.bend)
+
+
+def without_repeats(table: Array) -> Array:
+    """Rows of a recording without those that repeat the one before: the file's clock is faster."""
+    return np.asarray(table[np.diff(table[:, PHASE], prepend=-1.0) != 0.0])
 
 
 def fit_first_cycle(recording: RealRecording, model: str, seed: int) -> ModelFit:

@@ -1,10 +1,10 @@
 """One fit of several recordings of a rig whose tube is bent differently in each.
 
-What a device is like is one number for all recordings. Wires and joint hardly change from one shape
-of the tube to the next: their numbers scatter a little around a common mean, which the data of all
-recordings determine (partial pooling: Gelman, Hill, Data Analysis Using Regression and
-Multilevel/Hierarchical Models, Cambridge University Press 2007, ch. 12). Only what a bent sheath
-does to a wire is each recording's own.
+What a device is like, and its radii, is one number for all recordings. Wires and joint hardly
+change from one shape of the tube to the next: their numbers scatter a little around a common mean,
+which the data of all recordings determine (partial pooling: Gelman, Hill, Data Analysis Using
+Regression and Multilevel/Hierarchical Models, Cambridge University Press 2007, ch. 12). Only what a
+bent sheath does to a wire is each recording's own.
 """
 
 import math
@@ -19,11 +19,15 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.layout import (
     CAPSTAN_EXPONENT,
     FRICTION_PROFILE,
+    JOINT_RADIUS,
+    JOINT_REST_ANGLE,
     MOTOR_BANDWIDTH,
     MOTOR_DAMPING_RATIO,
     PRETENSION_PROFILE,
     PROFILE_TERMS,
+    PULLEY_RADIUS,
 )
+from endoscope_explain.fit.evidence import weights
 from endoscope_explain.fit.free_parameters import LEAD, FreeParameter
 from endoscope_explain.fit.model import Fit, JointModel, central_jacobian
 from endoscope_explain.fit.solver import STEP, Effort, Renewal, minimise
@@ -36,7 +40,7 @@ SPREAD = 0.1
 FIRST_SPREAD = 0.5
 """Scatter that is allowed at first, so that a recording finds its way to the others."""
 
-_OF_A_DEVICE = frozenset({MOTOR_BANDWIDTH, MOTOR_DAMPING_RATIO}) | {
+_OF_A_DEVICE = frozenset({MOTOR_BANDWIDTH, MOTOR_DAMPING_RATIO, PULLEY_RADIUS, JOINT_RADIUS}) | {
     place
     for definition in CATALOGUE.values()
     if definition.stage in (Stage.ACTUATOR, Stage.SENSING)
@@ -46,6 +50,7 @@ _OF_A_SHAPE = frozenset(
     {
         CAPSTAN_EXPONENT,
         PRETENSION_PROFILE,
+        JOINT_REST_ANGLE,
         *range(FRICTION_PROFILE, FRICTION_PROFILE + PROFILE_TERMS),
         *(p for e in CATALOGUE.values() if e.traits.of_shape for p in e.places),
     }
@@ -107,6 +112,7 @@ def fit_together(
     whole = np.clip(whole, layout.low, layout.high)
     if rough:
         return _together(models, layout, whole, SPREAD, ROUGH)
+    # Near the end channels are weighted by what is left, as the evidence does.
     whole = _whole(_together(models, layout, whole, FIRST_SPREAD, ON_THE_WAY), layout)
     return _together(models, layout, whole, SPREAD, THOROUGH)
 
@@ -117,6 +123,28 @@ def with_common_numbers(fits: Sequence[Fit]) -> list[Array]:
     for pool in layout.pools:
         whole[pool] = np.median(whole[pool])
     return [whole[columns] for columns in layout.columns]
+
+
+def deviations(fits: Sequence[Fit]) -> list[Array]:
+    """Standard deviations (n,) of each recording's coordinates, by what is left as white noise.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        Of `fit_together`: what they share is known by all of them.
+
+    Returns
+    -------
+    list of array (n,)
+    """
+    layout, whole = _laid_out(fits)
+    weight = [weights(f.model.observation, f.residuals) for f in fits]
+    together = _Together([f.model for f in fits], layout, SPREAD, weight)
+    left, slopes = [f.residuals for f in fits], [f.jacobian for f in fits]
+    normal, _ = together.normal_equations(whole, left, slopes)
+    ridge = 1e-9 * np.diag(np.maximum(np.diag(normal), 1e-12))
+    deviation = np.sqrt(np.diag(np.linalg.inv(normal + ridge)))
+    return [deviation[columns] for columns in layout.columns]
 
 
 def told_alone(fits: Sequence[Fit]) -> list[Fit]:
@@ -209,15 +237,18 @@ class _Together:
     models: Sequence[JointModel]
     layout: _Layout
     spread: float
+    weights: Sequence[Array]
 
     def bounds(self) -> tuple[Array, Array]:
         return self.layout.low, self.layout.high
 
     def evaluate(self, theta: Array) -> tuple[list[Array], float]:
         residuals, cost = [], 0.0
-        for model, columns in zip(self.models, self.layout.columns, strict=True):
+        for model, columns, weight in zip(
+            self.models, self.layout.columns, self.weights, strict=True
+        ):
             residuals.append(model.residuals(theta[columns]))
-            cost += model.cost(residuals[-1], theta[columns])
+            cost += model.cost(weight * residuals[-1], theta[columns])
         for pool in self.layout.pools:
             cost += 0.5 * float(np.sum((theta[pool] - np.mean(theta[pool])) ** 2)) / self.spread**2
         return residuals, cost
@@ -233,12 +264,12 @@ class _Together:
     ) -> tuple[Array, Array]:
         normal = np.zeros((len(theta), len(theta)))
         gradient = np.zeros(len(theta))
-        for model, columns, left, slope in zip(
-            self.models, self.layout.columns, residuals, derivative, strict=True
+        for model, columns, weight, left, slope in zip(
+            self.models, self.layout.columns, self.weights, residuals, derivative, strict=True
         ):
-            weight = model.prior_weight()
-            normal[np.ix_(columns, columns)] += slope.T @ slope + np.diag(weight**2)
-            gradient[columns] += slope.T @ left + weight * model.prior(theta[columns])
+            own, weighted = model.prior_weight(), weight[:, None] * slope
+            normal[np.ix_(columns, columns)] += weighted.T @ weighted + np.diag(own**2)
+            gradient[columns] += weighted.T @ (weight * left) + own * model.prior(theta[columns])
         for pool in self.layout.pools:
             together = (np.eye(len(pool)) - 1.0 / len(pool)) / self.spread**2
             normal[np.ix_(pool, pool)] += together
@@ -254,12 +285,14 @@ class _Together:
 def _together(
     models: Sequence[JointModel], layout: _Layout, start: Array, spread: float, effort: Effort
 ) -> list[Fit]:
-    found = minimise(_Together(models, layout, spread), start, effort)
+    begun = [m.residuals(start[c]) for m, c in zip(models, layout.columns, strict=True)]
+    weight = [weights(m.observation, r) for m, r in zip(models, begun, strict=True)]
+    found = minimise(_Together(models, layout, spread, weight), start, effort)
     fits = []
-    for model, columns, residuals, derivative in zip(
-        models, layout.columns, found.residuals, found.derivative, strict=True
+    for model, columns, own, residuals, derivative in zip(
+        models, layout.columns, weight, found.residuals, found.derivative, strict=True
     ):
         theta = found.theta[columns]
-        cost = model.cost(residuals, theta)
+        cost = model.cost(own * residuals, theta)
         fits.append(Fit(model, theta, residuals, derivative, cost))
     return fits

@@ -19,7 +19,7 @@ from endoscope_explain.fit.other_forms import with_form
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate, candidates
-from endoscope_explain.search.null_rigs import Null, null_of
+from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, shown
 from endoscope_explain.search.refit import (
     Composition,
     Look,
@@ -208,11 +208,12 @@ def _level(
         best.setdefault(frozenset(term.variant for term in each.terms), each)
     ranked = tuple(best.values())
     if not ranked:
-        return Level(first, (), Null(0.0, np.zeros(1), np.zeros(1)))
+        return Level(first, (), NOTHING_SHOWN)
     if not is_noise(ranked[0].fit):
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     behind, ways, _ = grown[0]
-    level = Level(first, ranked, null_of(behind, ways, ranked[0].fit, jobs))
+    null = shown(behind, ways, ranked[0].fit, jobs).null() if ways else NOTHING_SHOWN
+    level = Level(first, ranked, null)
     return replace(level, predicts=predicts_better(level.best.fit, first.fit))
 
 

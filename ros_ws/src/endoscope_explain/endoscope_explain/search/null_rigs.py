@@ -53,7 +53,32 @@ class Null:
         return (1.0 + int(np.sum(self.drawn >= self.observed))) / (1.0 + len(self.drawn))
 
 
-def null_of(behind: Background, ways: tuple[Directions, ...], best: Fit, jobs: int) -> Null:
+NOTHING_SHOWN = Null(0.0, np.zeros(1), np.zeros(1))
+"""Where no term moves anything."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Gains of all terms by the screen, as in `Null`.
+
+    Attributes
+    ----------
+    observed : array (terms,)
+    drawn, doubt : array (terms, B)
+    """
+
+    observed: Array
+    drawn: Array
+    doubt: Array
+
+    def null(self) -> Null:
+        """Of the best term of all."""
+        return Null(
+            float(np.max(self.observed)), np.max(self.drawn, axis=0), np.max(self.doubt, axis=0)
+        )
+
+
+def shown(behind: Background, ways: tuple[Directions, ...], best: Fit | None, jobs: int) -> Shown:
     """Run the screen over the recording and over rigs in which nothing is missing.
 
     Parameters
@@ -61,18 +86,16 @@ def null_of(behind: Background, ways: tuple[Directions, ...], best: Fit, jobs: i
     behind : Background
         The fit without the term.
     ways : tuple of Directions
-        Of all terms.
-    best : Fit
-        With the term that explains most.
+        Of all terms, one at least.
+    best : Fit or None
+        With the term that explains most; without one, there is no doubt about what is left.
     jobs : int
         Tasks side by side.
 
     Returns
     -------
-    Null
+    Shown
     """
-    if not ways:
-        return Null(0.0, np.zeros(1), np.zeros(1))
     found, observation = behind.fit, behind.fit.model.observation
     generator = np.random.default_rng(_SEED)
     own = behind.left(found.residuals * behind.weight)
@@ -99,17 +122,17 @@ def null_of(behind: Background, ways: tuple[Directions, ...], best: Fit, jobs: i
     winner = np.argmax(alone.values, axis=0)
     rest = np.sum(alone.left[winner, np.arange(FORMS)] * number, axis=1)
     whole = np.sum(left**2, axis=0)
-    off, remains = above_noise(found.residuals), above_noise(best.residuals)
+    off = above_noise(found.residuals)
+    remains = above_noise(best.residuals) if best is not None else np.zeros_like(off)
     as_off = np.sqrt(np.sum(number * floor * off) / np.maximum(whole, _TINY))
     as_left = np.sqrt(np.sum(number * floor * remains) / np.maximum(rest, _TINY))
 
-    def largest(residuals: Array) -> Array:
-        return np.asarray(np.max(gains(behind, ways, residuals).values, axis=0))
-
-    return Null(
-        float(largest(own[:, None])[0]),
-        largest(np.hstack([as_off * left, like(off)]) + white),
-        largest(np.hstack([np.minimum(as_left, as_off) * left, like(remains)]) + white),
+    drawn = np.hstack([as_off * left, like(off)]) + white
+    doubt = np.hstack([np.minimum(as_left, as_off) * left, like(remains)]) + white
+    return Shown(
+        gains(behind, ways, own[:, None]).values[:, 0],
+        gains(behind, ways, drawn).values,
+        gains(behind, ways, doubt).values,
     )
 
 

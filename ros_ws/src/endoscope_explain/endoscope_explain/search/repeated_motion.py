@@ -9,8 +9,8 @@ from endoscope_explain.observe.observation import TICK, JointObservation
 Array = NDArray[np.float64]
 
 
-EVERY = 20
-"""Ticks between the moments compared."""
+EVERY_S = 0.02
+"""Time between the moments compared."""
 APART_S = 1.0
 APART_SHARE = 0.05
 """Of the recording: a slow ramp has left the neighbourhood of an angle by then."""
@@ -34,27 +34,31 @@ def motion_repeats(observation: JointObservation) -> bool:
     -------
     bool
     """
-    return share_seen_before(observation.inputs[0, :, IN_COMMAND]) >= LEAST_SHARE
+    command = observation.inputs[0, :, IN_COMMAND]
+    return share_seen_before(command, observation.tick) >= LEAST_SHARE
 
 
-def share_seen_before(command: Array) -> float:
+def share_seen_before(command: Array, tick: float = TICK) -> float:
     """Share of the moments at which angle and speed were near what they had been before.
 
     Parameters
     ----------
     command : array (N,)
-        In rad, every `TICK`. Near is within `NEAR_ANGLE` of its range and `NEAR_SPEED` of its
-        largest speed; before is at least `APART_S` and `APART_SHARE` of the recording earlier.
+        In rad. Near is within `NEAR_ANGLE` of its range and `NEAR_SPEED` of its largest speed;
+        before is at least `APART_S` and `APART_SHARE` of the recording earlier.
+    tick : float
+        Time between two of its values in s.
 
     Returns
     -------
     float
     """
-    angle = command[::EVERY]
+    every = max(1, round(EVERY_S / tick))
+    angle = command[::every]
     speed = np.gradient(angle) if len(angle) > 1 else np.zeros_like(angle)
     near_angle = NEAR_ANGLE * np.ptp(angle)
     near_speed = NEAR_SPEED * np.max(np.abs(speed), initial=0.0)
-    apart = max(round(APART_S / (EVERY * TICK)), round(APART_SHARE * len(angle)))
+    apart = max(round(APART_S / (every * tick)), round(APART_SHARE * len(angle)))
     seen = [
         bool(
             np.any(

@@ -16,7 +16,7 @@ from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate, candidates
-from endoscope_explain.search.null_rigs import Null, null_of
+from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, shown
 from endoscope_explain.search.refit import Look, composition, look, polish
 from endoscope_explain.search.repeated_motion import motion_repeats
 from endoscope_explain.search.screen import background, directions, promises
@@ -34,6 +34,8 @@ STARTS = 2
 """Starting points of an effect that get a cheap fit."""
 POLISHED_FIRST, POLISHED = 6, 3
 """Effects that are fitted to all recordings, beside no other one and beside others."""
+_SEED = 11
+_TINY = 1e-12
 
 
 @dataclass(frozen=True)
@@ -61,35 +63,47 @@ class SharedChoice:
         """Gain of evidence from this choice to another."""
         return other.total() - self.total()
 
-    def null_of(self, other: 'SharedChoice', jobs: int) -> Null:
-        """What recordings show, all together, and rigs in which nothing more is missing.
+    def null(self, jobs: int) -> Null:
+        """What recordings show of one effect more, and rigs in which nothing more is missing.
 
         Parameters
         ----------
-        other : SharedChoice
-            With one effect more.
         jobs : int
             Tasks side by side.
 
         Returns
         -------
         Null
-            Sums over the recordings, each with its own best effect.
+            Of the effect that gains most in all recordings together: one is looked for that serves
+            all of them, and the best of each recording would gain more. Every shape of the tube
+            has a profile of its own, so that what is drawn for one says nothing of another.
         """
-        found = []
-        for before, after in zip(self.recordings, other.recordings, strict=True):
-            behind = background(before[0])
-            ways = directions(behind, _effects(before[0]), jobs)
-            found.append(null_of(behind, ways, after[0], jobs))
-        return Null(
-            sum(each.observed for each in found),
-            sum((each.drawn for each in found), np.zeros(1)),
-            sum((each.doubt for each in found), np.zeros(1)),
-        )
+        order = np.random.default_rng(_SEED)
+        by_recording = [_shown(anchors[0], order, jobs) for anchors in self.recordings]
+        everywhere = set.intersection(*(set(each) for each in by_recording))
+        if not everywhere:
+            return NOTHING_SHOWN
+        sums = [np.sum([each[effect] for each in by_recording], axis=0) for effect in everywhere]
+        largest = np.max(sums, axis=0)
+        return Null(float(largest[0]), largest[1:], largest[1:])
 
     def leaves_noise(self) -> bool:
         """Whether nothing is left to explain in any recording."""
         return all(is_noise(anchors[0]) for anchors in self.recordings)
+
+
+def _shown(found: Fit, order: np.random.Generator, jobs: int) -> dict[str, Array]:
+    """Gains (1 + B,) of each effect: on the recording, and on rigs in any order."""
+    behind = background(found)
+    ways = directions(behind, _effects(found), jobs)
+    if not ways:
+        return {}
+    screened = shown(behind, ways, None, jobs)
+    drawn = screened.drawn[:, order.permutation(screened.drawn.shape[1])]
+    gained: dict[str, Array] = {}
+    for way, row in zip(ways, np.column_stack([screened.observed, drawn]), strict=True):
+        gained[way.candidate.id] = np.maximum(gained.get(way.candidate.id, row), row)
+    return gained
 
 
 def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:

@@ -1,15 +1,24 @@
 """One fit of two recordings of a rig: the same device, nearly the same joint, another tube."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.layout import JOINT_RADIUS
+from endoscope_explain.fit.intervals import covariance
 from endoscope_explain.fit.model import fit
 from endoscope_explain.fit.nominal import anchored
-from endoscope_explain.fit.pooled import SPREAD, fit_together, told_alone, with_common_numbers
+from endoscope_explain.fit.pooled import (
+    SPREAD,
+    deviations,
+    fit_together,
+    told_alone,
+    with_common_numbers,
+)
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.candidate import with_effect
 
@@ -56,6 +65,46 @@ def test_a_device_is_one_number_and_a_tube_is_not(together):
     assert value(first, 'motor_bandwidth') == value(second, 'motor_bandwidth')
     for found, exponent in zip(together, TUBES, strict=True):
         assert value(found, 'capstan_exponent') == pytest.approx(exponent, rel=0.03)
+
+
+def test_a_channel_counts_by_what_is_left_of_it(together):
+    """A noise that is described too small is no reason to follow that sensor alone."""
+
+    def understated(model):
+        channels = model.observation.channels
+        cells = [
+            c if c.quantity != 'tension' else replace(c, noise=0.1 * c.noise) for c in channels
+        ]
+        return replace(model, observation=replace(model.observation, channels=tuple(cells)))
+
+    models = [understated(f.model) for f in together]
+    again = fit_together(models, [f.theta for f in together])
+    for before, after in zip(together, again, strict=True):
+        for name in ('joint_stiffness', 'wire_stiffness', 'pretension'):
+            assert value(after, name) == pytest.approx(value(before, name), rel=2e-3)
+
+
+def test_what_is_shared_is_known_better_than_by_one_recording(together):
+    for found, deviation in zip(together, deviations(together), strict=True):
+        alone = np.sqrt(np.diag(covariance(found)))
+        gain, exponent = place(found, 'gain'), place(found, 'capstan_exponent')
+        assert deviation[gain] < alone[gain]
+        assert deviation[exponent] < 1.01 * alone[exponent]
+    first, second = deviations(together)
+    assert first[gain] == second[gain]
+
+
+def test_radii_are_one_number(separate):
+    models, starts = [], []
+    for found in separate:
+        like = found.model.free[place(found, 'joint_stiffness')]
+        radius = replace(
+            like, index=JOINT_RADIUS, name='joint_radius', low=5e-4, high=1e-3, mean=math.log(8e-4)
+        )
+        models.append(replace(found.model, free=(*found.model.free, radius)))
+        starts.append(np.append(found.theta, radius.mean))
+    first, second = fit_together(models, starts)
+    assert value(first, 'joint_radius') == value(second, 'joint_radius')
 
 
 def test_a_recording_that_knows_little_of_its_joint_learns_from_the_other_one(separate, together):

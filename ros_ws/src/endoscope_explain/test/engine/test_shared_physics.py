@@ -1,5 +1,6 @@
 """One choice of effects for several recordings of a rig whose tube changes."""
 
+import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec
@@ -10,6 +11,7 @@ from endoscope_explain.fit.model import fit
 from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.candidate import with_effect
+from endoscope_explain.search.shared_choice import SharedChoice
 from endoscope_explain.shared_physics import shared_effects
 
 GAIN = 0.9
@@ -32,13 +34,24 @@ def recordings(one_joint):
 
 
 @pytest.fixture(scope='module')
-def chosen(one_joint, recordings):
-    anchors = []
+def anchors(one_joint, recordings):
+    found = []
     for recording in recordings:
         observations = observe(recording, one_joint.rig())
         _, (pair,) = anchored(recording, observations, one_joint.rig(), 0.15, 1)
-        anchors.append({'bend_x': pair})
+        found.append({'bend_x': pair})
+    return found
+
+
+@pytest.fixture(scope='module')
+def chosen(anchors):
     return [given['bend_x'] for given in shared_effects(anchors, 1, 2, lambda _: None)]
+
+
+def test_another_form_gains_by_one_effect_for_all_recordings(anchors):
+    own = [SharedChoice('bend_x', (), (each['bend_x'],)).null(2).drawn for each in anchors]
+    both = SharedChoice('bend_x', (), tuple(each['bend_x'] for each in anchors)).null(2).drawn
+    assert np.mean(both) < np.mean(own[0]) + np.mean(own[1]) - 1.0
 
 
 def test_what_all_recordings_lack_is_found_and_nothing_else(chosen):

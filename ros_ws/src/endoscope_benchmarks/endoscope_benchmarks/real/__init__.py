@@ -1,0 +1,1 @@
+"""Real recordings of a flexible endoscope, explained by one physics."""
