@@ -5,6 +5,7 @@ BENCHES: tuple[str, ...] = (
     'recorder',
     'explain',
     'concealed',
+    'peers',
     'simulate',
     'calibration_rate',
     'papers',
