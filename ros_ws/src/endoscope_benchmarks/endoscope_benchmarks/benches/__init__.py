@@ -8,6 +8,7 @@ BENCHES: tuple[str, ...] = (
     'criteria',
     'limits',
     'real',
+    'peers',
     'simulate',
     'calibration_rate',
     'papers',

@@ -1,0 +1,1 @@
+"""Other people's ways to say what is missing, on the rigs that our own is judged by."""

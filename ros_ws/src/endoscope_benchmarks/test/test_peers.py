@@ -1,0 +1,50 @@
+"""Other people's methods on the benchmark's cases."""
+
+import importlib.util
+
+import numpy as np
+import pytest
+
+from endoscope_benchmarks.concealed.strata import drawn_case
+from endoscope_benchmarks.peers.problem import PERIOD_S, predicts, problem_of
+from endoscope_benchmarks.peers.symbolic import OF_PLANT, OF_SENSOR, named_by
+from endoscope_benchmarks.peers.term_library import terms_of
+from endoscope_benchmarks.peers.trial import PEERS, example, require
+from endoscope_core.errors import EndoscopeError
+
+
+@pytest.fixture(scope='module')
+def problem():
+    """A load cell that drifts."""
+    return problem_of(drawn_case('mixed_forms', 1))
+
+
+def test_every_name_is_an_effect_or_a_place(problem):
+    for name in {*OF_PLANT.values(), *OF_SENSOR.values(), *(t.name for t in terms_of(problem))}:
+        assert problem.says(name).stage
+
+
+def test_the_cell_that_drifts_is_to_blame(problem):
+    def of_time(states, target, _):
+        found = np.polynomial.Polynomial.fit(states[:, 0], target, 8)
+        return lambda x: found(x[:, 0])
+
+    assert named_by(of_time, problem).name == 'load_cell_pos_of_time'
+
+
+def test_noise_is_not_predicted():
+    draw, time = np.random.default_rng(1), PERIOD_S * np.arange(1000)
+    noise = draw.standard_normal(1000)
+    assert not predicts(time, noise**2, (noise - 0.1 * draw.standard_normal(1000)) ** 2)
+    assert predicts(time, (noise + np.sin(time)) ** 2, noise**2)
+
+
+@pytest.mark.parametrize('peer', [name for name in PEERS if not PEERS[name][0]])
+def test_a_peer_that_is_written_here_works_on_its_own_example(peer):
+    assert example(peer).works
+
+
+@pytest.mark.skipif(importlib.util.find_spec('emdcmp') is not None, reason='peers are installed')
+def test_what_is_missing_is_said_in_one_line():
+    with pytest.raises(EndoscopeError, match=r'^emdcmp not installed: run `make -C ros_ws peers`'):
+        require(['forward selection', 'EMD comparison'], ['nulls'])
