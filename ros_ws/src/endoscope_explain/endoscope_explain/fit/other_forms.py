@@ -84,7 +84,7 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
         return rig
 
     def fitted(rig: Array) -> tuple[Array, Array]:
-        readings = _reading(model.observation, model.residuals_of(rig, lead))
+        readings = reading(model.observation, model.residuals_of(rig, lead))
         seen = replace(model, observation=readings, free=free)
         near = glance(seen, found.theta, found.jacobian, STEPS, weight)
         return near.residuals, near.theta - found.theta
@@ -126,8 +126,8 @@ def with_form(found: Fit, jobs: int) -> Fit:
     return replace(found, moved_by_form=moved, beyond_form=beyond)
 
 
-def _reading(observation: JointObservation, residuals: Array) -> JointObservation:
-    """The sensors as they would read without noise where a simulation leaves these residuals."""
+def reading(observation: JointObservation, residuals: Array) -> JointObservation:
+    """Sensors as they would read if they read more by residuals (size,) in noise units."""
     channels = tuple(
         replace(c, value=c.value + residuals[part] * c.noise)
         for c, part in zip(observation.channels, observation.slices(), strict=True)

@@ -222,13 +222,13 @@ def promises(behind: Background, found: tuple[Directions, ...]) -> list[Promised
     residuals = behind.left(behind.fit.residuals * behind.weight)[:, None]
     ranked = []
     for each, gain in zip(found, gains(behind, found, residuals).values[:, 0], strict=True):
-        candidate = _sided(behind, each, residuals)
+        candidate = sided(behind, each, residuals)
         if candidate is not None:
             ranked.append(Promised(candidate, float(gain)))
     return sorted(ranked, key=lambda p: -p.gain)
 
 
-def _sided(behind: Background, each: Directions, residuals: Array) -> Candidate | None:
+def sided(behind: Background, each: Directions, residuals: Array) -> Candidate | None:
     """The effect on the side of nothing on which it helps; None where it does not on any."""
     candidate = each.candidate
     helps = float((each.columns.T @ residuals)[0, 0]) < 0.0
