@@ -154,7 +154,8 @@ def searched(
         if not beam:
             break
         gain = best.gain_of(beam[0])
-        chance = best.null(jobs).p_value
+        shown, null = best.null(jobs)
+        chance = null.p_value(shown)
         if chance > FALSE_ALARMS:
             tell(
                 f'{nominal.joint}: not {_listed(beam[0])}: better by {gain:.0f} nats, but '

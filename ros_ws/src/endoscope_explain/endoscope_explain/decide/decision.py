@@ -132,7 +132,7 @@ def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
     if formula is not None and formula is not best:
         formula = replace(formula, fit=with_form(formula.fit, jobs))
     return MissingTerm(
-        last, name, alternatives, gain, max(best_other, 0.0) / gain, level.null.p_value, formula
+        last, name, alternatives, gain, max(best_other, 0.0) / gain, level.p_value, formula
     )
 
 

@@ -113,10 +113,14 @@ class Level:
         )
 
     @property
+    def p_value(self) -> float:
+        """Chance that a rig in which nothing is missing shows as much as the best composition."""
+        return self.null.p_value(self.gain(self.best)) if self.found else 1.0
+
+    @property
     def is_found(self) -> bool:
         """Whether something is missing, and found."""
-        shown = bool(self.found) and self.null.p_value <= FALSE_ALARMS
-        return shown and self.predicts and self.gain(self.best) > 0.0
+        return self.p_value <= FALSE_ALARMS and self.predicts
 
     def variants(self) -> tuple[Composition, ...]:
         """The best composition's effects acting on something else: beside another they may win."""

@@ -63,7 +63,7 @@ class SharedChoice:
         """Gain of evidence from this choice to another."""
         return other.total() - self.total()
 
-    def null(self, jobs: int) -> Null:
+    def null(self, jobs: int) -> tuple[float, Null]:
         """What recordings show of one effect more, and rigs in which nothing more is missing.
 
         Parameters
@@ -73,19 +73,20 @@ class SharedChoice:
 
         Returns
         -------
-        Null
-            Of the effect that gains most in all recordings together: one is looked for that serves
-            all of them, and the best of each recording would gain more. Every shape of the tube
-            has a profile of its own, so that what is drawn for one says nothing of another.
+        (float, Null)
+            Gains by the screen of the effect that gains most in all recordings together: one is
+            looked for that serves all of them, and the best of each recording would gain more.
+            Every shape of the tube has a profile of its own, so that what is drawn for one says
+            nothing of another.
         """
         order = np.random.default_rng(_SEED)
         by_recording = [_shown(anchors[0], order, jobs) for anchors in self.recordings]
         everywhere = set.intersection(*(set(each) for each in by_recording))
         if not everywhere:
-            return NOTHING_SHOWN
+            return 0.0, NOTHING_SHOWN
         sums = [np.sum([each[effect] for each in by_recording], axis=0) for effect in everywhere]
         largest = np.max(sums, axis=0)
-        return Null(float(largest[0]), largest[1:], largest[1:])
+        return float(largest[0]), Null(largest[1:], largest[1:])
 
     def leaves_noise(self) -> bool:
         """Whether nothing is left to explain in any recording."""

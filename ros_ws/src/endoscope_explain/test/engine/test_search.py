@@ -141,7 +141,7 @@ def _level(evidences, null):
     found = [_composition(value, terms[name]) for name, value in evidences.items()]
     found.sort(key=lambda c: -c.evidence)
     null = np.asarray(null, dtype=float)
-    return Level(_composition(0.0), tuple(found), Null(max(evidences.values()), null, null))
+    return Level(_composition(0.0), tuple(found), Null(null, null))
 
 
 def test_a_formula_is_taken_where_it_loses_no_more_than_form_is_worth():
@@ -180,5 +180,5 @@ def test_nothing_is_found_that_rigs_without_it_show_as_well():
     null = np.linspace(0.0, 1000.0, 39)
     assert not _level({'gravity': 500.0}, null).is_found
     assert _level({'gravity': 1001.0}, null).is_found
-    assert _level({'gravity': 1001.0}, null).null.p_value == pytest.approx(1.0 / 40.0)
+    assert _level({'gravity': 1001.0}, null).p_value == pytest.approx(1.0 / 40.0)
     assert not replace(_level({'gravity': 1001.0}, null), predicts=False).is_found

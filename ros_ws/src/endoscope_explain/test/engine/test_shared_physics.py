@@ -49,8 +49,8 @@ def chosen(anchors):
 
 
 def test_another_form_gains_by_one_effect_for_all_recordings(anchors):
-    own = [SharedChoice('bend_x', (), (each['bend_x'],)).null(2).drawn for each in anchors]
-    both = SharedChoice('bend_x', (), tuple(each['bend_x'] for each in anchors)).null(2).drawn
+    own = [SharedChoice('bend_x', (), (each['bend_x'],)).null(2)[1].drawn for each in anchors]
+    both = SharedChoice('bend_x', (), tuple(each['bend_x'] for each in anchors)).null(2)[1].drawn
     assert np.mean(both) < np.mean(own[0]) + np.mean(own[1]) - 1.0
 
 
