@@ -10,6 +10,7 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.observe.observation import Channel, JointObservation
 from endoscope_explain.observe.predicted_signals import view
+from endoscope_explain.observe.stamps_on_ticks import StampsOnTicks
 from endoscope_explain.recording import Recording
 from endoscope_explain.recording.signals import signal_name
 
@@ -108,10 +109,12 @@ def _kept(channel: Channel, residual: Array) -> Channel:
     # A tracker sample is one raw sample.
     return replace(
         channel,
-        tick=channel.tick[keep],
-        share=channel.share[keep],
-        first=np.arange(int(keep.sum())),
-        count=channel.count[keep],
+        stamps=StampsOnTicks(
+            channel.stamps.tick[keep],
+            channel.stamps.share[keep],
+            np.arange(int(keep.sum())),
+            channel.stamps.count[keep],
+        ),
         time=channel.time[keep],
         value=channel.value[keep],
         noise=channel.noise[keep],

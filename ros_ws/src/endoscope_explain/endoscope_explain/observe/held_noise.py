@@ -60,7 +60,7 @@ def held(observation: JointObservation) -> Mask:
 
 
 def _squares(channel: Channel, still: Mask) -> Array:
-    at_rest = still[channel.tick[channel.first]]
+    at_rest = still[channel.stamps.tick[channel.stamps.first]]
     whole = at_rest[:-3] & at_rest[3:]
     regular = np.diff(channel.time)
     even = np.ptp(np.stack([regular[:-2], regular[1:-1], regular[2:]]), axis=0) < 0.5 * np.median(

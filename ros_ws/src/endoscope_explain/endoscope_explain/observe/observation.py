@@ -5,13 +5,11 @@ it acts on simulated readings just the same); the tracker is taken at its own st
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise
 from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from endoscope_core.physics.description import PlantDescription, SensorParameters
 from endoscope_core.physics.layout import (
@@ -26,12 +24,12 @@ from endoscope_core.physics.layout import (
     OUT_TENSION_B,
 )
 from endoscope_core.physics.on_stamps import hold_on_ticks
+from endoscope_explain.observe.stamps_on_ticks import StampsOnTicks
 from endoscope_explain.observe.unresolved import fast_scatter
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.signals import QUANTITY_UNITS, signal_name
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 TICK = 1.0e-3
 ANALYSIS_PERIOD = 0.01
@@ -48,12 +46,7 @@ class Channel:
         Name as the report writes it, series of the recording, SI unit.
     output : int
         Column of the compiled physics' output that this sensor reads.
-    tick : array (R,) of int, share : array (R,)
-        Place of each raw sample between simulated ticks `tick` and `tick + 1`.
-    first : array (M,) of int
-        First raw sample of each analysis sample.
-    count : array (M,)
-        Raw samples in each analysis sample.
+    stamps : StampsOnTicks
     time, value, noise : array (M,)
         Stamp in s from the first command, reading, and its known noise (rms).
     """
@@ -62,10 +55,7 @@ class Channel:
     quantity: str
     unit: str
     output: int
-    tick: Indices
-    share: Array
-    first: Indices
-    count: Array
+    stamps: StampsOnTicks
     time: Array
     value: Array
     noise: Array
@@ -77,29 +67,7 @@ class Channel:
         that stamps, commands and then reads has a lead of up to one tick. `skew` is by how much
         the device's clock runs fast.
         """
-        column = outputs[:, self.output]
-        if skew == 0.0:
-            read, rise = self._mean_of_ticks
-            rows = column[: read.shape[1]]
-            return np.asarray(read @ rows + lead * (rise @ rows))
-        place = (self.tick + self.share) / (1.0 + skew) + lead
-        place = np.clip(place, 0.0, len(column) - 1.001)
-        tick = place.astype(np.int64)
-        left = column[tick]
-        raw = left + (place - tick) * (column[tick + 1] - left)
-        return np.asarray(np.add.reduceat(raw, self.first) / self.count)
-
-    @cached_property
-    def _mean_of_ticks(self) -> tuple[csr_array, csr_array]:
-        """Analysis samples from ticks (M, N), and by how much they rise over a tick."""
-        sample = np.repeat(np.arange(len(self.first)), self.count.astype(np.int64))
-        part = 1.0 / self.count[sample]
-        shape = (len(self.first), int(self.tick.max()) + 2)
-        here = csr_array((part, (sample, self.tick)), shape)
-        after = csr_array((part, (sample, self.tick + 1)), shape)
-        late = csr_array((part * self.share, (sample, self.tick)), shape)
-        next_late = csr_array((part * self.share, (sample, self.tick + 1)), shape)
-        return here - late + next_late, after - here
+        return self.stamps.read(outputs[:, self.output], lead, skew)
 
 
 @dataclass(frozen=True)
@@ -142,7 +110,7 @@ class JointObservation:
         missing = ticks * factor - self.inputs.shape[1]
         padded = np.concatenate([self.inputs, np.repeat(self.inputs[:, -1:], missing, axis=1)], 1)
         inputs = padded.reshape(1, ticks, factor, INPUTS).mean(axis=2)
-        channels = tuple(_on_coarser(channel, factor) for channel in self.channels)
+        channels = tuple(replace(c, stamps=c.stamps.coarser(factor)) for c in self.channels)
         return replace(self, inputs=inputs, channels=channels, tick=factor * self.tick)
 
     def slices(self) -> tuple[slice, ...]:
@@ -232,12 +200,6 @@ def _channels(
     return tuple(channels)
 
 
-def _on_coarser(channel: Channel, factor: int) -> Channel:
-    place = (channel.tick + channel.share) / factor
-    tick = place.astype(np.int64)
-    return replace(channel, tick=tick, share=place - tick)
-
-
 def _valid_column(
     series: Series, j: int, wire: int, begin: float, ticks: int
 ) -> tuple[Array, Array]:
@@ -279,10 +241,7 @@ def _channel(
         quantity,
         QUANTITY_UNITS[quantity],
         output,
-        tick,
-        place - tick,
-        first,
-        count,
+        StampsOnTicks(tick, place - tick, first, count),
         np.add.reduceat(time, first) / count,
         np.add.reduceat(values, first) / count,
         noise,

@@ -20,6 +20,7 @@ from endoscope_explain.fit.whiteness import WHITE
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate
+from endoscope_explain.search.refit import LOOK_STEPS
 from endoscope_explain.search.screen import Background, Directions, gains
 
 Array = NDArray[np.float64]
@@ -29,8 +30,6 @@ FORMS, WANDERING = 20, 19
 FITTED = 3
 """Terms of the screen that are fitted: in the study the truth was among the first three in 46 cases
 of 48."""
-STEPS = 12
-"""Simulations of each of these fits, whose derivative is known: twice those of a first look."""
 SLOWEST = 0.1
 """Longest correlation time of noise, as a share of the recording: what is slower is a drift."""
 _SEED = 11
@@ -179,7 +178,7 @@ def _gain(behind: Background, way: Directions, slopes: Array, off: Array) -> flo
     coarse = model.on_coarse_ticks(behind.offset)
     theta = model.begun_at(found.theta)
     known = np.hstack([found.jacobian, slopes])
-    after = glance(coarse, theta, known, STEPS, weight)
+    after = glance(coarse, theta, known, LOOK_STEPS, weight)
     before = behind.left(off * weight) / weight
     number = counts(seen)
     gained = log_likelihood(mean_squares(seen, after.residuals), number)
