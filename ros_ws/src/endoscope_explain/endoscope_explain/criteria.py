@@ -1,6 +1,17 @@
-"""Numbers by which explanations are judged."""
+"""Numbers by which explanations are judged, derived from cases whose truth is known.
 
-LEAST_SHARE = 0.5
-SURE, RIVALLED = 3.3, 0.0
-BEYOND_FORM = 1.5
-REACH = 1.0
+Made by `endoscope bench criteria` from 28 cases of `endoscope bench concealed`, seeds 1001, 1002,
+1004, 1005 of catalogue, mixed_forms, nulls, leave_a_form_out, tenth, sinusoid, teleoperation.
+"""
+
+LEAST_SHARE = 1
+"""Share of the best gain from which on another name may be the true one: such sets of names hold it
+in 90%."""
+SURE, RIVALLED = 3.98, 0
+"""Logarithm of the odds that a name without a rival is right, and what a rival that gains as much
+takes away."""
+BEYOND_FORM = 1.61
+"""What is left over what the worst rig of another form leaves, of the worst channel: 95%
+of right explanations leave less."""
+REACH = 1.31
+"""Factor on intervals that makes them hold 90% of the true numbers."""

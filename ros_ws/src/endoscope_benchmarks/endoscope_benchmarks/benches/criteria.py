@@ -24,19 +24,18 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_benchmarks.concealed.trial import Row
     from endoscope_core.atomic_output import write_text
     from endoscope_core.errors import EndoscopeError
-    from endoscope_explain.criteria import REACH
 
     rows = [Row(**row) for file in args.rows for row in json.loads(file.read_text())]
-    bank = bank_of(rows, REACH)
+    bank = bank_of(rows)
     try:
         criteria = derived(bank)
     except ValueError as error:
         raise EndoscopeError(str(error)) from error
-    seeds = sorted({row.seed for row in rows})
+    seeds = ', '.join(map(str, sorted({row.seed for row in rows})))
     strata = ', '.join(dict.fromkeys(row.stratum for row in rows))
     made_by = (
-        f'`endoscope bench criteria` from {len(rows)} cases of\n'
-        f'`endoscope bench concealed`, seeds {seeds[0]} to {seeds[-1]} of {strata}'
+        f'`endoscope bench criteria` from {len(rows)} cases of `endoscope bench concealed`, '
+        f'seeds {seeds} of {strata}'
     )
     print(sensitivity(bank, criteria))
     if args.write:

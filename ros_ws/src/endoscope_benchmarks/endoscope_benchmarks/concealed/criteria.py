@@ -7,6 +7,7 @@ is the quantile of the cases' own scores that holds the next one with the wanted
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import fill
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,7 @@ class Bank:
     beyond, exact : array (k,), array (k,)
         What is left over what another form leaves, and whether all was said rightly.
     errors : array (l,)
-        Of numbers, over what their intervals allow.
+        Of numbers, over what their intervals would allow with a `REACH` of one.
     """
 
     truth: Array
@@ -62,15 +63,8 @@ class Bank:
     errors: Array
 
 
-def bank_of(rows: Sequence[Row], reach: float) -> Bank:
-    """Collect what rows say.
-
-    Parameters
-    ----------
-    rows : sequence of Row
-    reach : float
-        `REACH` under which they were made.
-    """
+def bank_of(rows: Sequence[Row]) -> Bank:
+    """Collect what rows say."""
     known = [row for row in rows if math.isfinite(row.truth_share)]
     said = [row for row in rows if math.isfinite(row.rival)]
     left = [row for row in rows if math.isfinite(row.beyond_form)]
@@ -82,7 +76,7 @@ def bank_of(rows: Sequence[Row], reach: float) -> Bank:
         np.array([row.first and bool(row.concealed) for row in said], dtype=float),
         np.array([row.beyond_form for row in left]),
         np.array([row.exact for row in left], dtype=bool),
-        reach * errors[np.isfinite(errors)],
+        errors[np.isfinite(errors)],
     )
 
 
@@ -176,9 +170,10 @@ def sensitivity(bank: Bank, criteria: Criteria) -> str:
 
 def source(criteria: Criteria, made_by: str) -> str:
     """The module that holds them."""
+    origin = fill(f'Made by {made_by}.', 100)
     return f'''"""Numbers by which explanations are judged, derived from cases whose truth is known.
 
-Made by {made_by}; do not edit.
+{origin}
 """
 
 LEAST_SHARE = {criteria.LEAST_SHARE:.3g}

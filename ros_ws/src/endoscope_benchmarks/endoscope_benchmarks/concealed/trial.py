@@ -14,6 +14,7 @@ from endoscope_benchmarks.concealed.readings import misfit
 from endoscope_benchmarks.concealed.strata import drawn_case
 from endoscope_benchmarks.concealed.strength import left
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.criteria import REACH
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Estimate, Explanation
 
@@ -62,7 +63,7 @@ class Row:
     rival : float
         Gain of the best other name over that of the first one; NaN where none is said.
     errors : tuple of float
-        Error of each number over what its interval allows on that side.
+        Error of each number over what its interval would allow on that side with a `REACH` of one.
     """
 
     stratum: str
@@ -159,7 +160,7 @@ def row_of(case: Case) -> Row:
             default=math.nan,
         ),
         rival=said.effects[0].evidence['rival'] if said.effects else math.nan,
-        errors=tuple(errors),
+        errors=tuple(REACH * error for error in errors),
         **vars(judgement),
     )
 
