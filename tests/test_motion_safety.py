@@ -5,17 +5,20 @@ In simulated time, so that every instant is the same in every run.
 
 import dataclasses
 import math
+import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
 from rclpy.time import Time
 from sensor_msgs.msg import JointState, Joy
-from simulated_graph import TICK_RATE, SimulatedGraph
+from simulated_graph import PATIENCE_S, TICK_RATE, SimulatedGraph
 from std_msgs.msg import Header, String
 
 from endoscope_core.rig import load_rig
+from endoscope_core.safety import Refusal
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, status
 from endoscope_nodes.names import (
     CALIBRATION_RESULT,
@@ -423,6 +426,43 @@ def test_two_senders_of_a_motion_topic_are_a_fault_that_names_both():
         steps = np.abs(np.diff([s.position for s in moved.shafts], axis=0))
         assert len(drives) > 0.5 * TICK_RATE
         assert steps.max() < 1.3 * BOUND
+
+
+@pytest.mark.parametrize(
+    ('topic', 'names', 'reader'),
+    [(MOTOR_COMMAND, MOTORS, 'motor_driver'), (SLAVE_COMMAND, JOINTS, 'compensator')],
+)
+def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, console, topic, names, reader):
+    """It waits for a node that is not run, and only the session's own sender is left by then."""
+    console.move(100)
+    node = foreign.nodes[reader]
+    gate = node.gate if reader == 'compensator' else node.motion.gate
+    pose = console.angle if reader == 'compensator' else node.motion.goal
+    obeyed, refused = gate.accepted, gate.refused[Refusal.SENDER]
+    readers = foreign.probe.count_subscribers(topic)
+    senders = next(s for s in node.subscriptions if s.topic_name.endswith(topic)).handle
+    stranger = Node('stranger', context=foreign.runtime.context, namespace='endoscope')
+    rival = stranger.create_publisher(JointState, topic, COMMAND)
+    until(lambda: rival.get_subscription_count() == readers and senders.get_publisher_count() == 2)
+    message = JointState(name=list(names), position=[x + 1e-3 for x in pose])
+    message.header.frame_id = foreign.session
+    message.header.stamp = Time(nanoseconds=foreign.conductor.now_ns + 1_000_000).to_msg()
+    rival.publish(message)
+    stranger.destroy_node()
+    until(lambda: senders.get_publisher_count() == 1)
+    foreign.wait(lambda: gate.accepted > obeyed or gate.refused[Refusal.SENDER] > refused)
+    assert gate.accepted == obeyed
+    foreign.advance(0.1)
+    assert foreign.state == 'FAULT'
+    assert topic in foreign.cause
+
+
+def until(condition):
+    """Wait for the middleware alone: no node is run."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(1e-3)
 
 
 @pytest.mark.parametrize('session', ['', 'session-99'])

@@ -176,7 +176,9 @@ class AnyInterleaving(RuleBasedStateMachine):
 
     What may move the shafts is kept beside, by the rule alone: `word` is the session that an
     operator's last word opened, and `valid` that session for the driver of now: it heard it being
-    opened, and has neither stood still nor missed the supervisor since.
+    opened, and has neither stood still nor missed the supervisor since, nor taken anything from a
+    second sender. A driver that stalls finds the newest command when it wakes, as in a queue of
+    one: of a rival that spoke and was followed by the compensator it never hears.
     """
 
     def __init__(self):
@@ -201,11 +203,12 @@ class AnyInterleaving(RuleBasedStateMachine):
     def start_driver(self):
         self.driver = ShaftMotion(COMMANDS, LIMITS)
         self.turned = self.obeyed = self.heard_at = self.came = self.now
-        self.valid, self.heard = '', None
+        self.valid, self.heard, self.waiting = '', None, None
 
     def run(self, milliseconds):
         for _ in range(milliseconds):
             self.now += 1
+            self.take()
             awake = {who: self.now >= until for who, until in self.stalled.items()}
             if self.supervisor is not None and awake['supervisor'] and self.now % 50 == 0:
                 self.heartbeat(self.supervisor.session)
@@ -242,11 +245,18 @@ class AnyInterleaving(RuleBasedStateMachine):
     def send(self, session, position, ahead_ms=0, doubt=''):
         stamp = (self.now + ahead_ms) * MS
         self.sent.append((session, stamp, tuple(position)))
-        if self.now < self.stalled['driver']:
+        self.waiting = session, stamp, tuple(position), doubt
+        self.take()
+
+    def take(self):
+        if self.waiting is None or self.now < self.stalled['driver']:
             return
+        (session, stamp, position, doubt), self.waiting = self.waiting, None
         self.notice_what_ends_the_word()
+        if doubt:
+            self.valid = ''
         before, measured, now = self.driver.goal, tuple(self.shaft), self.now * MS
-        refusal = self.driver.command(session, stamp, tuple(position), (), now, doubt)
+        refusal = self.driver.command(session, stamp, position, (), now, doubt)
         # A stream that paused may go on as fast as the bound, by its stamps.
         period = max(1, stamp // MS - self.came)
         if refusal in (None, Refusal.RATE):
@@ -350,7 +360,6 @@ class AnyInterleaving(RuleBasedStateMachine):
 
     @rule(position=st.floats(-1e9, 1e9) | st.sampled_from([math.nan, math.inf, 0.5]))
     def rival(self, position):
-        self.valid = ''
         self.send(self.driver.session.name, (position, position), doubt='2 senders')
 
     @rule(position=st.floats(-2.0, 2.0), ahead=st.sampled_from([0, -500, 20, 10_000, 10**11]))
@@ -366,6 +375,42 @@ class AnyInterleaving(RuleBasedStateMachine):
     @rule(name=st.sampled_from(['', 'session-1', 'session-99999']))
     def rival_supervisor(self, name):
         self.heartbeat(name, '2 senders')
+
+
+def test_a_rival_that_a_stalled_driver_never_heard_ends_nothing():
+    graph = AnyInterleaving()
+    for _ in range(13):
+        graph.fault()
+    graph.into_motion(ms=1, speed=0.0)
+    graph.stall('driver', 20, 0)
+    graph.fault()
+    session, obeyed = graph.driver.session.name, graph.driver.gate.accepted
+    assert session
+    assert not graph.supervisor.session
+    graph.rival(0.0)
+    graph.fault()
+    assert graph.driver.session.name == session
+    assert graph.driver.gate.accepted > obeyed
+    graph.run(50)
+    assert not graph.driver.session.name
+    obeyed = graph.driver.gate.accepted
+    graph.run(200)
+    assert graph.driver.gate.accepted == obeyed
+
+
+def test_a_rival_whose_command_waits_for_a_stalled_driver_ends_its_session():
+    graph = AnyInterleaving()
+    graph.into_motion(ms=200, speed=0.2)
+    graph.stall('driver', 20, 0)
+    graph.stall('compensator', 90, 0)
+    obeyed = graph.driver.gate.accepted
+    graph.rival(0.0)
+    assert graph.driver.session.name
+    graph.run(300)
+    assert not graph.driver.session.name
+    assert graph.driver.gate.refused[Refusal.SENDER] == 1
+    assert graph.driver.gate.accepted == obeyed
+    assert graph.driver.holding
 
 
 TestAnyInterleaving = AnyInterleaving.TestCase

@@ -41,6 +41,7 @@ from endoscope_nodes.watches import (
     TURN_S,
     ClutchWatch,
     CommandReport,
+    SenderWatch,
     SessionWatch,
     rivals,
 )
@@ -125,8 +126,8 @@ class CompensatorNode(EndoscopeNode):
         self.ticker.every(TURN_S, self._watch_console)
         self.ticker.every(0.1, self._publish_state)
 
-    def _listen(self, topic: str, callback: Any, gate: CommandGate) -> JointSubscription:
-        return JointSubscription(
+    def _listen(self, topic: str, callback: Any, gate: CommandGate) -> SenderWatch:
+        stream = JointSubscription(
             self,
             topic,
             JOINTS,
@@ -135,6 +136,7 @@ class CompensatorNode(EndoscopeNode):
             exact=True,
             on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
         )
+        return self._session.senders_of(stream)
 
     def _on_parameters(self, parameters: CompensatorParameters) -> None:
         self._settings = parameters
@@ -214,12 +216,12 @@ class CompensatorNode(EndoscopeNode):
         if self._source == NOBODY:
             self._take_news()
 
-    def _may_pass(self, sample: JointSample, stream: JointSubscription, gate: CommandGate) -> bool:
+    def _may_pass(self, sample: JointSample, senders: SenderWatch, gate: CommandGate) -> bool:
         """Whether a message is of the open session and of the one sender of its topic."""
         if not self._session.belongs(sample):
             gate.refuse(Refusal.SESSION, sample.session or 'none named')
             return False
-        crowd = rivals(self, stream.subscription)
+        crowd = senders.rivals()
         if crowd:
             gate.refuse(Refusal.SENDER, crowd)
             self._session.leave(crowd)

@@ -4,7 +4,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from rclpy.clock import Clock, ClockType, ROSClock
+from rclpy.event_handler import QoSSubscriptionEventType
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 from rclpy.time import Time
 
 from endoscope_nodes.declared_parameters import declare_parameters
@@ -51,6 +54,7 @@ class EndoscopeNode(Node):
         )
         self.exit_code = 0
         self.given: dict[str, object] = {}
+        self._matched: list[rclpy_implementation.EventHandle] = []
         self.ticker = runtime.ticker_of(self)
         self.rig = runtime.rig
         self.diagnostics = Diagnostics(self, self.ticker)
@@ -65,6 +69,21 @@ class EndoscopeNode(Node):
         values = declare_parameters(self, kind, on_change, check)
         self.given |= changed(values)
         return values
+
+    def matched_event(self, subscription: Subscription) -> rclpy_implementation.EventHandle:
+        """Return what counts the senders of a subscription, to be asked; it ends with the node."""
+        event = rclpy_implementation.EventHandle(
+            subscription.handle, QoSSubscriptionEventType.RCL_SUBSCRIPTION_MATCHED
+        )
+        self._matched.append(event)
+        return event
+
+    def destroy_node(self) -> None:
+        """Leave the graph."""
+        # An event keeps its subscription in the graph.
+        for event in self._matched:
+            event.destroy_when_not_in_use()
+        super().destroy_node()
 
     def operate(self, words: str) -> str:
         """Return the command by which an operator does something to the graph of this node."""

@@ -35,7 +35,7 @@ from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
-from endoscope_nodes.watches import CommandReport, SessionWatch, rivals
+from endoscope_nodes.watches import CommandReport, SessionWatch
 
 
 class MotorDriverNode(EndoscopeNode):
@@ -92,6 +92,7 @@ class MotorDriverNode(EndoscopeNode):
             exact=True,
             on_malformed=lambda reason: self.motion.gate.refuse(Refusal.MALFORMED, reason),
         )
+        self._senders = self._session.senders_of(self._commands)
         self.diagnostics.add('commands', CommandReport(self.motion.gate, self._session.leave))
         self.diagnostics.add('device', self._report_device, device)
         self.ticker.add(self._on_tick)
@@ -131,7 +132,7 @@ class MotorDriverNode(EndoscopeNode):
             sample.position,
             sample.velocity,
             self.ticker.monotonic_ns(),
-            rivals(self, self._commands.subscription),
+            self._senders.rivals(),
         )
         if refusal is Refusal.SENDER:
             self._session.tell()

@@ -12,7 +12,7 @@ from endoscope_bags.errors import MalformedMessageError
 from endoscope_core.safety import CommandGate, MotionSession
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.joint_stream import JointReader, JointSample
+from endoscope_nodes.joint_stream import JointReader, JointSample, JointSubscription
 from endoscope_nodes.names import (
     JOINTS,
     MASTER_CLUTCH,
@@ -47,6 +47,31 @@ def rivals(node: EndoscopeNode, subscription: Subscription) -> str:
     if subscription.handle.get_publisher_count() <= 1:
         return ''
     return senders_in_words(node, subscription.topic_name)
+
+
+class SenderWatch:
+    """Whether a stream of commands has had but one sender since this was last asked.
+
+    A command may wait for a node that is not run and outlive its sender, which is not among those
+    who are there when it is taken.
+    """
+
+    def __init__(self, node: EndoscopeNode, subscription: Subscription) -> None:
+        self._node = node
+        self._topic = subscription.topic_name
+        self._event = node.matched_event(subscription)
+        self._there = self._ever = 0
+
+    def rivals(self) -> str:
+        """Say who else has been there; empty while there was but one."""
+        matched = self._event.take_event()
+        been = self._there + matched.total_count - self._ever
+        self._there, self._ever = matched.current_count, matched.total_count
+        if been <= 1:
+            return ''
+        relative = self._topic.removeprefix(f'{self._node.get_namespace()}/')
+        known = senders_in_words(self._node, self._topic)
+        return known or f'{relative} had {been} senders, of which not all are there any more'
 
 
 def senders_in_words(node: EndoscopeNode, topic: str) -> str:
@@ -86,14 +111,28 @@ class SessionWatch:
         self._on_enter = on_enter
         self._on_leave = on_leave
         self._told = ('', '')
+        self._streams: list[SenderWatch] = []
         self._subscription = node.create_subscription(Header, MOTION_SESSION, self._hear, EVENT)
         node.diagnostics.add(SESSION_REPORT, self._report)
-        node.ticker.every(TURN_S, self.turn)
+        node.ticker.every(TURN_S, self._watch)
 
     @property
     def name(self) -> str:
         """Session that the node takes part in; empty while it must not move anything."""
         return self._session.name
+
+    def senders_of(self, stream: JointSubscription) -> SenderWatch:
+        """Watch who sends commands on a topic: a second sender ends the node's part."""
+        senders = SenderWatch(self._node, stream.subscription)
+        self._streams.append(senders)
+        return senders
+
+    def _watch(self) -> None:
+        self.turn()
+        for senders in self._streams:
+            crowd = senders.rivals()
+            if crowd:
+                self.leave(crowd)
 
     def belongs(self, sample: JointSample) -> bool:
         """Whether a message is of the session that the node takes part in."""
