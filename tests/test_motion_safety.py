@@ -457,6 +457,27 @@ def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, console, topi
     assert topic in foreign.cause
 
 
+def test_a_heartbeat_that_outlives_its_sender_opens_nothing(foreign, console):
+    """A rival of the supervisor has come and gone while the motor driver was not run."""
+    console.move(100)
+    node = foreign.nodes['motor_driver']
+    readers = foreign.probe.count_subscribers(MOTION_SESSION)
+    senders = next(s for s in node.subscriptions if s.topic_name.endswith(MOTION_SESSION)).handle
+    stranger = Node('stranger', context=foreign.runtime.context, namespace='endoscope')
+    rival = stranger.create_publisher(Header, MOTION_SESSION, EVENT)
+    until(lambda: rival.get_subscription_count() == readers and senders.get_publisher_count() == 2)
+    rival.publish(Header(frame_id='session-99'))
+    stranger.destroy_node()
+    until(lambda: senders.get_publisher_count() == 1)
+    entered = set()
+    for _ in range(40):
+        foreign.advance(0.005)
+        entered.add(node._session.name)
+    assert 'session-99' not in entered
+    assert foreign.state == 'FAULT'
+    assert MOTION_SESSION in foreign.cause
+
+
 def until(condition):
     """Wait for the middleware alone: no node is run."""
     deadline = time.monotonic() + PATIENCE_S

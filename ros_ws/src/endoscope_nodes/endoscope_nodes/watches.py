@@ -50,9 +50,9 @@ def rivals(node: EndoscopeNode, subscription: Subscription) -> str:
 
 
 class SenderWatch:
-    """Whether a stream of commands has had but one sender since this was last asked.
+    """Whether a topic has had but one sender since this was last asked.
 
-    A command may wait for a node that is not run and outlive its sender, which is not among those
+    A message may wait for a node that is not run and outlive its sender, which is not among those
     who are there when it is taken.
     """
 
@@ -112,7 +112,8 @@ class SessionWatch:
         self._on_leave = on_leave
         self._told = ('', '')
         self._streams: list[SenderWatch] = []
-        self._subscription = node.create_subscription(Header, MOTION_SESSION, self._hear, EVENT)
+        heartbeat = node.create_subscription(Header, MOTION_SESSION, self._hear, EVENT)
+        self._supervisors = SenderWatch(node, heartbeat)
         node.diagnostics.add(SESSION_REPORT, self._report)
         node.ticker.every(TURN_S, self._watch)
 
@@ -151,7 +152,7 @@ class SessionWatch:
         self.tell()
 
     def _hear(self, message: Header) -> None:
-        doubt = rivals(self._node, self._subscription)
+        doubt = self._supervisors.rivals()
         now = self._node.ticker.monotonic_ns()
         if self._session.hear(message.frame_id, now, doubt):
             self._told = (self._session.name, '')
