@@ -21,7 +21,9 @@ NOT_SOURCE = {'__pycache__', '.mypy_cache', '.pytest_cache', '.ruff_cache'}
 
 # Names under which a distribution is imported, where they differ from its own.
 IMPORT_NAMES = {
+    'autora-theorist-bms': 'autora',
     'dynamixel-sdk': 'dynamixel_sdk',
+    'gp-elite': 'gp_elite',
     'ndicapi': 'ndicapy',
     'pyserial': 'serial',
     'pyyaml': 'yaml',
@@ -56,7 +58,8 @@ def _declared(package: Path) -> set[str]:
 
 def _locked_modules() -> set[str]:
     settings = tomllib.loads((WORKSPACE / 'pyproject.toml').read_text())
-    lines = settings['project']['dependencies'] + settings['dependency-groups']['train']
+    groups = settings['dependency-groups']
+    lines = settings['project']['dependencies'] + groups['train'] + groups['peers']
     names = [re.split(r'[^\w-]', line, maxsplit=1)[0] for line in lines]
     return {IMPORT_NAMES.get(name, name) for name in names}
 
