@@ -47,6 +47,8 @@ wanted, and 39 rigs tell no less."""
 LOOKED_AT, POLISHED = 10, 4
 """Terms that get a first fit and a full one: in the study the truth was among the first three of
 the screen in 46 cases of 48, and among the first five in 47."""
+STARTS = 2
+"""Starting points of each of these: what is far from linear promises most where it fits least."""
 REFINED = 3
 """Functions of these, the best, that are let vary faster."""
 SETTLED = 2
@@ -311,20 +313,21 @@ def _with_their_formulas(
 
 
 def _most_promising(ranked: list[Promised]) -> list[Candidate]:
-    """The best terms, the best start of each, and the formulas at the places of the best functions.
+    """The best terms, starts of each, and the formulas at the places of the best functions.
 
     A formula that is far from linear promises little at a start that is far from the truth; the
     function at its place is not misled by that.
     """
-    once: dict[tuple[str, tuple[float, ...]], Candidate] = {}
+    starts: dict[tuple[str, tuple[float, ...]], list[Candidate]] = {}
     for promised in ranked:
-        once.setdefault(promised.candidate.variant, promised.candidate)
-    terms = list(once.values())
-    chosen = terms[:LOOKED_AT]
+        starts.setdefault(promised.candidate.variant, []).append(promised.candidate)
+    variants = list(starts.values())
+    chosen = [term for own in variants[:LOOKED_AT] for term in own[:STARTS]]
+    terms = [own[0] for own in variants[LOOKED_AT:]]
     functions = [term for term in chosen if term.is_function][:POLISHED]
     chosen += [
         term
-        for term in terms[LOOKED_AT:]
+        for term in terms
         if not term.is_function and any(term.shares_place(each) for each in functions)
     ]
     return chosen
@@ -332,7 +335,10 @@ def _most_promising(ranked: list[Promised]) -> list[Candidate]:
 
 def _worth_a_fit(looks: list[Look]) -> list[Look]:
     """The best after a first fit, and all that are at the place of the best one."""
-    ranked = sorted(looks, key=lambda seen: seen.cost)
+    best: dict[tuple[str, tuple[float, ...]], Look] = {}
+    for seen in sorted(looks, key=lambda seen: seen.cost):
+        best.setdefault(seen.candidate.variant, seen)
+    ranked = list(best.values())
     chosen = ranked[:POLISHED]
     return chosen + [
         seen for seen in ranked[POLISHED:] if seen.candidate.shares_place(chosen[0].candidate)
