@@ -16,6 +16,7 @@ from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate, candidates
+from endoscope_explain.search.levels import LOOKED_AT, STARTS
 from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, shown
 from endoscope_explain.search.refit import Look, composition, look, polish
 from endoscope_explain.search.repeated_motion import motion_repeats
@@ -28,10 +29,6 @@ Begun = tuple[list[JointModel], list[Array]]
 Variant = tuple[str, tuple[float, ...]]
 """An effect, and what it acts on or which of its forms it has, which no shape of a tube changes."""
 
-LOOKED_AT = 10
-"""Effects that get a cheap fit in each recording."""
-STARTS = 2
-"""Starting points of an effect that get a cheap fit."""
 POLISHED_FIRST, POLISHED = 6, 3
 """Effects that are fitted to all recordings, beside no other one and beside others."""
 _SEED = 11
