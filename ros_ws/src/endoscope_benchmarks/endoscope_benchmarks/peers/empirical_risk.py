@@ -11,7 +11,7 @@ from scipy import constants
 
 from endoscope_benchmarks.concealed.judge import Statement
 from endoscope_benchmarks.peers.problem import OwnExample, Problem
-from endoscope_explain.search.candidate import candidates
+from endoscope_explain.search.candidate import effects, functions
 from endoscope_explain.search.refit import composition, look, polish
 from endoscope_explain.search.screen import background, directions, promises
 
@@ -27,8 +27,10 @@ SAMPLES = 4000
 def by_empirical_risk(problem: Problem) -> Statement | None:
     """The model of least expected risk, with those that it does not reject as rivals."""
     behind = background(problem.refitted)
-    terms = directions(behind, candidates(problem.refitted, problem.left_out), 1)
-    ranked = {each.candidate.id: each.candidate for each in promises(behind, terms)[::-1]}
+    left = behind.left(problem.refitted.residuals * behind.weight)
+    terms = (*effects(problem.refitted, problem.left_out), *functions(problem.refitted, left))
+    ways = directions(behind, terms, 1)
+    ranked = {each.candidate.id: each.candidate for each in promises(behind, ways)[::-1]}
     nominal = composition((), problem.refitted)
     fits = {'': problem.refitted}
     for name in list(ranked)[: -MODELS - 1 : -1]:

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from endoscope_benchmarks.concealed.judge import Statement
 from endoscope_benchmarks.peers.problem import OwnExample, Problem, is_held_out, predicts
 from endoscope_core.physics.functions.interpolation import NODES, VALUES
-from endoscope_explain.search.candidate import Candidate, candidates
+from endoscope_explain.search.candidate import Candidate, functions
 from endoscope_explain.search.screen import Background, background, directions
 
 Array = NDArray[np.float64]
@@ -26,12 +26,12 @@ EVALUATIONS = 4
 def by_network(problem: Problem) -> Statement | None:
     """The place at which a network leaves least of held-out blocks."""
     behind = background(problem.refitted)
-    functions = tuple(c for c in candidates(problem.refitted) if c.is_function)
-    scaled = [each.candidate for each in directions(behind, functions, 1)]
+    before = behind.left(problem.refitted.residuals * behind.weight)
+    terms = functions(problem.refitted, before)
+    scaled = [each.candidate for each in directions(behind, terms, 1)]
     observation = problem.refitted.model.observation
     time = np.concatenate([channel.time for channel in observation.channels])
     held = is_held_out(time)
-    before = behind.left(problem.refitted.residuals * behind.weight)
     trained = {place.id: _trained(behind, place, before, ~held) for place in scaled}
     best = min(trained, key=lambda name: float(np.sum(trained[name][held] ** 2)))
     if not predicts(time[held], before[held] ** 2, trained[best][held] ** 2):

@@ -5,7 +5,7 @@ Seven Karhunen-Loeve coefficients of a Matern-5/2 process whose length is a quar
 normal prior each: the evidence itself then pays for a flexible function.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ LENGTH = 0.25
 """Of the process with so many coefficients, as a share of the range."""
 LEAST_PART = 1e-9
 """Share of the largest eigenvalue below which one is rounding."""
+_IMAGES = 4
+"""Periods on either side that count for the process of a period."""
 LEAST_RANGE = 1e-6
 """Share of a place's own range below which a state has not moved."""
 
@@ -44,15 +46,23 @@ class Family:
     ----------
     place : Place
     low, high : float
-        Range of the argument.
+        Range of the argument; one period where functions repeat themselves.
     basis : array (NODES, K)
         Values at the nodes for coefficients that are normal, each with a variance of one.
+    band : (float, float), optional
+        Of the periods that functions may have that repeat themselves.
     """
 
     place: Place
     low: float
     high: float
     basis: Array
+    band: tuple[float, float] | None = None
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the range is a period, which a fit may move."""
+        return self.place.shape is Shape.PERIODIC
 
     @property
     def nodes(self) -> Array:
@@ -79,7 +89,7 @@ class Family:
             Their range, if it is another one.
         """
         size = np.sqrt(np.mean(np.sum(self.basis**2, axis=1)))
-        found = family_at(self.place, visited or (self.low, self.high), count)
+        found = family_at(self.place, visited or (self.low, self.high), count, self.band)
         assert found is not None
         return found.scaled(size / np.sqrt(np.mean(np.sum(found.basis**2, axis=1))))
 
@@ -92,13 +102,14 @@ class Family:
 
     def scaled(self, amplitude: float) -> 'Family':
         """The same functions, larger by a factor."""
-        return Family(self.place, self.low, self.high, amplitude * self.basis)
+        return replace(self, basis=amplitude * self.basis)
 
 
 def family_at(
     place: Place,
     visited: tuple[float, float],
     count: int = COEFFICIENTS,
+    band: tuple[float, float] | None = None,
 ) -> Family | None:
     """Functions of unit variance over the visited range; None where the state did not move.
 
@@ -106,8 +117,11 @@ def family_at(
     ----------
     place : Place
     visited : (float, float)
+        One period where functions repeat themselves.
     count : int
         Coefficients: the more there are, the shorter the length over which the functions vary.
+    band : (float, float), optional
+        Of their periods, if they repeat themselves.
 
     Returns
     -------
@@ -120,6 +134,8 @@ def family_at(
     if high - low <= LEAST_RANGE * (place.argument.high - place.argument.low):
         return None
     side, length = np.linspace(0.0, 1.0, NODES), LENGTH * COEFFICIENTS / count
+    if place.shape is Shape.PERIODIC:
+        return Family(place, low, high, _periodic(side, length, count), band)
     covariance = _matern((side[:, None] - side[None, :]) / length)
     if place.shape in (Shape.ODD, Shape.EVEN):
         mirrored = _matern((side[:, None] - (1.0 - side[None, :])) / length)
@@ -131,10 +147,26 @@ def family_at(
     return Family(place, low, high, vectors[:, largest] * signs * np.sqrt(sizes[largest]))
 
 
-def visited_ranges(
+def _periodic(side: Array, length: float, count: int) -> Array:
+    """Harmonics (NODES, about `count`) in pairs, each as large as the process of a period has it.
+
+    Its mean is left out: it is the rest angle, or taken away.
+    """
+    lags = side[:-1]
+    images = range(-_IMAGES, _IMAGES + 1)
+    covariance = np.sum([_matern((lags + image) / length) for image in images], axis=0)
+    spectrum = np.fft.rfft(covariance).real / len(lags)
+    columns = []
+    for k in range(1, min(count // 2, len(spectrum) - 2) + 1):
+        size = np.sqrt(2.0 * max(spectrum[k], 0.0))
+        columns += [size * np.cos(2.0 * np.pi * k * side), size * np.sin(2.0 * np.pi * k * side)]
+    return np.stack(columns, axis=1)
+
+
+def visited_states(
     observation: JointObservation, parameters: Array, outputs: Array
-) -> dict[tuple[str, str], tuple[float, float]]:
-    """Range of each state along a simulation, by the symbol and unit of a place's argument.
+) -> dict[tuple[str, str], Array]:
+    """States along a simulation, by the symbol and unit of a place's argument.
 
     Parameters
     ----------
@@ -142,6 +174,11 @@ def visited_ranges(
     parameters : array (parameters,)
         Packed.
     outputs : array (N, OUTPUTS)
+
+    Returns
+    -------
+    dict of (str, str) to array (any,)
+        Values whose ends are those of the range; time and the shaft's angle on ticks (N,).
     """
     angle, shaft = outputs[:, OUT_JOINT], outputs[:, OUT_MOTOR]
     speed = np.gradient(angle, observation.tick)
@@ -149,8 +186,8 @@ def visited_ranges(
     slid = 0.5 * np.abs(parameters[PULLEY_RADIUS] * shaft_speed + parameters[JOINT_RADIUS] * speed)
     tensions = outputs[:, [OUT_TENSION_A, OUT_TENSION_B]]
     command = observation.inputs[0, :, IN_COMMAND]
-    found = {
-        ('t', 's'): np.array([0.0, observation.duration]),
+    return {
+        ('t', 's'): np.linspace(0.0, observation.duration, len(outputs)),
         ('v', 'm/s'): np.array([0.0, np.quantile(slid, 0.99)]),
         ('d', 'm'): np.array([0.0, observation.tick * float(np.sum(slid))]),
         ('T', 'N'): tensions,
@@ -163,7 +200,6 @@ def visited_ranges(
         ('e', 'rad'): shaft - command,
         ('s', 'm'): parameters[PULLEY_RADIUS] * np.concatenate([shaft, -shaft]),
     }
-    return {key: (float(np.min(values)), float(np.max(values))) for key, values in found.items()}
 
 
 def _matern(distance: Array) -> Array:

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.effect import Parameter
+from endoscope_core.physics.effect import Effect, Parameter
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions.interpolation import HIGH
 from endoscope_core.physics.layout import (
     FRICTION_PROFILE,
     JOINT_PRESLIDING_SPREAD,
@@ -199,6 +200,11 @@ def _of_effect(index: int, parameter: Parameter) -> FreeParameter:
     positive = parameter.low > 0.0 and not math.isfinite(parameter.off)
     unit = parameter.scale or abs(parameter.typical) or 0.1 * (parameter.high - parameter.low)
     return FreeParameter(index, parameter.name, positive, unit, parameter.low, parameter.high)
+
+
+def period(place: Effect, low: float, high: float) -> FreeParameter:
+    """The period of a function that repeats itself: anywhere, evenly in its logarithm."""
+    return FreeParameter(place.first_parameter + HIGH, f'{place.id}_period', True, 1.0, low, high)
 
 
 def coefficients(place_id: str, count: int) -> tuple[FreeParameter, ...]:

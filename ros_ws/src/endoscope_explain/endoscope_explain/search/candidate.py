@@ -1,11 +1,12 @@
 """What may be missing from a joint: an effect of the literature, or a function at a place."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effect import Effect
@@ -14,14 +15,16 @@ from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.acting import FLAGS_OF_FUNCTIONS
 from endoscope_core.physics.functions.interpolation import HIGH, LOW
 from endoscope_core.physics.functions.place import Shape
-from endoscope_explain.fit.family import Family, family_at, visited_ranges
+from endoscope_explain.fit.family import Family, family_at, visited_states
 from endoscope_explain.fit.free_parameters import (
     coefficients,
     effect_parameters,
+    period,
     with_free_reference,
 )
 from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.fit.simulated_joint import simulate_joint
+from endoscope_explain.search.periods import likely_periods, period_bounds
 from endoscope_explain.search.repeated_motion import motion_repeats
 
 
@@ -98,42 +101,71 @@ def _with_function(model: JointModel, family: Family) -> JointModel:
     flags: NDArray[Any] = model.flags.astype(FLAGS_OF_FUNCTIONS)
     flags[place.flag] = True
     free = model.free + coefficients(place.id, family.basis.shape[1])
+    if family.band is not None:
+        free += (period(place, *family.band),)
     return replace(model, base=base, flags=flags, free=free, families=(*model.families, family))
 
 
-def candidates(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Candidate, ...]:
-    """All terms that may be added to a fit, effects at each of their starting points.
+def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Candidate, ...]:
+    """Effects of the catalogue that may be added to a fit, each at its starting points.
 
     Parameters
     ----------
     found : Fit
     left_out : tuple of str
-        Effects whose formulas are not tried.
+        Those that are not tried.
 
     Returns
     -------
     tuple of Candidate
-        Functions as tall as their place allows at most. Without terms that depend on time where the
-        joint makes no motion twice.
+        Without those that depend on time where the joint makes no motion twice.
     """
-    repeats = motion_repeats(found.model.observation)
-
-    flags = found.model.flags
-    functions = {place.id for place in FUNCTIONS.values() if flags[place.flag]}
-    formulas = {p for e in CATALOGUE.values() if flags[e.flag] for p in e.traits.families}
-
-    def is_tried(term: Effect) -> bool:
-        """Whether it is not there yet, as itself or as part of a function or of its formula."""
-        present = flags[term.flag] or term.id in formulas or functions & {*term.traits.families}
-        return not present and (repeats or not term.traits.depends_on_time)
-
-    effects = [
+    return tuple(
         Candidate(effect, start)
-        for effect in CATALOGUE.values()
-        if is_tried(effect) and not effect.traits.audited and effect.id not in left_out
+        for effect in _absent(found, CATALOGUE.values())
+        if not effect.traits.audited and effect.id not in left_out
         for start in starting_points(effect)
-    ]
-    return (*effects, *(Candidate(f.place, family=f) for f in _families(found, is_tried)))
+    )
+
+
+def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Candidate, ...]:
+    """Functions that may be added to a fit, as tall as their place allows at most.
+
+    Parameters
+    ----------
+    found : Fit
+    residuals : array (size,)
+        Weighted, without what the fitted numbers could take away.
+
+    Returns
+    -------
+    tuple of Candidate
+        One for each place whose argument has moved; one for each likely period where functions
+        repeat themselves. Without those of time where the joint makes no motion twice.
+    """
+    states, observation = states_of(found), found.model.observation
+    candidates = []
+    for place in _absent(found, FUNCTIONS.values()):
+        state = states[place.argument.symbol, place.argument.unit]
+        if place.shape is Shape.PERIODIC:
+            band = period_bounds(observation, state)
+            likely = likely_periods(observation, residuals, state)
+            families = [family_at(place, (0.0, each), band=band) for each in likely]
+        else:
+            families = [family_at(place, (float(np.min(state)), float(np.max(state))))]
+        candidates += [Candidate(place, family=f) for f in families if f is not None]
+    return tuple(candidates)
+
+
+def _absent[E: Effect](found: Fit, terms: Iterable[E]) -> Iterator[E]:
+    """Terms that are not there yet, as themselves or as part of a function or of its formula."""
+    flags, repeats = found.model.flags, motion_repeats(found.model.observation)
+    there = {place.id for place in FUNCTIONS.values() if flags[place.flag]}
+    formulas = {p for e in CATALOGUE.values() if flags[e.flag] for p in e.traits.families}
+    for term in terms:
+        present = flags[term.flag] or term.id in formulas or there & {*term.traits.families}
+        if not present and (repeats or not term.traits.depends_on_time):
+            yield term
 
 
 def starting_points(effect: Effect) -> list[dict[str, float]]:
@@ -160,18 +192,8 @@ def mirrored(candidate: Candidate) -> Candidate | None:
     return replace(candidate, start=start) if changed else None
 
 
-def states_of(found: Fit) -> dict[tuple[str, str], tuple[float, float]]:
-    """Range of each state that a function may depend on, along a fit; see `visited_ranges`."""
+def states_of(found: Fit) -> dict[tuple[str, str], NDArray[np.float64]]:
+    """States that a function may depend on, along a fit; see `visited_states`."""
     parameters, _ = found.model.packed(found.theta)
     outputs = simulate_joint(found.model.observation, parameters, found.model.flags)
-    return visited_ranges(found.model.observation, parameters, outputs)
-
-
-def _families(found: Fit, is_tried: Any) -> Iterator[Family]:
-    ranges = states_of(found)
-    for place in FUNCTIONS.values():
-        if place.shape is Shape.PERIODIC or not is_tried(place):
-            continue
-        family = family_at(place, ranges[place.argument.symbol, place.argument.unit])
-        if family is not None:
-            yield family
+    return visited_states(found.model.observation, parameters, outputs)

@@ -27,7 +27,10 @@ _ANY = (
 )  # fmt: skip
 _ODD = ('{x}', '{x} {x}**3', 'tanh({x}/{s})', 'sin({x}/{s})', '{x}*abs({x})')
 _EVEN = ('{x}**2', '{x}**2 {x}**4', 'abs({x})', 'exp(-({x}/{s})**2)', 'cos({x}/{s})')
-_FORMS = {Shape.ODD: _ODD, Shape.EVEN: _EVEN}
+_HARMONICS = ('sin({w}*{x})', 'cos({w}*{x})', 'sin(2*{w}*{x})', 'cos(2*{w}*{x})',
+              'sin(3*{w}*{x})', 'cos(3*{w}*{x})')  # fmt: skip
+_PERIODIC = tuple(' '.join(_HARMONICS[: 2 * count]) for count in (1, 2, 3))
+_FORMS = {Shape.ODD: _ODD, Shape.EVEN: _EVEN, Shape.PERIODIC: _PERIODIC}
 _CENTRES = np.linspace(0.05, 0.95, 13)
 _WIDTHS = (0.03, 0.05, 0.08, 0.12, 0.2, 0.35, 0.6)
 """Shares of the range."""
@@ -75,7 +78,7 @@ def fitted_function(found: Fit, place_id: str) -> FittedFunction:
     spread = covariance(found)[np.ix_(own, own)] * COORDINATE**2
     return FittedFunction(
         model.observation.joint,
-        model.families[which],
+        model.family_at(which, found.theta),
         model.coefficients(found.theta)[which],
         spread,
         len(found.residuals),
@@ -166,6 +169,7 @@ def _candidates(found: FittedFunction) -> Iterator[tuple[tuple[str, ...], int]]:
                     c=f'{family.low + centre * extent:.4g}',
                     s=f'{width * extent:.4g}',
                     low=f'{family.low:.4g}',
+                    w=f'{2.0 * np.pi / extent:.12g}',
                 )
                 terms = tuple(text.replace(' - ', '~').split(' '))
                 terms = tuple(term.replace('~', ' - ') for term in _joined(terms))

@@ -18,7 +18,7 @@ from endoscope_explain.fit.nominal import leans, with_any_numbers
 from endoscope_explain.fit.other_forms import with_form
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.candidate import Candidate, candidates
+from endoscope_explain.search.candidate import Candidate, effects, functions
 from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, null_of
 from endoscope_explain.search.refit import (
     Composition,
@@ -235,7 +235,9 @@ def _grown(
     parent: Composition, anchors: tuple[Fit, ...], jobs: int, left_out: tuple[str, ...]
 ) -> tuple[Background, tuple[Directions, ...], list[Composition]]:
     behind = background(parent.fit)
-    ways = directions(behind, candidates(parent.fit, left_out), jobs)
+    left = behind.left(behind.fit.residuals * behind.weight)
+    terms = (*effects(parent.fit, left_out), *functions(parent.fit, left))
+    ways = directions(behind, terms, jobs)
     likely = _most_promising(promises(behind, ways))
     for described in anchors[1:]:
         # What is missing has bent the fitted numbers, but not the described ones.

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from endoscope_explain.fit.evidence import counts, log_likelihood, mean_squares
-from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, glance, jacobian
 from endoscope_explain.fit.other_forms import other_forms, reading
 from endoscope_explain.fit.whiteness import WHITE
@@ -184,7 +183,7 @@ def _gain(behind: Background, way: Directions, slopes: Array, off: Array) -> flo
     gained = log_likelihood(mean_squares(seen, after.residuals), number)
     gained -= log_likelihood(mean_squares(seen, before), number)
     if way.candidate.is_function:
-        own = COORDINATE * after.theta[len(found.theta) :]
+        own = model.coefficients(after.theta)[-1]
         _, volume = np.linalg.slogdet(way.columns.T @ way.columns + np.eye(len(own)))
         gained -= 0.5 * (float(own @ own) + float(volume))
     return float(gained)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.functions.interpolation import NODES
 from endoscope_explain.fit.evidence import log_evidence, weights
-from endoscope_explain.fit.family import COEFFICIENTS
+from endoscope_explain.fit.family import COEFFICIENTS, Family
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, fit, glance, jacobian
 from endoscope_explain.fit.valleys import out_of_valleys
@@ -183,9 +183,9 @@ def refined(one: Composition, without: Fit, offset: Array) -> Composition:
     best, term = one, one.terms[-1]
     for count in FINER:
         assert term.family is not None
-        argument, before = term.family.place.argument, best.fit.model.families[-1]
+        before = best.fit.model.family_at(-1, best.fit.theta)
         # With what was missing, the joint goes further than it did without.
-        visited = states_of(best.fit)[argument.symbol, argument.unit]
+        visited = (before.low, before.high) if before.repeats else _visited(best.fit, before)
         finer = replace(term, family=term.family.finer(count, visited))
         assert finer.family is not None
         model = finer.added_to(without.model)
@@ -204,6 +204,13 @@ def refined(one: Composition, without: Fit, offset: Array) -> Composition:
         if found.model.offset is not None:
             offset = found.model.offset
     return best
+
+
+def _visited(found: Fit, family: Family) -> tuple[float, float]:
+    """Range of a family's argument along a fit."""
+    argument = family.place.argument
+    state = states_of(found)[argument.symbol, argument.unit]
+    return float(np.min(state)), float(np.max(state))
 
 
 def _twice(model: JointModel, offset: Array | None, theta: Array, weight: Array) -> Fit:

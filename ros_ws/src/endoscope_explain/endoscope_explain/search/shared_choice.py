@@ -15,7 +15,7 @@ from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.candidate import Candidate, candidates
+from endoscope_explain.search.candidate import Candidate, effects
 from endoscope_explain.search.levels import LOOKED_AT, STARTS
 from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, shown
 from endoscope_explain.search.refit import Look, composition, look, polish
@@ -138,11 +138,7 @@ def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
 def _effects(found: Fit) -> tuple[Candidate, ...]:
     """Effects that may be added: what was fitted to one motion is not told from time by another."""
     repeats = motion_repeats(found.model.observation)
-    return tuple(
-        term
-        for term in candidates(found)
-        if not term.is_function and (repeats or not term.term.traits.resembles_time)
-    )
+    return tuple(term for term in effects(found) if repeats or not term.term.traits.resembles_time)
 
 
 def _looks(choice: SharedChoice, jobs: int) -> dict[Variant, list[Look | None]]:

@@ -15,7 +15,12 @@ from endoscope_explain.fit.nominal import nominal_anchors
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.candidate import Candidate, candidates, starting_points
+from endoscope_explain.search.candidate import (
+    Candidate,
+    effects,
+    functions,
+    starting_points,
+)
 from endoscope_explain.search.levels import Level, search
 from endoscope_explain.search.null_rigs import Null
 from endoscope_explain.search.refit import Composition
@@ -27,10 +32,10 @@ def anchors(one_joint):
     """Makes the nominal plant, refitted and as described, of a rig with effects and functions."""
 
     def made(*terms, seconds=12.0):
-        effects = [term for term in terms if isinstance(term, EffectSpec)]
+        known = [term for term in terms if isinstance(term, EffectSpec)]
         functions = tuple(term for term in terms if isinstance(term, TermSpec))
         plant = one_joint.rig()
-        true = replace(one_joint.rig(*effects), terms=functions)
+        true = replace(one_joint.rig(*known), terms=functions)
         (observation,) = observe(one_joint.record(true, one_joint.motion(seconds)), plant)
         return nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
 
@@ -71,19 +76,21 @@ def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(ancho
 
 def test_what_is_there_already_is_not_tried_again(anchors):
     refitted, _ = anchors()
-    tried = {term.id for term in candidates(refitted)}
+    tried = {term.id for term in (*effects(refitted), *functions(refitted, refitted.residuals))}
     assert {'gravity', 'load_of_angle', 'contact'} <= tried
     with_function = Candidate(FUNCTIONS['load_of_angle'], family=_family(refitted)).added_to(
         refitted.model
     )
     model = replace(refitted, model=with_function, theta=with_function.begun_at(refitted.theta))
-    tried = {term.id for term in candidates(model, left_out=('viscous_friction',))}
+    terms = (*effects(model, ('viscous_friction',)), *functions(model, model.residuals))
+    tried = {term.id for term in terms}
     assert not tried & {'gravity', 'load_of_angle', 'contact', 'viscous_friction'}
     assert 'stribeck_friction' in tried
 
 
 def _family(found):
-    return next(term.family for term in candidates(found) if term.id == 'load_of_angle')
+    terms = functions(found, found.residuals)
+    return next(term.family for term in terms if term.id == 'load_of_angle')
 
 
 def test_gains_by_linear_algebra_are_those_of_the_residuals_themselves(anchors):
