@@ -1,7 +1,7 @@
 """What `explain_recording` finds out, as plain frozen data that a report is written from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -173,6 +173,10 @@ class UnknownTerm:
         Other names that the recording does not tell from it, nearest first.
     siblings : tuple of str
         Nearest effects of the catalogue, nearest first.
+    multiplies : bool
+        Whether it is one plus this function by which others at the same hook are multiplied.
+    factors : tuple of UnknownTerm
+        Functions of another state that multiply this one: both together are one of two states.
     """
 
     joint: str
@@ -192,6 +196,8 @@ class UnknownTerm:
     explained: float
     rivals: tuple[str, ...] = ()
     siblings: tuple[str, ...] = ()
+    multiplies: bool = False
+    factors: tuple['UnknownTerm', ...] = ()
 
     @property
     def helps(self) -> bool:
@@ -201,9 +207,10 @@ class UnknownTerm:
     def term(self) -> TermSpec:
         """As a plant has it: the formula where it is as good, else the function's values."""
         ends = float(self.nodes[0]), float(self.nodes[-1])
+        term = TermSpec(self.joint, self.place, range=ends, multiplies=self.multiplies)
         if self.formula_is_as_good:
-            return TermSpec(self.joint, self.place, self.expression, range=ends)
-        return TermSpec(self.joint, self.place, values=tuple(self.values.tolist()), range=ends)
+            return replace(term, expression=self.expression)
+        return replace(term, values=tuple(self.values.tolist()))
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,8 @@ AIM = (0.1, 0.6)
 WEAKER = 0.1
 FORM_AIM = (0.02, 0.05)
 """The same of a form of the sheath that is no concealed law."""
+FACTOR = (0.3, 1.0)
+"""By how much (rms) a form varies that another one multiplies."""
 _TRIES = 30
 _BEGIN = 0.02
 """Share of what a place takes at which the search for a law's strength begins."""
@@ -50,6 +52,14 @@ PLACES = tuple(p for p in FUNCTIONS if FUNCTIONS[p].argument is not BOTH_TENSION
 """Places at which a law shows."""
 _FAMILIES = [p for p in PLACES if effects_at(p)]
 _OUTSIDE = [p for p in PLACES if not effects_at(p)]
+_PAIRS = [
+    (p, other)
+    for p in PLACES
+    for other in PLACES
+    if (FUNCTIONS[p].hook, FUNCTIONS[p].only) == (FUNCTIONS[other].hook, FUNCTIONS[other].only)
+    and FUNCTIONS[p].argument.symbol != FUNCTIONS[other].argument.symbol
+]
+"""Places of two states on which the same can depend."""
 _WITH_FAMILIES = [e for e in DRAWN if set(CATALOGUE[e].traits.families) & set(PLACES)]
 
 
@@ -102,6 +112,14 @@ def outside(generator: Generator, seed: int) -> Case:
     true, other, least = _with_form(generator, replace(rig, true=true), second)
     case = _finished(generator, seed, rig, true, law, min(share, least))
     return replace(case, laws=(law, other))
+
+
+def two_states(generator: Generator, seed: int) -> Case:
+    """A drawn form of one state that a drawn form of another one multiplies."""
+    place, other = _turn(_PAIRS, seed)
+    rig = _rig(generator, max(_joints_of(place), _joints_of(other)))
+    case = _finished(generator, seed, rig, *_with_form(generator, rig, place, times=other))
+    return replace(case, also=frozenset({other}) | effects_at(other), note=f'times {other}')
 
 
 def another_sheath(generator: Generator, seed: int) -> Case:
@@ -190,6 +208,7 @@ STRATA: dict[str, Callable[[Generator, int], Case]] = {
     'tenth': tenth,
     'sinusoid': sinusoid,
     'teleoperation': teleoperation,
+    'two_states': two_states,
 }
 
 
@@ -243,15 +262,20 @@ def _with_form(
     place: str,
     joint: str | None = None,
     aim: tuple[float, float] = AIM,
+    times: str = '',
 ) -> tuple[PlantDescription, Law, float]:
     joint = joint or str(generator.choice(list(rig.true.joints)))
-    seen = visited(rig.true, rig.command, joint)[FUNCTIONS[place].argument]
+    seen = visited(rig.true, rig.command, joint)
 
     def drawn() -> tuple[Added, float]:
-        form, largest = drawn_form(generator, place, joint, seen)
+        form, largest = drawn_form(generator, place, joint, seen[FUNCTIONS[place].argument])
+        factors = []
+        if times:
+            factor, _ = drawn_form(generator, times, joint, seen[FUNCTIONS[times].argument])
+            factors = [replace(factor(generator.uniform(*FACTOR)), multiplies=True)]
 
         def added(plant: PlantDescription, strength: float) -> PlantDescription:
-            return replace(plant, terms=(*plant.terms, form(strength)))
+            return replace(plant, terms=(*plant.terms, form(strength), *factors))
 
         return added, _BEGIN * largest
 
@@ -296,7 +320,7 @@ def _finished(
     )
 
 
-def _turn(names: Sequence[str], seed: int) -> str:
+def _turn[T](names: Sequence[T], seed: int) -> T:
     """Each name in its turn, in an order that does not follow the chain."""
     order = np.random.default_rng(len(names)).permutation(len(names))
     return names[int(order[seed % len(names)])]

@@ -150,6 +150,9 @@ class TermSpec:
     range : (float, float), optional
         Of the argument; beyond it the function keeps its last value, or begins again. That of the
         place if not given.
+    multiplies : bool
+        Whether it is no term of its own: what other functions add where this one acts is multiplied
+        by one plus this one. Both together are a function of two states.
     """
 
     joint: str
@@ -157,6 +160,7 @@ class TermSpec:
     expression: str = ''
     values: tuple[float, ...] = ()
     range: tuple[float, float] | None = None
+    multiplies: bool = False
 
 
 def nominal_joints() -> dict[str, JointParameters]:

@@ -76,21 +76,23 @@ def _function(hook: Hook, links: list[tuple[Effect, str]]) -> str:
 
 
 def _functions(hook: Hook) -> str:
-    """Source of a function that adds up those of a hook's places."""
+    """Source of a function that adds up those of a hook's places, and multiplies the sum."""
     lines = [f'\n\n@compiled\ndef {hook.name}_functions(on, {hook.arguments}):']
-    lines.append('    r0, r1 = 0.0, 0.0')
+    lines.append('    r0, r1, m0, m1 = 0.0, 0.0, 1.0, 0.0')
     rows = [(number, places) for number, places in ROWS if places[0].hook is hook]
     for number, places in rows:
         arguments = [place.at for place in places] + ['0.0'] * (MOST - len(places))
         given = f'on, p, {float(number)}, {float(len(places))}, {", ".join(arguments)}'
         only = f'{places[0].only} and ' if places[0].only else ''
         lines.append(f'    if {only}({_any_of(places)}):')
-        lines.append(f'        value, slope = sum_of_functions({given})')
+        lines.append(f'        value, slope, factor, steep = sum_of_functions({given})')
         lines.append(f'        r0 += {places[0].sign or "1.0"} * value')
         if places[0].by_step:
             lines.append(f'        r1 -= {places[0].by_step} * slope')
-    given = 'math.exp(r0)' if hook.fold is Fold.FACTORS else 'r0'
-    lines.append(f'    return {given}' + (', r1' if hook.results == 2 else ''))
+            lines.append(f'        m1 = m1 * factor + m0 * {places[0].by_step} * steep')
+        lines.append('        m0 *= factor')
+    given = 'math.exp(r0 * m0)' if hook.fold is Fold.FACTORS else 'r0 * m0'
+    lines.append(f'    return {given}' + (', r1 * m0 - r0 * m1' if hook.results == 2 else ''))
     whole = [place for _, places in rows for place in places]
     return '\n'.join(lines) + '\n' + _test(f'{hook.name}_functions_act', whole)
 

@@ -6,11 +6,16 @@ import numpy as np
 
 from endoscope_core.compiled import Array, Flags
 from endoscope_core.errors import nearest
-from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
+from endoscope_core.physics.description import (
+    EffectSpec,
+    JointParameters,
+    PlantDescription,
+    TermSpec,
+)
 from endoscope_core.physics.effect import UnknownEffectError
 from endoscope_core.physics.effects import CATALOGUE, describe
 from endoscope_core.physics.functions import FUNCTIONS, describe_place
-from endoscope_core.physics.functions.acting import FLAGS_OF_FUNCTIONS
+from endoscope_core.physics.functions.acting import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
 from endoscope_core.physics.functions.term import tabulated
 from endoscope_core.physics.kernel import settle
 from endoscope_core.physics.layout import (
@@ -96,6 +101,8 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
         flags[j, definition.flag] = True
         first = definition.first_parameter
         parameters[j, first : first + len(values)] = values
+    if plant.terms:
+        flags = flags.astype(FLAGS_OF_FUNCTIONS)
     for term in plant.terms:
         if term.joint not in names:
             raise UnknownEffectError(
@@ -105,9 +112,21 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
         j, place = names.index(term.joint), describe_place(term.place)
         if flags[j, place.flag]:
             raise ValueError(f'unknown_term at {term.place} is given twice on joint {term.joint}')
-        flags[j, place.flag] = True
+        flags[j, place.flag] = MULTIPLIES if term.multiplies else ADDS
         parameters[j, place.places] = tabulated(term).numbers
-    return parameters, flags.astype(FLAGS_OF_FUNCTIONS) if plant.terms else flags
+    _check_products(plant.terms)
+    return parameters, flags
+
+
+def _check_products(terms: tuple[TermSpec, ...]) -> None:
+    """Refuse what multiplies nothing: its plant would be another one than meant."""
+    added = {(t.joint, describe_place(t.place).hook.name) for t in terms if not t.multiplies}
+    for term in terms:
+        if term.multiplies and (term.joint, describe_place(term.place).hook.name) not in added:
+            raise ValueError(
+                f'unknown_term at {term.place} on joint {term.joint} multiplies nothing: add the '
+                'unknown_term that it multiplies, or leave out multiplies'
+            )
 
 
 def _nominal(joint: JointParameters) -> list[float]:

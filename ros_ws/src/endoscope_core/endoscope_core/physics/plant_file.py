@@ -170,6 +170,8 @@ def _term_mapping(term: TermSpec) -> dict[str, Any]:
         mapping['values'] = [float(value) for value in term.values]
     if term.range is not None:
         mapping['range'] = [float(end) for end in term.range]
+    if term.multiplies:
+        mapping['multiplies'] = True
     return mapping
 
 
@@ -263,7 +265,8 @@ def _check_names(section: Mapping[str, Any], keys: tuple[str, ...], where: str) 
 
 
 def _term(section: Mapping[str, Any], where: str) -> TermSpec:
-    _check_keys(section, ('id', 'joint', 'stage', 'place', 'expression', 'values', 'range'), where)
+    keys = ('id', 'joint', 'stage', 'place', 'expression', 'values', 'range', 'multiplies')
+    _check_keys(section, keys, where)
     _check_names(section, ('joint', 'stage'), where)
     stages = {str(place.stage) for place in FUNCTIONS.values()}
     if section['stage'] not in stages:
@@ -290,12 +293,16 @@ def _term(section: Mapping[str, Any], where: str) -> TermSpec:
     if ends is not None and (not isinstance(ends, list) or len(ends) != 2):
         raise ValueError(f'{where}.range is {ends!r}: give [lowest, highest]')
     low_high = None if ends is None else _list(ends, f'{where}.range')
+    multiplies = section.get('multiplies', False)
+    if not isinstance(multiplies, bool):
+        raise ValueError(f'{where}.multiplies is {multiplies!r}: give true or false')
     return TermSpec(
         section['joint'],
         section['place'],
         expression,
         _list(section.get('values') or [], f'{where}.values'),
         None if low_high is None else (low_high[0], low_high[1]),
+        multiplies,
     )
 
 

@@ -200,7 +200,17 @@ def unknown_term(
         share,
         rivals,
         siblings,
+        term.multiplies,
+        tuple(
+            unknown_term(one, other)
+            for other in one.terms
+            if other.multiplies and not term.multiplies and _hook(other) == _hook(term)
+        ),
     )
+
+
+def _hook(term: Term) -> str:
+    return term.family.place.hook.name if term.family is not None else ''
 
 
 def missing_function(decisions: list[Decision]) -> UnknownTerm | None:

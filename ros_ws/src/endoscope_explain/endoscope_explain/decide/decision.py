@@ -100,7 +100,8 @@ def decide(search: JointSearch, jobs: int) -> Decision:
         if any(not t.is_function and may_be_absent(best.fit, t.term) for t in best.terms):
             break
         chosen = best
-        missing = (*missing[: len(best.terms) - 1], _missing(level, best, jobs))
+        if not best.terms[-1].multiplies:
+            missing = (*missing[: len(best.terms) - 1], _missing(level, best, jobs))
     missing = _named_as_chosen(search, chosen, missing, jobs)
     chosen = replace(chosen, fit=with_form(chosen.fit, jobs))
     return Decision(chosen, missing, share_explained(search.nominal, chosen))
@@ -157,6 +158,8 @@ def _named_as_chosen(
     """The missing terms as chosen: a rival of the first one may have led to a better two."""
     named = []
     for position, term in enumerate(chosen.terms):
+        if term.multiplies:
+            continue
         if position < len(missing) and missing[position].term.id == term.id:
             named.append(missing[position])
             continue

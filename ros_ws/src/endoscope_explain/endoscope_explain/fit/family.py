@@ -51,6 +51,8 @@ class Family:
         Values at the nodes for coefficients that are normal, each with a variance of one.
     band : (float, float), optional
         Of the periods that functions may have that repeat themselves.
+    multiplies : bool
+        Whether they multiply what other functions add there; see `TermSpec`.
     """
 
     place: Place
@@ -58,6 +60,12 @@ class Family:
     high: float
     basis: Array
     band: tuple[float, float] | None = None
+    multiplies: bool = False
+
+    @property
+    def largest(self) -> float:
+        """Largest absolute value."""
+        return self.place.largest_of(self.multiplies)
 
     @property
     def repeats(self) -> bool:
@@ -75,9 +83,9 @@ class Family:
 
     def within(self, values: Array) -> Array:
         """Values (NODES,) cut to what the place allows."""
-        if self.place.never_negative:
+        if self.place.never_negative and not self.multiplies:
             values = np.maximum(values, 0.0)
-        return np.clip(values, -self.place.largest, self.place.largest)
+        return np.clip(values, -self.largest, self.largest)
 
     def finer(self, count: int, visited: tuple[float, float] | None = None) -> 'Family':
         """Functions at the same place, of the same size, with more coefficients.
@@ -91,6 +99,7 @@ class Family:
         size = np.sqrt(np.mean(np.sum(self.basis**2, axis=1)))
         found = family_at(self.place, visited or (self.low, self.high), count, self.band)
         assert found is not None
+        found = replace(found, multiplies=self.multiplies)
         return found.scaled(size / np.sqrt(np.mean(np.sum(found.basis**2, axis=1))))
 
     def details(self, generator: np.random.Generator) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.acting import FLAGS_OF_FUNCTIONS
+from endoscope_core.physics.functions.acting import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
 from endoscope_core.physics.functions.interpolation import HIGH, LOW
 from endoscope_core.physics.functions.place import Shape
 from endoscope_explain.fit.family import Family, family_at, visited_states
@@ -54,6 +54,8 @@ class Candidate:
     @property
     def variant(self) -> tuple[str, tuple[float, ...]]:
         """Its id, and what it acts on or which of its forms it has."""
+        if self.multiplies:
+            return self.id, (float(MULTIPLIES),)
         choices = [p.name for p in self.term.parameters if p.choices and p.name in self.start]
         return self.id, tuple(self.start[name] for name in choices)
 
@@ -63,8 +65,15 @@ class Candidate:
         return self.family is not None
 
     @property
+    def multiplies(self) -> bool:
+        """Whether it makes another function one of two states."""
+        return self.family is not None and self.family.multiplies
+
+    @property
     def places(self) -> tuple[str, ...]:
         """Places whose functions it is one of."""
+        if self.multiplies:
+            return ()
         return (self.term.id,) if self.is_function else self.term.traits.families
 
     @property
@@ -99,7 +108,7 @@ def _with_function(model: JointModel, family: Family) -> JointModel:
     base[place.first_parameter + LOW] = family.low
     base[place.first_parameter + HIGH] = family.high
     flags: NDArray[Any] = model.flags.astype(FLAGS_OF_FUNCTIONS)
-    flags[place.flag] = True
+    flags[place.flag] = MULTIPLIES if family.multiplies else ADDS
     free = model.free + coefficients(place.id, family.basis.shape[1])
     if family.band is not None:
         free += (period(place, *family.band),)
@@ -141,9 +150,11 @@ def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Candidate, ..
     -------
     tuple of Candidate
         One for each place whose argument has moved; one for each likely period where functions
-        repeat themselves. Without those of time where the joint makes no motion twice.
+        repeat themselves; one more that multiplies those that are there. Without those of time
+        where the joint makes no motion twice.
     """
     states, observation = states_of(found), found.model.observation
+    there = {family.place.hook.name for family in found.model.families}
     candidates = []
     for place in _absent(found, FUNCTIONS.values()):
         state = states[place.argument.symbol, place.argument.unit]
@@ -153,7 +164,11 @@ def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Candidate, ..
             families = [family_at(place, (0.0, each), band=band) for each in likely]
         else:
             families = [family_at(place, (float(np.min(state)), float(np.max(state))))]
-        candidates += [Candidate(place, family=f) for f in families if f is not None]
+        alone = [family for family in families if family is not None]
+        candidates += [Candidate(place, family=family) for family in alone]
+        if place.hook.name in there:
+            both = (replace(family, multiplies=True) for family in alone)
+            candidates += [Candidate(place, family=family) for family in both]
     return tuple(candidates)
 
 

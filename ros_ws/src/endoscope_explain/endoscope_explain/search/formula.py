@@ -149,7 +149,9 @@ def _can_be_run(found: FittedFunction, expression: str) -> bool:
     """Whether a plant takes a formula: one may be too fine for its table, or go too far."""
     joint, family = found.joint, found.family
     try:
-        tabulated(TermSpec(joint, family.place.id, expression, range=(family.low, family.high)))
+        ends = (family.low, family.high)
+        term = TermSpec(joint, family.place.id, expression, (), ends, family.multiplies)
+        tabulated(term)
     except ValueError:
         return False
     return True

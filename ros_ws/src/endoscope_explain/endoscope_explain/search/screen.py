@@ -130,7 +130,7 @@ def _directions(behind: Background, term: Candidate) -> Directions | None:
         moved = model.residuals(model.begun_at(behind.fit.theta)) - behind.at
         columns = behind.left((moved * behind.weight)[:, None])
         return Directions(term, columns) if float(np.sum(columns**2)) > _NOTHING else None
-    trial = replace(term, family=term.family.scaled(_TRIAL * term.family.place.largest))
+    trial = replace(term, family=term.family.scaled(_TRIAL * term.family.largest))
     model = trial.added_to(behind.coarse)
     begun = model.begun_at(behind.fit.theta)
     places = model.places_of_coefficients()[-1]

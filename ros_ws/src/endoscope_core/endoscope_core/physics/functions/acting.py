@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 FLAGS_OF_FUNCTIONS = np.int8
 """Kind of the flags of a plant with functions."""
+ADDS, MULTIPLIES = 1, 2
+"""Flags of a function that is a term of its own, and of one that multiplies the others."""
 
 
 def functions_act(on: NDArray[Any]) -> bool:

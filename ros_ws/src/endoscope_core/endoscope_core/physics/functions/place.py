@@ -7,6 +7,8 @@ from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.functions.interpolation import NODES
 from endoscope_core.physics.hooks import Fold, Hook
 
+LARGEST_SHARE = 3.0
+"""By how many times itself a function may be larger, or smaller, by one that multiplies it."""
 SOURCE = (
     'Missing physics as a smooth function within the simulator: Heiden et al., NeuralSim, IEEE '
     'ICRA 2021; Kennedy, OHagan, J. R. Stat. Soc. B 63, 2001'
@@ -82,6 +84,10 @@ class Place(Effect):
     only: str = ''
     sign: str = ''
     by_step: str = ''
+
+    def largest_of(self, multiplies: bool) -> float:
+        """Largest absolute value of a function that is added, or of one that multiplies."""
+        return LARGEST_SHARE if multiplies else self.largest
 
     @property
     def is_factor(self) -> bool:

@@ -1,4 +1,4 @@
-"""The functions of all places of a hook, added up by one compiled function.
+"""The functions of all places of a hook, added up and multiplied by one compiled function.
 
 A call for each place would more than double the time to compile the plant, since numba works anew
 on all that a function calls. So the places of a hook that act alike stand in a row, and the fold
@@ -11,6 +11,7 @@ import numpy as np
 
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_core.physics.functions.acting import MULTIPLIES
 from endoscope_core.physics.functions.interpolation import function_at
 from endoscope_core.physics.functions.place import Place, Shape
 from endoscope_core.physics.hooks import HOOKS
@@ -54,17 +55,26 @@ def sum_of_functions(
     a3: float,
     a4: float,
     a5: float,
-) -> tuple[float, float]:
-    """Sum of the functions of `count` places from `number` of their row on, and of their slopes.
+) -> tuple[float, float, float, float]:
+    """Functions of `count` places from `number` of their row on, with the arguments `a0` to `a5`.
 
-    The functions have the arguments `a0` to `a5`.
+    Returns
+    -------
+    value, slope : float
+        Sum of those that are terms.
+    factor, steep : float
+        Product of one plus each of those that multiply, and its slope.
     """
-    value, slope = 0.0, 0.0
+    value, slope, factor, steep = 0.0, 0.0, 1.0, 0.0
     # Both are whole, but numba would compile this anew for every integer that stands in a call.
     for k in range(int(number), int(number + count)):
         if on[_FLAGS[k]]:
-            added, steep = function_at(p, _FIRST[k], a0, _SHARE[k], _SIDE[k], _REPEATS[k])
-            value += added
-            slope += steep
+            found, rise = function_at(p, _FIRST[k], a0, _SHARE[k], _SIDE[k], _REPEATS[k])
+            if on[_FLAGS[k]] == MULTIPLIES:
+                steep = steep * (1.0 + found) + factor * rise
+                factor *= 1.0 + found
+            else:
+                value += found
+                slope += rise
         a0, a1, a2, a3, a4 = a1, a2, a3, a4, a5
-    return value, slope
+    return value, slope, factor, steep

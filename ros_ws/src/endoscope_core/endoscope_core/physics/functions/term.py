@@ -74,7 +74,7 @@ def _tabulated(term: TermSpec, place: Place) -> Table:
         values = evaluate(term.expression, place.argument.symbol, nodes)
         numbers = np.array([low, high, *values])
         table = Table(numbers, *_errors(term.expression, place, numbers))
-    _check_values(place, table)
+    _check_values(place, table, term.multiplies)
     return table
 
 
@@ -130,14 +130,14 @@ def _check_shape(expression: str, place: Place, true: Array, span: float) -> Non
         raise ValueError(f'{expression!r} is not {place.shape}: {like[place.shape]}')
 
 
-def _check_values(place: Place, table: Table) -> None:
+def _check_values(place: Place, table: Table, multiplies: bool) -> None:
     values = table.numbers[VALUES:]
     extreme = float(values[np.argmax(np.abs(values))])
-    if abs(extreme) > place.largest:
-        unit = '' if place.unit == '-' else f' {place.unit}'
+    largest = place.largest_of(multiplies)
+    if abs(extreme) > largest:
+        unit = '' if place.unit == '-' or multiplies else f' {place.unit}'
         raise ValueError(
-            f'the function reaches {extreme:.6g}{unit}: it must stay within '
-            f'+-{place.largest:g}{unit}'
+            f'the function reaches {extreme:.6g}{unit}: it must stay within +-{largest:g}{unit}'
         )
-    if place.never_negative and values.min() < 0.0:
+    if place.never_negative and not multiplies and values.min() < 0.0:
         raise ValueError(f'the function reaches {values.min():.6g}: it must not be negative')
