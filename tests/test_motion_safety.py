@@ -796,7 +796,7 @@ def test_unusable_handle_messages_are_counted_and_said():
 def test_a_handle_that_nothing_follows_is_said_with_what_to_do(source):
     with run(overrides={'console': {'source': source}}) as graph:
         console, said = graph.nodes['console'], []
-        # While a motion is played the handle's clutch is a second one, which is an error of its own.
+        # While a motion is played the handle's clutch is a second one: an error of its own.
         console.get_logger = lambda: SimpleNamespace(warning=said.append, error=lambda _: None)
         handle = Handle(graph)
         handle.move(1.1, clutch=False)
