@@ -39,6 +39,7 @@ RIG = load_rig()
 TICK_S = 1.0 / TICK_RATE
 BOUND = RIG.motors.speed * TICK_S * 1.001
 STILL = 0.003
+LOW_REACH = {'low': -0.5, 'high': 0.5}
 
 
 class Sender:
@@ -430,26 +431,28 @@ def test_two_senders_of_a_motion_topic_are_a_fault_that_names_both():
 
 @pytest.mark.parametrize(
     ('topic', 'names', 'reader'),
-    [(MOTOR_COMMAND, MOTORS, 'motor_driver'), (SLAVE_COMMAND, JOINTS, 'compensator')],
+    [
+        (MOTOR_COMMAND, MOTORS, 'motor_driver'),
+        (SLAVE_COMMAND, JOINTS, 'compensator'),
+        (SLAVE_COMMAND, JOINTS, 'controller'),
+    ],
 )
 def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, console, topic, names, reader):
     """It waits for a node that is not run, and only the session's own sender is left by then."""
     console.move(100)
     node = foreign.nodes[reader]
-    gate = node.gate if reader == 'compensator' else node.motion.gate
-    pose = console.angle if reader == 'compensator' else node.motion.goal
+    gates = {
+        'motor_driver': lambda: node.motion.gate,
+        'compensator': lambda: node.gate,
+        'controller': lambda: node._gate,
+    }
+    gate = gates[reader]()
+    pose = node.motion.goal if reader == 'motor_driver' else console.angle
     obeyed, refused = gate.accepted, gate.refused[Refusal.SENDER]
-    readers = foreign.probe.count_subscribers(topic)
-    senders = next(s for s in node.subscriptions if s.topic_name.endswith(topic)).handle
-    stranger = Node('stranger', context=foreign.runtime.context, namespace='endoscope')
-    rival = stranger.create_publisher(JointState, topic, COMMAND)
-    until(lambda: rival.get_subscription_count() == readers and senders.get_publisher_count() == 2)
     message = JointState(name=list(names), position=[x + 1e-3 for x in pose])
     message.header.frame_id = foreign.session
     message.header.stamp = Time(nanoseconds=foreign.conductor.now_ns + 1_000_000).to_msg()
-    rival.publish(message)
-    stranger.destroy_node()
-    until(lambda: senders.get_publisher_count() == 1)
+    leave_behind(foreign, node, topic, message, COMMAND)
     foreign.wait(lambda: gate.accepted > obeyed or gate.refused[Refusal.SENDER] > refused)
     assert gate.accepted == obeyed
     foreign.advance(0.1)
@@ -457,18 +460,29 @@ def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, console, topi
     assert topic in foreign.cause
 
 
+def leave_behind(graph, node, topic, message, qos):
+    """Have a stranger send a message and go before a node is run that hears the topic."""
+    readers = graph.probe.count_subscribers(topic)
+    senders = next(s for s in node.subscriptions if s.topic_name.endswith(topic)).handle
+    before = senders.get_publisher_count()
+    stranger = Node('stranger', context=graph.runtime.context, namespace='endoscope')
+    rival = stranger.create_publisher(type(message), topic, qos)
+    until(
+        lambda: (
+            rival.get_subscription_count() == readers
+            and senders.get_publisher_count() == before + 1
+        )
+    )
+    rival.publish(message)
+    stranger.destroy_node()
+    until(lambda: senders.get_publisher_count() == before)
+
+
 def test_a_heartbeat_that_outlives_its_sender_opens_nothing(foreign, console):
     """A rival of the supervisor has come and gone while the motor driver was not run."""
     console.move(100)
     node = foreign.nodes['motor_driver']
-    readers = foreign.probe.count_subscribers(MOTION_SESSION)
-    senders = next(s for s in node.subscriptions if s.topic_name.endswith(MOTION_SESSION)).handle
-    stranger = Node('stranger', context=foreign.runtime.context, namespace='endoscope')
-    rival = stranger.create_publisher(Header, MOTION_SESSION, EVENT)
-    until(lambda: rival.get_subscription_count() == readers and senders.get_publisher_count() == 2)
-    rival.publish(Header(frame_id='session-99'))
-    stranger.destroy_node()
-    until(lambda: senders.get_publisher_count() == 1)
+    leave_behind(foreign, node, MOTION_SESSION, Header(frame_id='session-99'), EVENT)
     entered = set()
     for _ in range(40):
         foreign.advance(0.005)
@@ -476,6 +490,71 @@ def test_a_heartbeat_that_outlives_its_sender_opens_nothing(foreign, console):
     assert 'session-99' not in entered
     assert foreign.state == 'FAULT'
     assert MOTION_SESSION in foreign.cause
+
+
+def test_a_clutch_that_outlives_its_sender_is_not_held_before_it_is_let_go_of(foreign, console):
+    console.move(20)
+    console.hold(0)
+    clutches = [foreign.nodes[name]._clutch for name in ('compensator', 'console')]
+    foreign.advance(0.1)
+    leave_behind(foreign, foreign.nodes['compensator'], MASTER_CLUTCH, Joy(buttons=[1]), EVENT)
+    held = []
+    for _ in range(40):
+        foreign.advance(0.005)
+        held += [clutch.held for clutch in clutches]
+    assert not any(held)
+    assert foreign.state == 'FAULT'
+    assert MASTER_CLUTCH in foreign.cause
+    foreign.enable()
+    console.hold(1)
+    assert not any(clutch.held for clutch in clutches)
+    console.hold(0)
+    console.hold(1)
+    assert all(clutch.held for clutch in clutches)
+
+
+def test_a_handle_that_outlives_its_sender_is_not_followed(foreign):
+    foreign.command('disable')
+    foreign.enable()
+    handle = Handle(foreign)
+    handle.move(0.2, clutch=False)
+    console = foreign.nodes['console']
+    taken = []
+    take = console._handle.take
+    console._handle.take = lambda *sample: (taken.append(sample[1]), take(*sample))[1]
+    message = JointState(name=list(JOINTS), position=[0.9, 0.9])
+    message.header.stamp = Time(nanoseconds=foreign.conductor.now_ns + 1_000_000).to_msg()
+    leave_behind(foreign, console, MASTER_MEASURED, message, SENSOR_OFFERED)
+    handle.move(0.1, clutch=False)
+    del console._handle.take
+    foreign.probe.destroy_publisher(handle._publisher)
+    foreign.probe.destroy_publisher(handle._clutch)
+    assert taken
+    assert (0.9, 0.9) not in taken
+    assert foreign.state == 'FAULT'
+    assert MASTER_MEASURED in foreign.cause
+
+
+@pytest.mark.parametrize('reader', ['compensator', 'console'])
+def test_a_result_that_outlives_its_sender_is_not_taken(reader):
+    """Of the very session in which the slave is being calibrated."""
+    with run() as graph:
+        assert graph.call_calibration().success
+        graph.advance(0.5)
+        compensator, console = graph.nodes['compensator'], graph.nodes['console']
+        assert compensator._calibrated_in == graph.session
+        reaches = {f'reach.{joint}.{end}': x for joint in JOINTS for end, x in LOW_REACH.items()}
+        result = DiagnosticArray()
+        result.header.frame_id = graph.session
+        result.status = [
+            status('calibration: hysteresis class', OK, '', {'class_deg': 100} | reaches)
+        ]
+        leave_behind(graph, graph.nodes[reader], CALIBRATION_RESULT, result, RESULT)
+        graph.advance(0.5)
+        taken = {'compensator': compensator._found, 'console': console._reaches}
+        assert not taken[reader]
+        assert graph.state == 'FAULT'
+        assert CALIBRATION_RESULT in graph.cause
 
 
 def until(condition):
@@ -585,6 +664,31 @@ def test_a_node_started_anew_needs_another_enable(name):
         assert moved.largest_step < BOUND
 
 
+def test_a_calibration_node_started_anew_is_believed_after_another_enable():
+    """And its latched result is not taken by a compensator that is started anew after it."""
+    with run(overrides={'calibration': {'motion': 'brief'}}) as graph:
+        assert graph.call_calibration().success
+        graph.advance(0.5)
+        graph.kill('calibration')
+        graph.advance(0.02)
+        graph.start('calibration')
+        graph.advance(0.3)
+        assert graph.state == 'FAULT'
+        graph.enable()
+        graph.calibrate()
+        graph.advance(0.1)
+        assert graph.state == 'ENABLED'
+        assert graph.nodes['compensator'].findings is not None
+        assert graph.nodes['console']._reaches
+        graph.kill('compensator')
+        graph.advance(0.02)
+        graph.start('compensator')
+        graph.advance(0.3)
+        graph.enable()
+        graph.advance(0.5)
+        assert graph.nodes['compensator'].findings is None
+
+
 def test_a_tracker_that_comes_back_moves_nothing():
     with run(overrides={'calibration': {'motion': 'brief'}}) as graph:
         graph.calibrate()
@@ -692,7 +796,8 @@ def test_unusable_handle_messages_are_counted_and_said():
 def test_a_handle_that_nothing_follows_is_said_with_what_to_do(source):
     with run(overrides={'console': {'source': source}}) as graph:
         console, said = graph.nodes['console'], []
-        console.get_logger = lambda: SimpleNamespace(warning=said.append)
+        # While a motion is played the handle's clutch is a second one: an error of its own.
+        console.get_logger = lambda: SimpleNamespace(warning=said.append, error=lambda _: None)
         handle = Handle(graph)
         handle.move(1.1, clutch=False)
         assert not said

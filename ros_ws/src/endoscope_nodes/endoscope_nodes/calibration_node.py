@@ -38,6 +38,7 @@ from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
+    CALIBRATION_BEGUN,
     CALIBRATION_COMMAND,
     CALIBRATION_NUMBERS,
     CALIBRATION_RESULT,
@@ -126,7 +127,7 @@ class CalibrationNode(EndoscopeNode):
     def _on_run(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.message = self._start(homing=False)
         response.success = not response.message
-        response.message = response.message or f'begun; {CALIBRATION_RESULT} will say how it went'
+        response.message = response.message or CALIBRATION_BEGUN.format(self._began_ns)
         return response
 
     def _on_state_command(self, message: String) -> None:

@@ -43,7 +43,6 @@ from endoscope_nodes.watches import (
     CommandReport,
     SenderWatch,
     SessionWatch,
-    rivals,
 )
 
 CONSOLE = 'console'
@@ -109,16 +108,17 @@ class CompensatorNode(EndoscopeNode):
         self._motors = JointPublisher(self, MOTOR_COMMAND, MOTORS, ('position',), COMMAND)
         self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
         self._session = SessionWatch(self, self._start_anew, self._start_anew)
-        self._clutch = ClutchWatch(self, self._end_stream)
+        self._clutch = ClutchWatch(self, self._session, self._end_stream)
         self._pose = runtime.pose_of(self)
         self._calibration_in = self._listen(
             CALIBRATION_COMMAND, self._on_calibration, self.calibration_gate
         )
         self._console_in = self._listen(SLAVE_COMMAND, self._on_console, self.gate)
         self._correction_in = self._listen(CORRECTION, self._on_correction, self.correction_gate)
-        self._results = self.create_subscription(
+        results = self.create_subscription(
             DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
         )
+        self._results = self._session.senders_of(results, self._doubt_results)
         self.diagnostics.add('commands', CommandReport(self.gate, self._session.leave))
         self.diagnostics.add('calibration commands', CommandReport(self.calibration_gate))
         self.diagnostics.add('corrections', CommandReport(self.correction_gate))
@@ -136,7 +136,7 @@ class CompensatorNode(EndoscopeNode):
             exact=True,
             on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
         )
-        return self._session.senders_of(stream)
+        return self._session.senders_of(stream.subscription)
 
     def _on_parameters(self, parameters: CompensatorParameters) -> None:
         self._settings = parameters
@@ -146,12 +146,19 @@ class CompensatorNode(EndoscopeNode):
         found = findings_of(message)
         if found is None and not is_of_no_class(message):
             return
-        crowd = rivals(self, self._results)
+        crowd = self._results.rivals()
+        if crowd:
+            self._doubt_results(crowd)
         if crowd or not self._calibrated_in or message.header.frame_id != self._calibrated_in:
             why = crowd or f'it is of {message.header.frame_id or "no session"}'
             self.get_logger().warning(f'{CALIBRATION_RESULT} is not taken: {why}')
             return
         self._found, self._news = found, True
+
+    def _doubt_results(self, crowd: str) -> None:
+        """Take no result before another calibration: it may be somebody else's."""
+        self._calibrated_in = ''
+        self._session.leave(crowd)
 
     def _take_news(self) -> None:
         """Put a new calibration in force: only where nothing moves."""
@@ -218,7 +225,7 @@ class CompensatorNode(EndoscopeNode):
 
     def _may_pass(self, sample: JointSample, senders: SenderWatch, gate: CommandGate) -> bool:
         """Whether a message is of the open session and of the one sender of its topic."""
-        if not self._session.belongs(sample):
+        if not self._session.belongs(sample.session):
             gate.refuse(Refusal.SESSION, sample.session or 'none named')
             return False
         crowd = senders.rivals()
@@ -250,11 +257,6 @@ class CompensatorNode(EndoscopeNode):
             return
         if not self._clutch.held:
             self.gate.refuse(Refusal.CLUTCH)
-            return
-        crowd = rivals(self, self._clutch.subscription)
-        if crowd:
-            self.gate.refuse(Refusal.SENDER, crowd)
-            self._session.leave(crowd)
             return
         bending = self._pose.bending()
         dt = self._obey(CONSOLE, self.gate, sample, bending)

@@ -46,7 +46,6 @@ from endoscope_nodes.watches import (
     ClutchWatch,
     SessionWatch,
     StreamWatch,
-    rivals,
 )
 
 # A hand that rests on a handle moves it by less than half a degree.
@@ -103,7 +102,7 @@ class ConsoleNode(EndoscopeNode):
         self.create_subscription(
             JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True
         )
-        self._handle_in = JointSubscription(
+        handle = JointSubscription(
             self,
             MASTER_MEASURED,
             JOINTS,
@@ -111,10 +110,12 @@ class ConsoleNode(EndoscopeNode):
             SENSOR_ASKED,
             on_malformed=lambda reason: self._handle.refuse(HandleRefusal.MALFORMED, reason),
         )
-        self._clutch = ClutchWatch(self)
-        self._results = self.create_subscription(
+        self._handle_senders = self._session.senders_of(handle.subscription)
+        self._clutch = ClutchWatch(self, self._session)
+        results = self.create_subscription(
             DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
         )
+        self._results = self._session.senders_of(results)
         self._on_parameters(self._settings)
         self.diagnostics.add('commands', self._report)
         self.ticker.every(0.1, self._repeat_clutch)
@@ -160,7 +161,7 @@ class ConsoleNode(EndoscopeNode):
             self._clutch_out = None
 
     def _on_handle(self, sample: JointSample) -> None:
-        crowd = rivals(self, self._handle_in.subscription)
+        crowd = self._handle_senders.rivals()
         if crowd:
             self._session.leave(crowd)
             return
@@ -196,7 +197,10 @@ class ConsoleNode(EndoscopeNode):
 
     def _on_result(self, message: DiagnosticArray) -> None:
         """Keep to what this session's own calibration found out about the tube's reach."""
-        if message.header.frame_id != self._session.name or rivals(self, self._results):
+        crowd = self._results.rivals()
+        if crowd:
+            self._session.leave(crowd)
+        if not self._session.belongs(message.header.frame_id):
             return
         found = findings_of(message)
         if found is not None or is_of_no_class(message):

@@ -28,7 +28,7 @@ from endoscope_nodes.node_parameters import ControllerParameters
 from endoscope_nodes.qos import COMMAND, RESULT
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_S
-from endoscope_nodes.watches import CommandReport, SessionWatch, StreamWatch, rivals
+from endoscope_nodes.watches import CommandReport, SessionWatch, StreamWatch
 
 Controller = AdaptiveBacklashController | RecursiveHysteresisController
 LAWS: dict[str, type[Controller]] = {
@@ -71,7 +71,7 @@ class ControllerNode(EndoscopeNode):
         self.create_subscription(
             JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True
         )
-        self._commands = JointSubscription(
+        commands = JointSubscription(
             self,
             SLAVE_COMMAND,
             JOINTS,
@@ -80,6 +80,7 @@ class ControllerNode(EndoscopeNode):
             exact=True,
             on_malformed=lambda reason: self._gate.refuse(Refusal.MALFORMED, reason),
         )
+        self._senders = self._session.senders_of(commands.subscription)
         self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
         self.diagnostics.add('commands', CommandReport(self._gate))
         self.diagnostics.add('feedback', self._report)
@@ -105,12 +106,13 @@ class ControllerNode(EndoscopeNode):
 
     def _on_command(self, sample: JointSample) -> None:
         now = self.ticker.monotonic_ns()
-        if not self._session.belongs(sample):
+        if not self._session.belongs(sample.session):
             self._gate.refuse(Refusal.SESSION, sample.session or 'none named')
             return
-        crowd = rivals(self, self._commands.subscription)
+        crowd = self._senders.rivals()
         if crowd:
             self._gate.refuse(Refusal.SENDER, crowd)
+            self._session.leave(crowd)
             return
         bending = self._pose.bending()
         if bending is None:

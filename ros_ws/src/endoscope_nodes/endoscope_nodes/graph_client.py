@@ -1,6 +1,7 @@
 """The operator's side of a running graph: asks it for something, and hears what it answers."""
 
 import os
+import re
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -29,6 +30,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.discovery import stay_on_this_machine
 from endoscope_nodes.log_level import log_as_asked
 from endoscope_nodes.names import (
+    CALIBRATION_BEGUN,
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
     COMPENSATOR_STATE,
@@ -52,6 +54,8 @@ _OPENS = {'enable': 'ENABLED', 'resume': 'ENABLED', 'disable': 'DISABLED', 'paus
 # What was refused is told at once; the same words a second later are an old story.
 _JUST_NOW_S = 0.1
 _REPEATED_AFTER_S = 1.0
+# A result tells its duration with nine digits.
+_SAME_BEGIN_S = 1e-6
 # A loop that reads as seldom as this still hears every word.
 _HEARD = profile(Qos(200))
 _HEARD_LATCHED = profile(Qos(200, latched=True))
@@ -132,7 +136,7 @@ class GraphClient(ClosedOnExit):
         self.heard_ns: dict[str, int] = {}
         self.calibration: Health | None = None
         self.compensator: Health | None = None
-        self._busy_stamp_ns: int | None = None
+        self._busy = False
         self._prefix = f'{node.get_namespace().rstrip("/")}/'
         self._orders = node.create_publisher(String, STATE_COMMAND, EVENT)
         self._heard: list[tuple[RawSubscription, Callable[[bytes, int], object]]] = []
@@ -187,7 +191,7 @@ class GraphClient(ClosedOnExit):
             self.health[name] = health
             self.heard_ns[name.partition(':')[0]] = received_ns
             if name == PROCEDURE and health.message != PROCEDURE_WAITING:
-                self._busy_stamp_ns = health.stamp_ns
+                self._busy = True
 
     def _on_result(self, data: bytes, received_ns: int) -> None:
         message = deserialize_message(data, DiagnosticArray)
@@ -320,7 +324,7 @@ class GraphClient(ClosedOnExit):
             With the reason of the supervisor or of calibration.
         """
         asked_ns = time.time_ns()
-        self._busy_stamp_ns = None
+        self._busy = False
         self._ask(
             'home',
             lambda: self._begun(asked_ns),
@@ -334,23 +338,31 @@ class GraphClient(ClosedOnExit):
 
     def _begun(self, asked_ns: int) -> bool:
         said = self.health.get(PROCEDURE)
-        return self._busy_stamp_ns is not None and said is not None and said.received_ns > asked_ns
+        return self._busy and said is not None and said.received_ns > asked_ns
 
     def _procedure_to_its_end(
-        self, patience_s: float, progress: Callable[[str, float], None] = lambda step, share: None
+        self,
+        patience_s: float,
+        begun_ns: int = -1,
+        progress: Callable[[str, float], None] = lambda step, share: None,
+        is_told: Callable[[], bool] = lambda: False,
     ) -> str:
-        """Wait while calibration moves the slave; what it said last."""
-        while True:
-            said = self.health[PROCEDURE]
-            if said.message == PROCEDURE_WAITING:
+        """Wait while calibration moves the slave, or until its end is told; what it said last."""
+        while not is_told():
+            said = self.health.get(PROCEDURE)
+            heard_ns = 0 if said is None else said.received_ns
+            if said is not None and said.message != PROCEDURE_WAITING:
+                progress(said.message, float(said.values['progress']))
+            elif said is not None and said.stamp_ns > begun_ns:
                 return said.values['last']
-            progress(said.message, float(said.values['progress']))
 
-            def says_more(heard_ns: int = said.received_ns) -> bool:
-                return self.health[PROCEDURE].received_ns > heard_ns
+            def says_more(heard_ns: int = heard_ns) -> bool:
+                said = self.health.get(PROCEDURE)
+                return is_told() or (said is not None and said.received_ns > heard_ns)
 
             if not self.wait_until(says_more, patience_s):
                 raise GraphRefusedError(f'calibration has been silent for {patience_s:g} s')
+        return ''
 
     def calibrate(
         self,
@@ -371,18 +383,16 @@ class GraphClient(ClosedOnExit):
         GraphRefusedError
             It was refused or aborted, or the tube is of no known class; with the reason.
         """
-        self._busy_stamp_ns = None
-        self.trigger(CALIBRATION_RUN, patience_s)
-        # A result that was latched before this calibration began is another's.
-        self.wait_for(
-            lambda: self._busy_stamp_ns is not None, 'calibration to say that it begins', patience_s
-        )
-        begun_ns = cast(int, self._busy_stamp_ns)
-        said = self._procedure_to_its_end(patience_s, progress)
+        answer = self.trigger(CALIBRATION_RUN, patience_s)
+        begun = re.fullmatch(CALIBRATION_BEGUN.format(r'(\d+)'), answer)
+        if begun is None:
+            raise GraphRefusedError(f'{CALIBRATION_RUN} does not say when it has begun: {answer!r}')
+        begun_ns = int(begun[1])
 
         def is_told() -> bool:
-            return self.calibration is not None and self.calibration.stamp_ns > begun_ns
+            return self.calibration is not None and _is_of(self.calibration, begun_ns)
 
+        said = self._procedure_to_its_end(patience_s, begun_ns, progress, is_told)
         self.wait_for(is_told, f'{CALIBRATION_RESULT}; calibration says: {said}', patience_s)
         result = cast(Health, self.calibration)
         if result.level != 0:
@@ -451,6 +461,16 @@ def _health(message: DiagnosticArray, status: DiagnosticStatus, received_ns: int
         received_ns,
         message.header.frame_id,
     )
+
+
+def _is_of(result: Health, begun_ns: int) -> bool:
+    """Whether a result is of the calibration that began then.
+
+    Its stamp alone does not tell: in simulated time one may end in the instant in which the next
+    begins, or in that in which it began itself.
+    """
+    duration = float(result.values.get('duration', 'nan'))
+    return abs((result.stamp_ns - begun_ns) * 1e-9 - duration) < _SAME_BEGIN_S
 
 
 @contextmanager

@@ -97,7 +97,7 @@ class JointPublisher:
         self._stamp.pack_into(self._message, 4, seconds, nanoseconds)
         for start, part in self._parts:
             self._pack(self._message, start, *values[part])
-        # By the handle, as `rivals` does: the context manager costs as much as sending.
+        # By the handle: the context manager costs as much as sending.
         self._publisher.handle.publish_raw(bytes(self._message))
         self.count += 1
 

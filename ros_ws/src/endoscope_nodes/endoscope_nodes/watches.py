@@ -12,7 +12,7 @@ from endoscope_bags.errors import MalformedMessageError
 from endoscope_core.safety import CommandGate, MotionSession
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.joint_stream import JointReader, JointSample, JointSubscription
+from endoscope_nodes.joint_stream import JointReader, JointSample
 from endoscope_nodes.names import (
     JOINTS,
     MASTER_CLUTCH,
@@ -38,22 +38,12 @@ CLUTCH_TIMEOUT_NS = 350_000_000
 TRACKER_TIMEOUT_NS = 100_000_000
 
 
-def rivals(node: EndoscopeNode, subscription: Subscription) -> str:
-    """Say who else sends on a topic that has one sender; empty while there is but one.
-
-    A node killed without a last word counts until the middleware has given it up.
-    """
-    # By the handle: this is asked for every message, and the context manager costs more than it.
-    if subscription.handle.get_publisher_count() <= 1:
-        return ''
-    return senders_in_words(node, subscription.topic_name)
-
-
 class SenderWatch:
     """Whether a topic has had but one sender since this was last asked.
 
     A message may wait for a node that is not run and outlive its sender, which is not among those
-    who are there when it is taken.
+    who are there when it is taken.  A node killed without a last word counts until the middleware
+    has given it up.
     """
 
     def __init__(self, node: EndoscopeNode, subscription: Subscription) -> None:
@@ -111,7 +101,7 @@ class SessionWatch:
         self._on_enter = on_enter
         self._on_leave = on_leave
         self._told = ('', '')
-        self._streams: list[SenderWatch] = []
+        self._streams: list[tuple[SenderWatch, Callable[[str], None]]] = []
         heartbeat = node.create_subscription(Header, MOTION_SESSION, self._hear, EVENT)
         self._supervisors = SenderWatch(node, heartbeat)
         node.diagnostics.add(SESSION_REPORT, self._report)
@@ -122,24 +112,34 @@ class SessionWatch:
         """Session that the node takes part in; empty while it must not move anything."""
         return self._session.name
 
-    def senders_of(self, stream: JointSubscription) -> SenderWatch:
-        """Watch who sends commands on a topic: a second sender ends the node's part."""
-        senders = SenderWatch(self._node, stream.subscription)
-        self._streams.append(senders)
+    def senders_of(
+        self, subscription: Subscription, on_crowd: Callable[[str], None] | None = None
+    ) -> SenderWatch:
+        """Watch who sends on a topic: a second sender ends the node's part.
+
+        Parameters
+        ----------
+        subscription
+            By which the topic is heard.
+        on_crowd
+            Called with who there was, instead; it calls :meth:`leave`.
+        """
+        senders = SenderWatch(self._node, subscription)
+        self._streams.append((senders, on_crowd or self.leave))
         return senders
 
     def _watch(self) -> None:
         self.turn()
-        for senders in self._streams:
+        for senders, on_crowd in self._streams:
             crowd = senders.rivals()
             if crowd:
-                self.leave(crowd)
+                on_crowd(crowd)
 
-    def belongs(self, sample: JointSample) -> bool:
-        """Whether a message is of the session that the node takes part in."""
+    def belongs(self, session: str) -> bool:
+        """Whether a message that names this session is of the one that the node takes part in."""
         # After a standstill a message may come before the next turn does.
         self.turn()
-        return self._session.belongs(sample.session)
+        return self._session.belongs(session)
 
     def leave(self, reason: str) -> None:
         """End the node's part in the session, and say so at once: the slave goes to FAULT."""
@@ -181,27 +181,45 @@ class SessionWatch:
 class ClutchWatch:
     """The clutch as last heard; silence counts as released.
 
+    A second sender ends the node's part in the session, and the clutch counts as released until it
+    is let go of: who held it is not known.
+
     Parameters
     ----------
+    session
+        The node's part in motion sessions.
     on_release
         Called when it is let go of, or heard again after having been silent.
-
-    Attributes
-    ----------
-    subscription
-        Of the clutch, by which its senders are told.
     """
 
-    def __init__(self, node: EndoscopeNode, on_release: Callable[[], None] | None = None) -> None:
+    def __init__(
+        self,
+        node: EndoscopeNode,
+        session: SessionWatch,
+        on_release: Callable[[], None] | None = None,
+    ) -> None:
         self._ticker = node.ticker
+        self._session = session
         self._on_release = on_release
-        self._pressed = False
+        self._pressed = self._doubted = False
         self._heard_ns = 0
-        self.subscription = node.create_subscription(Joy, MASTER_CLUTCH, self._receive, EVENT)
+        subscription = node.create_subscription(Joy, MASTER_CLUTCH, self._receive, EVENT)
+        self._senders = session.senders_of(subscription, self._doubt)
+
+    def _doubt(self, crowd: str) -> None:
+        self._doubted = True
+        self._pressed = False
+        self._session.leave(crowd)
 
     def _receive(self, message: Joy) -> None:
+        crowd = self._senders.rivals()
+        if crowd:
+            self._doubt(crowd)
+            return
         before = self._pressed
         pressed = bool(message.buttons) and message.buttons[0] == 1
+        self._doubted = self._doubted and pressed
+        pressed = pressed and not self._doubted
         if before and not (pressed and self.held) and self._on_release is not None:
             self._on_release()
         self._pressed = pressed

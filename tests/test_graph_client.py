@@ -1,0 +1,83 @@
+"""Whoever asks the graph for something is told what came of that, and of nothing else."""
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from simulated_graph import SimulatedGraph
+
+from endoscope_nodes.graph_client import GraphClient, GraphRefusedError
+from endoscope_nodes.names import DIAGNOSTICS
+
+ABORTED = 'aborted: the motion session has ended'
+
+
+@pytest.fixture(scope='module')
+def graph():
+    with SimulatedGraph(overrides={'calibration': {'motion': 'brief'}}) as graph:
+        yield graph
+
+
+@pytest.fixture(autouse=True)
+def enabled(graph):
+    enable(graph)
+
+
+def enable(graph):
+    graph.command('disable')
+    graph.enable()
+
+
+class Asker(GraphClient):
+    """A client beside whose waiting the graph goes on, and something may happen to it once.
+
+    It hears of nodes' health only from then on, as one that they have found last.
+    """
+
+    def __init__(self, graph, happens):
+        super().__init__(graph.probe, self._live)
+        self._graph = graph
+        self._happens = happens
+        index = next(k for k, (s, _) in enumerate(self._heard) if s.topic == DIAGNOSTICS)
+        self._heard.pop(index)[0].close()
+
+    def _live(self, seconds):
+        if self._happens is None:
+            self._graph.advance(seconds)
+            return
+        # Time stands still until then.
+        self._graph.serve(0.01)
+        if self._graph.nodes['calibration'].active:
+            happens, self._happens = self._happens, None
+            happens()
+            self.listen(DiagnosticArray, DIAGNOSTICS, self._on_health)
+
+
+def calibrate(graph, happens):
+    with Asker(graph, happens) as asker:
+        return asker.calibrate(patience_s=5.0)
+
+
+def test_a_calibration_that_ends_before_it_is_heard_of_is_told(graph):
+    with pytest.raises(GraphRefusedError, match=ABORTED):
+        calibrate(graph, lambda: graph.command('pause'))
+
+
+def test_one_that_ends_in_the_instant_in_which_it_began_is_told(graph):
+    def lose_the_session():
+        calibration = graph.nodes['calibration']
+        assert calibration.ticker.now_ns() == calibration._began_ns
+        calibration._session.leave('the test ends it')
+
+    with pytest.raises(GraphRefusedError, match=ABORTED):
+        calibrate(graph, lose_the_session)
+
+
+def test_a_result_that_was_there_before_is_not_taken(graph):
+    with pytest.raises(GraphRefusedError, match=ABORTED):
+        calibrate(graph, lambda: graph.command('disable'))
+    enable(graph)
+    first = calibrate(graph, lambda: None)
+    assert first.level == 0
+    # No time has gone on: the next one begins in the instant in which this one has ended.
+    second = calibrate(graph, lambda: None)
+    assert second.level == 0
+    assert second.stamp_ns - float(second.values['duration']) * 1e9 >= first.stamp_ns
