@@ -155,10 +155,7 @@ def row_of(case: Case) -> Row:
         seconds=seconds,
         truth_share=max(true, default=0.0) if law and shares else math.nan,
         shares=tuple(sorted(shares.values(), reverse=True)),
-        beyond_form=max(
-            (v for key, v in said.adequacy.items() if key.startswith('beyond_form_')),
-            default=math.nan,
-        ),
+        beyond_form=said.beyond_form,
         rival=said.effects[0].evidence['rival'] if said.effects else math.nan,
         errors=tuple(REACH * error for error in errors),
         **vars(judgement),
