@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from endoscope_benchmarks.benches.concealed import seeds
+from endoscope_benchmarks.benches.cases import seeds
 from endoscope_benchmarks.concealed import motions
 from endoscope_benchmarks.concealed.case import law_at_place, law_of_effect
 from endoscope_benchmarks.concealed.forms import drawn_form, visited

@@ -9,7 +9,7 @@ from endoscope_benchmarks.concealed.strata import drawn_case
 from endoscope_benchmarks.peers.problem import PERIOD_S, predicts, problem_of
 from endoscope_benchmarks.peers.symbolic import OF_PLANT, OF_SENSOR, named_by
 from endoscope_benchmarks.peers.term_library import terms_of
-from endoscope_benchmarks.peers.trial import PEERS, example, require
+from endoscope_benchmarks.peers.trial import PEERS, example, require_installed
 from endoscope_core.errors import EndoscopeError
 
 
@@ -47,4 +47,4 @@ def test_a_peer_that_is_written_here_works_on_its_own_example(peer):
 @pytest.mark.skipif(importlib.util.find_spec('emdcmp') is not None, reason='peers are installed')
 def test_what_is_missing_is_said_in_one_line():
     with pytest.raises(EndoscopeError, match=r'^emdcmp not installed: run `make -C ros_ws peers`'):
-        require(['forward selection', 'EMD comparison'], ['nulls'])
+        require_installed(['forward selection', 'EMD comparison'])

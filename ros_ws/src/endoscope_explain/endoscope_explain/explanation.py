@@ -1,5 +1,6 @@
 """What `explain_recording` finds out, as plain frozen data that a report is written from."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -8,6 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription, TermSpec
+from endoscope_core.physics.effect import Effect
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_core.physics.functions.place import Place
 
 Array = NDArray[np.float64]
 
@@ -67,12 +72,10 @@ class NamedEffect:
 
     Attributes
     ----------
-    id, joint, stage : str
-        Catalogue id, joint name and stage of the chain.
+    id, joint : str
+        Catalogue id and joint name.
     probability : float
         Calibrated probability that this effect is present.
-    equation, source : str
-        Of the model that was fitted.
     parameters : mapping of str to Estimate
         Fitted parameters by name.
     alternatives : tuple of str
@@ -83,13 +86,20 @@ class NamedEffect:
 
     id: str
     joint: str
-    stage: str
     probability: float
-    equation: str
-    source: str
     parameters: Mapping[str, Estimate]
     alternatives: tuple[str, ...] = ()
     evidence: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def definition(self) -> Effect:
+        """The catalogue's effect: its physics, equation, source and parameters."""
+        return CATALOGUE[self.id]
+
+    @property
+    def stage(self) -> str:
+        """Part of the chain from command to recording."""
+        return str(self.definition.stage)
 
 
 @dataclass(frozen=True)
@@ -108,6 +118,11 @@ class ChannelFit:
 
     rmse: float
     noise: float
+
+    @staticmethod
+    def of(left: Array, noise: Array) -> 'ChannelFit':
+        """What is left (M,) of a signal, beside the noise of its samples (M,)."""
+        return ChannelFit(float(np.sqrt(np.mean(left**2))), float(np.sqrt(np.mean(noise**2))))
 
     @property
     def ratio(self) -> float:
@@ -149,14 +164,6 @@ class UnknownTerm:
         Where it acts.
     place : str
         Name in the table of places.
-    what : str
-        What it is a function of, and what it does, in words.
-    stage : str
-        Part of the chain.
-    unit : str
-        Of the function; '-' where it is the logarithm of a factor.
-    symbol, argument : str
-        The state that it depends on: in the formula, and in words with its unit.
     nodes, values, deviation : array (N,)
         The state, the function and its standard deviation.
     expression : str
@@ -181,11 +188,6 @@ class UnknownTerm:
 
     joint: str
     place: str
-    what: str
-    stage: str
-    unit: str
-    symbol: str
-    argument: str
     nodes: Array
     values: Array
     deviation: Array
@@ -198,6 +200,11 @@ class UnknownTerm:
     siblings: tuple[str, ...] = ()
     multiplies: bool = False
     factors: tuple['UnknownTerm', ...] = ()
+
+    @property
+    def there(self) -> Place:
+        """The place: its stage, what the function does, its unit and its argument."""
+        return FUNCTIONS[self.place]
 
     @property
     def helps(self) -> bool:
@@ -235,10 +242,8 @@ class Explanation:
         The missing term for `unknown_physics`.
     adequate : bool
         Whether the augmented plant leaves nothing but noise and small errors of form.
-    adequacy : mapping of str to float
-        Numbers behind `adequate`.
-    baseline_used : bool
-    runtime_s : float
+    beyond_form : float
+        What it leaves over what rigs of another form leave, of the worst joint.
     """
 
     verdict: Verdict
@@ -251,9 +256,7 @@ class Explanation:
     candidates: tuple[Candidate, ...] = ()
     unknown: UnknownTerm | None = None
     adequate: bool = True
-    adequacy: Mapping[str, float] = field(default_factory=dict)
-    baseline_used: bool = False
-    runtime_s: float = 0.0
+    beyond_form: float = math.nan
 
     @staticmethod
     def without_fit(verdict: Verdict, plant: PlantDescription) -> 'Explanation':

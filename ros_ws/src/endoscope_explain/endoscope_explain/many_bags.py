@@ -86,10 +86,6 @@ def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = Non
         Processes side by side.
     progress : callable, optional
 
-    Returns
-    -------
-    Reported
-
     Raises
     ------
     BagError

@@ -22,10 +22,6 @@ def parallel_map[Task, Result](
     jobs : int
         Number of threads.
 
-    Returns
-    -------
-    list
-
     Raises
     ------
     BaseException

@@ -139,14 +139,6 @@ def require_as_named(path: Path, audit: AuditReport) -> None:
 def read_inputs(sources: Sources) -> Inputs:
     """Read and audit all recordings of a case.
 
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    Inputs
-
     Raises
     ------
     BagError

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
-from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import simulate
 from endoscope_explain.audit import audit_recording
@@ -86,14 +85,10 @@ def stribeck_case(stribeck_recording):
     audit = audit_recording(stribeck_recording, plant)
     augmented = dataclasses.replace(plant, effects=(EXPLAINED,))
     recorded = view(audit.recording, {'nominal': plant, 'refitted': plant, 'augmented': augmented})
-    definition = CATALOGUE[EXPLAINED.id]
     effect = NamedEffect(
         EXPLAINED.id,
         EXPLAINED.joint,
-        str(definition.stage),
         0.97,
-        definition.equation,
-        definition.source,
         {name: Estimate(v, 0.9 * v, 1.1 * v, '-') for name, v in EXPLAINED.parameters.items()},
         ('viscous_friction',),
         {'gain': 120.0},
@@ -121,11 +116,6 @@ def missing_function():
     return UnknownTerm(
         'bend_x',
         'load_of_angle',
-        "Moment on the joint, a function of the joint's angle",
-        'joint',
-        'N m',
-        'q',
-        "the joint's angle, rad",
         np.linspace(-1.0, 1.0, 41),
         np.linspace(-1.0, 1.0, 41) ** 2,
         np.full(41, 0.05),

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
-from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.explanation import Estimate, Explanation, NamedEffect, Verdict
 from endoscope_explain.fit.free_parameters import FRICTION_PROFILE_NAMES
 from endoscope_explain.locate.chain_cut import cut_at_motor
@@ -21,10 +20,7 @@ def located(record, effect_id, joint='bend_x', **parameters):
     effect = NamedEffect(
         effect_id,
         joint,
-        str(CATALOGUE[effect_id].stage),
         1.0,
-        '',
-        '',
         {k: Estimate(v, v, v, '-') for k, v in parameters.items()},
     )
     (place,) = locate_effects(recording, plant, [effect])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
-from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.design.distance import distance
 from endoscope_explain.design.imagined import imagine, is_safe
 from endoscope_explain.design.proposal import propose
@@ -15,10 +14,7 @@ PLANT = PlantDescription()
 RIVALLED = NamedEffect(
     'transport_delay',
     'bend_x',
-    str(CATALOGUE['transport_delay'].stage),
     0.5,
-    '',
-    '',
     {},
     ('actuator_lag',),
 )
@@ -83,6 +79,6 @@ def test_where_no_motion_is_safe_none_is_proposed(record):
 
 
 def test_without_a_rival_there_is_nothing_to_separate(record):
-    effect = NamedEffect('transport_delay', 'bend_x', 'actuator', 0.9, '', '', {})
+    effect = NamedEffect('transport_delay', 'bend_x', 0.9, {})
     plant = with_effect('transport_delay')
     assert propose(record(plant, duration=3.0), plant, effect) is None

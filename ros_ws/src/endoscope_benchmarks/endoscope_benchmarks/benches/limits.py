@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_benchmarks.benches.concealed import seeds
+from endoscope_benchmarks.benches.cases import add_seeds
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -14,9 +14,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'is not named on one of some rigs, and prints the last strength at which it was.',
     )
     parser.add_argument('--effects', nargs='+', metavar='ID', help='(default: all that are drawn)')
-    parser.add_argument(
-        '--seeds', type=seeds, default=range(1, 4), metavar='A-B', help='of the rigs (1-3)'
-    )
+    add_seeds(parser, 'of the rigs (default: 1-3)')
     parser.add_argument('--jobs', type=int, default=1, metavar='N', help='effects side by side (1)')
 
 

@@ -77,7 +77,7 @@ def statements(said: Explanation) -> tuple[Statement, ...]:
     if term is not None and not any(
         e.joint == term.joint and e.id in term.siblings for e in said.effects
     ):
-        unknown = Statement(term.place, term.joint, term.stage, term.rivals)
+        unknown = Statement(term.place, term.joint, str(term.there.stage), term.rivals)
         place = 0 if said.verdict is Verdict.UNKNOWN_PHYSICS else len(found)
         found.insert(place, unknown)
     return tuple({(each.name, each.joint): each for each in found}.values())

@@ -22,8 +22,8 @@ GOOD = 1.3
 """Rmse over noise up to which a second recording is predicted."""
 
 
-@dataclass(frozen=True)
-class Row:
+@dataclass(frozen=True, kw_only=True)
+class Row(Judgement):
     """What was concealed, what was said, and how far it is right.
 
     Attributes
@@ -41,10 +41,6 @@ class Row:
     verdict : str
     said : tuple of str
         Names with their joints, most certain first.
-    first, place, stage, exact, in_set : bool
-    false : int
-    set_size : float
-        See `Judgement`.
     probability : float
         Of the first name; NaN where none is said.
     held, intervals : int
@@ -74,20 +70,13 @@ class Row:
     left: float
     verdict: str
     said: tuple[str, ...]
-    first: bool
-    place: bool
-    stage: bool
-    exact: bool
-    false: int
-    in_set: bool
-    set_size: float
-    probability: float
-    held: int
-    intervals: int
-    nominal: float
-    refitted: float
-    augmented: float
-    seconds: float
+    probability: float = math.nan
+    held: int = 0
+    intervals: int = 0
+    nominal: float = math.nan
+    refitted: float = math.nan
+    augmented: float = math.nan
+    seconds: float = math.nan
     truth_share: float = math.nan
     shares: tuple[float, ...] = ()
     beyond_form: float = math.nan
@@ -138,14 +127,14 @@ def row_of(case: Case) -> Row:
         for plant in (said.nominal, said.refitted, said.augmented)
     )
     return Row(
-        case.stratum,
-        case.seed,
-        tuple(f'{law.name}@{law.joint or "all"}' for law in case.laws),
-        case.note,
-        case.moved,
-        left(case.bare, case.true, case.recording.command.values) if case.laws else 0.0,
-        str(said.verdict),
-        tuple(f'{each.name}@{each.joint}' for each in names),
+        stratum=case.stratum,
+        seed=case.seed,
+        concealed=tuple(f'{law.name}@{law.joint or "all"}' for law in case.laws),
+        note=case.note,
+        moved=case.moved,
+        left=left(case.bare, case.true, case.recording.command.values) if case.laws else 0.0,
+        verdict=str(said.verdict),
+        said=tuple(f'{each.name}@{each.joint}' for each in names),
         probability=said.effects[0].probability if said.effects else math.nan,
         held=sum(error <= 1.0 for error in errors),
         intervals=len(errors),
@@ -155,10 +144,7 @@ def row_of(case: Case) -> Row:
         seconds=seconds,
         truth_share=max(true, default=0.0) if law and shares else math.nan,
         shares=tuple(sorted(shares.values(), reverse=True)),
-        beyond_form=max(
-            (v for key, v in said.adequacy.items() if key.startswith('beyond_form_')),
-            default=math.nan,
-        ),
+        beyond_form=said.beyond_form,
         rival=said.effects[0].evidence['rival'] if said.effects else math.nan,
         errors=tuple(REACH * error for error in errors),
         **vars(judgement),
@@ -203,21 +189,14 @@ def failed(stratum: str, seed: int, error: BaseException) -> Row:
     """The row of a case that could not be explained: wrong in every respect."""
     wrong = Judgement(False, False, False, False, 0, False, math.nan)
     return Row(
-        stratum,
-        seed,
-        (),
-        f'{type(error).__name__}: {error}',
-        math.nan,
-        math.nan,
-        'FAILED',
-        (),
-        probability=math.nan,
-        held=0,
-        intervals=0,
-        nominal=math.nan,
-        refitted=math.nan,
-        augmented=math.nan,
-        seconds=math.nan,
+        stratum=stratum,
+        seed=seed,
+        concealed=(),
+        note=f'{type(error).__name__}: {error}',
+        moved=math.nan,
+        left=math.nan,
+        verdict='FAILED',
+        said=(),
         **vars(wrong),
     )
 

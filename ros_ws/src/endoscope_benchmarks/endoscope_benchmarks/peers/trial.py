@@ -9,8 +9,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from endoscope_benchmarks.concealed.judge import Judgement, Statement, judged
-from endoscope_benchmarks.concealed.strata import STRATA, drawn_case
-from endoscope_benchmarks.concealed.trial import Row, explained
+from endoscope_benchmarks.concealed.strata import drawn_case
+from endoscope_benchmarks.concealed.trial import explained
 from endoscope_benchmarks.peers import regression_on_library as library
 from endoscope_benchmarks.peers import symbolic
 from endoscope_benchmarks.peers.empirical_risk import by_empirical_risk, empirical_risk_example
@@ -56,12 +56,8 @@ class Answer:
         return f'{case}  {self.peer:19s}{right:6s}{self.seconds:7.1f} s  {self.said}'
 
 
-def require(names: Sequence[str], strata: Sequence[str]) -> None:
-    """Raise EndoscopeError for what is not known, and for peers that are not installed."""
-    for kind, given, known in (('peer', names, PEERS), ('stratum', strata, STRATA)):
-        for name in given:
-            if name not in known:
-                raise EndoscopeError(f"no {kind} '{name}'; known are {', '.join(known)}")
+def require_installed(names: Sequence[str]) -> None:
+    """Raise EndoscopeError for peers that are not installed."""
     missing = [PEERS[name][0] for name in names if not _version(PEERS[name][0])]
     if missing:
         raise EndoscopeError(
@@ -74,7 +70,7 @@ def answers(names: Sequence[str], stratum: str, seed: int) -> list[Answer]:
     """Ask peers, and last ourselves, about one case on one core."""
     case, found = drawn_case(stratum, seed), []
 
-    def answer(peer: str, said: Sequence[str], judged_as: Judgement | Row, seconds: float) -> None:
+    def answer(peer: str, said: Sequence[str], judged_as: Judgement, seconds: float) -> None:
         right = judged_as.first, judged_as.place, judged_as.false
         found.append(Answer(peer, stratum, seed, ' + '.join(said) or 'nothing', *right, seconds))
 

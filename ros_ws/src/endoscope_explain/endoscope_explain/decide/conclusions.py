@@ -1,5 +1,6 @@
 """What is concluded from the decisions on all joints: names, verdict, plants, ladder of fits."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -69,15 +70,10 @@ def named(
     # once before any comes again.
     once: dict[tuple[str, str], NamedEffect] = {}
     for effect in ordered:
-        shared = CATALOGUE[effect.id].stage == Stage.RECORDING
+        shared = effect.stage == Stage.RECORDING
         once.setdefault((effect.id, '' if shared else effect.joint), effect)
-    seen: set[str] = set()
-    first: list[NamedEffect] = []
-    again: list[NamedEffect] = []
-    for effect in once.values():
-        (again if effect.id in seen else first).append(effect)
-        seen.add(effect.id)
-    return tuple(first + again)
+    first = {effect.id: effect for effect in reversed(once.values())}
+    return tuple(sorted(once.values(), key=lambda e: e is not first[e.id]))
 
 
 def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
@@ -87,10 +83,7 @@ def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
     return NamedEffect(
         term.name,
         joint,
-        str(definition.stage),
         term.probability,
-        definition.equation,
-        definition.source,
         {}
         if fitted is None
         else effect_estimates(
@@ -115,13 +108,8 @@ def verdict_of(effects: tuple[NamedEffect, ...], decisions: list[Decision]) -> V
     unnamed = any(not d.adequate and d.explained < MOST for d in decisions)
     if unknown or unnamed:
         return Verdict.UNKNOWN_PHYSICS
-    stages = {effect.stage for effect in effects}
-    if stages & {Stage.ACTUATOR, Stage.TRANSMISSION, Stage.JOINT}:
-        return Verdict.MISSING_PHYSICS
-    if Stage.SENSING in stages:
-        return Verdict.SENSOR_FAULT
-    if Stage.RECORDING in stages:
-        return Verdict.RECORDING_FAULT
+    if effects:
+        return verdict_by_stage(effects)
     changed = any(
         has_changed(name, e)
         for d in decisions
@@ -130,6 +118,14 @@ def verdict_of(effects: tuple[NamedEffect, ...], decisions: list[Decision]) -> V
         ).items()
     )
     return Verdict.PARAMETERS_DIFFER if changed else Verdict.CONSISTENT
+
+
+def verdict_by_stage(effects: Sequence[NamedEffect]) -> Verdict:
+    """What effects amount to: physics wins over a faulty sensor, that over a faulty recording."""
+    stages = {effect.stage for effect in effects}
+    if stages & {Stage.ACTUATOR, Stage.TRANSMISSION, Stage.JOINT}:
+        return Verdict.MISSING_PHYSICS
+    return Verdict.SENSOR_FAULT if Stage.SENSING in stages else Verdict.RECORDING_FAULT
 
 
 def has_changed(name: str, estimate: NominalEstimate) -> bool:
@@ -181,15 +177,10 @@ def unknown_term(
     UnknownTerm
     """
     function = fitted_function(one.fit, term.id)
-    place, formula = function.family.place, nearest_formula(function)
+    formula = nearest_formula(function)
     return UnknownTerm(
         function.joint,
-        place.id,
-        place.physics.rstrip('.'),
-        str(place.stage),
-        place.unit,
-        place.argument.symbol,
-        f'{place.argument.words}, {place.argument.unit}',
+        function.family.place.id,
         function.family.nodes,
         function.values,
         function.deviation,

@@ -52,12 +52,6 @@ def refit(
 def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescription:
     """Put the fitted numbers of one joint back into a plant.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-    joint : str
-    found : Fit
-
     Returns
     -------
     PlantDescription

@@ -16,11 +16,6 @@ Array = NDArray[np.float64]
 def imagine(plant: PlantDescription, waveform: Waveform) -> Recording:
     """Record a plant's noise-free answer to a motion.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-    waveform : Waveform
-
     Returns
     -------
     Recording

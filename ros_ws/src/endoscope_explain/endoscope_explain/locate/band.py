@@ -12,10 +12,6 @@ Array = NDArray[np.float64]
 def band_hz(excess: SignalExcess) -> tuple[float, float]:
     """Find the band that holds 90 % of what the prediction lacks.
 
-    Parameters
-    ----------
-    excess : SignalExcess
-
     Returns
     -------
     (float, float)

@@ -83,7 +83,7 @@ def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place
     recorded = view(recording, {'refitted': explanation.refitted})
     found = excess_between(list(recorded.signals.values()), 'refitted', None)
     if term is not None and term.helps:
-        return [place(recording, found, term.stage, term.joint)]
+        return [place(recording, found, str(term.there.stage), term.joint)]
     return [place(recording, found, _shows_in(found), found[0].view.joint)]
 
 

@@ -74,10 +74,6 @@ def simulate(
     out : str or Path, optional
         Where to write the answer as a bag; without it, it is kept as long as the result is.
 
-    Returns
-    -------
-    Signals
-
     Raises
     ------
     EndoscopeError
@@ -133,10 +129,6 @@ def explain(
         Processes side by side.
     progress : callable, optional
         Told in a few words what is being done, such as `print`.
-
-    Returns
-    -------
-    Explained
 
     Raises
     ------

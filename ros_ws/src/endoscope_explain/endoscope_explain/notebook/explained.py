@@ -16,7 +16,7 @@ from endoscope_explain.explanation import NamedEffect, NominalEstimate
 from endoscope_explain.notebook.drawing import OUTSIDE, embedded, html_table
 from endoscope_explain.observe.predicted_signals import RecordedView, view
 from endoscope_explain.report.html_page import html_page
-from endoscope_explain.report.numbers import PLANTS, Shown, measurable, shown
+from endoscope_explain.report.numbers import PLANTS, Shown, numbers_of
 from endoscope_explain.report.report_mapping import report_mapping
 from endoscope_explain.report.sentences import HEADLINES, next_step, verdict_sentence
 from endoscope_explain.report.terminal import fits_table, told
@@ -129,8 +129,7 @@ class Explained:
         rows: list[tuple[str, ...]] = []
         for effect in self.effects:
             named = (effect.id, effect.joint, f'{effect.probability:.2f}')
-            numbers = [shown(name, e) for name, e in measurable(effect).items()]
-            for one in numbers or [Shown('-', '-', '-', '-', '-')]:
+            for one in numbers_of(effect) or [Shown('-', '-', '-', '-', '-')]:
                 rows.append((*named, one.name, one.value, f'{one.low} to {one.high}', one.unit))
                 named = ('', '', '')
         return rows

@@ -165,10 +165,6 @@ def signals_of_bag(path: str | Path, namespace: str | None = None, kept: Any = N
     kept : object, optional
         Held as long as the signals are.
 
-    Returns
-    -------
-    Signals
-
     Raises
     ------
     BagError

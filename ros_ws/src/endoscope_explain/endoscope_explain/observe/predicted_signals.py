@@ -183,9 +183,6 @@ def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> Record
 def rung(recorded: RecordedView, name: str) -> dict[str, ChannelFit]:
     """Return rmse and noise of every signal, on all samples, under one of a view's plants."""
     return {
-        signal: ChannelFit(
-            float(np.sqrt(np.mean((v.measured - v.predicted[name]) ** 2))),
-            float(np.sqrt(np.mean(v.noise**2))),
-        )
+        signal: ChannelFit.of(v.measured - v.predicted[name], v.noise)
         for signal, v in recorded.signals.items()
     }

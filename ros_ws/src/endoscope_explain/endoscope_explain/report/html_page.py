@@ -1,20 +1,18 @@
 """report.html: one self-contained page that is read in a minute."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from numpy.typing import NDArray
 
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.case import ExplainedCase, Ladder, Place
-from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
+from endoscope_explain.case import ExplainedCase, Ladder
+from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.tolerance import tolerance
 from endoscope_explain.fit.whiteness import slips
+from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.predicted_signals import RecordedView, view
 from endoscope_explain.recording.signals import gear
-from endoscope_explain.report.chain_drawing import chain_svg
 from endoscope_explain.report.figures.experiment import experiment_figure, unknown_figure
 from endoscope_explain.report.figures.ladder import ladder_figure
 from endoscope_explain.report.figures.loops import (
@@ -30,8 +28,8 @@ from endoscope_explain.report.numbers import (
     digits,
     in_degrees,
     judged,
-    measurable,
     moving_joints,
+    numbers_of,
     rmse,
     shown,
 )
@@ -48,8 +46,6 @@ from endoscope_explain.report.sentences import (
 )
 from endoscope_explain.search.repeated_motion import motion_repeats
 
-Array = NDArray[np.float64]
-
 GREEN, BLUE, AMBER, RED, GREY = '#136b4f', '#2f6fb7', '#a15c00', '#b3261e', '#52606d'
 COLOURS = {
     Verdict.CONSISTENT: GREEN,
@@ -65,36 +61,26 @@ EFFECTS_TITLE = {
     Verdict.SENSOR_FAULT: 'What is at fault',
     Verdict.RECORDING_FAULT: 'What is at fault',
 }
+CHAIN = {
+    'command': ('Command', 'motor/servo_jp'),
+    'actuator': ('Servo', 'motor/measured_js'),
+    'transmission': ('Wires, sheath', 'wires/measured_js'),
+    'joint': ('Bending joint', 'the tip'),
+    'sensing': ('Sensors', 'load cells, tracker'),
+    'recording': ('Recording', 'clocks, samples'),
+}
+"""From command to recording: what each stage is called, and what is read of it."""
+
+DRAWINGS = ('unknown', 'timeline', 'loops', 'signals', 'ladder', 'experiment')
 
 
 def html_page(case: ExplainedCase) -> str:
-    """Return the page of a case.
-
-    Parameters
-    ----------
-    case : ExplainedCase
-
-    Returns
-    -------
-    str
-        HTML that needs no other file.
-    """
+    """Return the page of a case: HTML that needs no other file."""
     explanation = case.explanation
-    plants = _plants(explanation)
-    recorded = view(case.recording, plants)
+    recorded = view(case.recording, _plants(explanation))
     joint = _joint_of_interest(case, recorded)
-    j = case.recording.joints.index(joint)
-    command = (case.recording.command.time, case.recording.command.values[:, j] / gear())
-    # Where a sensor repeats one reading, none of its samples is judged.
-    judgeable = any(v.quantity == 'bending' for v in recorded.of_joint(joint))
-    passage = telling_passage(recorded, joint) if judgeable else (0.0, case.recording.duration)
-    moved = judgeable and joint in moving_joints(case.recording)
-    # What is drawn is then what was meant, and shows nothing.
-    shaded = () if case.audit.unusable else case.places
-    experiment = case.next_experiment
     found = explanation.unknown
     unknown = found if found is not None and found.helps else None
-    formula = unknown is not None and unknown.formula_share >= LEAST_SHARE
     ladder = judged(case, case.ladder)
     environment = Environment(
         loader=PackageLoader('endoscope_explain', 'report/templates'),
@@ -103,50 +89,33 @@ def html_page(case: ExplainedCase) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters.update(digits=digits, plain=plain)
     return environment.get_template('report.html.j2').render(
-        name=case.recording.name,
+        case=case,
         headline=HEADLINES[case.verdict],
         colour=COLOURS[case.verdict],
         sentence=verdict_sentence(case),
         change=before_and_after(case),
-        chain=chain_svg(_guilty(case)),
-        places=[_place(place) for place in case.places],
+        chain=CHAIN,
+        guilty=_guilty(case),
         cut=_cut(case, joint) if case.places else '',
         effects_title=EFFECTS_TITLE.get(case.verdict, 'What was named besides'),
-        effects=[_effect(effect) for effect in case.effects],
+        numbers_of=numbers_of,
+        physics_of=physics_of,
+        meaning=EVIDENCE,
         joint=joint,
         slipping=[o.joint for o in recorded.observations if slips(o)],
-        fitted=bool(explanation.fit),
-        differs=bool(case.places),
         plants=[PLANTS[name] for name in shown_plants(recorded.of_joint(joint)[0])],
-        mended=case.audit.unusable,
-        passage=passage,
         unknown=unknown,
-        formula=formula,
-        unknown_svg=unknown_figure(unknown, formula) if unknown else '',
-        timeline_svg=timeline_figure(recorded, command, joint, shaded) if judgeable else '',
-        loops_svg=loops_figure(recorded, command, joint, passage) if moved else '',
-        signals_svg=signals_figure(recorded, joint, passage) if moved else '',
-        ladder_svg=ladder_figure(ladder) if ladder else '',
+        formula=unknown is not None and unknown.formula_share >= LEAST_SHARE,
+        drawings=_drawings(case, recorded, joint, ladder),
         tables=_tables(case, ladder),
         parameters=_parameters(case),
-        band=case.band,
         tried=_tried(case),
-        not_refitted=_not_refitted(case, recorded),
+        not_refitted=[_not_refitted(case, o) for o in recorded.observations],
         next_step=next_step(case),
-        experiment=experiment,
-        experiment_svg=experiment_figure(experiment) if experiment else '',
-        distances=_ranked(experiment.distances) if experiment else [],
         experiment_file=EXPERIMENT_FILE,
-        findings=case.audit.findings,
-        notes=case.recording.notes,
-        duration=f'{case.recording.duration:.1f}',
-        joints=case.recording.joints,
-        runtime_s=case.runtime_s,
-        baseline=case.baseline_name,
-        validation=case.validation_name,
-        provenance=case.provenance,
-        written='improved' if case.effects or unknown else PLANTS[list(plants)[-1]],
+        written='improved' if case.effects or unknown else PLANTS[list(_plants(explanation))[-1]],
     )
 
 
@@ -168,7 +137,33 @@ def _joint_of_interest(case: ExplainedCase, recorded: RecordedView) -> str:
     return case.recording.joints[int(np.argmax(moved))]
 
 
+def _drawings(
+    case: ExplainedCase, recorded: RecordedView, joint: str, ladder: Ladder
+) -> dict[str, Any]:
+    """The drawings that can be made, as SVG by their names, and the passage that they show."""
+    drawn: dict[str, Any] = dict.fromkeys(DRAWINGS, '')
+    # Where a sensor repeats one reading, none of its samples is judged.
+    if any(v.quantity == 'bending' for v in recorded.of_joint(joint)):
+        j = case.recording.joints.index(joint)
+        command = (case.recording.command.time, case.recording.command.values[:, j] / gear())
+        # What is drawn of a recording that cannot be used is what was meant, and shows nothing.
+        shaded = () if case.audit.unusable else case.places
+        drawn['timeline'] = timeline_figure(recorded, command, joint, shaded)
+        if joint in moving_joints(case.recording):
+            passage = drawn['passage'] = telling_passage(recorded, joint)
+            drawn['loops'] = loops_figure(recorded, command, joint, passage)
+            drawn['signals'] = signals_figure(recorded, joint, passage)
+    if case.explanation.unknown is not None:
+        drawn['unknown'] = unknown_figure(case.explanation.unknown)
+    if ladder:
+        drawn['ladder'] = ladder_figure(ladder)
+    if case.next_experiment is not None:
+        drawn['experiment'] = experiment_figure(case.next_experiment)
+    return drawn
+
+
 def _guilty(case: ExplainedCase) -> dict[str, list[str]]:
+    """What was found in each stage of the chain."""
     guilty: dict[str, list[str]] = {}
     for effect in case.effects:
         guilty.setdefault(effect.stage, []).append(f'{effect.id} ({effect.joint})')
@@ -177,21 +172,6 @@ def _guilty(case: ExplainedCase) -> dict[str, list[str]]:
         for place in case.places:
             guilty.setdefault(place.stage, []).append(f'{word.replace("_", " ")} ({place.joint})')
     return guilty
-
-
-def _place(place: Place) -> dict[str, Any]:
-    low, high = place.band_hz
-    shown = ', '.join(f'{a:.1f} … {b:.1f}' for a, b in place.intervals[:6])
-    more = len(place.intervals) - 6
-    return {
-        'stage': place.stage,
-        'joint': place.joint,
-        # The audit's findings have no state of the rig: their text stands above.
-        'regime': place.regime if place.shares else '',
-        'bars': [{'signal': plain(s), 'share': place.shares.get(s, 0.0)} for s in place.signals],
-        'intervals': shown + (f' s and {more} more' if more > 0 else ' s') if shown else '',
-        'band': f'{low:.2g} … {high:.2g} Hz' if high > 0 else '',
-    }
 
 
 def _cut(case: ExplainedCase, joint: str) -> str:
@@ -205,46 +185,33 @@ def _cut(case: ExplainedCase, joint: str) -> str:
     )
 
 
-def _effect(effect: NamedEffect) -> dict[str, Any]:
-    rows = [shown(name, e) for name, e in measurable(effect).items()]
-    return {
-        'id': effect.id,
-        'joint': effect.joint,
-        'physics': physics_of(effect),
-        'equation': effect.equation,
-        'source': effect.source,
-        'alternatives': effect.alternatives,
-        'rows': rows or [None],
-        'probability': f'{100 * effect.probability:.0f} %',
-        'evidence': [
-            {'key': key, 'value': digits(value), 'meaning': EVIDENCE.get(key, '')}
-            for key, value in effect.evidence.items()
-        ],
-    }
-
-
 def _tables(case: ExplainedCase, ladder: Ladder) -> list[dict[str, Any]]:
-    tables = [_table(case, 'held-out blocks of this recording', ladder)] if ladder else []
-    if case.validation:
-        title = f'second recording: {case.validation_name}'
-        tables.append(_table(case, title, judged(case, case.validation)))
-    return tables
+    titled = {'held-out blocks of this recording': ladder}
+    titled[f'second recording: {case.validation_name}'] = judged(case, case.validation)
+    return [
+        {
+            'title': title,
+            'models': [MODELS[name] for name in models],
+            'rows': [_row(signal, models) for signal in next(iter(models.values()))],
+        }
+        for title, models in titled.items()
+        if models
+    ]
 
 
-def _table(case: ExplainedCase, title: str, ladder: Ladder) -> dict[str, Any]:
-    rows = []
-    for signal in next(iter(ladder.values())):
-        fits = [fits.get(signal) for fits in ladder.values()]
-        least = min(f.rmse for f in fits if f is not None)
-        texts = [('', '') if f is None else rmse(signal, f) for f in fits]
-        cells = [
-            {'text': '', 'best': False}
-            if f is None
-            else {'text': f'{text} ({digits(f.ratio)})', 'best': f.rmse <= 1.02 * least}
-            for f, (text, _) in zip(fits, texts, strict=True)
-        ]
-        rows.append({'signal': plain(signal), 'unit': texts[0][1], 'cells': cells})
-    return {'title': title, 'models': [MODELS[name] for name in ladder], 'rows': rows}
+def _row(signal: str, models: Ladder) -> dict[str, Any]:
+    """What each model leaves of a signal; empty where one does not predict it."""
+    fits = [fits.get(signal) for fits in models.values()]
+    least = min(f.rmse for f in fits if f is not None)
+    texts = [('', '') if f is None else rmse(signal, f) for f in fits]
+    cells = [
+        {
+            'text': f'{text} ({digits(f.ratio)})' if f else '',
+            'best': f is not None and f.rmse <= 1.02 * least,
+        }
+        for f, (text, _) in zip(fits, texts, strict=True)
+    ]
+    return {'signal': signal, 'unit': texts[0][1], 'cells': cells}
 
 
 def _parameters(case: ExplainedCase) -> list[dict[str, Any]]:
@@ -266,46 +233,24 @@ def _parameters(case: ExplainedCase) -> list[dict[str, Any]]:
     return rows
 
 
-def _tried(case: ExplainedCase) -> list[dict[str, str]]:
+def _tried(case: ExplainedCase) -> list[dict[str, Any]]:
     """All that was refitted, joint by joint: scores of two joints have nothing to do."""
     rows = []
     for joint in case.recording.joints:
         ranked = [c for c in case.explanation.candidates if c.joint == joint]
         rows += [
-            {
-                'joint': joint,
-                'name': (' + '.join(c.effects) or 'no effect')
-                + (', numbers beyond their tolerance' if c.beyond_band else ''),
-                'score': f'{c.score:.1f}',
-                'behind': f'{c.score - ranked[0].score:.1f}',
-                'misfit': f'{np.sqrt(c.misfit):.2f}',
-            }
+            {'candidate': c, 'behind': c.score - ranked[0].score, 'misfit': np.sqrt(c.misfit)}
             for c in ranked
         ]
     return rows
 
 
-def _not_refitted(case: ExplainedCase, recorded: RecordedView) -> list[dict[str, Any]]:
+def _not_refitted(case: ExplainedCase, observation: JointObservation) -> dict[str, Any]:
     """Effects that no composition of a joint holds, and why."""
-    found = []
-    for observation in recorded.observations:
-        sets = [c.effects for c in case.explanation.candidates if c.joint == observation.joint]
-        if not any(sets):
-            found.append({'joint': observation.joint, 'less': [], 'late': []})
-            continue
-        known = {effect for effects in sets for effect in effects}
-        rest = [e for e in CATALOGUE.values() if e.id not in known and not e.traits.audited]
-        once = not motion_repeats(observation)
-        late = [e.id for e in rest if once and e.traits.depends_on_time]
-        found.append(
-            {
-                'joint': observation.joint,
-                'less': [e.id for e in rest if e.id not in late],
-                'late': late,
-            }
-        )
-    return found
-
-
-def _ranked(distances: Mapping[str, float]) -> list[tuple[str, float]]:
-    return sorted(distances.items(), key=lambda item: -item[1])
+    sets = [c.effects for c in case.explanation.candidates if c.joint == observation.joint]
+    known = {effect for effects in sets for effect in effects}
+    rest = [e for e in CATALOGUE.values() if e.id not in known and not e.traits.audited]
+    once = not motion_repeats(observation)
+    late = [e.id for e in rest if once and e.traits.depends_on_time]
+    less = [e.id for e in rest if e.id not in late]
+    return {'joint': observation.joint, 'any': bool(known), 'less': less, 'late': late}

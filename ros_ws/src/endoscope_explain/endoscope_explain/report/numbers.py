@@ -1,11 +1,9 @@
 """Numbers as a person reads them: in degrees, without switches and settings that do nothing."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from endoscope_core.physics.effect import Parameter
-from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.plant_file import JOINT_NAMES
 from endoscope_explain.case import ExplainedCase, Ladder
 from endoscope_explain.explanation import ChannelFit, Estimate, NamedEffect
@@ -75,20 +73,21 @@ def shown(name: str, estimate: Estimate) -> Shown:
 
 def measurable(effect: NamedEffect) -> dict[str, Estimate]:
     """Parameters of an effect that are numbers: no switches, and no settings left at nothing."""
-    known = _known(effect)
-    return {
-        name: e
-        for name, e in effect.parameters.items()
-        if name not in known or _is_number(known[name], e)
-    }
+    known = {p.name: p for p in effect.definition.parameters}
+    return {name: e for name, e in effect.parameters.items() if _is_number(known[name], e)}
+
+
+def numbers_of(effect: NamedEffect) -> list[Shown]:
+    """The measurable parameters of an effect as text."""
+    return [shown(name, e) for name, e in measurable(effect).items()]
 
 
 def form(effect: NamedEffect) -> tuple[str, ...]:
     """What the switches of an effect stand for, in words."""
     return tuple(
-        parameter.said(effect.parameters[name].value)
-        for name, parameter in _known(effect).items()
-        if parameter.is_switch and name in effect.parameters
+        parameter.said(effect.parameters[parameter.name].value)
+        for parameter in effect.definition.parameters
+        if parameter.is_switch and parameter.name in effect.parameters
     )
 
 
@@ -123,11 +122,6 @@ def rmse(signal: str, fit: ChannelFit) -> tuple[str, str]:
     """Error of a signal and its unit, as text."""
     _, unit, factor = in_degrees('_rad', _units(JOINT_NAMES)[signal])
     return digits(factor * fit.rmse), unit
-
-
-def _known(effect: NamedEffect) -> Mapping[str, Parameter]:
-    definition = CATALOGUE.get(effect.id)
-    return {} if definition is None else {p.name: p for p in definition.parameters}
 
 
 def _is_number(parameter: Parameter, estimate: Estimate) -> bool:

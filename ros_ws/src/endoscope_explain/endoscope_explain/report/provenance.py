@@ -19,10 +19,6 @@ def provenance(bag: Path, plant: Path | None, command: str) -> Provenance:
         Its file.
     command : str
 
-    Returns
-    -------
-    Provenance
-
     Raises
     ------
     OSError

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.case import ExplainedCase, Place
 from endoscope_explain.decide.combine import changed_parameters
 from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
@@ -63,10 +62,9 @@ def verdict_sentence(case: ExplainedCase) -> str:
 
 def physics_of(effect: NamedEffect) -> str:
     """What an effect does, and in which form."""
-    definition = CATALOGUE.get(effect.id)
-    physics = definition.physics.rstrip('.') if definition else effect.id.replace('_', ' ')
     said = form(effect)
-    return f'{physics}.' + (f' Here: {", ".join(said)}.' if said else '')
+    physics = f'{effect.definition.physics.rstrip(".")}.'
+    return f'{physics} Here: {", ".join(said)}.' if said else physics
 
 
 def where(place: Place) -> str:
@@ -147,7 +145,8 @@ def _unknown(case: ExplainedCase) -> str:
     if term is None or not term.helps:
         joint = case.places[0].joint if case.places else case.recording.joints[0]
         return f'Neither an effect of the catalogue nor a function of one state explains {joint}.'
-    return f'Missing on {term.joint}: {term.what[0].lower()}{term.what[1:]}.'
+    what = term.there.physics.rstrip('.')
+    return f'Missing on {term.joint}: {what[0].lower()}{what[1:]}.'
 
 
 def _percent(effect: NamedEffect) -> str:

@@ -3,7 +3,7 @@
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.report.columns import table
-from endoscope_explain.report.numbers import PLANTS, digits, judged, measurable, shown
+from endoscope_explain.report.numbers import PLANTS, digits, judged, numbers_of, shown
 from endoscope_explain.report.sentences import (
     differing,
     next_step,
@@ -17,10 +17,6 @@ from endoscope_explain.report.sentences import (
 def told(case: ExplainedCase) -> str:
     """Say what was found.
 
-    Parameters
-    ----------
-    case : ExplainedCase
-
     Returns
     -------
     str
@@ -29,7 +25,7 @@ def told(case: ExplainedCase) -> str:
     lines = [verdict_sentence(case)]
     for effect in case.effects:
         lines.append(f'  {effect.id}: {physics_of(effect)}')
-        lines += [f'    {shown(name, e)}' for name, e in measurable(effect).items()]
+        lines += [f'    {one}' for one in numbers_of(effect)]
     if case.verdict is Verdict.PARAMETERS_DIFFER:
         for (joint, name), e in differing(case).items():
             lines.append(f'  {joint}: {shown(name, e)}')

@@ -55,15 +55,6 @@ def wire_names(joint: str) -> tuple[str, str]:
 def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommands:
     """Shaft commands of a recording; desired angles times the gear where it has none.
 
-    Parameters
-    ----------
-    recording : Recording
-    plant : PlantDescription
-
-    Returns
-    -------
-    BagCommands
-
     Raises
     ------
     NoCommandsError

@@ -97,7 +97,6 @@ def test_what_was_there_in_health_is_not_explained_again(one_joint):
         baseline=one_joint.record(healthy, command, 2),
         jobs=2,
     )
-    assert explanation.baseline_used
     assert [e.id for e in explanation.effects] == ['tracker_bias']
     assert explanation.effects[0].parameters['bias_rad'].value == pytest.approx(0.05, rel=0.1)
 

@@ -1,77 +1,24 @@
 """The black boxes' rungs of the ladder: nominal parameters refitted, then the residual learnt."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.compare.black_box.features import motion_features
-from endoscope_explain.compare.black_box.regressors import (
-    GaussianProcess,
-    NeuralNetwork,
-    Regressor,
-    training,
-)
+from endoscope_explain.compare.black_box.regressors import KINDS, trained, training
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording
+from endoscope_explain.recording.signals import gear
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-KINDS: Mapping[str, Callable[[Array, Array], Regressor]] = {
-    'gaussian_process': GaussianProcess,
-    'neural_network': NeuralNetwork,
-}
 LEARNT = ('bending', 'tension', 'shaft_effort', 'shaft_position')
 BASE = 'refitted'
-
-
-class ResidualModel:
-    """One black box for all signals of one joint.
-
-    Parameters
-    ----------
-    kind : str
-        A key of `KINDS`.
-    recording : Recording
-    recorded : RecordedView
-        With the prediction `BASE`.
-    joint : str
-    use : callable
-        Which samples to train on, by their times.
-    """
-
-    def __init__(
-        self,
-        kind: str,
-        recording: Recording,
-        recorded: RecordedView,
-        joint: str,
-        use: Callable[[Array], Mask],
-    ) -> None:
-        self._joint = joint
-        views = _learnt(recorded, joint)
-        bending = next(v for v in views if v.quantity == 'bending')
-        time = bending.time[use(bending.time)]
-        residuals = np.stack([_averaged(v, time) for v in views], axis=1)
-        self._signals = [v.signal for v in views]
-        self._model = KINDS[kind](self._features(recording, recorded, time), residuals)
-
-    def corrections(
-        self, recording: Recording, recorded: RecordedView, time: Array
-    ) -> dict[str, Array]:
-        """Return the learnt residual of each signal at some times, in the signal's unit."""
-        predicted = self._model.predict(self._features(recording, recorded, time))
-        return dict(zip(self._signals, predicted.T, strict=True))
-
-    def _features(self, recording: Recording, recorded: RecordedView, at: Array) -> Array:
-        order = [self._joint, *(o for o in recorded.joints if o != self._joint)]
-        columns = [recording.joints.index(name) for name in order]
-        angle = 2.0 * recording.command.values[:, columns]
-        return motion_features(recording.command.time, angle, at)
 
 
 @dataclass(frozen=True)
@@ -120,8 +67,7 @@ def black_box_rungs(
 
     def judged(task: tuple[int, str, str]) -> dict[str, ChannelFit]:
         index, kind, joint = task
-        exam = exams[index]
-        return _judged(ResidualModel(kind, recording, recorded, joint, exam.use), exam, joint)
+        return _judged(kind, recording, recorded, exams[index], joint)
 
     rungs: list[dict[str, dict[str, ChannelFit]]] = [{kind: {} for kind in KINDS} for _ in exams]
     with training():
@@ -131,24 +77,33 @@ def black_box_rungs(
     return rungs
 
 
-def _judged(model: ResidualModel, exam: Exam, joint: str) -> dict[str, ChannelFit]:
+def _judged(
+    kind: str, recording: Recording, recorded: RecordedView, exam: Exam, joint: str
+) -> dict[str, ChannelFit]:
+    """One black box for all signals of one joint, judged on each."""
+    views = _learnt(recorded, joint)
+    bending = next(v for v in views if v.quantity == 'bending')
+    time = bending.time[exam.use(bending.time)]
+    residuals = np.stack([_averaged(v, time) for v in views], axis=1)
+    predict = trained(kind, _features(recording, recorded, joint, time), residuals)
+    column = {v.signal: k for k, v in enumerate(views)}
     found = {}
-    # Signals of one device have the same stamps, and a prediction is of all signals.
-    predicted: dict[bytes, dict[str, Array]] = {}
     for one in _learnt(exam.recorded, joint):
         chosen = exam.test(one.time)
         if not chosen.any():
             continue
-        time = one.time[chosen]
-        stamps = time.tobytes()
-        if stamps not in predicted:
-            predicted[stamps] = model.corrections(exam.recording, exam.recorded, time)
-        left = (one.measured - one.predicted[BASE])[chosen] - predicted[stamps][one.signal]
-        found[one.signal] = ChannelFit(
-            float(np.sqrt(np.mean(left**2))),
-            float(np.sqrt(np.mean(one.noise[chosen] ** 2))),
-        )
+        features = _features(exam.recording, exam.recorded, joint, one.time[chosen])
+        learnt = predict(features)[:, column[one.signal]]
+        left = (one.measured - one.predicted[BASE])[chosen] - learnt
+        found[one.signal] = ChannelFit.of(left, one.noise[chosen])
     return found
+
+
+def _features(recording: Recording, recorded: RecordedView, joint: str, at: Array) -> Array:
+    order = [joint, *(o for o in recorded.joints if o != joint)]
+    columns = [recording.joints.index(name) for name in order]
+    angle = recording.command.values[:, columns] / gear()
+    return motion_features(recording.command.time, angle, at)
 
 
 def _learnt(recorded: RecordedView, joint: str) -> list[SignalView]:

@@ -1,15 +1,13 @@
 """The ladder of fits."""
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 
 from endoscope_explain.case import Ladder
 from endoscope_explain.report.figures.style import (
     INK,
     RUNG_COLOUR,
     RUNG_TITLE,
-    STYLE,
+    page_figure,
     svg,
 )
 from endoscope_explain.report.sentences import plain
@@ -27,33 +25,19 @@ LEAST = 0.1
 
 
 def ladder_figure(ladder: Ladder) -> str:
-    """Plot rmse / noise of every signal for every model, on samples not used for fitting.
-
-    Parameters
-    ----------
-    ladder : Ladder
-        Of what is shown.
-
-    Returns
-    -------
-    str
-        SVG.
-    """
+    """Plot rmse / noise of every signal for every model, on samples not used for fitting."""
     rungs = list(ladder)
     signals = list(ladder[rungs[0]])
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 0.30 * len(signals) + 1.1), layout='constrained')
+    with page_figure(0.30 * len(signals) + 1.1) as figure:
         axis = figure.subplots()
         rows = np.arange(len(signals))[::-1]
         for number, name in enumerate(rungs):
-            fits = [ladder[name].get(signal) for signal in signals]
-            known = [
-                (r, max(f.ratio, LEAST)) for r, f in zip(rows, fits, strict=True) if f is not None
-            ]
+            # Beside each other, so that none is hidden where two models are as good.
+            beside = rows + 0.17 * (0.5 * (len(rungs) - 1) - number)
+            known = [(r, s) for r, s in zip(beside, signals, strict=True) if s in ladder[name]]
             axis.plot(
-                [v for _, v in known],
-                # Beside each other, so that none is hidden where two models are as good.
-                [r + 0.17 * (0.5 * (len(rungs) - 1) - number) for r, _ in known],
+                [max(ladder[name][s].ratio, LEAST) for _, s in known],
+                [r for r, _ in known],
                 MARKERS[name],
                 color=RUNG_COLOUR[name],
                 ms=6.5,
@@ -74,5 +58,5 @@ def ladder_figure(ladder: Ladder) -> str:
         axis.set_yticks(rows, [plain(s) for s in signals])
         axis.set_ylim(-0.6, len(signals) - 0.2)
         axis.set_xlabel('rmse / noise on held-out samples')
-        figure.legend(loc='outside upper left', ncols=3, fontsize=8)
+        figure.legend(loc='outside upper left', ncols=3)
         return svg(figure)

@@ -1,20 +1,11 @@
 """Hysteresis loops and signals in the passage that tells most."""
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
-from endoscope_explain.report.figures.style import (
-    RUNG_COLOUR,
-    RUNG_STYLE,
-    RUNG_TITLE,
-    STYLE,
-    svg,
-    thinned,
-)
+from endoscope_explain.report.figures.style import ABOVE, look, page_figure, svg, thinned
 
 Array = NDArray[np.float64]
 
@@ -23,11 +14,6 @@ PASSAGE_S = 8.0
 
 def telling_passage(recorded: RecordedView, joint: str) -> tuple[float, float]:
     """Find the passage in which the nominal prediction is furthest off.
-
-    Parameters
-    ----------
-    recorded : RecordedView
-    joint : str
 
     Returns
     -------
@@ -66,15 +52,9 @@ def loops_figure(
     joint : str
     passage : (float, float)
         In s.
-
-    Returns
-    -------
-    str
-        SVG.
     """
     views = _shown(recorded, joint)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 3.5), layout='constrained')
+    with page_figure(3.5) as figure:
         for axis, one in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
             inside = (one.time >= passage[0]) & (one.time <= passage[1])
             time = one.time[inside]
@@ -92,8 +72,7 @@ def loops_figure(
 def signals_figure(recorded: RecordedView, joint: str, passage: tuple[float, float]) -> str:
     """Plot angle and tensions over time, measured and predicted, and what each plant misses."""
     views = _shown(recorded, joint)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 1.5 * len(views) + 0.4), layout='constrained')
+    with page_figure(1.5 * len(views) + 0.4) as figure:
         axes = figure.subplots(len(views), 2, sharex=True, squeeze=False, width_ratios=(1.6, 1.0))
         for (axis, missed), one in zip(axes, views, strict=True):
             inside = (one.time >= passage[0]) & (one.time <= passage[1])
@@ -104,7 +83,7 @@ def signals_figure(recorded: RecordedView, joint: str, passage: tuple[float, flo
                     _draw(missed, one.time[inside], name, curves[0][1] - values, width)
             axis.set_title(_title(one))
             missed.set_title('measured - predicted')
-        axes[0, 0].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8)
+        axes[0, 0].legend(**ABOVE, ncols=3)
         for axis in axes[-1]:
             axis.set_xlabel('time (s)')
             axis.set_xlim(passage)
@@ -112,14 +91,8 @@ def signals_figure(recorded: RecordedView, joint: str, passage: tuple[float, flo
 
 
 def _draw(axis: Axes, across: Array, name: str, values: Array, width: float) -> None:
-    axis.plot(
-        *thinned(across, values),
-        RUNG_STYLE[name],
-        color=RUNG_COLOUR[name],
-        lw=width,
-        label=RUNG_TITLE[name],
-        zorder=1 if name == 'measured' else 2,
-    )
+    behind = 1 if name == 'measured' else 2
+    axis.plot(*thinned(across, values), **look(name), lw=width, zorder=behind)
 
 
 def shown_plants(one: SignalView) -> tuple[str, ...]:

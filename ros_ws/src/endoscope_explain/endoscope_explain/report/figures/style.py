@@ -1,8 +1,11 @@
 """One look for all plots of the report."""
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -44,9 +47,30 @@ STYLE: dict[Any, Any] = {
     'xtick.color': INK,
     'ytick.color': INK,
     'legend.frameon': False,
+    'legend.fontsize': 8.0,
     'svg.fonttype': 'none',
     'svg.hashsalt': 'endoscope',
 }
+
+
+ABOVE: dict[str, Any] = {'loc': 'lower right', 'bbox_to_anchor': (1.0, 1.0)}
+"""Where a legend hides no curve."""
+
+
+@contextmanager
+def page_figure(height: float) -> Iterator[Figure]:
+    """A figure as wide as the page, `height` inches high."""
+    with matplotlib.rc_context(STYLE):
+        yield Figure(figsize=(9.6, height), layout='constrained')
+
+
+def look(name: str) -> dict[str, Any]:
+    """How the curve of a model, or of what was measured, is drawn."""
+    return {
+        'color': RUNG_COLOUR[name],
+        'label': RUNG_TITLE[name],
+        'linestyle': RUNG_STYLE[name],
+    }
 
 
 def svg(figure: Figure) -> str:
@@ -57,18 +81,7 @@ def svg(figure: Figure) -> str:
     return content[content.index('<svg') :]
 
 
-def thinned(*columns: Array, most: int = MOST_POINTS) -> tuple[Array, ...]:
-    """Thin columns of equal length alike, so that a page stays small.
-
-    Parameters
-    ----------
-    *columns : array (N,)
-    most : int
-        Largest number of points.
-
-    Returns
-    -------
-    tuple of array (M,)
-    """
-    step = max(1, int(np.ceil(len(columns[0]) / most)))
+def thinned(*columns: Array) -> tuple[Array, ...]:
+    """Thin columns (N,) of equal length alike, so that a page stays small."""
+    step = max(1, int(np.ceil(len(columns[0]) / MOST_POINTS)))
     return tuple(column[::step] for column in columns)

@@ -2,23 +2,20 @@
 
 from collections.abc import Sequence
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from endoscope_explain.case import Place
 from endoscope_explain.locate.time_windows import WINDOW_S
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
 from endoscope_explain.report.figures.style import (
+    ABOVE,
     GUILTY,
     INK,
-    RUNG_COLOUR,
-    RUNG_STYLE,
-    RUNG_TITLE,
     SHADE,
-    STYLE,
+    look,
+    page_figure,
     svg,
     thinned,
 )
@@ -43,16 +40,10 @@ def timeline_figure(
     joint : str
     places : sequence of Place
         Their intervals are shaded.
-
-    Returns
-    -------
-    str
-        SVG.
     """
     views = recorded.of_joint(joint)
     bending = next(v for v in views if v.quantity == 'bending')
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 3.9), layout='constrained')
+    with page_figure(3.9) as figure:
         motion, misfit = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.25))
         for axis in (motion, misfit):
             _shade(axis, places)
@@ -62,19 +53,11 @@ def timeline_figure(
             bending.time, np.degrees(bending.measured), color=INK, lw=0.9, label='bending, measured'
         )
         motion.set_ylabel('deg')
-        motion.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=8)
+        motion.legend(**ABOVE, ncols=2)
         motion.set_title(f'Motion of {joint}')
         centres, levels = _misfit(views)
         for name, level in levels.items():
-            misfit.step(
-                centres,
-                np.maximum(level, LEAST),
-                RUNG_STYLE[name],
-                where='mid',
-                color=RUNG_COLOUR[name],
-                lw=1.1,
-                label=RUNG_TITLE[name],
-            )
+            misfit.step(centres, np.maximum(level, LEAST), where='mid', lw=1.1, **look(name))
         misfit.axhline(1.0, color=INK, lw=0.8, ls=':')
         misfit.annotate(
             'noise',
@@ -91,7 +74,7 @@ def timeline_figure(
         misfit.set_xlabel('time (s)')
         marked = '; shaded: where it shows' if any(place.intervals for place in places) else ''
         misfit.set_title(f'Misfit of its signals{marked}')
-        misfit.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8)
+        misfit.legend(**ABOVE, ncols=3)
         misfit.set_xlim(0.0, float(bending.time[-1]))
         return svg(figure)
 
