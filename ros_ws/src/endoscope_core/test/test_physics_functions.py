@@ -8,11 +8,13 @@ import pytest
 from endoscope_core.control.iterated_inverse import iterated_inverse
 from endoscope_core.physics import EffectSpec, PlantDescription, TermSpec, simulate
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.folds import sum_of
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.interpolation import NODES, VALUES, function_at
 from endoscope_core.physics.functions.place import Shape
 from endoscope_core.physics.functions.term import tabulated
-from endoscope_core.physics.hooks import HOOKS
+from endoscope_core.physics.hooks import HOOKS, LOAD
+from endoscope_core.physics.packing import pack, rest_state
 
 TICK = 1e-3
 SECONDS = 5.0
@@ -120,6 +122,45 @@ def test_ticks_agree_as_those_of_the_nominal_plant_do(place_id, nominal):
         left = np.abs(readings(shown(place_id), tick=tick)[::every] - fine).max(axis=0)
         bare = np.abs(readings(tick=tick)[::every] - few).max(axis=0)
         assert np.all(left < 2.0 * bare + 0.3), (tick, left, bare)
+
+
+PRODUCTS = [
+    ('load_of_speed', 'load_of_angle'),
+    ('load_of_angle', 'load_of_time'),
+    ('exponent_of_speed', 'exponent_of_angle'),
+    ('stiffness_of_tension', 'stiffness_of_time'),
+    ('length_difference_of_time', 'length_of_angle'),
+    ('pulley_of_shaft', 'pulley_of_tension'),
+    ('load_cell_pos_of_tension', 'load_cell_pos_of_time'),
+]
+
+
+@pytest.mark.parametrize(('place_id', 'other'), PRODUCTS)
+def test_a_function_that_multiplies_scales_what_the_others_add(place_id, other):
+    nothing = TermSpec('bend_x', other, values=(0.0,) * NODES, multiplies=True)
+    same = readings(shown(place_id))
+    np.testing.assert_array_equal(readings(shown(place_id), nothing), same)
+    if FUNCTIONS[other].from_zero:
+        return
+    more = TermSpec('bend_x', other, values=(0.5,) * NODES, multiplies=True)
+    scaled = readings(shown(place_id, 1.5))
+    np.testing.assert_allclose(readings(shown(place_id), more), scaled, rtol=1e-9, atol=1e-6)
+
+
+def test_the_slope_of_a_product_is_what_it_changes_by_the_step():
+    law, factor = shown('load_of_speed'), shown('load_of_angle')
+    factor = TermSpec('bend_x', factor.place, '0.5*sin(2*q)', range=(-1.5, 1.5), multiplies=True)
+    parameters, flags = pack(PlantDescription(terms=(law, factor)))
+    states, _, _ = rest_state(parameters, flags, TICK)
+    moment = sum_of(LOAD)
+
+    def load(step):
+        return moment(flags[0], parameters[0], states[0], 0.3 + step, step, 0.0, 1.0, TICK)
+
+    step, little = 1e-3, 1e-7
+    slope = (load(step + little)[0] - load(step - little)[0]) / (2.0 * little)
+    assert load(step)[1] == pytest.approx(-slope, rel=1e-5)
+    assert abs(slope) > 1e-6
 
 
 SAME = {

@@ -138,6 +138,7 @@ def test_unknown_terms_survive_the_round_trip(tmp_path):
         terms=(
             TermSpec('bend_y', 'exponent_of_speed', '0.3*exp(-v / 1e-3)  ', range=(0.0, 0.01)),
             TermSpec('bend_y', 'load_of_angle', '1e-3*sin(q)'),
+            TermSpec('bend_y', 'load_of_time', '0.2*sin(t)', multiplies=True),
             TermSpec('bend_x', 'load_of_angle', values=tuple(1e-5 * k for k in range(NODES))),
         ),
     )
@@ -154,6 +155,11 @@ def entry(more):
     [
         ('place: load_of_angle, expression: q', 'has no stage'),
         ('stage: joynt, place: load_of_angle', 'unknown stage joynt: did you mean joint?'),
+        ('stage: joint, place: load_of_angle, expression: q, multiplies: 2', 'give true or false'),
+        (
+            'stage: joint, place: load_of_angle, expression: q, multiplies: true',
+            'multiplies nothing',
+        ),
         ('stage: joint, expression: q', 'has no place: valid are end_way_of_angle'),
         ('stage: joint, place: load_of_angel', 'did you mean load_of_angle?'),
         ('stage: joint, place: pulley_of_shaft', 'a place of the stage actuator, not joint'),

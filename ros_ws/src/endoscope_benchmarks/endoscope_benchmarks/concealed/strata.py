@@ -56,7 +56,7 @@ _PAIRS = [
     (p, other)
     for p in PLACES
     for other in PLACES
-    if (FUNCTIONS[p].hook, FUNCTIONS[p].only) == (FUNCTIONS[other].hook, FUNCTIONS[other].only)
+    if FUNCTIONS[p].point == FUNCTIONS[other].point
     and FUNCTIONS[p].argument.symbol != FUNCTIONS[other].argument.symbol
 ]
 """Places of two states on which the same can depend."""

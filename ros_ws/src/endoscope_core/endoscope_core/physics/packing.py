@@ -120,9 +120,9 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
 
 def _check_products(terms: tuple[TermSpec, ...]) -> None:
     """Refuse what multiplies nothing: its plant would be another one than meant."""
-    added = {(t.joint, describe_place(t.place).hook.name) for t in terms if not t.multiplies}
+    added = {(t.joint, describe_place(t.place).point) for t in terms if not t.multiplies}
     for term in terms:
-        if term.multiplies and (term.joint, describe_place(term.place).hook.name) not in added:
+        if term.multiplies and (term.joint, describe_place(term.place).point) not in added:
             raise ValueError(
                 f'unknown_term at {term.place} on joint {term.joint} multiplies nothing: add the '
                 'unknown_term that it multiplies, or leave out multiplies'

@@ -195,13 +195,12 @@ def unknown_term(
         tuple(
             unknown_term(one, other)
             for other in one.terms
-            if other.multiplies and not term.multiplies and _hook(other) == _hook(term)
+            if other.family is not None
+            and other.multiplies
+            and not term.multiplies
+            and other.family.place.point == function.family.place.point
         ),
     )
-
-
-def _hook(term: Term) -> str:
-    return term.family.place.hook.name if term.family is not None else ''
 
 
 def missing_function(decisions: list[Decision]) -> UnknownTerm | None:

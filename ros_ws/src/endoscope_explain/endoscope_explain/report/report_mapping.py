@@ -124,6 +124,7 @@ def _symbolic(term: UnknownTerm) -> dict[str, Any]:
         'rivals': list(term.rivals),
         'explained': term.explained,
         'siblings': list(term.siblings),
+        'multiplied_by': [_symbolic(factor) for factor in term.factors],
     }
 
 

@@ -144,9 +144,10 @@ def _unknown(case: ExplainedCase) -> str:
     term = case.explanation.unknown
     if term is None or not term.helps:
         joint = case.places[0].joint if case.places else case.recording.joints[0]
-        return f'Neither an effect of the catalogue nor a function of one state explains {joint}.'
+        return f'Neither an effect of the catalogue nor a function explains {joint}.'
     what = term.there.physics.rstrip('.')
-    return f'Missing on {term.joint}: {what[0].lower()}{what[1:]}.'
+    states = ''.join(f' and {factor.there.argument.words}' for factor in term.factors)
+    return f'Missing on {term.joint}: {what[0].lower()}{what[1:]}{states}.'
 
 
 def _percent(effect: NamedEffect) -> str:

@@ -154,7 +154,7 @@ def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Candidate, ..
         where the joint makes no motion twice.
     """
     states, observation = states_of(found), found.model.observation
-    there = {family.place.hook.name for family in found.model.families}
+    there = {family.place.point for family in found.model.families}
     candidates = []
     for place in _absent(found, FUNCTIONS.values()):
         state = states[place.argument.symbol, place.argument.unit]
@@ -166,7 +166,7 @@ def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Candidate, ..
             families = [family_at(place, (float(np.min(state)), float(np.max(state))))]
         alone = [family for family in families if family is not None]
         candidates += [Candidate(place, family=family) for family in alone]
-        if place.hook.name in there:
+        if place.point in there:
             both = (replace(family, multiplies=True) for family in alone)
             candidates += [Candidate(place, family=family) for family in both]
     return tuple(candidates)

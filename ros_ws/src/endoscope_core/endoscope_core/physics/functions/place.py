@@ -90,6 +90,11 @@ class Place(Effect):
         return LARGEST_SHARE if multiplies else self.largest
 
     @property
+    def point(self) -> tuple[str, str]:
+        """Point of the chain whose functions multiply one another: the hook, and which sensor."""
+        return self.hook.name, self.only
+
+    @property
     def is_factor(self) -> bool:
         """Whether the plant takes the exponential of the function as a factor."""
         return self.hook.fold is Fold.FACTORS

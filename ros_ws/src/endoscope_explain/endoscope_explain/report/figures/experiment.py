@@ -1,6 +1,7 @@
 """The next experiment's motion, and what a missing function looks like."""
 
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from endoscope_explain.case import NextExperiment
@@ -31,26 +32,37 @@ def experiment_figure(experiment: NextExperiment) -> str:
 
 
 def unknown_figure(term: UnknownTerm) -> str:
-    """Plot the missing function with its 90 % band, and the formula that comes near, if any."""
-    argument, factor = term.there.argument, term.there.is_factor
+    """Plot the missing function, and those that multiply it, each with its 90 % band.
+
+    The formula that comes near is drawn, too, if there is one.
+    """
+    every = (term, *term.factors)
+    with page_figure(2.6) as figure:
+        for axis, one in zip(figure.subplots(1, len(every), squeeze=False)[0], every, strict=True):
+            _draw_function(axis, one)
+        return svg(figure)
+
+
+def _draw_function(axis: Axes, term: UnknownTerm) -> None:
+    argument = term.there.argument
     _, unit, across = in_degrees('_rad', argument.unit)
     _, of, up = in_degrees('_rad', term.there.unit)
 
     def drawn(values: Array) -> Array:
-        return np.exp(values) if factor else up * values
+        if term.multiplies:
+            return 1.0 + values
+        return np.exp(values) if term.there.is_factor else up * values
 
     band = NINETY_PERCENT * term.deviation
     nodes = across * term.nodes
-    with page_figure(2.6) as figure:
-        axis = figure.subplots()
-        low, high = drawn(term.values - band), drawn(term.values + band)
-        axis.fill_between(nodes, low, high, color=INK, alpha=0.15, lw=0.0)
-        axis.plot(nodes, drawn(term.values), color=INK, lw=1.6, label='function, with 90 % band')
-        if term.formula_share >= LEAST_SHARE:
-            colour = RUNG_COLOUR['augmented']
-            axis.plot(nodes, drawn(term.formula), '--', color=colour, lw=1.2, label='formula')
-        axis.set_xlabel(f'{argument.words} ({unit})' if unit else argument.words)
-        axis.set_ylabel('factor' if factor else of)
-        axis.set_title(f'{term.place} of {term.joint}')
-        axis.legend(loc='best', ncols=2)
-        return svg(figure)
+    low, high = drawn(term.values - band), drawn(term.values + band)
+    axis.fill_between(nodes, low, high, color=INK, alpha=0.15, lw=0.0)
+    axis.plot(nodes, drawn(term.values), color=INK, lw=1.6, label='function, with 90 % band')
+    if term.formula_share >= LEAST_SHARE:
+        colour = RUNG_COLOUR['augmented']
+        axis.plot(nodes, drawn(term.formula), '--', color=colour, lw=1.2, label='formula')
+    axis.set_xlabel(f'{argument.words} ({unit})' if unit else argument.words)
+    times = 'factor on it' if term.multiplies else 'factor'
+    axis.set_ylabel(times if term.multiplies or term.there.is_factor else of)
+    axis.set_title(f'{term.place} of {term.joint}')
+    axis.legend(loc='best', ncols=2)
