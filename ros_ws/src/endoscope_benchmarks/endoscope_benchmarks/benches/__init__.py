@@ -6,6 +6,7 @@ BENCHES: tuple[str, ...] = (
     'explain',
     'concealed',
     'criteria',
+    'mistakes',
     'limits',
     'real',
     'peers',

@@ -108,7 +108,7 @@ def _as_meant(
         topics = {signal.partition(':')[0] for f in frozen for signal in f.signals}
         still = [n for n, s in recording.measured().items() if s.topic in topics]
         comparison = Comparison(recording, plant, still)
-    mistakes = comparison.judged().mistakes
+    mistakes = comparison.judged()
     misread += as_findings(recording, mistakes)
     return as_meant(recording, mistakes), noisy
 

@@ -1,9 +1,9 @@
 """Units, signs and orders that people take by mistake, and how each is said."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import permutations
-from math import pi
+from math import log, pi
 
 from endoscope_bags.units import UNITS
 from endoscope_core.physics.description import PlantDescription
@@ -17,12 +17,10 @@ LARGE = 5.0
 STANDARD_GRAVITY = 9.80665
 GEAR = 'radians of the bending joint'
 COUNTS = 'counts of the encoder'
-ELSEWHERE = 0.2
-"""Price, beside that of a whole topic, of a mistake in some of its columns."""
-RARELY = 0.5
-"""The same of a unit that hardly anybody uses."""
-ROUND_ABOUT = 0.5
-"""The same of an order that no single exchange makes."""
+KINDS = 6 * 4
+"""Of mistakes: unit, sign, order and factor of the command and of five measured quantities."""
+CONVERTER_BITS = 24
+"""Of the finest converter whose counts anybody records."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +33,8 @@ class Misreading:
         Series of a `Recording`.
     kind : str
         `right`, `unit`, `sign`, `order` or `factor`, which is no unit known.
-    weight : float
-        0 for what is right, else how many mistakes it counts as.
+    price : float
+        Logarithm of how many mistakes are as likely as this one; 0 for what is right.
     source : tuple of int
         Measured column that holds each signal.
     factor : tuple of float
@@ -47,7 +45,7 @@ class Misreading:
 
     quantity: str
     kind: str
-    weight: float
+    price: float
     source: tuple[int, ...]
     factor: tuple[float, ...]
     unit: str = ''
@@ -60,11 +58,6 @@ class Misreading:
             for c, (s, f) in enumerate(zip(self.source, self.factor, strict=True))
             if (s, f) != (c, 1.0)
         )
-
-    @property
-    def is_beyond_reach(self) -> bool:
-        """Whether no physics comes near to such readings."""
-        return self.kind in ('sign', 'order') or max(self.factor) > LARGE
 
     @property
     def of_gear(self) -> bool:
@@ -116,35 +109,42 @@ def misreadings(quantity: str, plant: PlantDescription, columns: int) -> Iterato
     """
     whole = tuple(range(columns))
     yield Misreading(quantity, 'right', 0.0, whole, (1.0,) * columns)
-    joints = len(plant.joints)
-    parts = [whole]
-    if columns > joints:
-        parts += [(c, c + 1) for c in range(0, columns, 2)]
-    parts += [(c,) for c in whole]
-    parts = list(dict.fromkeys(parts))
-    for unit, factor in known_units(quantity, plant).items():
-        for part in parts:
-            if len(part) * joints >= columns:
-                one = scaled(quantity, 'unit', factor, part, columns, unit)
-                yield replace(one, weight=one.weight + (RARELY if unit == 'mrad' else 0.0))
-    for part in parts:
-        yield scaled(quantity, 'sign', -1.0, part, columns)
-    for order in permutations(whole):
-        if order != whole:
-            moved = sum(a != b for a, b in zip(order, whole, strict=True))
-            # Both plugs of a joint with those of the other one, or all positive with negative ones.
-            plain = moved == 2 or order in ((2, 3, 0, 1), (1, 0, 3, 2))
-            weight = 1.0 if plain else 1.0 + ROUND_ABOUT
-            yield Misreading(quantity, 'order', weight, order, (1.0,) * columns)
+    units = known_units(quantity, plant)
+    for part, parts in _parts(columns, len(plant.joints)):
+        for unit, factor in units.items():
+            if len(part) * len(plant.joints) >= columns:
+                yield scaled(quantity, 'unit', factor, part, columns, len(units) * parts, unit)
+        yield scaled(quantity, 'sign', -1.0, part, columns, parts)
+    orders = [order for order in permutations(whole) if order != whole]
+    for order in orders:
+        price = log(KINDS * len(orders))
+        yield Misreading(quantity, 'order', price, order, (1.0,) * columns)
 
 
 def scaled(
-    quantity: str, kind: str, factor: float, part: Sequence[int], columns: int, unit: str = ''
+    quantity: str,
+    kind: str,
+    factor: float,
+    part: Sequence[int],
+    columns: int,
+    ways: float,
+    unit: str = '',
 ) -> Misreading:
-    """A misreading of some columns by one factor."""
-    weight = 1.0 if len(part) == columns else 1.0 + ELSEWHERE
+    """A misreading of some columns by one factor, one of several ways to take them wrongly."""
     factors = tuple(factor if c in part else 1.0 for c in range(columns))
-    return Misreading(quantity, kind, weight, tuple(range(columns)), factors, unit)
+    price = log(KINDS * ways)
+    return Misreading(quantity, kind, price, tuple(range(columns)), factors, unit)
+
+
+def _parts(columns: int, joints: int) -> list[tuple[tuple[int, ...], int]]:
+    """Columns that are taken wrongly together, with the number of parts that are as likely."""
+    per_joint = columns // joints
+    found: dict[tuple[int, ...], int] = {}
+    extents = dict.fromkeys((columns, per_joint, 1))
+    for extent in extents:
+        for first in range(0, columns, extent):
+            found[tuple(range(first, first + extent))] = len(extents) * columns // extent
+    return list(found.items())
 
 
 def as_findings(recording: Recording, mistakes: Sequence[Misreading]) -> list[Finding]:

@@ -7,7 +7,7 @@ is said where it makes the whole recording fit far better. Physics that is left 
 and shapes within those tolerances, or into what no mistake explains.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from math import inf, log, pi
 
@@ -17,171 +17,46 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.on_stamps import hold_on_ticks
 from endoscope_core.physics.simulator import LARGEST_COMMAND, TICK, simulate
 from endoscope_core.rig import shipped_rig
-from endoscope_explain.audit.misreading import Misreading, misreadings, scaled
+from endoscope_explain.audit.criteria import DERIVED
+from endoscope_explain.audit.misfit import LONGEST_S, PERIOD_S, Bounds, Criteria, Moments
+from endoscope_explain.audit.misreading import (
+    CONVERTER_BITS,
+    KINDS,
+    Misreading,
+    misreadings,
+    scaled,
+)
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.series import Array
 
-PERIOD_S = 0.02
-"""Between the samples that are compared."""
-LONGEST_S = 90.0
-"""Motion that is compared: ten times the shortest calibration."""
-LAGS_S = (0.0, 0.02, 0.04, 0.06, 0.1, 0.14, 0.2, 0.3, 0.4, 0.5)
-"""Up to the longest delay of the catalogue."""
-SCALES = {
-    'shaft_position': (1.0 / 1.05, 1.05),
-    'shaft_velocity': (1.0 / 1.5, 1.5),
-    'shaft_effort': (0.1, 200.0),
-    'tension': (1.0 / 3.0, 3.0),
-    'bending': (0.0, 3.0),
-}
-"""Least and largest scale from a simulated signal to a real one. A servo follows its command. An
-effort is at most the motor's stall torque of 4.1 N m, 200 times what the nominal wires ask for.
-Wires and load cells differ by a factor of 3. A joint may be held fast."""
-WINDING, PUSHED_RAD = 1.2, 1.0
-"""A joint bends at most this many times as far as its wires are wound up, and as much further as
-loads push it."""
-CELL_OFFSET_N = 1.0
-"""By which a load cell may read too little: those of the recorded rig are 0.6 N off."""
-LEAST = {'shaft_position': 0.03}
-USUALLY_LEAST, MOST = 0.1, 3.0
-"""Misfit below which a signal fits, and above which it does not fit at all: differences beyond are
-no evidence."""
-FOLLOWS = 0.15
-"""Misfit of a shaft that follows its command, up to which a gear may be called wrong: limits of
-speed and torque change its shape by more."""
-WELL, HARDLY = 0.6, 0.9
-"""Misfit, on the mean and at most, up to which signals may be said to be right in another unit,
-sign or order."""
-NOISE_COUNTS, NOISE_APART = 0.2, 100.0
-"""By how much a noise unlike the sensor's counts beside the misfit, and the factor beyond which it
-says no more: a simulated recording has none."""
-PRICE = 1.0
-"""Fall of the sum of the misfits' logarithms that each mistake must bring."""
-FREE = 1.3
-"""Weight of a factor that is of no known unit."""
-MOST_MISTAKES = 3
+TURN_RAD = 2.0 * pi
+"""No section bends further, from one side to the other."""
+MOST = 1.0
+"""Misfit of what has nothing in common."""
 MOVES = 0.01
 """Shaft angle in rad that is a motion."""
 
 
 @dataclass(frozen=True)
-class Judged:
-    """What is said of a recording.
+class Way:
+    """One way to read a quantity, and what speaks against it.
 
     Attributes
     ----------
-    mistakes : tuple of Misreading
-        Empty where none is beyond doubt.
-    as_read, at_best : float
-        Sum of the misfits' logarithms without and with them.
+    reading : Misreading
+    misfit : float
+        Sum of the logarithms of its columns' misfits.
+    size : float
+        By how much larger or smaller they are than simulated, in what rigs usually differ by.
     """
 
-    mistakes: tuple[Misreading, ...]
-    as_read: float
-    at_best: float
+    reading: Misreading
+    misfit: float
+    size: float
 
-
-@dataclass(frozen=True)
-class Bounds:
-    """What real rigs make of a simulated quantity.
-
-    Attributes
-    ----------
-    scale : (float, float)
-        Least and largest one.
-    reach : array (P,)
-        From the lowest to the highest value that it can have.
-    noise : float
-        Of the sensor as described.
-    scatter : array (M,)
-        Of the reading from sample to sample, in its own unit.
-    pulls : bool
-        Whether it is the tension of a wire, which cannot push.
-    """
-
-    scale: tuple[float, float]
-    reach: Array
-    noise: float
-    scatter: Array
-    pulls: bool
-
-
-@dataclass(frozen=True)
-class Moments:
-    """Second moments of M measured and P simulated columns, the latter at L lags.
-
-    Attributes
-    ----------
-    mean, variance, reach : array (M,)
-        The latter from low to high.
-    simulated_mean, simulated_variance : array (L, P)
-    covariance : array (L, M, P)
-    """
-
-    mean: Array
-    variance: Array
-    reach: Array
-    simulated_mean: Array
-    simulated_variance: Array
-    covariance: Array
-
-    @staticmethod
-    def of(measured: Array, simulated: Array) -> 'Moments':
-        """Of arrays (N, M) and (N, P) on one grid."""
-        lags = [round(lag / PERIOD_S) for lag in LAGS_S]
-        late = measured[lags[-1] :]
-        early = np.stack([simulated[lags[-1] - lag : len(simulated) - lag] for lag in lags])
-        reach = np.ptp(np.quantile(late, (0.01, 0.99), axis=0), axis=0)
-        mean, simulated_mean = late.mean(axis=0), early.mean(axis=1)
-        late, early = late - mean, early - simulated_mean[:, None]
-        return Moments(
-            mean,
-            (late**2).mean(axis=0),
-            reach,
-            simulated_mean,
-            (early**2).mean(axis=1),
-            np.matmul(late.T, early) / len(late),
-        )
-
-    def misfit(self, factor: float, bounds: 'Bounds') -> Array:
-        """Share of each measured column that no lag, offset and scale make of each simulated one.
-
-        Parameters
-        ----------
-        factor : float
-            Reading of one SI unit.
-        bounds : Bounds
-
-        Returns
-        -------
-        array (M, P)
-            0 where they agree, 1 where they have nothing in common.
-        """
-        mean, variance = self.mean / factor, (self.variance / factor**2)[:, None]
-        covariance, power = self.covariance / factor, self.simulated_variance[:, None, :]
-        best = np.clip(covariance / np.maximum(power, 1e-300), *bounds.scale)
-        left = variance - 2.0 * best * covariance + best**2 * power
-        if bounds.pulls:
-            highest = (1.0 + bounds.scale[1]) * self.simulated_mean[:, None, :]
-            left = left + np.maximum(-CELL_OFFSET_N - mean, 0.0)[:, None] ** 2
-            left = left + np.maximum(mean[:, None] - highest, 0.0) ** 2
-        left = left + np.maximum((self.reach / abs(factor))[:, None] - bounds.reach, 0.0) ** 2
-        # What a unit makes small must not pass for noise, unless the reading is as noisy in it.
-        spread = np.full((len(mean), 1), bounds.noise)
-        if abs(factor) > 1.0:
-            spread = np.minimum(spread, bounds.scatter[:, None] / abs(factor))
-        floor = (3.0 * spread) ** 2
-        return np.asarray(np.sqrt(np.maximum(left, 0.0) / (variance + floor + 1e-300)).min(axis=0))
-
-    def size(self) -> Array:
-        """Times that each measured column is as large as its simulated one, where they agree."""
-        power = np.maximum(self.simulated_variance, 1e-300)
-        alike = np.einsum('lmm->lm', self.covariance) / np.sqrt(
-            np.maximum(power * self.variance, 1e-300)
-        )
-        lag = alike.argmax(axis=0)
-        column = np.arange(len(self.mean))
-        return np.sqrt(self.variance / power[lag, column]) * (alike.max(axis=0) > 0.0)
+    def against(self, worth: float) -> float:
+        """Minus the logarithm of its likelihood where a column is worth so many samples."""
+        return worth * self.misfit + self.size
 
 
 class Comparison:
@@ -195,12 +70,18 @@ class Comparison:
         Of its joints.
     leave_out : collection of str
         Quantities that are not compared.
+    criteria : Criteria
     """
 
     def __init__(
-        self, recording: Recording, plant: PlantDescription, leave_out: Collection[str] = ()
+        self,
+        recording: Recording,
+        plant: PlantDescription,
+        leave_out: Collection[str] = (),
+        criteria: Criteria = DERIVED,
     ) -> None:
         self._plant = plant
+        self._criteria = criteria
         begin, end = _span(recording)
         self.grid = np.arange(begin, end, PERIOD_S)
         self._held = hold_on_ticks(
@@ -220,6 +101,8 @@ class Comparison:
             quantity: tuple(misreadings(quantity, plant, values.shape[1]))
             for quantity, values in self.measured.items()
         }
+        self._answers: dict[Misreading, dict[str, Array]] = {}
+        self._known: dict[tuple[Misreading, str], list[Way]] = {}
         sensors = plant.sensors
         self.noise = {
             'shaft_position': 2.0 * pi / sensors.encoder_counts,
@@ -229,39 +112,48 @@ class Comparison:
             'bending': sensors.tracker_noise,
         }
 
-    def judged(self) -> Judged:
-        """Find the mistakes that make the recording fit far better, if any."""
-        drives = tuple(misreadings('command', self._plant, self._held.shape[1]))
-        costs = self._costs(drives[0])
-        as_read = sum(of[0][0] for of in costs.values())
-        least, best = as_read, Judged((), as_read, as_read)
-        if all(fits for (_, _, fits), *_ in costs.values()):
-            return best
-        beyond = np.abs(self._held).max() > WINDING * shipped_rig().motors.reach
-        if not beyond and costs.get('shaft_position', [(0.0, drives[0], False)])[0][2]:
-            # The shaft follows: of the command only what is wrong with both can be.
-            drives = tuple(drive for drive in drives if drive.kind not in ('unit', 'factor'))
-        for drive in drives:
-            if drive.weight:
-                costs = self._costs(drive)
-            if drive.weight and not self._may_be_meant(drive, costs):
+    def judged(self, worth: float | None = None) -> tuple[Misreading, ...]:
+        """Find the mistakes that make the recording more likely than their price, if any."""
+        worth = self._criteria.worth if worth is None else worth
+        right, usual = self._right(), self._criteria.usual
+        as_read = sum(self._ways(right, q)[0].against(worth) for q in self.measured)
+        at_best = sum(self.measured[q].shape[1] * log(usual[q]) for q in self.measured)
+        if as_read - worth * at_best < log(KINDS):
+            return ()
+        least = as_read
+        best: tuple[Misreading, ...] = ()
+        for drive in misreadings('command', self._plant, self._held.shape[1]):
+            if drive.price and not self._may_be_meant(drive):
                 continue
-            reached, said = 0.0, [drive] if drive.weight else []
-            for quantity, of in costs.items():
-                allowed = [
-                    c
-                    for c in of
-                    if not (drive.of_gear and quantity == 'shaft_position' and c[1].of_gear)
-                    and (c[2] or not c[1].weight)
-                ]
-                cost, reading, _ = min(allowed, key=lambda c: c[0] + PRICE * c[1].weight)
-                reached += cost
-                said += [reading] if reading.weight else []
-            weights = _weights(said)
-            priced = reached + PRICE * sum(weights)
-            if priced < least - 1e-9 and len(weights) <= MOST_MISTAKES:
-                least, best = priced, Judged(tuple(said), as_read, reached)
+            against, said = 0.0, [drive] if drive.price else []
+            for quantity in self.measured:
+                of_gear = drive.of_gear and quantity == 'shaft_position'
+                way = min(
+                    (w for w in self._ways(drive, quantity) if not (of_gear and w.reading.of_gear)),
+                    key=lambda w: w.against(worth) + w.reading.price,
+                )
+                against += way.against(worth)
+                said += [way.reading] if way.reading.price else []
+            against += sum(_prices(said))
+            if against < least - 1e-9:
+                least, best = against, tuple(said)
         return best
+
+    def _right(self) -> Misreading:
+        return next(misreadings('command', self._plant, self._held.shape[1]))
+
+    def _may_be_meant(self, drive: Misreading) -> bool:
+        """Whether it moves, and either cannot be what was given or the shafts follow it."""
+        if np.ptp(self._shaft(drive)[:, list(drive.touched)], axis=0).max() < MOVES:
+            return False
+        if np.abs(self._held).max() > shipped_rig().motors.reach:
+            return True
+        # Bending and tension of half the motion may be those of another rig.
+        if 'shaft_position' not in self.measured:
+            return not drive.of_gear
+        followed = self._ways(drive, 'shaft_position')
+        allowed = log(self._criteria.follows) * self._held.shape[1]
+        return any(w.misfit <= allowed for w in followed if w.reading.kind in ('right', 'sign'))
 
     def simulated(self, command: Misreading) -> dict[str, Array]:
         """Simulate the plant on the command as it is meant."""
@@ -273,9 +165,13 @@ class Comparison:
             for quantity in self.measured
         }
 
+    def moments(self) -> dict[str, Moments]:
+        """Of each quantity beside what the plant makes of the command as it is read."""
+        return {q: Moments.of(self.measured[q], of) for q, of in self.expected().items()}
+
     def expected(self) -> dict[str, Array]:
         """Simulate the plant on the command as it is read."""
-        return self.simulated(next(misreadings('command', self._plant, self._held.shape[1])))
+        return self.simulated(self._right())
 
     def is_noisy(self) -> bool:
         """Whether the readings have noise, as those of a simulation have not."""
@@ -285,77 +181,46 @@ class Comparison:
             if q in self.measured
         )
 
-    def _may_be_meant(
-        self, drive: Misreading, costs: Mapping[str, list[tuple[float, Misreading, bool]]]
-    ) -> bool:
-        """Whether the command as it is given is impossible, or the shaft follows it as meant."""
-        if np.ptp(self._shaft(drive)[:, list(drive.touched)], axis=0).max() < MOVES:
-            return False
-        if np.abs(self._held).max() > WINDING * shipped_rig().motors.reach:
-            return True
-        if 'shaft_position' in costs:
-            return any(
-                fits
-                for _, reading, fits in costs['shaft_position']
-                if reading.kind in ('right', 'sign')
-            )
-        # Bending and tension of half the motion may be those of another rig.
-        return not drive.of_gear
-
     def _shaft(self, command: Misreading) -> Array:
         shaft = self._held[:, list(command.source)] / np.asarray(command.factor)
         return np.clip(shaft, -LARGEST_COMMAND, LARGEST_COMMAND)
 
-    def _costs(self, command: Misreading) -> dict[str, list[tuple[float, Misreading, bool]]]:
-        """Logarithm of the misfit of each way to read each quantity, and whether it fits well."""
-        winding = [j.pulley_radius / j.joint_radius for j in self._plant.joints.values()]
-        bent = WINDING * np.ptp(self._shaft(command), axis=0) * winding + PUSHED_RAD
-        found: dict[str, list[tuple[float, Misreading, bool]]] = {}
-        for quantity, simulated in self.simulated(command).items():
-            lowest, largest = SCALES[quantity]
-            if quantity == 'bending':
-                # Where friction all but holds the described joint, another one may bend freely.
-                largest = max(
-                    largest, float((bent / np.maximum(np.ptp(simulated, axis=0), 1e-9)).max())
-                )
-            bounds = Bounds(
-                (lowest, largest),
-                bent if quantity == 'bending' else np.full(simulated.shape[1], inf),
-                self.noise[quantity],
-                self._scatter[quantity],
-                quantity == 'tension',
+    def _ways(self, command: Misreading, quantity: str) -> list[Way]:
+        """All ways to read a quantity where the command is meant so."""
+        if (command, quantity) not in self._known:
+            if command not in self._answers:
+                self._answers[command] = self.simulated(command)
+            self._known[command, quantity] = self._ways_of(
+                quantity, self._answers[command][quantity]
             )
-            moments = Moments.of(self.measured[quantity], simulated)
-            misfits: dict[float, Array] = {}
-            found[quantity] = []
-            for reading in (*self._readings[quantity], *self._of_any_size(quantity, moments)):
-                misfit = []
-                for column, (source, factor) in enumerate(
-                    zip(reading.source, reading.factor, strict=True)
-                ):
-                    if factor not in misfits:
-                        misfits[factor] = moments.misfit(factor, bounds)
-                    misfit.append(misfits[factor][source, column])
-                judged = np.array(misfit)[list(reading.touched or range(len(misfit)))]
-                if quantity == 'shaft_position' and not reading.is_beyond_reach:
-                    well = bool(judged.max() < FOLLOWS)
-                else:
-                    mean = np.exp(np.log(judged + 1e-9).mean())
-                    well = bool(mean < WELL and judged.max() < HARDLY)
-                kept = np.clip(misfit, LEAST.get(quantity, USUALLY_LEAST), MOST)
-                cost = float(np.log(kept).sum()) + self._noise_apart(quantity, reading)
-                found[quantity].append((cost, reading, well))
-        return found
+        return self._known[command, quantity]
 
-    def _noise_apart(self, quantity: str, reading: Misreading) -> float:
-        """How far the readings' noise is from the sensor's, where it is white."""
-        if quantity not in ('tension', 'bending'):
-            return 0.0
-        factor = np.abs(reading.factor)
-        ratio = np.maximum(self._scatter[quantity], 1e-12) / (
-            factor * self.noise[quantity] + 1e-300
+    def _ways_of(self, quantity: str, simulated: Array) -> list[Way]:
+        moments = Moments.of(self.measured[quantity], simulated)
+        lowest, largest = self._criteria.scales[quantity]
+        usual = self._criteria.usual[quantity]
+        bounds = Bounds(
+            (lowest, largest),
+            TURN_RAD if quantity == 'bending' else inf,
+            self.noise[quantity],
+            self._scatter[quantity],
+            self._criteria.least_tension if quantity == 'tension' else -inf,
         )
-        return float(NOISE_COUNTS * np.minimum(np.abs(np.log(ratio)), log(NOISE_APART)).sum())
+        misfits: dict[float, Array] = {}
+        found = []
+        for reading in (*self._readings[quantity], *self._of_any_size(quantity, moments)):
+            misfit = []
+            for column, (source, factor) in enumerate(
+                zip(reading.source, reading.factor, strict=True)
+            ):
+                if factor not in misfits:
+                    misfits[factor] = moments.misfit(factor, bounds)
+                misfit.append(misfits[factor][:, source, column])
+            share, scale = np.transpose(misfit)
+            kept = np.log(np.clip(share, usual, MOST))
+            size = np.abs(np.log(np.maximum(scale, usual))) / max(log(largest), usual)
+            found.append(Way(reading, float(kept.sum()), float(size.sum())))
+        return found
 
     def _of_any_size(self, quantity: str, moments: Moments) -> Iterator[Misreading]:
         """Readings of a factor that belongs to no unit: of a gear, or of a converter."""
@@ -363,20 +228,14 @@ class Comparison:
             return
         size = moments.size()
         columns = len(size)
-        if quantity == 'tension':
-            factor = float(np.median(size))
-            parts = [tuple(range(columns))] if factor > 10.0 else []
-        else:
-            parts = [(c,) for c in range(columns)]
-            if columns > 1 and np.ptp(size) < 0.02 * size.max():
-                parts.append(tuple(range(columns)))
-        for part in parts:
+        whole = tuple(range(columns))
+        parts = [whole] if quantity == 'tension' else [*((c,) for c in whole), whole]
+        ways = CONVERTER_BITS * log(2.0) / self._criteria.usual[quantity]
+        for part in dict.fromkeys(parts):
             factor = float(np.median(size[list(part)]))
             if factor > 0.0:
-                one = scaled(quantity, 'factor', factor, part, columns)
-                yield Misreading(
-                    quantity, one.kind, FREE * one.weight, one.source, one.factor, one.unit
-                )
+                many = len(parts) - 1 if len(part) < columns else 1
+                yield scaled(quantity, 'factor', factor, part, columns, ways * many)
 
 
 def as_meant(recording: Recording, mistakes: Collection[Misreading]) -> Recording:
@@ -396,13 +255,13 @@ def as_meant(recording: Recording, mistakes: Collection[Misreading]) -> Recordin
     return recording.with_series(changed)
 
 
-def _weights(mistakes: list[Misreading]) -> list[float]:
-    """Weight of each mistake; all that a motor's messages hold is exchanged together."""
-    weights = {
-        (m.quantity.partition('_')[0] if m.kind == 'order' else m.quantity, m.source): m.weight
+def _prices(mistakes: list[Misreading]) -> list[float]:
+    """Price of each mistake; all that a motor's messages hold is exchanged together."""
+    prices = {
+        (m.quantity.partition('_')[0] if m.kind == 'order' else m.quantity, m.source): m.price
         for m in mistakes
     }
-    return list(weights.values())
+    return list(prices.values())
 
 
 def _span(recording: Recording) -> tuple[float, float]:

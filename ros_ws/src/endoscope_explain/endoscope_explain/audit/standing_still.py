@@ -7,7 +7,7 @@ import numpy as np
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.audit.misreading import column_name
 from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.series import BENDING, Array
+from endoscope_explain.recording.series import MOTOR, Array
 
 MOVES_RAD = 0.01
 """Shaft angle that is a motion."""
@@ -61,7 +61,7 @@ def frozen_findings(
         columns = [
             (quantity, c) for quantity, _ in held for c in range(expected[quantity].shape[1])
         ]
-        sure = noisy or held[0][1].topic != BENDING
+        sure = noisy or held[0][1].topic == MOTOR
         if (
             sure
             and found is not None

@@ -1,0 +1,1 @@
+"""Recordings in which people took something wrongly, and right ones."""

@@ -1,0 +1,214 @@
+"""What people take wrongly, and what must be said of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from endoscope_benchmarks.mistakes.drawing import Generator
+from endoscope_explain.audit import AuditReport
+from endoscope_explain.recording import Recording
+from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
+
+Change = Callable[[Recording, Generator], Recording]
+Columns = Callable[[Generator, int], list[int]]
+Said = tuple[tuple[str, str, str], ...]
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """What was done to a recording, and what the audit may say of it.
+
+    Attributes
+    ----------
+    change : callable
+        From a recording and a random generator to the recording as it was mistaken.
+    said : tuple of tuple of (str, str, str)
+        Id, topic and words of each finding; any one of the tuples will do.
+    joints : int
+        How many the recording must have.
+    """
+
+    change: Change
+    said: tuple[Said, ...]
+    joints: int = 1
+
+
+def scaled(
+    quantity: str,
+    factor: float | Callable[[Generator], float],
+    columns: Columns | None = None,
+) -> Change:
+    """Give a quantity, or some of its columns, in another unit."""
+
+    def change(recording: Recording, rng: Generator) -> Recording:
+        series = getattr(recording, quantity)
+        values = series.values.reshape(len(series.values), -1).copy()
+        chosen = columns(rng, values.shape[1]) if columns else list(range(values.shape[1]))
+        values[:, chosen] *= factor(rng) if callable(factor) else factor
+        changed = replace(series, values=values.reshape(series.values.shape))
+        return recording.with_series({quantity: changed})
+
+    return change
+
+
+def ordered(order: tuple[int, ...], *quantities: str) -> Change:
+    """Give quantities in another order."""
+
+    def change(recording: Recording, _: Generator) -> Recording:
+        changed = {}
+        for quantity in quantities:
+            series = getattr(recording, quantity)
+            flat = series.values.reshape(len(series.values), -1)
+            whole = [*order, *range(len(order), flat.shape[1])]
+            changed[quantity] = replace(series, values=flat[:, whole].reshape(series.values.shape))
+        return recording.with_series(changed)
+
+    return change
+
+
+def stamped(factor: float, *topics: str) -> Change:
+    """Give stamps, of some topics or of all, in another unit."""
+
+    def change(recording: Recording, _: Generator) -> Recording:
+        every = {'command': recording.command, **recording.measured()}
+        return recording.with_series(
+            {
+                name: replace(s, time=s.time * factor)
+                for name, s in every.items()
+                if not topics or s.topic in topics
+            }
+        )
+
+    return change
+
+
+def frozen(*quantities: str) -> Change:
+    """Repeat the first reading of some quantities."""
+
+    def change(recording: Recording, _: Generator) -> Recording:
+        every = {'command': recording.command, **recording.measured()}
+        return recording.with_series(
+            {
+                q: replace(
+                    every[q], values=np.broadcast_to(every[q].values[:1], every[q].values.shape)
+                )
+                for q in quantities
+            }
+        )
+
+    return change
+
+
+def together(*changes: Change) -> Change:
+    """Make several mistakes at once."""
+
+    def change(recording: Recording, rng: Generator) -> Recording:
+        for one in changes:
+            recording = one(recording, rng)
+        return recording
+
+    return change
+
+
+def one_column(rng: Generator, columns: int) -> list[int]:
+    """Any one of the columns."""
+    return [int(rng.integers(columns))]
+
+
+DEG = 180.0 / np.pi
+GRAVITY = 9.80665
+MOTOR_QUANTITIES = ('shaft_position', 'shaft_velocity', 'shaft_effort')
+
+
+def unit(topic: str, words: str) -> Said:
+    """What is said of a wrong unit."""
+    return (('wrong_unit', topic, words),)
+
+
+def of_gear(words: str) -> tuple[Said, ...]:
+    """The command's gear, or the shaft's: what differs is the same."""
+    return (unit(COMMAND, words), (('wrong_gear', MOTOR, 'times as far as commanded'),))
+
+
+MISTAKES = {
+    'angle in deg': Mistake(scaled('bending', DEG), (unit(BENDING, 'in deg'),)),
+    'angle in mrad': Mistake(scaled('bending', 1e3), (unit(BENDING, 'in mrad'),)),
+    'shaft in deg': Mistake(scaled('shaft_position', DEG), (unit(MOTOR, 'in deg'),)),
+    'shaft in counts': Mistake(
+        scaled('shaft_position', 4096 / (2.0 * np.pi)), (unit(MOTOR, 'in counts'),)
+    ),
+    'command in deg': Mistake(scaled('command', DEG), (unit(COMMAND, 'in deg'),)),
+    'command in mm of wire': Mistake(scaled('command', 2.4), of_gear('in mm of wire')),
+    'command in joint rad': Mistake(scaled('command', 2.0), of_gear('of the bending joint')),
+    'shaft in joint rad': Mistake(scaled('shaft_position', 2.0), of_gear('gear once more')),
+    'another gear': Mistake(
+        scaled('shaft_position', lambda rng: float(rng.choice([0.6, 0.8, 1.25, 1.5]))),
+        ((('wrong_gear', MOTOR, 'times as far as commanded'),),),
+    ),
+    'all angles in deg': Mistake(
+        together(*(scaled(q, DEG) for q in ('command', 'shaft_position', 'bending'))),
+        (unit(COMMAND, 'in deg') + unit(MOTOR, 'in deg') + unit(BENDING, 'in deg'),),
+    ),
+    'speed in rpm': Mistake(scaled('shaft_velocity', 30.0 / np.pi), (unit(MOTOR, 'in rpm'),)),
+    'effort in mN m': Mistake(scaled('shaft_effort', 1e3), (unit(MOTOR, 'in mN m'),)),
+    'tension in mN': Mistake(scaled('tension', 1e3), (unit(WIRES, 'in mN'),)),
+    'tension in g': Mistake(scaled('tension', 1e3 / GRAVITY), (unit(WIRES, 'in g'),)),
+    'tension in kg': Mistake(scaled('tension', 1.0 / GRAVITY), (unit(WIRES, 'in kg'),)),
+    'tension in counts': Mistake(
+        scaled('tension', lambda rng: float(rng.choice([5e3, 2e4, 4e5]))),
+        (unit(WIRES, 'counts of a converter'),),
+    ),
+    'tensions negative': Mistake(scaled('tension', -1.0), ((('wrong_sign', WIRES, 'negated'),),)),
+    'one tension negative': Mistake(
+        scaled('tension', -1.0, one_column), ((('wrong_sign', WIRES, 'negated'),),)
+    ),
+    'angle negative': Mistake(
+        scaled('bending', -1.0, one_column), ((('wrong_sign', BENDING, 'negated'),),)
+    ),
+    'shaft negative': Mistake(
+        scaled('shaft_position', -1.0, one_column), ((('wrong_sign', MOTOR, 'negated'),),)
+    ),
+    'command negative': Mistake(
+        scaled('command', -1.0, one_column), ((('wrong_sign', COMMAND, 'negated'),),)
+    ),
+    'wires of a joint': Mistake(
+        ordered((1, 0), 'tension'), ((('exchanged', WIRES, 'exchanged'),),)
+    ),
+    'wires of two joints': Mistake(
+        ordered((2, 3, 0, 1), 'tension'), ((('exchanged', WIRES, 'exchanged'),),), 2
+    ),
+    'one wire of each joint': Mistake(
+        ordered((2, 1, 0, 3), 'tension'), ((('exchanged', WIRES, 'exchanged'),),), 2
+    ),
+    'motors': Mistake(
+        ordered((1, 0), *MOTOR_QUANTITIES), ((('exchanged', MOTOR, 'exchanged'),),), 2
+    ),
+    'commands': Mistake(ordered((1, 0), 'command'), ((('exchanged', COMMAND, 'exchanged'),),), 2),
+    'tracker': Mistake(ordered((1, 0), 'bending'), ((('exchanged', BENDING, 'exchanged'),),), 2),
+    'all stamps in ms': Mistake(stamped(1e3), (unit(COMMAND, 'in ms, not in s'),)),
+    'all stamps in us': Mistake(stamped(1e6), (unit(COMMAND, 'in us, not in s'),)),
+    'stamps taken for ms': Mistake(stamped(1e-3), (unit(COMMAND, 'were taken for ms'),)),
+    "tracker's stamps in ms": Mistake(stamped(1e3, BENDING), (unit(BENDING, 'in ms, not in s'),)),
+    "cells' stamps in us": Mistake(stamped(1e6, WIRES), (unit(WIRES, 'in us, not in s'),)),
+    'frozen motor': Mistake(frozen(*MOTOR_QUANTITIES), ((('frozen', MOTOR, 'is frozen'),),)),
+    'frozen cells': Mistake(frozen('tension'), ((('frozen', WIRES, 'is frozen'),),)),
+    'frozen tracker': Mistake(frozen('bending'), ((('frozen', BENDING, 'is frozen'),),)),
+    'frozen command': Mistake(frozen('command'), ((('frozen', COMMAND, 'is frozen'),),)),
+}
+
+
+def is_said(mistake: Mistake, report: AuditReport) -> bool:
+    """Whether a report says all that is wrong, and nothing else."""
+    found = [(f.id, f.signals[0].partition(':')[0], f.text) for f in report.findings]
+    for wanted in mistake.said:
+        left = list(found)
+        for identity, topic, words in wanted:
+            match = [f for f in left if f[:2] == (identity, topic) and words in f[2]]
+            left = [f for f in left if f not in match[:1]]
+            if not match:
+                break
+        else:
+            if not left:
+                return report.unusable
+    return False

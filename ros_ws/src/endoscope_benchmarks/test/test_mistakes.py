@@ -1,0 +1,53 @@
+"""What people take wrongly is said before anything is fitted; physics is not taken for it."""
+
+import numpy as np
+import pytest
+
+from endoscope_benchmarks.mistakes import drawing
+from endoscope_benchmarks.mistakes.mistake import MISTAKES, is_said
+from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.audit import audit_recording
+from endoscope_explain.explanation import Verdict
+from endoscope_explain.pipeline import Inputs, explain_case
+
+STRONGEST = [i for i, effect in CATALOGUE.items() if not effect.traits.audited]
+
+
+def seed_of(name):
+    return sum(map(ord, name))
+
+
+def never(*_, **__):
+    raise AssertionError('a misread recording was fitted')
+
+
+@pytest.mark.parametrize('name', MISTAKES)
+def test_a_mistake_is_said_and_nothing_is_fitted(name):
+    mistake = MISTAKES[name]
+    rng = np.random.default_rng(seed_of(name))
+    joints = ('bend_x', 'bend_y')[: mistake.joints]
+    recording, _ = drawing.draw_recording(rng, joints, 0.1, 0.0, 0)
+    plant = drawing.described(recording)
+    audit = audit_recording(mistake.change(recording, rng), plant)
+    assert is_said(mistake, audit), [f.text for f in audit.findings]
+    case = explain_case(Inputs(plant, audit, None, None), never, extras=False)
+    assert case.verdict is Verdict.RECORDING_FAULT
+    assert case.effects == ()
+
+
+@pytest.mark.parametrize('effect_id', STRONGEST)
+def test_the_strongest_physics_is_not_taken_for_a_mistake(effect_id):
+    rng = np.random.default_rng(seed_of(effect_id))
+    joint = {'bend_x': JointParameters()}
+    for strength in (1.0, 0.8, 0.5, 0.2):
+        values = drawing.draw_strength(rng, CATALOGUE[effect_id], strength)
+        plant = PlantDescription(joints=joint, effects=(EffectSpec(effect_id, 'bend_x', values),))
+        at, command = drawing.draw_motion(rng, ('bend_x',))
+        recording, survives = drawing.read(plant, at, command, 1)
+        if survives:
+            break
+    else:
+        raise AssertionError('no strength that the rig survives')
+    audit = audit_recording(recording, PlantDescription(joints=joint))
+    assert not audit.unusable, [f.text for f in audit.findings]
