@@ -4,7 +4,7 @@ import argparse
 from concurrent.futures import Executor
 from pathlib import Path
 
-from endoscope_benchmarks.benches.concealed import seeds
+from endoscope_benchmarks.benches.cases import seeds
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
