@@ -191,7 +191,7 @@ class UnknownTerm:
     formula: Array
     formula_share: float
     formula_is_as_good: bool
-    explained: float
+    explained: float = 1.0
     rivals: tuple[str, ...] = ()
     siblings: tuple[str, ...] = ()
 

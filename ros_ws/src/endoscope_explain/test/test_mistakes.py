@@ -1,6 +1,7 @@
 """What people take wrongly is said before anything is fitted; physics is not taken for it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import mistaken_recordings as drawn
 import numpy as np
@@ -9,9 +10,8 @@ import pytest
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import audit_recording
-from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.pipeline import Inputs, explain_case
+from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.report.writing import write_report
 
 STRONGEST = [i for i, effect in CATALOGUE.items() if not effect.traits.audited]
@@ -19,6 +19,10 @@ STRONGEST = [i for i, effect in CATALOGUE.items() if not effect.traits.audited]
 
 def seed_of(name):
     return sum(map(ord, name))
+
+
+def inputs(plant, audit):
+    return Inputs(Sources(Path('rig'), plant), audit)
 
 
 def never(*_, **__):
@@ -34,7 +38,7 @@ def test_a_mistake_is_said_and_nothing_is_fitted(name):
     plant = drawn.described(recording)
     audit = audit_recording(mistake.change(recording, rng), plant)
     assert drawn.is_said(mistake, audit), [f.text for f in audit.findings]
-    case = explain_case(Inputs(plant, audit, None, None), never, extras=False)
+    case = explain_case(inputs(plant, audit), never)
     assert case.verdict is Verdict.RECORDING_FAULT
     assert case.effects == ()
 
@@ -68,7 +72,7 @@ def test_plugs_that_were_exchanged_are_at_the_sensors(record):
     swapped = replace(sound.tension, values=sound.tension.values[:, ::-1])
     plant = PlantDescription()
     audit = audit_recording(sound.with_series({'tension': swapped}), plant)
-    case = explain_case(Inputs(plant, audit, None, None), never, extras=False)
+    case = explain_case(inputs(plant, audit), never)
     assert case.verdict is Verdict.RECORDING_FAULT
     assert {place.stage for place in case.places} == {'sensing'}
 
@@ -103,7 +107,7 @@ def test_where_nothing_moves_a_report_says_that_there_is_too_little(record, tmp_
     still = {name: replace(s, time=every[name].time) for name, s in still.items()}
     plant = PlantDescription()
     audit = audit_recording(sound.with_series(still), plant)
-    case = explain_case(Inputs(plant, audit, None, None), explain_recording, jobs=1)
+    case = explain_case(inputs(plant, audit), jobs=1)
     assert case.verdict is Verdict.INSUFFICIENT_DATA
     write_report(case, tmp_path)
     assert 'The recording cannot tell' in (tmp_path / 'report.html').read_text()
