@@ -181,7 +181,7 @@ class UnknownTerm:
     siblings : tuple of str
         Nearest effects of the catalogue, nearest first.
     multiplies : bool
-        Whether it is one plus this function by which others at the same hook are multiplied.
+        Whether others at the same point of the chain are multiplied by one plus this function.
     factors : tuple of UnknownTerm
         Functions of another state that multiply this one: both together are one of two states.
     """
@@ -195,7 +195,7 @@ class UnknownTerm:
     formula: Array
     formula_share: float
     formula_is_as_good: bool
-    explained: float
+    explained: float = 1.0
     rivals: tuple[str, ...] = ()
     siblings: tuple[str, ...] = ()
     multiplies: bool = False

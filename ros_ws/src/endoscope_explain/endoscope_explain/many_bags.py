@@ -14,7 +14,6 @@ from endoscope_core.atomic_output import atomic_directory, require_free_director
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.worker_pool import worker_pool
 from endoscope_explain.case import ExplainedCase
-from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
 from endoscope_explain.report.provenance import provenance
 from endoscope_explain.report.terminal import told
@@ -23,6 +22,16 @@ from endoscope_explain.shared_physics import physics_of_all
 
 SUMMARY_CSV = 'summary.csv'
 PARAMETERS_CSV = 'parameters.csv'
+SUMMARY = (
+    'bag',
+    'verdict',
+    'effects',
+    'probabilities',
+    'nominal_rmse_over_noise',
+    'augmented_rmse_over_noise',
+    'runtime_s',
+)
+"""Columns of the summary."""
 
 Say = Callable[[str], None]
 
@@ -55,36 +64,27 @@ class Reported:
         """The verdict's sentence."""
         return self.told.partition('\n')[0]
 
-    def content(self) -> dict[str, object]:
+    def content(self) -> dict[str, Any]:
         """Return what report.json says."""
-        parsed: dict[str, object] = json.loads(self.files[REPORT_JSON])
+        parsed: dict[str, Any] = json.loads(self.files[REPORT_JSON])
         return parsed
 
 
 def explained_case(
     sources: Sources, jobs: int = 1, progress: Progress | None = None
 ) -> ExplainedCase:
-    """Explain one bag; parameters and errors as in `explain_one`."""
+    """Explain one bag; errors as in `explain_one`."""
     inputs = read_inputs(sources)
     for note in inputs.audit.recording.notes:
         if progress is not None:
             progress(f'note: {note}')
-    case = explain_case(
-        inputs, explain_recording, jobs=jobs, progress=progress, extras=not sources.quick
-    )
+    case = explain_case(inputs, jobs=jobs, progress=progress)
     made_from = provenance(sources.bag, sources.plant_file, sources.command)
     return replace(case, provenance=made_from)
 
 
 def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = None) -> Reported:
     """Explain one bag.
-
-    Parameters
-    ----------
-    sources : Sources
-    jobs : int
-        Processes side by side.
-    progress : callable, optional
 
     Raises
     ------
@@ -186,7 +186,7 @@ def unique_names(bags: Sequence[Path]) -> list[str]:
 
 def summary(name: str, reported: Reported) -> dict[str, Any]:
     """Return one bag's line of the summary as plain data."""
-    content = json.loads(reported.files[REPORT_JSON])
+    content = reported.content()
     return {
         'bag': name,
         'verdict': content['verdict'],
@@ -202,42 +202,25 @@ def summary(name: str, reported: Reported) -> dict[str, Any]:
 
 def summary_table(reports: Mapping[str, Reported]) -> str:
     """Return one CSV line for each bag: verdict, effects, largest misfit before and after."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator='\n')
-    writer.writerow(
-        [
-            'bag',
-            'verdict',
-            'effects',
-            'probabilities',
-            'nominal_rmse_over_noise',
-            'augmented_rmse_over_noise',
-            'runtime_s',
-        ]
-    )
+    rows = []
     for name, reported in reports.items():
         line = summary(name, reported)
         effects = line['effects']
-        # Where the rig moved too little to tell, nothing was fitted.
-        ratios = (line['nominal_rmse_over_noise'], line['augmented_rmse_over_noise'])
-        writer.writerow(
-            [
-                name,
-                line['verdict'],
-                ' '.join(f'{e["id"]}@{e["joint"]}' for e in effects),
-                ' '.join(f'{e["probability"]:.3f}' for e in effects),
-                *('' if ratio is None else f'{ratio:.2f}' for ratio in ratios),
-                f'{line["runtime_s"]:.1f}',
-            ]
-        )
-    return text.getvalue()
+        line['effects'] = ' '.join(f'{e["id"]}@{e["joint"]}' for e in effects)
+        line['probabilities'] = ' '.join(f'{e["probability"]:.3f}' for e in effects)
+        for key in ('nominal_rmse_over_noise', 'augmented_rmse_over_noise'):
+            # Where the rig moved too little to tell, nothing was fitted.
+            line[key] = '' if line[key] is None else f'{line[key]:.2f}'
+        line['runtime_s'] = f'{line["runtime_s"]:.1f}'
+        rows.append([line[key] for key in SUMMARY])
+    return _csv(SUMMARY, rows)
 
 
 def parameter_table(reports: Mapping[str, Reported]) -> str:
     """Return one CSV line for each fitted parameter, bags beside each other in columns."""
     columns: dict[tuple[str, str, str], dict[str, float]] = {}
     for name, reported in reports.items():
-        content = json.loads(reported.files[REPORT_JSON])
+        content = reported.content()
         for joint, estimates in content['parameters'].items():
             for parameter, estimate in estimates.items():
                 columns.setdefault((joint, 'plant', parameter), {})[name] = estimate['value']
@@ -245,12 +228,16 @@ def parameter_table(reports: Mapping[str, Reported]) -> str:
             for parameter, estimate in effect['parameters'].items():
                 key = (effect['joint'], effect['id'], parameter)
                 columns.setdefault(key, {})[name] = estimate['value']
+    rows = [
+        [*key, *(f'{values[name]:.5g}' if name in values else '' for name in reports)]
+        for key, values in columns.items()
+    ]
+    return _csv(['joint', 'of', 'parameter', *reports], rows)
+
+
+def _csv(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator='\n')
-    writer.writerow(['joint', 'of', 'parameter', *reports])
-    for key, values in columns.items():
-        cells = [f'{values[name]:.5g}' if name in values else '' for name in reports]
-        writer.writerow([*key, *cells])
+    csv.writer(text, lineterminator='\n').writerows([head, *rows])
     return text.getvalue()
 
 

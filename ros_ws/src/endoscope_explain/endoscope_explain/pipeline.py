@@ -15,6 +15,7 @@ from endoscope_explain.compare.ladder import ladders
 from endoscope_explain.decide.combine import combined_effects, combined_verdict, improved_plant
 from endoscope_explain.decide.given_physics import GivenJoints
 from endoscope_explain.design.proposal import propose
+from endoscope_explain.explain_recording import Progress, explain_recording
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.isolated_samples import with_isolated_marked
@@ -32,7 +33,6 @@ from endoscope_explain.recording import (
 )
 from endoscope_explain.search.levels import MOST_EFFECTS
 
-Progress = Callable[[str], None]
 Engine = Callable[..., Explanation]
 
 
@@ -88,31 +88,21 @@ class Inputs:
 
     Attributes
     ----------
-    described : PlantDescription
-        As given.
+    sources : Sources
     audit : AuditReport
     baseline, validation : Recording or None
         As audited.
-    band : float
-        Relative tolerance of the plant's parameters.
-    most_effects : int
-        Largest number of effects on a joint that are looked for.
-    given
-        As in `Sources`.
     """
 
-    described: PlantDescription
+    sources: Sources
     audit: AuditReport
-    baseline: Recording | None
-    validation: Recording | None
-    band: float = BAND
-    most_effects: int = MOST_EFFECTS
-    given: GivenJoints | None = None
+    baseline: Recording | None = None
+    validation: Recording | None = None
 
     @property
     def plant(self) -> PlantDescription:
         """Return the plant as described, with the recorded joints only."""
-        return self.described.of_joints(self.audit.recording.joints)
+        return self.sources.plant.of_joints(self.audit.recording.joints)
 
 
 class JointsDifferError(BagError):
@@ -165,45 +155,21 @@ def read_inputs(sources: Sources) -> Inputs:
         return audited.recording
 
     return Inputs(
-        sources.plant,
-        audit_recording(raw, plant),
-        second(sources.baseline),
-        second(sources.validate),
-        sources.band,
-        sources.most_effects,
-        sources.given,
+        sources, audit_recording(raw, plant), second(sources.baseline), second(sources.validate)
     )
 
 
 def explain_case(
     inputs: Inputs,
-    engine: Engine,
+    engine: Engine = explain_recording,
     *,
     jobs: int = 2,
     progress: Progress | None = None,
-    extras: bool = True,
 ) -> ExplainedCase:
-    """Explain a recording.
-
-    Parameters
-    ----------
-    inputs : Inputs
-    engine : callable
-        `explain_recording`.
-    jobs : int
-        Tasks side by side.
-    progress : callable, optional
-        Told in a few words what is being done.
-    extras : bool
-        Whether to train the black boxes and to look for the next experiment.
-
-    Returns
-    -------
-    ExplainedCase
-    """
+    """Explain a recording by `engine`, which is told what to explain as `explain_recording` is."""
     begun = time.monotonic()
     tell = progress or (lambda _: None)
-    audit = inputs.audit
+    sources, audit, validation = inputs.sources, inputs.audit, inputs.validation
     for finding in audit.findings:
         tell(f'audit: {finding.text}; {finding.remedy}')
     if audit.unusable:
@@ -215,9 +181,9 @@ def explain_case(
                 audit.recording,
                 inputs.plant,
                 baseline=inputs.baseline,
-                band=inputs.band,
-                most_effects=inputs.most_effects,
-                given=inputs.given,
+                band=sources.band,
+                most_effects=sources.most_effects,
+                given=sources.given,
                 jobs=jobs,
                 progress=progress,
             )
@@ -232,23 +198,22 @@ def explain_case(
         combined_verdict(explanation, audit),
         combined_effects(explanation, audit),
         (),
-        with_unrecorded(plant, inputs.described),
+        with_unrecorded(plant, sources.plant),
         {},
-        validation_name='' if inputs.validation is None else inputs.validation.name,
+        validation_name='' if validation is None else validation.name,
         baseline_name='' if inputs.baseline is None else inputs.baseline.name,
-        band=inputs.band,
+        band=sources.band,
     )
     case = replace(case, places=_places(case), cuts=_cuts(case))
     if not explanation.fit:
         ladder = ladders(recording, explanation, None, black_boxes=False, jobs=jobs)[0]
         return replace(case, ladder=ladder, runtime_s=time.monotonic() - begun)
-    if extras:
+    if not sources.quick:
         case = replace(case, next_experiment=_next(case, jobs, tell))
-    tell('judging beside black boxes' if extras else 'comparing the plants')
-    validation = inputs.validation
+    tell('comparing the plants' if sources.quick else 'judging beside black boxes')
     if validation is not None:
         validation = with_isolated_marked(validation, plant)
-    held_out, second = ladders(recording, explanation, validation, extras, jobs)
+    held_out, second = ladders(recording, explanation, validation, not sources.quick, jobs)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
 
 

@@ -38,14 +38,6 @@ def physics_of_all(
 ) -> list[GivenJoints]:
     """Read several recordings of a rig and choose the effects that explain all of them.
 
-    Parameters
-    ----------
-    sources : sequence of Sources
-    jobs : int
-        Tasks side by side.
-    tell : callable
-        Told what is being done.
-
     Returns
     -------
     list of mapping of joint name to GivenPhysics
@@ -67,7 +59,7 @@ def physics_of_all(
                 recording,
                 with_held_noise(observe(recording, inputs.plant)),
                 inputs.plant,
-                inputs.band,
+                one.band,
                 jobs,
             )
             joints = recording.joints
@@ -95,9 +87,7 @@ def shared_effects(
     most_effects : int
         Largest number of effects on a joint.
     jobs : int
-        Tasks side by side.
     tell : callable
-        Told each effect when it is chosen.
 
     Returns
     -------
@@ -119,17 +109,6 @@ def searched(
     nominal: SharedChoice, most_effects: int, jobs: int, tell: Callable[[str], None]
 ) -> tuple[SharedChoice, SharedChoice | None]:
     """Add effects one by one to the best few choices: the best single effect may mislead.
-
-    Parameters
-    ----------
-    nominal : SharedChoice
-        Without effects.
-    most_effects : int
-        Largest number of them.
-    jobs : int
-        Tasks side by side.
-    tell : callable
-        Told each effect when it is chosen.
 
     Returns
     -------

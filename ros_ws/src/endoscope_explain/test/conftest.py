@@ -20,7 +20,7 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.observe.predicted_signals import rung, view
-from endoscope_explain.pipeline import Inputs, explain_case
+from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.signals import gear
 
@@ -106,8 +106,8 @@ def stribeck_case(stribeck_recording):
         augmented,
         {name: rung(recorded, name) for name in ('nominal', 'refitted', 'augmented')},
     )
-    inputs = Inputs(plant, audit, None, None)
-    return explain_case(inputs, lambda *_, **__: explanation, extras=False)
+    inputs = Inputs(Sources(Path('synthetic'), plant, quick=True), audit)
+    return explain_case(inputs, lambda *_, **__: explanation)
 
 
 @pytest.fixture(scope='session')

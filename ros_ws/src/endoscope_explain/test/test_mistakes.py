@@ -1,15 +1,19 @@
 """A mistake is said before anything is fitted, and what looks like one is not."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import audit_recording
-from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.pipeline import Inputs, explain_case
+from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.report.writing import write_report
+
+
+def inputs(plant, audit):
+    return Inputs(Sources(Path('rig'), plant), audit)
 
 
 def never(*_, **__):
@@ -28,7 +32,7 @@ def test_plugs_that_were_exchanged_are_at_the_sensors(record):
     swapped = replace(sound.tension, values=sound.tension.values[:, ::-1])
     plant = PlantDescription()
     audit = audit_recording(sound.with_series({'tension': swapped}), plant)
-    case = explain_case(Inputs(plant, audit, None, None), never, extras=False)
+    case = explain_case(inputs(plant, audit), never)
     assert case.verdict is Verdict.RECORDING_FAULT
     assert {place.stage for place in case.places} == {'sensing'}
 
@@ -63,7 +67,7 @@ def test_where_nothing_moves_a_report_says_that_there_is_too_little(record, tmp_
     still = {name: replace(s, time=every[name].time) for name, s in still.items()}
     plant = PlantDescription()
     audit = audit_recording(sound.with_series(still), plant)
-    case = explain_case(Inputs(plant, audit, None, None), explain_recording, jobs=1)
+    case = explain_case(inputs(plant, audit), jobs=1)
     assert case.verdict is Verdict.INSUFFICIENT_DATA
     write_report(case, tmp_path)
     assert 'The recording cannot tell' in (tmp_path / 'report.html').read_text()

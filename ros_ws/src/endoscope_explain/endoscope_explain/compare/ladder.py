@@ -27,23 +27,8 @@ def ladders(
 ) -> tuple[Ladder, Ladder]:
     """Judge all fits, on held-out blocks and on a second recording.
 
-    Parameters
-    ----------
-    recording : Recording
-        As audited.
-    explanation : Explanation
-    validation : Recording or None
-        Of the same rig; the black boxes see all of the first recording before they are judged
-        on it.
-    black_boxes : bool
-        Whether to train them.
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    held_out, second : Ladder
-        The latter empty without a second recording.
+    The black boxes, if asked for, see all of the first recording before they are judged on the
+    second one; without a second one its ladder is empty.
     """
     plants = {name: getattr(explanation, name) for name in PHYSICS}
     held_out: dict[str, Mapping[str, ChannelFit]] = {

@@ -13,12 +13,9 @@ from endoscope_explain.fit.free_parameters import FORM_SPREAD
 
 
 def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[NamedEffect, ...]:
-    """Merge the effects that the audit found into those of the engine.
+    """Merge the effects that the audit found into those of the engine, most certain first.
 
-    Returns
-    -------
-    tuple of NamedEffect
-        Most certain first; an effect that both found is listed once, as the engine fitted it.
+    An effect that both found is listed once, as the engine fitted it.
     """
     known = {(e.id, e.joint) for e in explanation.effects}
     found = [
@@ -60,16 +57,7 @@ def improved_plant(explanation: Explanation, audit: AuditReport) -> PlantDescrip
 
 
 def changed_parameters(estimates: Mapping[str, NominalEstimate]) -> dict[str, NominalEstimate]:
-    """Return the parameters whose intervals exclude their described values, largest change first.
-
-    Parameters
-    ----------
-    estimates : mapping of str to NominalEstimate
-
-    Returns
-    -------
-    dict of str to NominalEstimate
-    """
+    """Parameters whose intervals exclude their described values, the largest change first."""
     changed = {name: e for name, e in estimates.items() if has_changed(name, e)}
 
     def reach(item: tuple[str, NominalEstimate]) -> float:

@@ -1,12 +1,13 @@
 """What is concluded from the decisions on all joints: names, verdict, plants, ladder of fits."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
-from endoscope_core.physics.effect import Stage
+from endoscope_core.physics.effect import Effect, Stage
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.decide.decision import Decision, MissingTerm
 from endoscope_explain.explanation import (
@@ -29,28 +30,32 @@ from endoscope_explain.search.formula import fitted_function, nearest_formula
 from endoscope_explain.search.levels import JointSearch
 from endoscope_explain.search.refit import Composition
 
+Array = NDArray[np.float64]
+
 CHANGED = 0.04
 """Relative difference of a nominal parameter that is worth a verdict."""
 MOST = 0.5
 """Share of the misfit that names must explain where they leave more than another form would: with
 less, the main thing has no name."""
-NOMINAL_UNITS = {
-    'pretension': 'N',
-    'wire_stiffness': 'N/m',
-    'joint_radius': 'm',
-    'pulley_radius': 'm',
-    'capstan_exponent': '-',
-    'joint_stiffness': 'N m/rad',
-    'joint_damping': 'N m s/rad',
-    'joint_friction': 'N m',
-    'joint_presliding': 'rad',
-    'joint_presliding_spread': '-',
-    'pretension_profile': '-',
-    'joint_rest_angle': 'rad',
-    **dict.fromkeys(FRICTION_PROFILE_NAMES, '-'),
-    'motor_bandwidth': 'rad/s',
-    'motor_damping_ratio': '-',
+NOMINAL = {
+    'pretension': (Stage.TRANSMISSION, 'N'),
+    'wire_stiffness': (Stage.TRANSMISSION, 'N/m'),
+    'joint_radius': (Stage.TRANSMISSION, 'm'),
+    'pulley_radius': (Stage.TRANSMISSION, 'm'),
+    'capstan_exponent': (Stage.TRANSMISSION, '-'),
+    'joint_stiffness': (Stage.JOINT, 'N m/rad'),
+    'joint_damping': (Stage.JOINT, 'N m s/rad'),
+    'joint_friction': (Stage.JOINT, 'N m'),
+    'joint_presliding': (Stage.JOINT, 'rad'),
+    'joint_presliding_spread': (Stage.JOINT, '-'),
+    'pretension_profile': (Stage.TRANSMISSION, '-'),
+    'joint_rest_angle': (Stage.JOINT, 'rad'),
+    **dict.fromkeys(FRICTION_PROFILE_NAMES, (Stage.TRANSMISSION, '-')),
+    'motor_bandwidth': (Stage.ACTUATOR, 'rad/s'),
+    'motor_damping_ratio': (Stage.ACTUATOR, '-'),
 }
+"""Part of the chain and unit of each number of the nominal plant."""
+NOMINAL_UNITS = {name: unit for name, (_, unit) in NOMINAL.items()}
 
 
 def named(
@@ -137,8 +142,12 @@ def has_changed(name: str, estimate: NominalEstimate) -> bool:
 
 
 def plant_of(plant: PlantDescription, fits: list[Composition]) -> PlantDescription:
-    """A plant with the numbers of its joints' fits, and with their effects and functions."""
+    """A plant with the numbers of its joints' fits, and with their effects and functions.
+
+    What is of a device that joints share has the numbers of the joint that shows it best.
+    """
     joints, specs, terms = dict(plant.joints), list(plant.effects), list(plant.terms)
+    shared: dict[str, tuple[float, Mapping[str, float]]] = {}
     for one in fits:
         joint = one.fit.model.observation.joint
         packed, _ = one.fit.model.packed(one.fit.theta)
@@ -147,35 +156,33 @@ def plant_of(plant: PlantDescription, fits: list[Composition]) -> PlantDescripti
             if term.is_function:
                 terms.append(unknown_term(one, term).term())
                 continue
-            names = [p.name for p in term.term.parameters]
-            values = packed[list(term.term.places)].tolist()
-            specs.append(EffectSpec(term.id, joint, dict(zip(names, values, strict=True))))
+            spec = spec_of(term.term, joint, packed)
+            specs.append(spec)
+            if term.term.traits.of_device:
+                known = shared.get(term.id, (np.inf, {}))
+                shared[term.id] = min(
+                    known, (_width(one.fit, term.term), spec.parameters), key=lambda each: each[0]
+                )
+    specs = [replace(s, parameters=shared[s.id][1]) if s.id in shared else s for s in specs]
     return replace(plant, joints=joints, effects=tuple(specs), terms=tuple(terms))
 
 
-def unknown_term(
-    one: Composition,
-    term: Term,
-    share: float = 1.0,
-    rivals: tuple[str, ...] = (),
-    siblings: tuple[str, ...] = (),
-) -> UnknownTerm:
-    """A function of a fitted joint, with the formula that comes nearest to it.
+def _width(found: Fit, effect: Effect) -> float:
+    """Width of the interval of an effect's first number."""
+    first = effect.parameters[0]
+    estimate = effect_estimates(found, effect.first_parameter, {first.name: first.unit})[first.name]
+    return estimate.high - estimate.low
 
-    Parameters
-    ----------
-    one : Composition
-    term : Term
-        One of its functions.
-    share : float
-        Of the excess misfit that the joint's terms remove.
-    rivals, siblings : tuple of str
-        Other places, and effects of the catalogue, nearest first.
 
-    Returns
-    -------
-    UnknownTerm
-    """
+def spec_of(effect: Effect, joint: str, packed: Array) -> EffectSpec:
+    """An effect of a joint as a plant has it, with its numbers of `packed` (parameters,)."""
+    names = [parameter.name for parameter in effect.parameters]
+    values = packed[list(effect.places)].tolist()
+    return EffectSpec(effect.id, joint, dict(zip(names, values, strict=True)))
+
+
+def unknown_term(one: Composition, term: Term) -> UnknownTerm:
+    """A function of a fitted joint, with the formula that comes nearest to it."""
     function = fitted_function(one.fit, term.id)
     formula = nearest_formula(function)
     return UnknownTerm(
@@ -188,11 +195,8 @@ def unknown_term(
         formula.values,
         formula.share,
         formula.as_good,
-        share,
-        rivals,
-        siblings,
-        term.multiplies,
-        tuple(
+        multiplies=term.multiplies,
+        factors=tuple(
             unknown_term(one, other)
             for other in one.terms
             if other.family is not None
@@ -215,7 +219,12 @@ def missing_function(decisions: list[Decision]) -> UnknownTerm | None:
         return None
     _, decision, term = max(found, key=lambda each: each[0])
     siblings = (term.name,) if term.is_known else ()
-    return unknown_term(decision.chosen, term.term, decision.explained, term.alternatives, siblings)
+    return replace(
+        unknown_term(decision.chosen, term.term),
+        explained=decision.explained,
+        rivals=term.alternatives,
+        siblings=siblings,
+    )
 
 
 def refitted(tried: JointSearch, decision: Decision) -> Composition:

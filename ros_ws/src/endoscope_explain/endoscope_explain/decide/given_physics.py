@@ -66,19 +66,9 @@ def explained_by(
 ) -> tuple[JointSearch, Decision]:
     """Fit given physics to a joint, and see what each of its effects is needed for.
 
-    Parameters
-    ----------
-    anchors : (Fit, Fit)
-        Nominal plant refitted, and as described.
-    given : GivenPhysics
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    (JointSearch, Decision)
-        Each effect gains what the joint loses without it. One term more is searched only where
-        they leave more than another form would.
+    Each effect gains what the joint loses without it. One term more is searched only where they
+    leave more than another form would. The anchors are the nominal plant refitted, and as
+    described.
     """
     nominal = composition((), anchors[0])
     found = anchors[0]

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.decide.conclusions import spec_of
 from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
 from endoscope_explain.fit.model import Fit, JointModel, fit
 from endoscope_explain.fit.simulated_joint import joint_of, packed_joint
@@ -32,10 +33,6 @@ def refit(
     band : float
         Relative freedom of the nominal parameters.
     iterations : int
-
-    Returns
-    -------
-    Fit
     """
     base, flags = packed_joint(plant, observation.joint)
     free = nominal_parameters(base, band)
@@ -50,41 +47,17 @@ def refit(
 
 
 def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescription:
-    """Put the fitted numbers of one joint back into a plant.
-
-    Returns
-    -------
-    PlantDescription
-    """
+    """Put the fitted numbers of one joint back into a plant."""
     packed, _ = found.model.packed(found.theta)
-    joints = {**plant.joints, joint: joint_of(packed)}
-    effects = []
-    for spec in plant.effects:
-        if spec.joint != joint:
-            effects.append(spec)
-            continue
-        definition = CATALOGUE[spec.id]
-        first = definition.first_parameter
-        effects.append(
-            EffectSpec(
-                spec.id,
-                joint,
-                {p.name: float(packed[first + i]) for i, p in enumerate(definition.parameters)},
-            )
-        )
-    return replace(plant, joints=joints, effects=tuple(effects))
+    effects = tuple(
+        spec_of(CATALOGUE[spec.id], joint, packed) if spec.joint == joint else spec
+        for spec in plant.effects
+    )
+    return replace(plant, joints={**plant.joints, joint: joint_of(packed)}, effects=effects)
 
 
 def distance(truth: Recording, rival: PlantDescription, joint: str) -> float:
-    """Return what a rival misses of an imagined recording after its refit.
-
-    Parameters
-    ----------
-    truth : Recording
-        Noise-free answer of the other rival.
-    rival : PlantDescription
-    joint : str
-        The joint in question.
+    """What a rival misses of the other rival's noise-free answer after its refit.
 
     Returns
     -------

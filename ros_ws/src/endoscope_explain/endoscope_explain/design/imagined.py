@@ -14,13 +14,7 @@ Array = NDArray[np.float64]
 
 
 def imagine(plant: PlantDescription, waveform: Waveform) -> Recording:
-    """Record a plant's noise-free answer to a motion.
-
-    Returns
-    -------
-    Recording
-        Fast signals every tick, the tracker's at its rate.
-    """
+    """A plant's noise-free answer to a motion: the tracker at its rate, all else every tick."""
     time = np.arange(0.0, waveform.time[-1], TICK)
     joints = plant.joint_names()
     desired = np.zeros((len(time), len(joints)))
@@ -41,16 +35,7 @@ def imagine(plant: PlantDescription, waveform: Waveform) -> Recording:
 
 
 def is_safe(recording: Recording, tension_limit: float, bending_limit: float) -> bool:
-    """Tell whether an imagined motion stays within what the rig has been through.
-
-    Parameters
-    ----------
-    recording : Recording
-    tension_limit : float
-        In N.
-    bending_limit : float
-        In rad.
-    """
+    """Tell whether an imagined motion stays within a tension in N and an angle in rad."""
     return bool(
         recording.tension.values.max() <= tension_limit
         and np.abs(recording.bending.values).max() <= bending_limit

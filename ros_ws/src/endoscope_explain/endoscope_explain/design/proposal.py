@@ -12,10 +12,11 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_explain.case import NextExperiment
+from endoscope_explain.decide.conclusions import spec_of
 from endoscope_explain.design.distance import distance, refit, with_fit
 from endoscope_explain.design.imagined import imagine, is_safe
 from endoscope_explain.design.waveforms import Waveform, family
@@ -37,17 +38,7 @@ MARGIN = 1.15
 def propose(
     recording: Recording, plant: PlantDescription, effect: NamedEffect, jobs: int = 1
 ) -> NextExperiment | None:
-    """Propose the motion that tells an effect from its alternatives.
-
-    Parameters
-    ----------
-    recording : Recording
-        As audited.
-    plant : PlantDescription
-        With the effect in it.
-    effect : NamedEffect
-    jobs : int
-        Tasks side by side.
+    """Propose the motion that tells an effect, which `plant` has, from its alternatives.
 
     Returns
     -------
@@ -93,26 +84,11 @@ def propose(
 def rival_plant(
     recording: Recording, plant: PlantDescription, effect: NamedEffect, rival: str
 ) -> PlantDescription | None:
-    """Fit a rival in an effect's place.
-
-    Parameters
-    ----------
-    recording : Recording
-    plant : PlantDescription
-    effect : NamedEffect
-        Taken out.
-    rival : str
-        Put in.
-
-    Returns
-    -------
-    PlantDescription or None
-        None where the rival has no simulation.
-    """
+    """Fit a rival in an effect's place; None where the rival has no simulation."""
     if rival not in CATALOGUE:
         return None
     others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
-    families = CATALOGUE[effect.id].traits.families if effect.id in CATALOGUE else ()
+    families = effect.definition.traits.families
     functions = tuple(
         t for t in plant.terms if t.joint != effect.joint or t.place not in (effect.id, *families)
     )
@@ -124,30 +100,14 @@ def rival_plant(
     if not ranked:
         return None
     packed = ranked[0].candidate.added_to(behind.fit.model).base
-    definition = CATALOGUE[rival]
-    values = packed[list(definition.places)].tolist()
-    names = [p.name for p in definition.parameters]
-    spec = EffectSpec(rival, effect.joint, dict(zip(names, values, strict=True)))
-    candidate = replace(bare, effects=(*others, spec))
+    candidate = replace(bare, effects=(*others, spec_of(CATALOGUE[rival], effect.joint, packed)))
     return with_fit(candidate, effect.joint, refit(candidate, observation, 0.2, 6))
 
 
 def safe_family(
     recording: Recording, plants: Sequence[PlantDescription], joint: str
 ) -> list[Waveform]:
-    """List motions that keep every rival within what the rig has been through.
-
-    Parameters
-    ----------
-    recording : Recording
-    plants : sequence of PlantDescription
-        The rivals: whichever is right, the motion must be safe.
-    joint : str
-
-    Returns
-    -------
-    list of Waveform
-    """
+    """List motions that keep every rival within what the rig has been through."""
     j = recording.joints.index(joint)
     reach = float(np.abs(recording.command.values[:, j]).max()) / gear()
     tension = MARGIN * float(recording.tension.values[recording.tension.valid].max())

@@ -34,21 +34,7 @@ class Waveform:
 
 
 def family(joint: str, others: tuple[str, ...], reach: float) -> list[Waveform]:
-    """List the motions.
-
-    Parameters
-    ----------
-    joint : str
-        The joint in question.
-    others : tuple of str
-        The rest of the joints: each is moved alone, too, while `joint` rests.
-    reach : float
-        Largest desired angle in rad.
-
-    Returns
-    -------
-    list of Waveform
-    """
+    """List the motions of a joint up to `reach` rad; the others are each moved alone, too."""
     a = reach
     signals = [
         ('steps with holds', steps_with_holds((0.5 * a, a, 0.2 * a, -a, -0.4 * a), 0.15, 2.0)),
@@ -65,40 +51,17 @@ def family(joint: str, others: tuple[str, ...], reach: float) -> list[Waveform]:
 
 
 def nested_reversals(reach: float) -> Signal:
-    """Turn back earlier and earlier: inner loops within outer ones.
-
-    Parameters
-    ----------
-    reach : float
-        In rad.
-    """
-    turns = [
-        reach,
-        -reach,
-        0.8 * reach,
-        -0.6 * reach,
-        0.6 * reach,
-        -0.3 * reach,
-        0.4 * reach,
-        0.0,
-        0.2 * reach,
-        0.0,
-    ]
+    """Turn back earlier and earlier: inner loops within outer ones (`reach` in rad)."""
     parts, here = [], 0.0
-    for target in turns:
+    for share in (1.0, -1.0, 0.8, -0.6, 0.6, -0.3, 0.4, 0.0, 0.2, 0.0):
+        target = share * reach
         parts.append(move(here, target, 0.4 + 1.2 * abs(target - here) / max(reach, 1e-9)))
         here = target
     return sequence('nested reversals', parts)
 
 
 def fast_and_slow(reach: float) -> Signal:
-    """Make the same stroke at three speeds: what depends on speed shows against what does not.
-
-    Parameters
-    ----------
-    reach : float
-        In rad.
-    """
+    """Make the same stroke at three speeds: what depends on speed shows against what does not."""
     parts: list[Signal] = []
     for duration in (3.0, 1.2, 0.5):
         parts += [
@@ -111,13 +74,7 @@ def fast_and_slow(reach: float) -> Signal:
 
 
 def rest_on_either_side(reach: float) -> Signal:
-    """Rest for long at rest, bent one way and bent the other: what changes by itself shows.
-
-    Parameters
-    ----------
-    reach : float
-        In rad.
-    """
+    """Rest for long at rest, bent one way and bent the other: what changes by itself shows."""
     return sequence(
         'rest on either side',
         [

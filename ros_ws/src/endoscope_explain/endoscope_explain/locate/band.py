@@ -10,12 +10,9 @@ Array = NDArray[np.float64]
 
 
 def band_hz(excess: SignalExcess) -> tuple[float, float]:
-    """Find the band that holds 90 % of what the prediction lacks.
+    """Find the band in Hz that holds 90 % of what the prediction lacks.
 
-    Returns
-    -------
-    (float, float)
-        In Hz; the lower end is 0 where a constant is part of it.
+    The lower end is 0 where a constant is part of it.
     """
     time, missing = excess.view.time, excess.missing
     if len(time) < 8:

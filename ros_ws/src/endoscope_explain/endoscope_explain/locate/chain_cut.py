@@ -20,21 +20,12 @@ BEHIND = ('tension', 'bending')
 
 
 def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCut, ...]:
-    """Compare both ways of driving wires and joint.
+    """Compare both ways of driving wires and joint, by a plant to which nothing was added.
 
-    Parameters
-    ----------
-    recording : Recording
-        As audited.
-    plant : PlantDescription
-        Its parameters refitted, nothing added.
-
-    Returns
-    -------
-    tuple of ChainCut
-        Of each joint; empty where the shaft was not recorded.
+    Empty where the shaft was not recorded.
     """
-    if recording.shaft_position is None:
+    shaft = recording.shaft_position
+    if shaft is None:
         return ()
     observations = observe(recording, plant)
     whole = simulate_rig(observations, plant)
@@ -43,34 +34,20 @@ def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCu
     cuts = []
     for j, observation in enumerate(observations):
         inputs = observation.inputs.copy()
-        inputs[0, :, IN_MOTOR] = _measured_motor(
-            recording,
-            recording.joints.index(observation.joint),
-            lead,
-            inputs.shape[1],
-        )
+        k = recording.joints.index(observation.joint)
+        time = shaft.time - recording.command.time[0] + lead * TICK
+        inputs[0, :, IN_MOTOR] = _at_ends_of_ticks(time, shaft.values[:, k], inputs.shape[1])
         out = simulate_joint(observation, parameters[j], flags[j], inputs)
-        cuts.append(
-            ChainCut(
-                observation.joint,
-                _misfit(observation, whole[j], lead),
-                _misfit(observation, out, lead),
-            )
-        )
+        misfits = (_misfit(observation, each, lead) for each in (whole[j], out))
+        cuts.append(ChainCut(observation.joint, *misfits))
     return tuple(cuts)
 
 
-def _measured_motor(recording: Recording, j: int, lead: float, ticks: int) -> Array:
-    shaft = recording.shaft_position
-    if shaft is None:
-        raise ValueError('the shaft was not recorded')
-    period = float(np.median(np.diff(shaft.time)))
+def _at_ends_of_ticks(time: Array, angle: Array, ticks: int) -> Array:
+    """The angle that a motor shall have reached at the end of each tick, smoothed."""
+    period = float(np.median(np.diff(time)))
     width = max(5, 2 * int(0.5 * SMOOTHED_S / period) + 1)
-    angle = savgol_filter(shaft.values[:, j], width, 2)
-    begin = float(recording.command.time[0])
-    # The angle that the motor shall have reached at the end of each tick.
-    ends = TICK * np.arange(1, ticks + 1)
-    return np.interp(ends, shaft.time - begin + lead * TICK, angle)
+    return np.interp(TICK * np.arange(1, ticks + 1), time, savgol_filter(angle, width, 2))
 
 
 def _misfit(observation: JointObservation, outputs: Array, lead: float) -> float:

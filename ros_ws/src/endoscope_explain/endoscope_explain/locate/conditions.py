@@ -1,7 +1,5 @@
 """States of the rig as a person names them, from what was measured."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,24 +16,8 @@ AFTER_REVERSAL_RAD = 0.15
 STANDING_RAD_PER_S = 0.02
 
 
-@dataclass(frozen=True)
-class Condition:
-    """One state.
-
-    Attributes
-    ----------
-    words : str
-        As it stands in a sentence after "shows".
-    active : array (N,) of bool
-        On a grid of `GRID_S`.
-    """
-
-    words: str
-    active: Mask
-
-
-def conditions(recording: Recording, j: int) -> list[Condition]:
-    """List the states that a joint was in.
+def conditions(recording: Recording, j: int) -> dict[str, Mask]:
+    """When a joint was in each state, by the state's words as they stand after "shows".
 
     Parameters
     ----------
@@ -46,8 +28,8 @@ def conditions(recording: Recording, j: int) -> list[Condition]:
 
     Returns
     -------
-    list of Condition
-        Those that hold for some, not all of the time.
+    mapping of str to array (N,) of bool
+        On a grid of `GRID_S`: those that hold for some, not all of the time.
     """
     grid = np.arange(0.0, recording.duration, GRID_S)
     motor = _motor(recording, j, grid)
@@ -56,45 +38,37 @@ def conditions(recording: Recording, j: int) -> list[Condition]:
     tension = recording.tension.values[:, j].sum(axis=1)
     tension = np.interp(grid, recording.tension.time, tension)
     moving = np.abs(speed) > STANDING_RAD_PER_S
-    found = [
-        Condition('in holds', _lasting(~moving, 0.2)),
-        Condition('while the motor moves', moving),
-        Condition('while the motor turns in the positive direction', speed > STANDING_RAD_PER_S),
-        Condition('while the motor turns in the negative direction', speed < -STANDING_RAD_PER_S),
-        Condition('just after reversals', _after_reversal(motor, speed)),
-    ]
+    found = {
+        'in holds': _lasting(~moving, 0.2),
+        'while the motor moves': moving,
+        'while the motor turns in the positive direction': speed > STANDING_RAD_PER_S,
+        'while the motor turns in the negative direction': speed < -STANDING_RAD_PER_S,
+        'just after reversals': _after_reversal(motor, speed),
+    }
     if moving.any():
         slow, fast = np.quantile(np.abs(speed[moving]), [1 / 3, 2 / 3])
-        found += [
-            Condition('at low speed', moving & (np.abs(speed) < slow)),
-            Condition('at low speed and in holds', np.abs(speed) < slow),
-            Condition('at high speed', np.abs(speed) > fast),
-        ]
+        found['at low speed'] = moving & (np.abs(speed) < slow)
+        found['at low speed and in holds'] = np.abs(speed) < slow
+        found['at high speed'] = np.abs(speed) > fast
     largest = float(np.abs(bending).max())
     for share in (0.3, 0.5, 0.7, 0.85):
         level = share * largest
         degrees = f'{np.degrees(level):.0f} deg'
-        found += [
-            Condition(f'beyond {degrees} of bending', np.abs(bending) > level),
-            Condition(f'above +{degrees} of bending', bending > level),
-            Condition(f'below -{degrees} of bending', bending < -level),
-        ]
-    found.append(
-        Condition(
-            f'within {np.degrees(0.2 * largest):.0f} deg of straight',
-            np.abs(bending) < 0.2 * largest,
-        )
-    )
+        found.setdefault(f'beyond {degrees} of bending', np.abs(bending) > level)
+        found.setdefault(f'above +{degrees} of bending', bending > level)
+        found.setdefault(f'below -{degrees} of bending', bending < -level)
+    within = 0.2 * largest
+    found[f'within {np.degrees(within):.0f} deg of straight'] = np.abs(bending) < within
     high = float(np.quantile(tension, 0.75))
-    found.append(Condition(f'where the wires carry more than {high:.1f} N', tension > high))
+    found[f'where the wires carry more than {high:.1f} N'] = tension > high
     for other, name in enumerate(recording.joints):
         if other != j:
             its_speed = _speed(_motor(recording, other, grid))
-            found.append(Condition(f'while {name} moves', np.abs(its_speed) > STANDING_RAD_PER_S))
+            found[f'while {name} moves'] = np.abs(its_speed) > STANDING_RAD_PER_S
     for share in (0.25, 0.5, 0.75):
         time = share * recording.duration
-        found.append(Condition(f'after {time:.0f} s', grid > time))
-    return [c for c in found if 0.02 < c.active.mean() < 0.98]
+        found.setdefault(f'after {time:.0f} s', grid > time)
+    return {words: active for words, active in found.items() if 0.02 < active.mean() < 0.98}
 
 
 def drive(recording: Recording, j: int, end: float) -> Array:

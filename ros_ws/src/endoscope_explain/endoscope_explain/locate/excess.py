@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.observe.predicted_signals import SignalView
+from endoscope_core.physics.description import PlantDescription
+from endoscope_explain.observe.predicted_signals import SignalView, view
+from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
 
@@ -38,29 +40,20 @@ class SignalExcess:
 
 
 def excess_between(
-    views: Sequence[SignalView], without: str, with_it: str | None
+    recording: Recording, without: PlantDescription, with_it: PlantDescription | None
 ) -> list[SignalExcess]:
-    """Compare two predictions of each signal.
+    """Compare what two plants miss of each signal, largest excess first.
 
-    Parameters
-    ----------
-    views : sequence of SignalView
-    without, with_it : str
-        Names of the predictions; `with_it` None stands for noise alone.
-
-    Returns
-    -------
-    list of SignalExcess
-        Largest total first.
+    No second plant stands for noise alone.
     """
+    plants = {'without': without} if with_it is None else {'without': without, 'with': with_it}
     found = []
-    for one in views:
-        worse = one.residual(without)
+    for one in view(recording, plants).signals.values():
+        worse = one.residual('without')
         if with_it is None:
-            kept = worse
-            excess, missing = worse**2 - 1.0, worse
+            kept, excess, missing = worse, worse**2 - 1.0, worse
         else:
-            kept = one.residual(with_it)
+            kept = one.residual('with')
             excess, missing = worse**2 - kept**2, worse - kept
         found.append(SignalExcess(one, excess, kept, missing))
     return sorted(found, key=lambda e: -e.total)

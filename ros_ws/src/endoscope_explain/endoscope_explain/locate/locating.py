@@ -1,87 +1,46 @@
 """Where a mismatch is: stage, signals, time, state and frequency."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.audit import AuditReport, Finding
+from endoscope_explain.audit import AuditReport
 from endoscope_explain.case import Place
 from endoscope_explain.decide.combine import changed_parameters
+from endoscope_explain.decide.conclusions import NOMINAL
 from endoscope_explain.explanation import Explanation, NamedEffect
-from endoscope_explain.fit.free_parameters import FRICTION_PROFILE_NAMES
 from endoscope_explain.locate.band import band_hz
 from endoscope_explain.locate.conditions import conditions, drive
 from endoscope_explain.locate.excess import SignalExcess, excess_between, shares
 from endoscope_explain.locate.regime import regime_in_words
 from endoscope_explain.locate.time_windows import intervals, onset
-from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.recording import Recording
-
-STAGE_OF_PARAMETER = {
-    'pretension': 'transmission',
-    'wire_stiffness': 'transmission',
-    'joint_radius': 'transmission',
-    'pulley_radius': 'transmission',
-    'capstan_exponent': 'transmission',
-    'pretension_profile': 'transmission',
-    **dict.fromkeys(FRICTION_PROFILE_NAMES, 'transmission'),
-    'joint_stiffness': 'joint',
-    'joint_damping': 'joint',
-    'joint_friction': 'joint',
-    'joint_presliding': 'joint',
-    'joint_presliding_spread': 'joint',
-    'joint_rest_angle': 'joint',
-    'motor_bandwidth': 'actuator',
-    'motor_damping_ratio': 'actuator',
-}
 
 
 def locate_effects(
     recording: Recording, plant: PlantDescription, effects: Sequence[NamedEffect]
 ) -> list[Place]:
-    """Say where each effect of an explained recording shows.
+    """Say where each effect of an explained recording shows, but for those that the plant lacks.
 
     The plant with all effects is compared with the same plant without the one in question: what
     the measurement then has in excess is that effect's trace.
-
-    Parameters
-    ----------
-    recording : Recording
-        As audited.
-    plant : PlantDescription
-        With the effects in it.
-    effects : sequence of NamedEffect
-
-    Returns
-    -------
-    list of Place
-        In the order of the effects; those that the plant does not hold are left out.
     """
     located = []
     for effect in effects:
         rest = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
         if len(rest) == len(plant.effects):
             continue
-        recorded = view(recording, {'without': replace(plant, effects=rest), 'with': plant})
-        found = excess_between(list(recorded.signals.values()), 'without', 'with')
+        found = excess_between(recording, replace(plant, effects=rest), plant)
         time = effect.parameters.get('time_s')
-        located.append(
-            place(
-                recording,
-                found,
-                effect.stage,
-                effect.joint,
-                None if time is None else time.value,
-            )
-        )
+        began = None if time is None else time.value
+        located.append(place(recording, found, effect.stage, effect.joint, began))
     return located
 
 
 def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place]:
     """Say where a mismatch shows that no effect of the catalogue explains."""
     term = explanation.unknown
-    recorded = view(recording, {'refitted': explanation.refitted})
-    found = excess_between(list(recorded.signals.values()), 'refitted', None)
+    found = excess_between(recording, explanation.refitted, None)
     if term is not None and term.helps:
         return [place(recording, found, str(term.there.stage), term.joint)]
     return [place(recording, found, _shows_in(found), found[0].view.joint)]
@@ -100,19 +59,21 @@ def _shows_in(found: Sequence[SignalExcess]) -> str:
 
 def locate_parameters(recording: Recording, explanation: Explanation) -> list[Place]:
     """Say where parameters that changed show, stage by stage."""
-    recorded = view(recording, {'nominal': explanation.nominal, 'refitted': explanation.refitted})
-    found = excess_between(list(recorded.signals.values()), 'nominal', 'refitted')
-    stages: Mapping[tuple[str, str], float] = {
-        (STAGE_OF_PARAMETER[name], joint): 0.0
+    found = excess_between(recording, explanation.nominal, explanation.refitted)
+    stages = dict.fromkeys(
+        (str(NOMINAL[name][0]), joint)
         for joint, estimates in explanation.parameters.items()
         for name in changed_parameters(estimates)
-    }
+    )
     return [place(recording, found, stage, joint) for stage, joint in stages]
 
 
 def locate_findings(audit: AuditReport) -> list[Place]:
     """Say where the audit's faults are."""
-    return [_place_of(finding) for finding in audit.faults()]
+    return [
+        Place(f.stage, f.joint, f.signals, f.intervals[:12], f.text, (0.0, 0.0))
+        for f in audit.faults()
+    ]
 
 
 def place(
@@ -133,10 +94,6 @@ def place(
         Known already.
     began : float, optional
         When it began, in s, where that is known.
-
-    Returns
-    -------
-    Place
     """
     by_signal = shares(found)
     j = recording.joints.index(joint)
@@ -157,15 +114,4 @@ def place(
         band_hz(telling[0]),
         by_signal,
         began,
-    )
-
-
-def _place_of(finding: Finding) -> Place:
-    return Place(
-        finding.stage,
-        finding.joint,
-        finding.signals,
-        finding.intervals[:12],
-        finding.text,
-        (0.0, 0.0),
     )

@@ -1,11 +1,11 @@
 """In which states of the rig a mismatch shows, in words."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.locate.conditions import GRID_S, Condition
+from endoscope_explain.locate.conditions import GRID_S
 from endoscope_explain.locate.excess import SignalExcess
 
 Array = NDArray[np.float64]
@@ -17,7 +17,7 @@ SHIFTS = 99
 
 
 def regime_in_words(
-    excesses: Sequence[SignalExcess], states: Sequence[Condition], seed: int = 0
+    excesses: Sequence[SignalExcess], states: Mapping[str, Mask], seed: int = 0
 ) -> str:
     """Name the one or two states that hold most of the excess in the least time.
 
@@ -28,25 +28,21 @@ def regime_in_words(
     ----------
     excesses : sequence of SignalExcess
         The signals in which it shows.
-    states : sequence of Condition
-        On the grid of `conditions`.
+    states : mapping of str to array (N,) of bool
+        When each holds, see `conditions`.
     seed : int
         Of the shifts.
-
-    Returns
-    -------
-    str
     """
     if not states or not excesses:
         return 'throughout'
-    energy = _energy_on_grid(excesses, len(states[0].active))
+    energy = _energy_on_grid(excesses, len(next(iter(states.values()))))
     everywhere = np.ones(len(energy), bool)
     first = _best(energy, states, everywhere, seed)
     if first is None:
         return 'throughout'
-    rest = [s for s in states if s is not first]
-    second = _best(energy, rest, first.active, seed + 1)
-    return first.words if second is None else f'{first.words}, {second.words}'
+    rest = {words: active for words, active in states.items() if words != first}
+    second = _best(energy, rest, states[first], seed + 1)
+    return first if second is None else f'{first}, {second}'
 
 
 def information(energy: Array, active: Mask, within: Mask) -> float:
@@ -72,20 +68,22 @@ def information(energy: Array, active: Mask, within: Mask) -> float:
     )
 
 
-def _best(energy: Array, states: Sequence[Condition], within: Mask, seed: int) -> Condition | None:
-    scored = [(information(energy, s.active, within), i) for i, s in enumerate(states)]
-    value, index = max(scored)
+def _best(energy: Array, states: Mapping[str, Mask], within: Mask, seed: int) -> str | None:
+    scored = {words: information(energy, active, within) for words, active in states.items()}
+    # Of states that say as much, the last one is named.
+    words, value = max(reversed(scored.items()), key=lambda item: item[1])
     if value < LEAST_NATS:
         return None
     rng = np.random.default_rng(seed)
     least = int(1.0 / GRID_S)
     if len(energy) < 4 * least:
-        return states[index]
+        return words
     shifts = rng.integers(least, len(energy) - least, SHIFTS)
     by_chance = [
-        max(information(np.roll(energy, k), s.active, within) for s in states) for k in shifts
+        max(information(np.roll(energy, k), active, within) for active in states.values())
+        for k in shifts
     ]
-    return states[index] if value > np.quantile(by_chance, 0.9) else None
+    return words if value > np.quantile(by_chance, 0.9) else None
 
 
 def _energy_on_grid(excesses: Sequence[SignalExcess], size: int) -> Array:

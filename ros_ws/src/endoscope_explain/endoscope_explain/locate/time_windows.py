@@ -48,7 +48,7 @@ def windowed(excesses: Sequence[SignalExcess], end: float) -> tuple[Array, Array
 def intervals(
     excesses: Sequence[SignalExcess], end: float, most: int = 12
 ) -> tuple[tuple[float, float], ...]:
-    """Find where the excess stands out of the noise.
+    """Find where the excess stands out of the noise, in s, in order of time.
 
     Parameters
     ----------
@@ -57,17 +57,10 @@ def intervals(
         Length of the recording in s.
     most : int
         Largest number of intervals; the weakest are dropped.
-
-    Returns
-    -------
-    tuple of (float, float)
-        In s, in order of time.
     """
     sums, spread = windowed(excesses, end)
-    # Beside a strong effect's main passages its faint traces are significant, but not of interest.
-    strong = (sums > SIGMAS * spread) & (sums > FAINT * np.quantile(sums, 0.95))
     found: list[list[float]] = []
-    for w in np.flatnonzero(strong):
+    for w in _strong(sums, spread):
         begin, finish = w * WINDOW_S, min((w + 1) * WINDOW_S, end)
         if found and begin - found[-1][1] < JOIN_S:
             found[-1][1] = finish
@@ -79,27 +72,16 @@ def intervals(
 
 
 def onset(excesses: Sequence[SignalExcess], driven: Array, end: float) -> float | None:
-    """Find when a mismatch began that was not there from the start.
+    """Find when, in s, a mismatch began that was not there from the start.
 
     A change point of the windowed excess (Page, Biometrika 41, 1954, for one upward change). It
     counts only where nothing stands out before it over at least a tenth of the recording, and
     where the rig moved as much before as it did when the mismatch showed: what no motion called
-    for has not begun.
-
-    Parameters
-    ----------
-    excesses : sequence of SignalExcess
-    driven : array (W, K)
-        How much the rig was driven in each window of `WINDOW_S`: K measures that grow with it.
-    end : float
-
-    Returns
-    -------
-    float or None
-        In s.
+    for has not begun. `driven` (W, K) are K measures of how much the rig was driven in each window
+    of `WINDOW_S`; the recording ends at `end` s.
     """
     sums, spread = windowed(excesses, end)
-    strong = np.flatnonzero((sums > SIGMAS * spread) & (sums > FAINT * np.quantile(sums, 0.95)))
+    strong = _strong(sums, spread)
     if not len(strong) or strong[0] * WINDOW_S < 0.1 * end:
         return None
     before = slice(0, strong[0])
@@ -107,6 +89,11 @@ def onset(excesses: Sequence[SignalExcess], driven: Array, end: float) -> float 
     usual = np.quantile(driven[strong], 0.25, axis=0)
     called_for = bool((driven[before].max(axis=0) > usual).all())
     return float(strong[0] * WINDOW_S) if quiet and called_for else None
+
+
+def _strong(sums: Array, spread: Array) -> NDArray[np.intp]:
+    # Beside a strong effect's main passages its faint traces are significant, but not of interest.
+    return np.flatnonzero((sums > SIGMAS * spread) & (sums > FAINT * np.quantile(sums, 0.95)))
 
 
 def _correlation_time(values: Array, longest: int = 50) -> float:

@@ -1,7 +1,8 @@
-"""`read`, `simulate` and `explain`: the commands of these names, with results in memory."""
+"""`simulate` and `explain`: the commands of these names, with results in memory."""
 
 import tempfile
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from endoscope_core.physics import PlantDescription, load_plant
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.many_bags import explained_case
 from endoscope_explain.notebook.explained import Explained
-from endoscope_explain.notebook.signals import Signals, signals_of_bag
+from endoscope_explain.notebook.signals import Signals, read
 from endoscope_explain.pipeline import Progress, Sources
 from endoscope_explain.recording.series import COMMAND, DESIRED
 from endoscope_explain.search.levels import MOST_EFFECTS
@@ -28,29 +29,6 @@ TIME = 'time'
 
 class CommandsError(EndoscopeError, ValueError):
     """Arrays that are no commands."""
-
-
-def read(bag: str | Path, *, namespace: str | None = None) -> Signals:
-    """Read a recording.
-
-    Parameters
-    ----------
-    bag : str or Path
-        rosbag2 folder, `.mcap` or `.db3`.
-    namespace : str, optional
-        Of the rig's topics, where a bag has several rigs.
-
-    Returns
-    -------
-    Signals
-        Arrays in SI by name.
-
-    Raises
-    ------
-    BagError
-        It cannot be read or holds no joint states.
-    """
-    return signals_of_bag(bag, namespace)
 
 
 def simulate(
@@ -86,7 +64,7 @@ def simulate(
         source = _path(commands)
     target = Path(scratch.name) / 'simulated.mcap' if out is None else Path(out)
     write_answer(_plant(plant), open_bag(source), target, noise)
-    return signals_of_bag(target, kept=scratch)
+    return replace(read(target), _kept=scratch)
 
 
 def explain(

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -97,17 +96,16 @@ class Signals(Mapping[str, Signal]):
         """Seconds from the first stamp to the last."""
         return max(float(signal.time[-1]) for signal in self.values())
 
-    @cached_property
     def _rows(self) -> list[tuple[str, ...]]:
         return [_cells(signal) for signal in self.values()]
 
     def __repr__(self) -> str:
-        return f'{self.path.name}: {self.duration:.3f} s\n{table(_HEAD, self._rows)}'
+        return f'{self.path.name}: {self.duration:.3f} s\n{table(_HEAD, self._rows())}'
 
     def _repr_html_(self) -> str:
         return (
             f'<p><b>{escape(self.path.name)}</b>: {self.duration:.3f} s</p>'
-            f'{html_table(_HEAD, self._rows)}{embedded(self.plot())}'
+            f'{html_table(_HEAD, self._rows())}{embedded(self.plot())}'
         )
 
     def plot(self, names: Sequence[str] | None = None, beside: 'Signals | None' = None) -> 'Figure':
@@ -153,34 +151,33 @@ class Signals(Mapping[str, Signal]):
 _HEAD = ('signal', 'unit', 'samples', 'rate', 'range')
 
 
-def signals_of_bag(path: str | Path, namespace: str | None = None, kept: Any = None) -> Signals:
-    """Read all joint states of a bag.
+def read(bag: str | Path, *, namespace: str | None = None) -> Signals:
+    """Read all joint states of a recording.
 
     Parameters
     ----------
-    path : str or Path
+    bag : str or Path
         rosbag2 folder, `.mcap` or `.db3`.
     namespace : str, optional
-        Where several rigs are in one bag.
-    kept : object, optional
-        Held as long as the signals are.
+        Of the rig's topics, where a bag has several rigs.
 
     Raises
     ------
     BagError
-        The bag cannot be read, has no joint states, or a topic is under several namespaces.
+        It cannot be read, has no joint states, or a topic is under several namespaces.
     """
-    path = Path(path)
-    bag = open_bag(path)
-    names = [n for n, t in bag.topics.items() if t.type == JOINT_STATE and t.message_count]
+    path, recorded = Path(bag), open_bag(bag)
+    names = [n for n, t in recorded.topics.items() if t.type == JOINT_STATE and t.message_count]
     relative = sorted({'/'.join(name.split('/')[-2:]) for name in names})
     series = {
-        topic: bag.joint_state(topic, namespace=namespace, finite=())
+        topic: recorded.joint_state(topic, namespace=namespace, finite=())
         for topic in relative
-        if bag.has(topic, namespace)
+        if recorded.has(topic, namespace)
     }
     if not series:
-        raise MissingTopicError(f'{path}: holds no joint states; it has {", ".join(bag.topics)}')
+        raise MissingTopicError(
+            f'{path}: holds no joint states; it has {", ".join(recorded.topics)}'
+        )
     origin_ns = min(int(one.stamp_ns[0]) for one in series.values())
     found = {}
     for topic, one in series.items():
@@ -194,7 +191,7 @@ def signals_of_bag(path: str | Path, namespace: str | None = None, kept: Any = N
                     np.ascontiguousarray(values[:, column]),
                 )
                 found[signal.name] = signal
-    return Signals(path, origin_ns * 1e-9, found, kept)
+    return Signals(path, origin_ns * 1e-9, found)
 
 
 def _name(topic: str, name: str, quantity: str) -> str:

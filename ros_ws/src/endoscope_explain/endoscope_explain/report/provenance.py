@@ -9,15 +9,7 @@ from endoscope_explain.case import Provenance
 
 
 def provenance(bag: Path, plant: Path | None, command: str) -> Provenance:
-    """Note what a report is made from, now.
-
-    Parameters
-    ----------
-    bag : Path
-        rosbag2 folder or file.
-    plant : Path or None
-        Its file.
-    command : str
+    """Note what a report is made from, now: the bag's files and the plant's by their hashes.
 
     Raises
     ------

@@ -15,13 +15,7 @@ from endoscope_explain.report.sentences import (
 
 
 def told(case: ExplainedCase) -> str:
-    """Say what was found.
-
-    Returns
-    -------
-    str
-        Lines; the first one is the verdict's sentence.
-    """
+    """Say what was found, in lines of which the first one is the verdict's sentence."""
     lines = [verdict_sentence(case)]
     for effect in case.effects:
         lines.append(f'  {effect.id}: {physics_of(effect)}')

@@ -17,11 +17,7 @@ PLANT_YAML = 'plant.yaml'
 def write_report(case: ExplainedCase, folder: Path) -> None:
     """Write report.json, report.html, plant.yaml and the next experiment's motion, if any.
 
-    Parameters
-    ----------
-    case : ExplainedCase
-    folder : Path
-        Existing; see `atomic_directory`.
+    The folder exists, see `atomic_directory`.
 
     Raises
     ------

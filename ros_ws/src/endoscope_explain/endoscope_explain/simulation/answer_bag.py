@@ -1,6 +1,6 @@
 """Writes the bag in which a plant answers the commands of another bag."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,26 +20,19 @@ from endoscope_core.physics.on_stamps import (
 from endoscope_core.physics.recording import recording_faults
 from endoscope_core.physics.samples import TOPICS
 from endoscope_core.physics.simulator import TICK
+from endoscope_explain.recording.series import BENDING, COMMAND, DESIRED, MOTOR, WIRES
+from endoscope_explain.recording.signals import motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_running_stamps
 from endoscope_explain.simulation.answer_poses import answer_poses
-from endoscope_explain.simulation.commands_of_bag import (
-    ANGLE_TOPIC,
-    SHAFT_TOPIC,
-    BagCommands,
-    commands_of_bag,
-    motor_name,
-    wire_names,
-)
+from endoscope_explain.simulation.commands_of_bag import BagCommands, commands_of_bag
 
-MOTOR_TOPIC = 'motor/measured_js'
-WIRES_TOPIC = 'wires/measured_js'
-BENDING_TOPIC = 'slave/measured_js'
 POSE_TOPIC = 'tracker/measured_cp'
 
 READ_DELAYS = (0.0, TICK)
 """Seconds from a stamp to its reading that a rig at 1 kHz may have."""
 
 Stamps = NDArray[np.int64]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -94,32 +87,26 @@ def write_answer(
     commands = commands_of_bag(recording, plant)
     driven = plant.of_joints(commands.joints)
     with BagWriter(out) as writer:
-        times = {
-            suffix: _times(recording, commands, suffix, rate)
-            for suffix, rate in (
-                (MOTOR_TOPIC, plant.sensors.load_cell_rate),
-                (WIRES_TOPIC, plant.sensors.load_cell_rate),
-                (BENDING_TOPIC, plant.sensors.tracker_rate),
-            )
+        rates = {
+            MOTOR: plant.sensors.load_cell_rate,
+            WIRES: plant.sensors.load_cell_rate,
+            BENDING: plant.sensors.tracker_rate,
         }
-        faults = recording_faults(driven)
-        for suffix, device in zip((MOTOR_TOPIC, WIRES_TOPIC, BENDING_TOPIC), TOPICS, strict=True):
-            since = (times[suffix].stamp_ns - commands.stamp_ns[0]) * NANOSECONDS
-            times[suffix] = times[suffix].only(faults.keeps(device, since))
-        stamps = AnswerStamps(
-            *(times[s].stamp_ns for s in (MOTOR_TOPIC, WIRES_TOPIC, BENDING_TOPIC))
-        )
+        faults, times = recording_faults(driven), {}
+        for (suffix, rate), device in zip(rates.items(), TOPICS, strict=True):
+            every = _times(recording, commands, suffix, rate)
+            since = (every.stamp_ns - commands.stamp_ns[0]) * NANOSECONDS
+            times[suffix] = every.only(faults.keeps(device, since))
+        stamps = AnswerStamps(*(times[suffix].stamp_ns for suffix in rates))
         answer = _answer_as_stamped(driven, commands, stamps, _recorded_shaft(recording, commands))
         if noise_seed is not None:
             answer = _noisy(answer, SensorModel(plant.sensors, noise_seed))
         streams = [
-            _copied(recording, suffix)
-            for suffix in (SHAFT_TOPIC, ANGLE_TOPIC)
-            if recording.has(suffix)
+            _copied(recording, suffix) for suffix in (COMMAND, DESIRED) if recording.has(suffix)
         ]
         streams += _encoded(answer, times, commands.joints)
         if recording.has(POSE_TOPIC):
-            bending_ns = times[BENDING_TOPIC].stamp_ns
+            bending_ns = times[BENDING].stamp_ns
             poses = recording.poses(POSE_TOPIC)
             streams.append(answer_poses(poses, bending_ns, answer.bending, commands.joints))
         writer.write_streams(streams)
@@ -128,9 +115,9 @@ def write_answer(
 
 def _recorded_shaft(recording: Recording, commands: BagCommands) -> JointStateSeries | None:
     motors = [motor_name(joint) for joint in commands.joints]
-    if not recording.has(MOTOR_TOPIC):
+    if not recording.has(MOTOR):
         return None
-    series = recording.joint_state(MOTOR_TOPIC, finite=())
+    series = recording.joint_state(MOTOR, finite=())
     if series.position is None or not set(motors) <= set(series.names):
         return None
     return series.select(motors)
@@ -172,7 +159,7 @@ def _times(recording: Recording, commands: BagCommands, suffix: str, rate: float
         series = recording.joint_state(suffix, order='recorded', finite=())
         require_running_stamps(recording.path, series)
         return _Times(series.topic, series.stamp_ns, series.log_ns, series.publish_ns)
-    namespace = commands.topic.removesuffix(SHAFT_TOPIC).removesuffix(ANGLE_TOPIC)
+    namespace = commands.topic.removesuffix(COMMAND).removesuffix(DESIRED)
     first, last = int(commands.stamp_ns[0]), int(commands.stamp_ns[-1])
     stamps = np.arange(first, last + 1, round(1e9 / rate), dtype=np.int64)
     return _Times(namespace + suffix, stamps, stamps, stamps)
@@ -203,27 +190,24 @@ def _copied(recording: Recording, suffix: str) -> MessageStream:
 def _encoded(
     answer: Answer, times: dict[str, _Times], joints: tuple[str, ...]
 ) -> list[MessageStream]:
+    def stream(
+        suffix: str,
+        names: Sequence[str],
+        position: Floats | None = None,
+        velocity: Floats | None = None,
+        effort: Floats | None = None,
+    ) -> MessageStream:
+        at = times[suffix]
+        payloads = encode_joint_states(
+            names, at.stamp_ns, position=position, velocity=velocity, effort=effort
+        )
+        return MessageStream(at.topic, JOINT_STATE, payloads, at.log_ns, at.publish_ns)
+
     motors = [motor_name(joint) for joint in joints]
     wires = [wire for joint in joints for wire in wire_names(joint)]
     tension = answer.tension.reshape(len(answer.tension), -1)
-    payloads: dict[str, Callable[[Stamps], list[bytes]]] = {
-        MOTOR_TOPIC: lambda stamps: encode_joint_states(
-            motors,
-            stamps,
-            position=answer.shaft_position,
-            velocity=answer.shaft_velocity,
-            effort=answer.shaft_effort,
-        ),
-        WIRES_TOPIC: lambda stamps: encode_joint_states(wires, stamps, effort=tension),
-        BENDING_TOPIC: lambda stamps: encode_joint_states(joints, stamps, position=answer.bending),
-    }
     return [
-        MessageStream(
-            times[suffix].topic,
-            JOINT_STATE,
-            encode(times[suffix].stamp_ns),
-            times[suffix].log_ns,
-            times[suffix].publish_ns,
-        )
-        for suffix, encode in payloads.items()
+        stream(MOTOR, motors, answer.shaft_position, answer.shaft_velocity, answer.shaft_effort),
+        stream(WIRES, wires, effort=tension),
+        stream(BENDING, joints, answer.bending),
     ]

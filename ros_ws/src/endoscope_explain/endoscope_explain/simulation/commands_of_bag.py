@@ -5,14 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_bags import JointStateSeries, Recording
+from endoscope_bags import Recording
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
-from endoscope_core.rig import shipped_rig
+from endoscope_explain.recording.series import COMMAND, DESIRED
+from endoscope_explain.recording.signals import gear, motor_name
 from endoscope_explain.recording.usable_stamps import require_running_stamps
-
-SHAFT_TOPIC = 'motor/servo_jp'
-ANGLE_TOPIC = 'slave/servo_jp'
 
 
 class NoCommandsError(EndoscopeError, ValueError):
@@ -41,17 +39,6 @@ class BagCommands:
     shaft: NDArray[np.float64]
 
 
-def motor_name(joint: str) -> str:
-    """Name of the motor that drives a joint: `bend_x` is driven by `motor_x`."""
-    return joint.replace('bend_', 'motor_')
-
-
-def wire_names(joint: str) -> tuple[str, str]:
-    """Names of the wires that bend a joint to the positive and to the negative side."""
-    wire = joint.replace('bend_', 'wire_')
-    return f'{wire}_pos', f'{wire}_neg'
-
-
 def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommands:
     """Shaft commands of a recording; desired angles times the gear where it has none.
 
@@ -62,16 +49,16 @@ def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommand
     BagError
         If a command is not finite or does not decode, or all are stamped alike.
     """
-    if recording.has(SHAFT_TOPIC):
-        series = recording.joint_state(SHAFT_TOPIC, finite=('position',))
+    if recording.has(COMMAND):
+        series = recording.joint_state(COMMAND, finite=('position',))
         names = {joint: motor_name(joint) for joint in plant.joints}
-    elif recording.has(ANGLE_TOPIC):
-        series = recording.joint_state(ANGLE_TOPIC, finite=('position',))
+    elif recording.has(DESIRED):
+        series = recording.joint_state(DESIRED, finite=('position',))
         names = {joint: joint for joint in plant.joints}
     else:
         found = ', '.join(sorted(recording.topics)) or 'none'
         raise NoCommandsError(
-            f'{recording.path}: lacks topic {SHAFT_TOPIC} or {ANGLE_TOPIC}; it has {found}'
+            f'{recording.path}: lacks topic {COMMAND} or {DESIRED}; it has {found}'
         )
     require_running_stamps(recording.path, series)
     joints = tuple(joint for joint, name in names.items() if name in series.names)
@@ -81,11 +68,5 @@ def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommand
             f'the plant has {", ".join(names.values())}'
         )
     chosen = series.select([names[joint] for joint in joints])
-    return BagCommands(series.topic, joints, chosen.stamp_ns, _shaft_angles(chosen))
-
-
-def _shaft_angles(series: JointStateSeries) -> NDArray[np.float64]:
-    position = series.require('position')
-    if series.topic.endswith(SHAFT_TOPIC):
-        return position
-    return position * shipped_rig().joints.gear
+    scale = 1.0 if recording.has(COMMAND) else gear()
+    return BagCommands(series.topic, joints, chosen.stamp_ns, scale * chosen.require('position'))

@@ -76,7 +76,7 @@ def test_a_law_of_no_known_form_is_a_function_at_its_place(one_joint):
     assert unknown.place == 'exponent_of_angle'
     assert unknown.explained > 0.95
     inner = slice(len(unknown.nodes) // 8, -len(unknown.nodes) // 8)
-    expected = evaluate(law, unknown.symbol, unknown.nodes[inner])
+    expected = evaluate(law, unknown.there.argument.symbol, unknown.nodes[inner])
     assert np.corrcoef(unknown.values[inner], expected)[0, 1] > 0.95
     time = 1e-3 * np.arange(6000)
     other = gear() * (0.9 * np.sin(1.7 * time) + 0.3 * np.sin(4.1 * time))

@@ -5,14 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.physics.description import EffectSpec, TermSpec
+from endoscope_core.physics.description import EffectSpec, PlantDescription, TermSpec
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_core.physics.functions.acting import MULTIPLIES
+from endoscope_core.physics.packing import pack
 from endoscope_explain.criteria import LEAST_SHARE
+from endoscope_explain.decide.conclusions import plant_of
 from endoscope_explain.decide.decision import decide
 from endoscope_explain.fit.evidence import misfit
+from endoscope_explain.fit.model import jacobian
 from endoscope_explain.fit.nominal import nominal_anchors
-from endoscope_explain.fit.simulated_joint import packed_joint
+from endoscope_explain.fit.simulated_joint import packed_joint, simulate_joint
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.candidate import (
@@ -23,7 +27,7 @@ from endoscope_explain.search.candidate import (
 )
 from endoscope_explain.search.levels import Level, search
 from endoscope_explain.search.null_rigs import Null
-from endoscope_explain.search.refit import Composition
+from endoscope_explain.search.refit import Composition, composition
 from endoscope_explain.search.screen import background, directions, gains, promises
 
 
@@ -85,6 +89,9 @@ def test_what_is_there_already_is_not_tried_again(anchors):
     terms = (*effects(model, ('viscous_friction',)), *functions(model, model.residuals))
     tried = {term.id for term in terms}
     assert not tried & {'gravity', 'load_of_angle', 'contact', 'viscous_friction'}
+    multiply = {term.id for term in terms if term.multiplies}
+    assert {'load_of_speed', 'load_of_time'} <= multiply
+    assert not multiply & {'load_of_angle', 'exponent_of_angle', 'tracker_of_angle'}
     assert 'stribeck_friction' in tried
 
 
@@ -189,3 +196,49 @@ def test_nothing_is_found_that_rigs_without_it_show_as_well():
     assert _level({'gravity': 1001.0}, null).is_found
     assert _level({'gravity': 1001.0}, null).p_value == pytest.approx(1.0 / 40.0)
     assert not replace(_level({'gravity': 1001.0}, null), predicts=False).is_found
+
+
+def test_a_function_of_two_states_is_exported_as_a_product(anchors):
+    refitted, _ = anchors()
+    family = _family(refitted)
+    alone = Candidate(family.place, family=family.scaled(1e-4))
+    model = alone.added_to(refitted.model)
+    found = replace(refitted, model=model, theta=model.begun_at(refitted.theta))
+    both = next(
+        term
+        for term in functions(found, found.residuals)
+        if term.multiplies and term.id == 'load_of_speed'
+    )
+    model = both.added_to(model)
+    theta = model.begun_at(found.theta)
+    theta[model.places_of_coefficients()[0]] = 0.05
+    theta[model.places_of_coefficients()[1]] = 0.02
+    fitted = replace(refitted, model=model, theta=theta, jacobian=jacobian(model, theta))
+    described = PlantDescription().of_joints(['bend_x'])
+    plant = plant_of(described, [composition((alone, both), fitted)])
+    assert [(term.place, term.multiplies) for term in plant.terms] == [
+        ('load_of_angle', False),
+        ('load_of_speed', True),
+    ]
+    parameters, flags = pack(plant)
+    assert flags[0, FUNCTIONS['load_of_speed'].flag] == MULTIPLIES
+    outputs = simulate_joint(model.observation, parameters[0], flags[0])
+    assert np.isfinite(outputs).all()
+
+
+def test_a_device_that_joints_share_has_one_number_in_the_plant(anchors):
+    refitted, _ = anchors()
+    skew = next(term for term in effects(refitted) if term.id == 'clock_skew')
+    fits = []
+    for joint, rate in (('bend_x', 0.010), ('bend_y', 0.011)):
+        model = skew.added_to(refitted.model)
+        model = replace(model, observation=replace(model.observation, joint=joint))
+        theta = model.begun_at(refitted.theta)
+        theta[-1] = model.free[-1].coordinate(rate)
+        slopes = jacobian(model, theta) * (1.0 if joint == 'bend_x' else 2.0)
+        fitted = replace(refitted, model=model, theta=theta, jacobian=slopes)
+        fits.append(composition((skew,), fitted))
+    plant = plant_of(PlantDescription(), fits)
+    # The second one shows it twice as well.
+    assert [s.parameters['skew'] for s in plant.effects] == pytest.approx([0.011, 0.011])
+    pack(plant)

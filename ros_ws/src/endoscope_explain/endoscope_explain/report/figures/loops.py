@@ -13,13 +13,7 @@ PASSAGE_S = 8.0
 
 
 def telling_passage(recorded: RecordedView, joint: str) -> tuple[float, float]:
-    """Find the passage in which the nominal prediction is furthest off.
-
-    Returns
-    -------
-    (float, float)
-        Begin and end in s.
-    """
+    """Find begin and end, in s, of the passage in which the nominal prediction is furthest off."""
     views = recorded.of_joint(joint)
     first, last = float(views[0].time[0]), float(views[0].time[-1])
     if last - first <= PASSAGE_S:
@@ -44,14 +38,7 @@ def loops_figure(
 ) -> str:
     """Plot angle and tensions against the command, measured and predicted.
 
-    Parameters
-    ----------
-    recorded : RecordedView
-    command : (array (N,), array (N,))
-        Stamps in s and command in rad, joint-equivalent.
-    joint : str
-    passage : (float, float)
-        In s.
+    The command has stamps (N,) in s and angles (N,) in rad, joint-equivalent.
     """
     views = _shown(recorded, joint)
     with page_figure(3.5) as figure:

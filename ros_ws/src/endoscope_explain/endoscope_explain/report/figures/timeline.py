@@ -31,15 +31,8 @@ def timeline_figure(
 ) -> str:
     """Plot a joint's motion and, window by window, how far each prediction is off.
 
-    Parameters
-    ----------
-    recorded : RecordedView
-        With the prediction `nominal`, and `refitted` and `augmented` where something was fitted.
-    command : (array (N,), array (N,))
-        Stamps in s and command in rad, joint-equivalent.
-    joint : str
-    places : sequence of Place
-        Their intervals are shaded.
+    The command has stamps (N,) in s and angles (N,) in rad, joint-equivalent; the intervals of the
+    places are shaded.
     """
     views = recorded.of_joint(joint)
     bending = next(v for v in views if v.quantity == 'bending')
