@@ -1,5 +1,7 @@
 """What people take wrongly is said before anything is fitted; physics is not taken for it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from endoscope_core.physics.description import EffectSpec, JointParameters, Plan
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.pipeline import Inputs, explain_case
+from endoscope_explain.pipeline import Inputs, Sources, explain_case
 
 STRONGEST = [i for i, effect in CATALOGUE.items() if not effect.traits.audited]
 
@@ -31,7 +33,7 @@ def test_a_mistake_is_said_and_nothing_is_fitted(name):
     plant = drawing.described(recording)
     audit = audit_recording(mistake.change(recording, rng), plant)
     assert is_said(mistake, audit), [f.text for f in audit.findings]
-    case = explain_case(Inputs(plant, audit, None, None), never, extras=False)
+    case = explain_case(Inputs(Sources(Path('rig'), plant), audit), never)
     assert case.verdict is Verdict.RECORDING_FAULT
     assert case.effects == ()
 
