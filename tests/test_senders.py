@@ -1,0 +1,349 @@
+"""Nothing moves for a second sender, nor when senders and nodes come and go.
+
+In simulated time, so that every instant is the same in every run.
+"""
+
+import math
+import time
+
+import commanded_graph
+import numpy as np
+import pytest
+from commanded_graph import BOUND, STILL, TICK_S, Handle, Moved, Sender, run
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rclpy.time import Time
+from sensor_msgs.msg import JointState, Joy
+from simulated_graph import PATIENCE_S, TICK_RATE
+from std_msgs.msg import Header, String
+
+from endoscope_core.safety import Refusal
+from endoscope_nodes.diagnostics import ERROR, OK, status
+from endoscope_nodes.names import (
+    CALIBRATION_RESULT,
+    CORRECTION,
+    JOINTS,
+    MASTER_CLUTCH,
+    MASTER_MEASURED,
+    MOTION_SESSION,
+    MOTOR_COMMAND,
+    MOTORS,
+    OPERATING_STATE,
+    SLAVE_COMMAND,
+)
+from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
+
+LOW_REACH = {'low': -0.5, 'high': 0.5}
+# pytest looks for the fixtures of a test in its own module.
+foreign, console = commanded_graph.foreign, commanded_graph.console
+
+
+def until(condition):
+    """Wait for the middleware alone: no node is run."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(1e-3)
+
+
+def leave_behind(graph, node, topic, message, qos):
+    """Have a stranger send a message and go before a node is run that hears the topic."""
+    readers = graph.probe.count_subscribers(topic)
+    senders = next(s for s in node.subscriptions if s.topic_name.endswith(topic)).handle
+    before = senders.get_publisher_count()
+    stranger = Node('stranger', context=graph.runtime.context, namespace='endoscope')
+    rival = stranger.create_publisher(type(message), topic, qos)
+    until(
+        lambda: (
+            rival.get_subscription_count() == readers
+            and senders.get_publisher_count() == before + 1
+        )
+    )
+    rival.publish(message)
+    stranger.destroy_node()
+    until(lambda: senders.get_publisher_count() == before)
+
+
+# ---- senders
+
+
+def test_two_senders_of_a_motion_topic_are_a_fault_that_names_both():
+    with run() as graph:
+        graph.set('console', source='motion')
+        graph.advance(2.0)
+        moved = Moved(graph)
+        for topic, names, value in (
+            (SLAVE_COMMAND, JOINTS, 0.5),
+            (CORRECTION, JOINTS, 2.0),
+            (CORRECTION, JOINTS, 1e9),
+            (CORRECTION, JOINTS, math.nan),
+            (MOTOR_COMMAND, MOTORS, 0.5),
+        ):
+            rival = Sender(graph, topic, names)
+            for _ in range(100):
+                rival.send([value] * 2)
+                graph.advance(TICK_S)
+            assert graph.state == 'FAULT'
+            assert topic in graph.cause
+            assert '/endoscope/probe' in graph.cause
+            assert graph.cause.count('/endoscope/') >= 2
+            assert graph.command('enable') == 'FAULT'
+            graph.probe.destroy_publisher(rival._publisher)
+            graph.advance(0.3)
+            assert graph.command('enable') == 'ENABLED'
+            graph.advance(0.5)
+        drives = [g for g in moved.goals if g.session]
+        steps = np.abs(np.diff([s.position for s in moved.shafts], axis=0))
+        assert len(drives) > 0.5 * TICK_RATE
+        assert steps.max() < 1.3 * BOUND
+
+
+@pytest.mark.parametrize(
+    ('topic', 'names', 'reader'),
+    [
+        (MOTOR_COMMAND, MOTORS, 'motor_driver'),
+        (SLAVE_COMMAND, JOINTS, 'compensator'),
+        (SLAVE_COMMAND, JOINTS, 'controller'),
+    ],
+)
+def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, console, topic, names, reader):
+    """It waits for a node that is not run, and only the session's own sender is left by then."""
+    console.move(100)
+    node = foreign.nodes[reader]
+    gates = {
+        'motor_driver': lambda: node.motion.gate,
+        'compensator': lambda: node.gate,
+        'controller': lambda: node._gate,
+    }
+    gate = gates[reader]()
+    pose = node.motion.goal if reader == 'motor_driver' else console.angle
+    obeyed, refused = gate.accepted, gate.refused[Refusal.SENDER]
+    message = JointState(name=list(names), position=[x + 1e-3 for x in pose])
+    message.header.frame_id = foreign.session
+    message.header.stamp = Time(nanoseconds=foreign.conductor.now_ns + 1_000_000).to_msg()
+    leave_behind(foreign, node, topic, message, COMMAND)
+    foreign.wait(lambda: gate.accepted > obeyed or gate.refused[Refusal.SENDER] > refused)
+    assert gate.accepted == obeyed
+    foreign.advance(0.1)
+    assert foreign.state == 'FAULT'
+    assert topic in foreign.cause
+
+
+def test_a_heartbeat_that_outlives_its_sender_opens_nothing(foreign, console):
+    """A rival of the supervisor has come and gone while the motor driver was not run."""
+    console.move(100)
+    node = foreign.nodes['motor_driver']
+    leave_behind(foreign, node, MOTION_SESSION, Header(frame_id='session-99'), EVENT)
+    entered = set()
+    for _ in range(40):
+        foreign.advance(0.005)
+        entered.add(node._session.name)
+    assert 'session-99' not in entered
+    assert foreign.state == 'FAULT'
+    assert MOTION_SESSION in foreign.cause
+
+
+def test_a_clutch_that_outlives_its_sender_is_not_held_before_it_is_let_go_of(foreign, console):
+    console.move(20)
+    console.hold(0)
+    clutches = [foreign.nodes[name]._clutch for name in ('compensator', 'console')]
+    foreign.advance(0.1)
+    leave_behind(foreign, foreign.nodes['compensator'], MASTER_CLUTCH, Joy(buttons=[1]), EVENT)
+    held = []
+    for _ in range(40):
+        foreign.advance(0.005)
+        held += [clutch.held for clutch in clutches]
+    assert not any(held)
+    assert foreign.state == 'FAULT'
+    assert MASTER_CLUTCH in foreign.cause
+    foreign.enable()
+    console.hold(1)
+    assert not any(clutch.held for clutch in clutches)
+    console.hold(0)
+    console.hold(1)
+    assert all(clutch.held for clutch in clutches)
+
+
+def test_a_handle_that_outlives_its_sender_is_not_followed(foreign):
+    foreign.command('disable')
+    foreign.enable()
+    handle = Handle(foreign)
+    handle.move(0.2, clutch=False)
+    console = foreign.nodes['console']
+    taken = []
+    take = console._handle.take
+    console._handle.take = lambda *sample: (taken.append(sample[1]), take(*sample))[1]
+    message = JointState(name=list(JOINTS), position=[0.9, 0.9])
+    message.header.stamp = Time(nanoseconds=foreign.conductor.now_ns + 1_000_000).to_msg()
+    leave_behind(foreign, console, MASTER_MEASURED, message, SENSOR_OFFERED)
+    handle.move(0.1, clutch=False)
+    del console._handle.take
+    foreign.probe.destroy_publisher(handle._publisher)
+    foreign.probe.destroy_publisher(handle._clutch)
+    assert taken
+    assert (0.9, 0.9) not in taken
+    assert foreign.state == 'FAULT'
+    assert MASTER_MEASURED in foreign.cause
+
+
+@pytest.mark.parametrize('reader', ['compensator', 'console'])
+def test_a_result_that_outlives_its_sender_is_not_taken(reader):
+    """Of the very session in which the slave is being calibrated."""
+    with run() as graph:
+        assert graph.call_calibration().success
+        graph.advance(0.5)
+        compensator, console = graph.nodes['compensator'], graph.nodes['console']
+        assert compensator._calibrated_in == graph.session
+        reaches = {f'reach.{joint}.{end}': x for joint in JOINTS for end, x in LOW_REACH.items()}
+        result = DiagnosticArray()
+        result.header.frame_id = graph.session
+        result.status = [
+            status('calibration: hysteresis class', OK, '', {'class_deg': 100} | reaches)
+        ]
+        leave_behind(graph, graph.nodes[reader], CALIBRATION_RESULT, result, RESULT)
+        graph.advance(0.5)
+        taken = {'compensator': compensator._found, 'console': console._reaches}
+        assert not taken[reader]
+        assert graph.state == 'FAULT'
+        assert CALIBRATION_RESULT in graph.cause
+
+
+@pytest.mark.parametrize('session', ['', 'session-99'])
+def test_a_rival_of_the_supervisor_moves_nothing(session):
+    with run() as graph:
+        graph.set('console', source='motion')
+        graph.command('disable')
+        graph.advance(0.5)
+        moved = Moved(graph)
+        states = graph.speak(String, OPERATING_STATE, RESULT)
+        sessions = graph.speak(Header, MOTION_SESSION, EVENT)
+        for _ in range(300):
+            states.publish(String(data='ENABLED'))
+            if session:
+                sessions.publish(Header(frame_id=session))
+            graph.advance(0.005)
+        assert moved.goals == []
+        assert moved.of_shafts < STILL
+        causes = '; '.join(graph.nodes['supervisor'].machine.present_causes.values())
+        assert '/endoscope/probe and /endoscope/supervisor' in causes
+
+
+def test_a_result_of_somebody_else_changes_nothing():
+    with run() as graph:
+        graph.set('console', source='motion')
+        graph.advance(2.0)
+        result = DiagnosticArray()
+        result.header.frame_id = graph.session
+        result.status = [status('calibration: hysteresis class', OK, '', {'class_deg': 100})]
+        publisher = graph.speak(DiagnosticArray, CALIBRATION_RESULT, RESULT)
+        publisher.publish(result)
+        graph.advance(0.5)
+        assert graph.nodes['compensator'].findings is None
+        assert graph.state == 'FAULT'
+        assert CALIBRATION_RESULT in graph.cause
+
+
+@pytest.mark.parametrize('prefix', ['/arm1/', ''], ids=['another rig', 'no namespace'])
+def test_health_of_another_rig_is_not_ours(prefix):
+    """Neither does its error stop us, nor does its good health end our own trouble."""
+    others = f'{prefix}ghost: motion session'
+    with run() as graph:
+        publisher = graph.speak(DiagnosticArray, '/diagnostics', EVENT)
+
+        def tell(name, level):
+            publisher.publish(DiagnosticArray(status=[status(name, level, 'broken', {})]))
+            graph.advance(0.1)
+
+        tell(others, ERROR)
+        assert graph.state == 'ENABLED'
+        tell('/endoscope/ghost: motion session', ERROR)
+        assert graph.state == 'FAULT'
+        tell(others, OK)
+        assert graph.command('enable') == 'FAULT'
+        tell('/endoscope/ghost: motion session', OK)
+        assert graph.command('enable') == 'ENABLED'
+
+
+# ---- nodes that vanish and come back
+
+
+def test_a_dead_supervisor_stops_the_motion_within_a_fifth_of_a_second():
+    with run() as graph:
+        graph.set('console', source='motion')
+        graph.advance(2.0)
+        moved = Moved(graph)
+        graph.kill('supervisor')
+        graph.advance(1.0)
+        assert len(moved.goals) <= 200
+        moved.clear()
+        graph.advance(1.0)
+        assert moved.of_shafts < STILL
+        graph.start('supervisor')
+        graph.advance(0.5)
+        assert graph.state == 'DISABLED'
+        assert moved.goals == []
+        graph.enable()
+        graph.advance(1.0)
+        assert len(moved.goals) > 0.9 * TICK_RATE
+        assert moved.largest_step < BOUND
+
+
+@pytest.mark.parametrize('name', ['compensator', 'console', 'controller'])
+def test_a_node_started_anew_needs_another_enable(name):
+    with run(overrides={'console': {'source': 'motion'}}) as graph:
+        graph.advance(2.5)
+        graph.kill(name)
+        graph.advance(0.02)
+        graph.start(name)
+        graph.advance(0.3)
+        assert graph.state == 'FAULT'
+        moved = Moved(graph)
+        graph.advance(1.0)
+        assert moved.goals == []
+        assert moved.of_shafts < STILL
+        assert graph.command('enable') == 'ENABLED'
+        graph.advance(1.0)
+        assert len(moved.goals) > 0.9 * TICK_RATE
+        assert moved.largest_step < BOUND
+
+
+def test_a_calibration_node_started_anew_is_believed_after_another_enable():
+    """And its latched result is not taken by a compensator that is started anew after it."""
+    with run(overrides={'calibration': {'motion': 'brief'}}) as graph:
+        assert graph.call_calibration().success
+        graph.advance(0.5)
+        graph.kill('calibration')
+        graph.advance(0.02)
+        graph.start('calibration')
+        graph.advance(0.3)
+        assert graph.state == 'FAULT'
+        graph.enable()
+        graph.calibrate()
+        graph.advance(0.1)
+        assert graph.state == 'ENABLED'
+        assert graph.nodes['compensator'].findings is not None
+        assert graph.nodes['console']._reaches
+        graph.kill('compensator')
+        graph.advance(0.02)
+        graph.start('compensator')
+        graph.advance(0.3)
+        graph.enable()
+        graph.advance(0.5)
+        assert graph.nodes['compensator'].findings is None
+
+
+def test_a_tracker_that_comes_back_moves_nothing():
+    with run(overrides={'calibration': {'motion': 'brief'}}) as graph:
+        graph.calibrate()
+        handle = Handle(graph)
+        graph.set('console', source='master')
+        handle.move(2.0, (0.4, 0.3))
+        handle.move(0.5)
+        moved = Moved(graph)
+        graph.kill('em_tracker')
+        handle.move(1.5)
+        graph.start('em_tracker')
+        handle.move(2.0)
+        assert graph.state == 'ENABLED'
+        assert moved.largest_step < BOUND
+        assert moved.of_tip < 0.05
