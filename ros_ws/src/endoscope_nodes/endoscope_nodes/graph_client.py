@@ -1,25 +1,16 @@
 """The operator's side of a running graph: asks it for something, and hears what it answers."""
 
-import os
 import re
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.client import Client
-from rclpy.context import Context
-from rclpy.exceptions import InvalidNamespaceException
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.time import Time
 from std_msgs.msg import Header, String
@@ -27,8 +18,6 @@ from std_srvs.srv import Trigger
 
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.discovery import stay_on_this_machine
-from endoscope_nodes.log_level import log_as_asked
 from endoscope_nodes.names import (
     CALIBRATION_BEGUN,
     CALIBRATION_RESULT,
@@ -471,70 +460,3 @@ def _is_of(result: Health, begun_ns: int) -> bool:
     """
     duration = float(result.values.get('duration', 'nan'))
     return abs((result.stamp_ns - begun_ns) * 1e-9 - duration) < _SAME_BEGIN_S
-
-
-@contextmanager
-def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterator[GraphClient]:
-    """Join the graph of a namespace as a node of this name, for as long as the block lasts.
-
-    Raises
-    ------
-    EndoscopeError
-        The namespace or the domain cannot be one.
-    """
-    stay_on_this_machine()
-    log_as_asked()
-    context = Context()
-    # What rcl says to the log besides raising it would be a second line.
-    set_logger_level('rcl', LoggingSeverity.FATAL)
-    try:
-        rclpy.init(
-            args=[],
-            context=context,
-            domain_id=domain,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
-    except rclpy_implementation.RCLError as error:
-        given = os.environ.get('ROS_DOMAIN_ID', '')
-        raise EndoscopeError(
-            f'ROS_DOMAIN_ID is {given!r}; give a whole number from 0 to 232'
-        ) from error
-    finally:
-        set_logger_level('rcl', LoggingSeverity.UNSET)
-    try:
-        with _node(name, namespace, context) as node:
-            executor = SingleThreadedExecutor(context=context)
-            executor.add_node(node)
-
-            def serve(seconds: float) -> None:
-                end = time.monotonic() + seconds
-                while (left := end - time.monotonic()) > 0.0:
-                    executor.spin_once(timeout_sec=left)
-
-            try:
-                with GraphClient(node, serve) as client:
-                    yield client
-            finally:
-                executor.shutdown()
-    finally:
-        context.try_shutdown()
-
-
-@contextmanager
-def _node(name: str, namespace: str, context: Context) -> Iterator[Node]:
-    try:
-        node = Node(
-            name,
-            context=context,
-            namespace=f'/{namespace.strip("/")}',
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
-    except InvalidNamespaceException as error:
-        raise EndoscopeError(
-            f'--namespace {namespace!r} cannot be one: letters, digits, _ and /'
-        ) from error
-    try:
-        yield node
-    finally:
-        node.destroy_node()

@@ -83,7 +83,8 @@ def run(args: argparse.Namespace) -> int:
 
     check_terminal()
     from endoscope_bringup.operating.teleoperation import teleoperate
-    from endoscope_nodes.graph_client import GraphRefusedError, joined_graph
+    from endoscope_nodes.graph_client import GraphRefusedError
+    from endoscope_nodes.joined_graph import joined_graph
 
     try:
         with joined_graph('teleop', args.namespace) as client:

@@ -1,0 +1,87 @@
+"""A program joins a running graph as a node of its own, for as long as it asks it for something."""
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import rclpy
+from rclpy.context import Context
+from rclpy.exceptions import InvalidNamespaceException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import LoggingSeverity, set_logger_level
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from endoscope_core.errors import EndoscopeError
+from endoscope_nodes.discovery import stay_on_this_machine
+from endoscope_nodes.graph_client import GraphClient
+from endoscope_nodes.log_level import log_as_asked
+
+
+@contextmanager
+def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterator[GraphClient]:
+    """Join the graph of a namespace as a node of this name, for as long as the block lasts.
+
+    Raises
+    ------
+    EndoscopeError
+        The namespace or the domain cannot be one.
+    """
+    stay_on_this_machine()
+    log_as_asked()
+    context = Context()
+    # What rcl says to the log besides raising it would be a second line.
+    set_logger_level('rcl', LoggingSeverity.FATAL)
+    try:
+        rclpy.init(
+            args=[],
+            context=context,
+            domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+    except rclpy_implementation.RCLError as error:
+        given = os.environ.get('ROS_DOMAIN_ID', '')
+        raise EndoscopeError(
+            f'ROS_DOMAIN_ID is {given!r}; give a whole number from 0 to 232'
+        ) from error
+    finally:
+        set_logger_level('rcl', LoggingSeverity.UNSET)
+    try:
+        with _node(name, namespace, context) as node:
+            executor = SingleThreadedExecutor(context=context)
+            executor.add_node(node)
+
+            def serve(seconds: float) -> None:
+                end = time.monotonic() + seconds
+                while (left := end - time.monotonic()) > 0.0:
+                    executor.spin_once(timeout_sec=left)
+
+            try:
+                with GraphClient(node, serve) as client:
+                    yield client
+            finally:
+                executor.shutdown()
+    finally:
+        context.try_shutdown()
+
+
+@contextmanager
+def _node(name: str, namespace: str, context: Context) -> Iterator[Node]:
+    try:
+        node = Node(
+            name,
+            context=context,
+            namespace=f'/{namespace.strip("/")}',
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+    except InvalidNamespaceException as error:
+        raise EndoscopeError(
+            f'--namespace {namespace!r} cannot be one: letters, digits, _ and /'
+        ) from error
+    try:
+        yield node
+    finally:
+        node.destroy_node()
