@@ -4,7 +4,9 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from simulated_graph import SimulatedGraph
 
+from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.graph_client import GraphClient, GraphRefusedError
+from endoscope_nodes.joined_graph import joined_graph
 from endoscope_nodes.names import DIAGNOSTICS
 
 ABORTED = 'aborted: the motion session has ended'
@@ -81,3 +83,13 @@ def test_a_result_that_was_there_before_is_not_taken(graph):
     second = calibrate(graph, lambda: None)
     assert second.level == 0
     assert second.stamp_ns - float(second.values['duration']) * 1e9 >= first.stamp_ns
+
+
+@pytest.mark.parametrize('given', ['abc', '-1', '233'])
+def test_a_domain_that_cannot_be_is_refused(monkeypatch, given):
+    monkeypatch.setenv('ROS_DOMAIN_ID', given)
+    with (
+        pytest.raises(EndoscopeError, match=f"'{given}'; give a whole number from 0 to 232"),
+        joined_graph('asks', ''),
+    ):
+        pass

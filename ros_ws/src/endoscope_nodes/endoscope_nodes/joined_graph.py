@@ -9,8 +9,6 @@ import rclpy
 from rclpy.context import Context
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
@@ -18,6 +16,9 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.discovery import stay_on_this_machine
 from endoscope_nodes.graph_client import GraphClient
 from endoscope_nodes.log_level import log_as_asked
+
+LAST_DOMAIN = 232
+"""The ports of higher ones do not exist (DDSI-RTPS 2.5, 9.6.2)."""
 
 
 @contextmanager
@@ -31,23 +32,15 @@ def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterat
     """
     stay_on_this_machine()
     log_as_asked()
-    context = Context()
-    # What rcl says to the log besides raising it would be a second line.
-    set_logger_level('rcl', LoggingSeverity.FATAL)
-    try:
-        rclpy.init(
-            args=[],
-            context=context,
-            domain_id=domain,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
-    except rclpy_implementation.RCLError as error:
-        given = os.environ.get('ROS_DOMAIN_ID', '')
+    given = os.environ.get('ROS_DOMAIN_ID', '')
+    if domain is None and given and not (given.isdecimal() and int(given) <= LAST_DOMAIN):
         raise EndoscopeError(
-            f'ROS_DOMAIN_ID is {given!r}; give a whole number from 0 to 232'
-        ) from error
-    finally:
-        set_logger_level('rcl', LoggingSeverity.UNSET)
+            f'ROS_DOMAIN_ID is {given!r}; give a whole number from 0 to {LAST_DOMAIN}'
+        )
+    context = Context()
+    rclpy.init(
+        args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO
+    )
     try:
         with _node(name, namespace, context) as node:
             executor = SingleThreadedExecutor(context=context)

@@ -28,7 +28,7 @@ from endoscope_benchmarks.concealed.strength import OutOfReachError, scaled_to
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.places import BOTH_TENSIONS, OTHER_ANGLE
+from endoscope_core.physics.functions.places import BOTH_TENSIONS, DISTANCE, OTHER_ANGLE, TIME
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator
@@ -58,8 +58,9 @@ _PAIRS = [
     for other in PLACES
     if FUNCTIONS[p].point == FUNCTIONS[other].point
     and FUNCTIONS[p].argument.symbol != FUNCTIONS[other].argument.symbol
+    and {FUNCTIONS[p].argument, FUNCTIONS[other].argument} != {TIME, DISTANCE}
 ]
-"""Places of two states on which the same can depend."""
+"""Places of two states on which the same can depend; time and distance only grow together."""
 _WITH_FAMILIES = [e for e in DRAWN if set(CATALOGUE[e].traits.families) & set(PLACES)]
 
 
