@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Effect, Stage
@@ -19,7 +20,11 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit.evidence import misfit
-from endoscope_explain.fit.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
+from endoscope_explain.fit.free_parameters import (
+    FITTED_NOMINAL,
+    FORM_SPREAD,
+    FRICTION_PROFILE_NAMES,
+)
 from endoscope_explain.fit.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.fit.model import Fit
@@ -34,6 +39,9 @@ Array = NDArray[np.float64]
 
 CHANGED = 0.04
 """Relative difference of a nominal parameter that is worth a verdict."""
+JOINTLY = float(norm.ppf(1.0 - 0.05 / len(FITTED_NOMINAL)) / norm.ppf(0.95))
+"""Factor on intervals of all numbers of a joint that hold all of them in 90 % (Bonferroni): of as
+many that did not change, each with its own, one would mostly be said to differ."""
 MOST = 0.5
 """Share of the misfit that names must explain where they leave more than another form would: with
 less, the main thing has no name."""
@@ -135,10 +143,12 @@ def verdict_by_stage(effects: Sequence[NamedEffect]) -> Verdict:
 
 def has_changed(name: str, estimate: NominalEstimate) -> bool:
     """Whether a nominal parameter differs from its description by more than chance and matter."""
-    outside = estimate.low > estimate.nominal or estimate.high < estimate.nominal
+    value, nominal = estimate.value, estimate.nominal
+    reach = value - estimate.low if nominal < value else estimate.high - value
+    outside = abs(value - nominal) > JOINTLY * reach
     if name in FORM_SPREAD:
         return outside and not estimate.in_band
-    return outside and abs(np.log(estimate.value / estimate.nominal)) > CHANGED
+    return outside and abs(np.log(value / nominal)) > CHANGED
 
 
 def plant_of(plant: PlantDescription, fits: list[Composition]) -> PlantDescription:

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 PERIODS = 6
 """Periods of a state that are tried."""
 CYCLES = 2.0
-"""Fewest cycles within what is visited: what repeats itself less often is a function like others."""
+"""Fewest cycles within what is visited: what repeats less often is a function like others."""
 HARMONICS = 3
 """Of the shortest period, so many are below the Nyquist frequency of the slowest sensor."""
 _PER_RESOLVED = 5.0
