@@ -16,7 +16,9 @@ from endoscope_core.errors import EndoscopeError
 @pytest.fixture(scope='module')
 def problem():
     """A load cell that drifts."""
-    return problem_of(drawn_case('mixed_forms', 1))
+    case = drawn_case('mixed_forms', 9)
+    assert case.laws[0].name == 'load_cell_pos_of_time'
+    return problem_of(case)
 
 
 def test_every_name_is_an_effect_or_a_place(problem):

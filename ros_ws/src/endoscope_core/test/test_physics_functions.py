@@ -1,12 +1,19 @@
 """Smooth functions of one state at the places of the chain, in the simulated plant."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from endoscope_core.control.iterated_inverse import iterated_inverse
-from endoscope_core.physics import EffectSpec, PlantDescription, TermSpec, simulate
+from endoscope_core.physics import (
+    EffectSpec,
+    JointParameters,
+    PlantDescription,
+    TermSpec,
+    simulate,
+)
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.folds import sum_of
 from endoscope_core.physics.functions import FUNCTIONS
@@ -51,6 +58,7 @@ def nominal():
 REACHED = {
     'v': (0.0, 0.005), 'd': (0.0, 0.03), 't': (0.0, SECONDS), 's': (-0.003, 0.003),
     'e': (-0.2, 0.2), 'w': (-5.0, 5.0), 'D': (-10.0, 10.0), 'T': (0.0, 12.0),
+    'F': (-5.0, 5.0), 'y': (0.0, 0.005), 'z': (-0.5, 0.5),
 }  # fmt: skip
 """Of each symbol, what the command visits."""
 SIZE = {'N s/m': 200.0, 'm': 3e-4, 'N m': 2e-4, 'N': 0.5, 'rad': 0.05, '-': 0.3}
@@ -208,6 +216,34 @@ def test_a_law_of_the_catalogue_as_a_function_does_the_same(effect_id, nominal):
     size = np.abs(effect - nominal).max()
     assert size > 2.0
     assert np.abs(here - effect).max() < 0.02 * size
+
+
+def test_creep_is_a_function_of_the_lagging_tension(nominal):
+    ratio, lag = 0.05, 0.8
+    creep = {'compliance_ratio': ratio, 'time_constant_s': lag}
+    effect = readings(EffectSpec('wire_creep', 'bend_x', creep)) - nominal
+    stiffness = JointParameters().wire_stiffness
+    law = f'{ratio / stiffness} * F'
+    where = 'length_of_lagging_tension'
+    here = readings(TermSpec('bend_x', where, law, range=(-15.0, 15.0), lag_s=lag)) - nominal
+    size = np.abs(effect).max()
+    assert size > 2.0
+    # The wire unloads as it creeps, which makes it quicker by the ratio.
+    assert np.abs(here - effect).max() < 1.5 * ratio * size
+
+
+def test_what_lags_follows_the_faster_the_shorter_its_time_is():
+    def late(lag):
+        law = TermSpec('bend_x', 'load_of_relaxing_angle', '-0.002 * z', range=(-1.5, 1.5))
+        return readings(replace(law, lag_s=lag))[:, -1]
+
+    nothing, stiffer = (
+        readings()[:, -1],
+        readings(TermSpec('bend_x', 'load_of_angle', '-0.002 * q', range=(-1.5, 1.5)))[:, -1],
+    )
+    moved = np.abs(stiffer - nothing).max()
+    assert np.abs(late(0.05) - nothing).max() < 0.5 * moved
+    assert np.abs(late(60.0) - stiffer).max() < 0.2 * moved
 
 
 def table(law, low=0.0, high=1.0):

@@ -139,6 +139,7 @@ def test_unknown_terms_survive_the_round_trip(tmp_path):
             TermSpec('bend_y', 'exponent_of_speed', '0.3*exp(-v / 1e-3)  ', range=(0.0, 0.01)),
             TermSpec('bend_y', 'load_of_angle', '1e-3*sin(q)'),
             TermSpec('bend_y', 'load_of_time', '0.2*sin(t)', multiplies=True),
+            TermSpec('bend_y', 'load_of_relaxing_angle', '-1e-3*z', lag_s=2.5),
             TermSpec('bend_x', 'load_of_angle', values=tuple(1e-5 * k for k in range(NODES))),
         ),
     )
@@ -156,6 +157,14 @@ def entry(more):
         ('place: load_of_angle, expression: q', 'has no stage'),
         ('stage: joynt, place: load_of_angle', 'unknown stage joynt: did you mean joint?'),
         ('stage: joint, place: load_of_angle, expression: q, multiplies: 2', 'give true or false'),
+        (
+            'stage: joint, place: load_of_angle, expression: 0.01*q, lag_s: 1',
+            'does not lag, leave it out',
+        ),
+        (
+            'stage: joint, place: load_of_relaxing_angle, expression: 0.01*z, lag_s: 0',
+            'from 0.05 to 60 s',
+        ),
         (
             'stage: joint, place: load_of_angle, expression: q, multiplies: true',
             'multiplies nothing',

@@ -182,6 +182,8 @@ class UnknownTerm:
         Nearest effects of the catalogue, nearest first.
     multiplies : bool
         Whether others at the same point of the chain are multiplied by one plus this function.
+    lag_s : float, optional
+        Time constant of an argument that lags.
     factors : tuple of UnknownTerm
         Functions of another state that multiply this one: both together are one of two states.
     """
@@ -199,6 +201,7 @@ class UnknownTerm:
     rivals: tuple[str, ...] = ()
     siblings: tuple[str, ...] = ()
     multiplies: bool = False
+    lag_s: float | None = None
     factors: tuple['UnknownTerm', ...] = ()
 
     @property
@@ -214,7 +217,9 @@ class UnknownTerm:
     def term(self) -> TermSpec:
         """As a plant has it: the formula where it is as good, else the function's values."""
         ends = float(self.nodes[0]), float(self.nodes[-1])
-        term = TermSpec(self.joint, self.place, range=ends, multiplies=self.multiplies)
+        term = TermSpec(
+            self.joint, self.place, range=ends, multiplies=self.multiplies, lag_s=self.lag_s
+        )
         if self.formula_is_as_good:
             return replace(term, expression=self.expression)
         return replace(term, values=tuple(self.values.tolist()))

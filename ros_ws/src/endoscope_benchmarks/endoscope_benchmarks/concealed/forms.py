@@ -48,6 +48,8 @@ _TRIES = 1000
 PERIODS_S = (1.5, 6.0)
 CYCLES = (3.0, 10.0)
 """Of a law that repeats with the shaft, over the shaft's range."""
+LAGS_S = (0.3, 6.0)
+"""Time constants of arguments that lag."""
 EVERY = 10
 """Ticks from one look at the states to the next."""
 _EDGE = 0.005
@@ -108,6 +110,7 @@ def drawn_form(
     place = FUNCTIONS[place_id]
     for _ in range(_TRIES):
         low, high = _range(generator, place, visited)
+        lag = float(np.exp(generator.uniform(*np.log(LAGS_S)))) if place.argument.lags else None
         text = _text(generator, place, low, high)
         try:
             grid = np.linspace(low, high, GRID)
@@ -116,7 +119,7 @@ def drawn_form(
             if not 1e-3 < rms < 1e3 or _share_of_a_line(grid, values) > LIKE_A_LINE:
                 continue
             largest = 0.99 * place.largest / float(np.abs(values).max())
-            tabulated(_law(place, joint, text, 1e-6 * largest, (low, high)))
+            tabulated(_law(place, joint, text, 1e-6 * largest, (low, high), lag))
         except ValueError:
             continue
 
@@ -125,15 +128,23 @@ def drawn_form(
             text: str = text,
             rms: float = rms,
             ends: tuple[float, float] = (low, high),
+            lag: float | None = lag,
         ) -> TermSpec:
-            return _law(place, joint, text, strength / rms, ends)
+            return _law(place, joint, text, strength / rms, ends, lag)
 
         return form, largest * rms
     raise RuntimeError(f'no form of {_TRIES} can stand at {place_id}')
 
 
-def _law(place: Place, joint: str, text: str, factor: float, ends: tuple[float, float]) -> TermSpec:
-    return TermSpec(joint, place.id, f'{factor:.6g}*({text})', range=ends)
+def _law(
+    place: Place,
+    joint: str,
+    text: str,
+    factor: float,
+    ends: tuple[float, float],
+    lag: float | None,
+) -> TermSpec:
+    return TermSpec(joint, place.id, f'{factor:.6g}*({text})', range=ends, lag_s=lag)
 
 
 def _range(
@@ -228,6 +239,9 @@ def visited(
         places.COMMANDED: asked,
         places.SERVO: asked - x[MOTOR],
         places.WOUND: np.concatenate([wound, -wound]),
+        places.LAGGED_TENSION: np.concatenate([mean + half, mean - half]) - mean[0],
+        places.LAGGED_SLIDING: np.array([0.0, np.quantile(np.abs(x[SLIDING_SPEED]), 1.0 - _EDGE)]),
+        places.RELAXING: 0.5 * np.ptp(angle) * np.array([-1.0, 1.0]),
         places.READING: readings,
         places.NEIGHBOUR: readings,
         places.CYCLE: np.array(PERIODS_S),

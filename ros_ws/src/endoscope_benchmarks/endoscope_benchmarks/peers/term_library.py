@@ -25,9 +25,12 @@ SAME = 0.98
 STATE_OF_ARGUMENT = {
     ('t', 's'): 't', ('v', 'm/s'): 'v', ('d', 'm'): 'd', ('T', 'N'): 'T', ('D', 'N'): 'D',
     ('q', 'rad'): 'q', ('q_other', 'rad'): 'other', ('w', 'rad/s'): 'dq', ('m', 'rad'): 'm',
-    ('u', 'rad'): 'u', ('e', 'rad'): 'e', ('s', 'm'): 'm',
+    ('u', 'rad'): 'u', ('e', 'rad'): 'e', ('s', 'm'): 'm', ('F', 'N'): 'D', ('y', 'm/s'): 'v',
+    ('z', 'rad'): 'q',
 }  # fmt: skip
-"""State that a place's function depends on, by symbol and unit."""
+"""State that a place's function depends on, or follows, by symbol and unit."""
+LAG_SHARE = 0.5 * PERIOD_S
+"""Share of the way that what lags by 2 s goes from sample to sample."""
 
 
 class Term(NamedTuple):
@@ -74,6 +77,10 @@ def _of_place(place: Place, states: Mapping[str, Array]) -> Iterator[Term]:
     factor = factors.get(place.hook.name, np.ones_like(argument))
     if place.argument.symbol == 'v':
         argument = np.abs(argument)
+    if place.argument.lags:
+        argument = np.abs(argument) if place.argument.symbol == 'y' else argument
+        late = lfilter([LAG_SHARE], [1.0, LAG_SHARE - 1.0], argument)
+        argument = argument - late if place.argument.symbol == 'z' else late
     for values in _functions(argument, place):
         yield Term(place.id, signals, factor * values)
 
@@ -99,14 +106,13 @@ def _of_effects(problem: Problem) -> Iterator[Term]:
     tight = np.quantile(np.minimum(s['ta'], s['tb']), 0.2)
     beyond = np.maximum(np.abs(s['D']) - np.quantile(np.abs(s['D']), 0.9), 0.0)
     way = tanh(s['v'] / (0.1 * np.std(s['v']) + 1e-12))
-    share = 0.5 * PERIOD_S
     everywhere = {
         'transport_delay': s['dm'],
         'actuator_lag': s['ddm'],
         'torque_limit': np.sign(s['D']) * beyond,
         'gear_backlash': tanh(s['dm'] / 0.05),
         'wire_slack': np.maximum(tight - s['ta'], 0.0) - np.maximum(tight - s['tb'], 0.0),
-        'wire_creep': lfilter([share], [1.0, share - 1.0], s['D']),
+        'wire_creep': lfilter([LAG_SHARE], [1.0, LAG_SHARE - 1.0], s['D']),
         'friction_asymmetry': np.abs(way) * s['T'],
         'joint_backlash': tanh(s['D'] / 0.5),
         'joint_inertia': s['ddq'],

@@ -153,6 +153,8 @@ class TermSpec:
     multiplies : bool
         Whether it is no term of its own: what other functions add where this one acts is multiplied
         by one plus this one. Both together are a function of two states.
+    lag_s : float, optional
+        Time constant in s of an argument that lags; that of the place if not given.
     """
 
     joint: str
@@ -161,6 +163,7 @@ class TermSpec:
     values: tuple[float, ...] = ()
     range: tuple[float, float] | None = None
     multiplies: bool = False
+    lag_s: float | None = None
 
 
 def nominal_joints() -> dict[str, JointParameters]:

@@ -40,7 +40,7 @@ def source() -> str:
         functions.append(_function(hook, names))
         if any(places[0].hook is hook for _, places in ROWS):
             functions.append(_functions(hook))
-    follow = [place for place in FUNCTIONS.values() if place.at in KEPT_UP]
+    follow = [place for place in FUNCTIONS.values() if place.at in KEPT_UP or place.argument.lags]
     functions.append(_test('functions_follow', follow))
     return '\n'.join(imports) + '\n' + ''.join(functions)
 

@@ -10,7 +10,9 @@ import numpy as np
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics import hooks
 from endoscope_core.physics.folds import acting, folded, follow, some_of, sum_of
+from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.acting import functions_act
+from endoscope_core.physics.functions.interpolation import LAG
 from endoscope_core.physics.joint import bend, stiffness_on_the_way
 from endoscope_core.physics.layout import (
     ANGLE_HISTORY,
@@ -29,6 +31,9 @@ from endoscope_core.physics.layout import (
     IN_OTHER_JOINT,
     JOINT,
     JOINT_STEP,
+    LAGGED_ANGLE,
+    LAGGED_LOAD,
+    LAGGED_SPEED,
     MEAN_TENSION,
     MOTOR,
     MOTOR_BANDWIDTH,
@@ -106,6 +111,15 @@ effort_functions = sum_of(hooks.EFFORT)
 tracker_functions = sum_of(hooks.TRACKER)
 load_cell_functions = sum_of(hooks.LOAD_CELL)
 functions_follow = follow()
+_LENGTH_LAGS, _EXPONENT_LAGS, _LOAD_LAGS = (
+    (FUNCTIONS[name].flag, FUNCTIONS[name].first_parameter + LAG)
+    for name in (
+        'length_of_lagging_tension',
+        'exponent_of_lagging_speed',
+        'load_of_relaxing_angle',
+    )
+)
+"""Flag of each function whose argument lags, and where its time constant stands."""
 
 _SHAFT_ANGLES = np.array(SLOTS.shaft_angles)
 _STEPS_TO_START = 64
@@ -153,6 +167,7 @@ def settle(
             x[wire + NODES + i] = start + x[FLOOR]
         relax(x, wire, table, sheath[WORK : WORK + 3])
     x[REST_TENSION] = mean_tension(x, WIRE_A, table) - x[FLOOR]
+    x[LAGGED_LOAD] = x[LAGGED_LOAD + 1] = x[REST_TENSION]
     steps = _STEPS_TO_START if shaft != 0.0 else 1
     for k in range(1, steps + 1):
         if length_varies(on) or (functions_act(on) and length_has_some(on)):
@@ -161,7 +176,7 @@ def settle(
         _wind_up(x, table, p, on, x[MOTOR])
         bend(x, table, p, on, 0.0, 0.0, -0.5 * _SETTLING_TICK, _SETTLING_TICK)
         if functions_act(on) and functions_follow(on):
-            _keep_up(x, table, 0.0)
+            _keep_up(x, table, p, on, 0.0)
     for wire in range(2):
         x[FILM + wire] = 0.0
     x[SLIDING_SPEED] = x[JOINT_STEP] = 0.0
@@ -170,13 +185,29 @@ def settle(
 
 
 @compiled
-def _keep_up(x: Array, table: Array, tick: float) -> None:
-    """Let the states follow that only functions depend on."""
+def _keep_up(x: Array, table: Array, p: Array, on: Flags, tick: float) -> None:
+    """Let the states follow that only functions depend on; in no time they are where they go."""
     load_a = mean_tension(x, WIRE_A, table) - x[FLOOR]
     load_b = mean_tension(x, WIRE_B, table) - x[FLOOR]
     x[MEAN_TENSION] = 0.5 * (load_a + load_b)
     x[TENSION_DIFFERENCE] = load_a - load_b
     x[PATH] += abs(x[SLIDING_SPEED]) * tick
+    if on[_LENGTH_LAGS[0]]:
+        way = _way(tick, p[_LENGTH_LAGS[1]])
+        x[LAGGED_LOAD] += way * (load_a - x[LAGGED_LOAD])
+        x[LAGGED_LOAD + 1] += way * (load_b - x[LAGGED_LOAD + 1])
+    if on[_EXPONENT_LAGS[0]]:
+        way = _way(tick, p[_EXPONENT_LAGS[1]])
+        x[LAGGED_SPEED] += way * (abs(x[SLIDING_SPEED]) - x[LAGGED_SPEED])
+    if on[_LOAD_LAGS[0]]:
+        way = _way(tick, p[_LOAD_LAGS[1]])
+        x[LAGGED_ANGLE] += way * (x[JOINT] - x[LAGGED_ANGLE])
+
+
+@compiled
+def _way(tick: float, lag: float) -> float:
+    """Share of the way to what it follows that a lagging argument goes in a tick; all at none."""
+    return -math.expm1(-tick / lag) if tick > 0.0 else 1.0
 
 
 @compiled
@@ -401,7 +432,7 @@ def advance_tick(
         load_b = mean_tension(x, WIRE_B, table) - x[FLOOR]
         advance(on, p, x, load_a, load_b, time, tick)
     if functions_act(on) and functions_follow(on):
-        _keep_up(x, table, tick)
+        _keep_up(x, table, p, on, tick)
 
 
 @compiled

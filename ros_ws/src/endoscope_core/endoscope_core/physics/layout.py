@@ -136,6 +136,13 @@ MEAN_TENSION = SLOTS.state_block()
 """Of both wires, N."""
 TENSION_DIFFERENCE = SLOTS.state_block()
 """Mean tension of the positive wire less that of the negative one, N."""
+LAGGED_LOAD = SLOTS.state_block(2)
+"""Mean tension of each wire as it was a while ago, N; as the next two, only where a place has a
+function."""
+LAGGED_SPEED = SLOTS.state_block()
+"""Sliding speed as it was a while ago, m/s."""
+LAGGED_ANGLE = SLOTS.state_block()
+"""Joint's angle as it was a while ago, rad."""
 NOW = SLOTS.state_block()
 """Time in the middle of the tick, s."""
 OTHER = SLOTS.state_block()

@@ -172,6 +172,8 @@ def _term_mapping(term: TermSpec) -> dict[str, Any]:
         mapping['range'] = [float(end) for end in term.range]
     if term.multiplies:
         mapping['multiplies'] = True
+    if term.lag_s is not None:
+        mapping['lag_s'] = float(term.lag_s)
     return mapping
 
 
@@ -265,8 +267,8 @@ def _check_names(section: Mapping[str, Any], keys: tuple[str, ...], where: str) 
 
 
 def _term(section: Mapping[str, Any], where: str) -> TermSpec:
-    keys = ('id', 'joint', 'stage', 'place', 'expression', 'values', 'range', 'multiplies')
-    _check_keys(section, keys, where)
+    more = ('expression', 'values', 'range', 'multiplies', 'lag_s')
+    _check_keys(section, ('id', 'joint', 'stage', 'place', *more), where)
     _check_names(section, ('joint', 'stage'), where)
     stages = {str(place.stage) for place in FUNCTIONS.values()}
     if section['stage'] not in stages:
@@ -303,6 +305,7 @@ def _term(section: Mapping[str, Any], where: str) -> TermSpec:
         _list(section.get('values') or [], f'{where}.values'),
         None if low_high is None else (low_high[0], low_high[1]),
         multiplies,
+        None if section.get('lag_s') is None else _number(section['lag_s'], f'{where}.lag_s'),
     )
 
 

@@ -206,6 +206,7 @@ def unknown_term(one: Composition, term: Term) -> UnknownTerm:
         formula.share,
         formula.as_good,
         multiplies=term.multiplies,
+        lag_s=function.family.lag,
         factors=tuple(
             unknown_term(one, other)
             for other in one.terms

@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from endoscope_core.physics.functions.interpolation import NODES
 from endoscope_core.physics.functions.place import Place, Shape
+from endoscope_core.physics.functions.places import RELAXING
 from endoscope_core.physics.layout import (
     IN_COMMAND,
     IN_OTHER_JOINT,
@@ -50,9 +52,11 @@ class Family:
     basis : array (NODES, K)
         Values at the nodes for coefficients that are normal, each with a variance of one.
     band : (float, float), optional
-        Of the periods that functions may have that repeat themselves.
+        Of the periods that functions may have that repeat themselves, or of an argument's lag.
     multiplies : bool
         Whether they multiply what other functions add there; see `TermSpec`.
+    lag : float, optional
+        Time constant in s of an argument that lags, which a fit may move.
     """
 
     place: Place
@@ -61,6 +65,7 @@ class Family:
     basis: Array
     band: tuple[float, float] | None = None
     multiplies: bool = False
+    lag: float | None = None
 
     @property
     def largest(self) -> float:
@@ -99,7 +104,7 @@ class Family:
         size = np.sqrt(np.mean(np.sum(self.basis**2, axis=1)))
         found = family_at(self.place, visited or (self.low, self.high), count, self.band)
         assert found is not None
-        found = replace(found, multiplies=self.multiplies)
+        found = replace(found, multiplies=self.multiplies, lag=self.lag)
         return found.scaled(size / np.sqrt(np.mean(np.sum(found.basis**2, axis=1))))
 
     def details(self, generator: np.random.Generator) -> Array:
@@ -130,7 +135,7 @@ def family_at(
     count : int
         Coefficients: the more there are, the shorter the length over which the functions vary.
     band : (float, float), optional
-        Of their periods, if they repeat themselves.
+        Of their periods, if they repeat themselves, or of their argument's lag.
 
     Returns
     -------
@@ -153,7 +158,8 @@ def family_at(
     largest = [k for k in np.argsort(sizes)[::-1][:count] if sizes[k] > LEAST_PART * sizes.max()]
     # What an eigenvector's sign is depends on the library; a drag grows with the first of them.
     signs = np.where(vectors[:, largest].sum(axis=0) < 0.0, -1.0, 1.0)
-    return Family(place, low, high, vectors[:, largest] * signs * np.sqrt(sizes[largest]))
+    basis = vectors[:, largest] * signs * np.sqrt(sizes[largest])
+    return Family(place, low, high, basis, band)
 
 
 def _periodic(side: Array, length: float, count: int) -> Array:
@@ -187,7 +193,8 @@ def visited_states(
     Returns
     -------
     dict of (str, str) to array (any,)
-        Values whose ends are those of the range; time and the shaft's angle on ticks (N,).
+        Values whose ends are those of the range; time, the shaft's angle, and what arguments that
+        lag follow, on ticks (N, ...).
     """
     angle, shaft = outputs[:, OUT_JOINT], outputs[:, OUT_MOTOR]
     speed = np.gradient(angle, observation.tick)
@@ -206,9 +213,36 @@ def visited_states(
         ('w', 'rad/s'): np.quantile(np.concatenate([speed, shaft_speed]), [0.005, 0.995]),
         ('m', 'rad'): shaft,
         ('u', 'rad'): command,
+        ('z', 'rad'): angle,
+        ('F', 'N'): tensions - tensions[0],
+        ('y', 'm/s'): slid,
         ('e', 'rad'): shaft - command,
         ('s', 'm'): parameters[PULLEY_RADIUS] * np.concatenate([shaft, -shaft]),
     }
+
+
+def visited_range(
+    place: Place, states: dict[tuple[str, str], Array], tick: float, lag: float | None = None
+) -> tuple[float, float]:
+    """Range of a place's argument along a simulation.
+
+    Parameters
+    ----------
+    place : Place
+    states : dict of (str, str) to array
+        See `visited_states`.
+    tick : float
+        In s.
+    lag : float, optional
+        Time constant in s of an argument that lags.
+    """
+    state = states[place.argument.symbol, place.argument.unit]
+    if lag is not None:
+        kept = np.exp(-tick / lag)
+        start = kept * state[:1]
+        late, _ = lfilter([1.0 - kept], [1.0, -kept], state, axis=0, zi=start)
+        state = state - late if place.argument is RELAXING else late
+    return float(np.min(state)), float(np.max(state))
 
 
 def _matern(distance: Array) -> Array:

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.effect import Effect, Parameter
+from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_core.physics.functions.interpolation import HIGH
+from endoscope_core.physics.functions.interpolation import HIGH, LAG
+from endoscope_core.physics.functions.place import Place
 from endoscope_core.physics.layout import (
     FRICTION_PROFILE,
     JOINT_PRESLIDING_SPREAD,
@@ -202,9 +203,13 @@ def _of_effect(index: int, parameter: Parameter) -> FreeParameter:
     return FreeParameter(index, parameter.name, positive, unit, parameter.low, parameter.high)
 
 
-def period(place: Effect, low: float, high: float) -> FreeParameter:
-    """The period of a function that repeats itself: anywhere, evenly in its logarithm."""
-    return FreeParameter(place.first_parameter + HIGH, f'{place.id}_period', True, 1.0, low, high)
+def time_scale(place: Place, low: float, high: float) -> FreeParameter:
+    """The period of a function that repeats itself, or the lag of its argument.
+
+    It is anywhere in between, evenly in its logarithm.
+    """
+    name, index = ('lag', LAG) if place.argument.lags else ('period', HIGH)
+    return FreeParameter(place.first_parameter + index, f'{place.id}_{name}', True, 1.0, low, high)
 
 
 def coefficients(place_id: str, count: int) -> tuple[FreeParameter, ...]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.effect import Symptom
 from endoscope_core.physics.effects import CATALOGUE, showing
-from endoscope_core.physics.functions.interpolation import HIGH, NODES, VALUES
+from endoscope_core.physics.functions.interpolation import HIGH, LAG, NODES, VALUES
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
 from endoscope_explain.fit.simulated_joint import residuals, simulate_joint
@@ -86,12 +86,15 @@ class JointModel:
         return np.split(np.array(found, dtype=np.int64), ends[:-1]) if self.families else []
 
     def family_at(self, which: int, theta: Array) -> Family:
-        """Functions of a place, with the period that they have at the coordinates `theta` (n,)."""
+        """Functions of a place, with the period or lag that they have at `theta` (n,)."""
         family = self.families[which]
-        if not family.repeats:
+        if family.band is None:
             return family
         parameters, _ = self.packed(theta)
-        return replace(family, high=float(parameters[family.place.first_parameter + HIGH]))
+        first = family.place.first_parameter
+        if family.repeats:
+            return replace(family, high=float(parameters[first + HIGH]))
+        return replace(family, lag=float(parameters[first + LAG]))
 
     def begun_at(self, theta: Array) -> Array:
         """Coordinates `theta` of the first free parameters; the others as `base` has them."""

@@ -124,6 +124,7 @@ def _symbolic(term: UnknownTerm) -> dict[str, Any]:
         'rivals': list(term.rivals),
         'explained': term.explained,
         'siblings': list(term.siblings),
+        'lag_s': term.lag_s,
         'multiplied_by': [_symbolic(factor) for factor in term.factors],
     }
 

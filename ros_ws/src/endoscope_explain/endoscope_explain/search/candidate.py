@@ -13,19 +13,23 @@ from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.acting import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
-from endoscope_core.physics.functions.interpolation import HIGH, LOW
-from endoscope_core.physics.functions.place import Shape
-from endoscope_explain.fit.family import Family, family_at, visited_states
+from endoscope_core.physics.functions.interpolation import HIGH, LAG, LOW
+from endoscope_core.physics.functions.place import LAGS_S, Place, Shape
+from endoscope_explain.fit.family import Family, family_at, visited_range, visited_states
 from endoscope_explain.fit.free_parameters import (
     coefficients,
     effect_parameters,
-    period,
+    time_scale,
     with_free_reference,
 )
 from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.fit.simulated_joint import simulate_joint
+from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.periods import likely_periods, period_bounds
 from endoscope_explain.search.repeated_motion import motion_repeats
+
+LAGS = 3
+"""Time constants at which arguments that lag are tried."""
 
 
 @dataclass(frozen=True)
@@ -107,11 +111,13 @@ def _with_function(model: JointModel, family: Family) -> JointModel:
     place, base = family.place, model.base.copy()
     base[place.first_parameter + LOW] = family.low
     base[place.first_parameter + HIGH] = family.high
+    if family.lag is not None:
+        base[place.first_parameter + LAG] = family.lag
     flags: NDArray[Any] = model.flags.astype(FLAGS_OF_FUNCTIONS)
     flags[place.flag] = MULTIPLIES if family.multiplies else ADDS
     free = model.free + coefficients(place.id, family.basis.shape[1])
     if family.band is not None:
-        free += (period(place, *family.band),)
+        free += (time_scale(place, *family.band),)
     return replace(model, base=base, flags=flags, free=free, families=(*model.families, family))
 
 
@@ -150,8 +156,8 @@ def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Candidate, ..
     -------
     tuple of Candidate
         One for each place whose argument has moved; one for each likely period where functions
-        repeat themselves; one more that multiplies those that are there. Without those of time
-        where the joint makes no motion twice.
+        repeat themselves, and for some lags where their argument lags; one more that multiplies
+        those that are there. Without those of time where the joint makes no motion twice.
     """
     states, observation = states_of(found), found.model.observation
     there = {family.place.point for family in found.model.families}
@@ -162,14 +168,38 @@ def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Candidate, ..
             band = period_bounds(observation, state)
             likely = likely_periods(observation, residuals, state)
             families = [family_at(place, (0.0, each), band=band) for each in likely]
+        elif place.argument.lags:
+            families = [_lagging(place, states, observation, lag) for lag in _lags(observation)]
         else:
-            families = [family_at(place, (float(np.min(state)), float(np.max(state))))]
+            families = [family_at(place, visited_range(place, states, observation.tick))]
         alone = [family for family in families if family is not None]
         candidates += [Candidate(place, family=family) for family in alone]
         if place.point in there:
             both = (replace(family, multiplies=True) for family in alone)
             candidates += [Candidate(place, family=family) for family in both]
     return tuple(candidates)
+
+
+def _lags(observation: JointObservation) -> NDArray[np.float64]:
+    """Time constants to begin at, evenly in their logarithm.
+
+    They are longer than ten ticks of the slowest sensor, and shorter than a third of the recording:
+    what is quicker is the state itself, and what is slower a function of time.
+    """
+    slowest = min(len(channel.time) for channel in observation.channels)
+    low = max(LAGS_S[0], 10.0 * observation.duration / slowest)
+    return np.geomspace(low, max(low, observation.duration / 3.0), LAGS + 2)[1:-1]
+
+
+def _lagging(
+    place: Place,
+    states: dict[tuple[str, str], NDArray[np.float64]],
+    observation: JointObservation,
+    lag: float,
+) -> Family | None:
+    visited = visited_range(place, states, observation.tick, lag)
+    found = family_at(place, visited, band=LAGS_S)
+    return found and replace(found, lag=float(lag))
 
 
 def _absent[E: Effect](found: Fit, terms: Iterable[E]) -> Iterator[E]:

@@ -150,7 +150,7 @@ def _can_be_run(found: FittedFunction, expression: str) -> bool:
     joint, family = found.joint, found.family
     try:
         ends = (family.low, family.high)
-        term = TermSpec(joint, family.place.id, expression, (), ends, family.multiplies)
+        term = TermSpec(joint, family.place.id, expression, (), ends, family.multiplies, family.lag)
         tabulated(term)
     except ValueError:
         return False

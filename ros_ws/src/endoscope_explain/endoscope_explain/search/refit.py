@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.functions.interpolation import NODES
 from endoscope_explain.fit.evidence import log_evidence, weights
-from endoscope_explain.fit.family import COEFFICIENTS, Family
+from endoscope_explain.fit.family import COEFFICIENTS, Family, visited_range
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, fit, glance, jacobian
 from endoscope_explain.fit.valleys import out_of_valleys
@@ -186,7 +186,7 @@ def refined(one: Composition, without: Fit, offset: Array) -> Composition:
         before = best.fit.model.family_at(-1, best.fit.theta)
         # With what was missing, the joint goes further than it did without.
         visited = (before.low, before.high) if before.repeats else _visited(best.fit, before)
-        finer = replace(term, family=term.family.finer(count, visited))
+        finer = replace(term, family=before.finer(count, visited))
         assert finer.family is not None
         model = finer.added_to(without.model)
         values = before.values(best.fit.model.coefficients(best.fit.theta)[-1])
@@ -208,9 +208,8 @@ def refined(one: Composition, without: Fit, offset: Array) -> Composition:
 
 def _visited(found: Fit, family: Family) -> tuple[float, float]:
     """Range of a family's argument along a fit."""
-    argument = family.place.argument
-    state = states_of(found)[argument.symbol, argument.unit]
-    return float(np.min(state)), float(np.max(state))
+    tick = found.model.observation.tick
+    return visited_range(family.place, states_of(found), tick, family.lag)
 
 
 def _twice(model: JointModel, offset: Array | None, theta: Array, weight: Array) -> Fit:

@@ -14,12 +14,14 @@ from endoscope_explain.criteria import LEAST_SHARE
 from endoscope_explain.decide.conclusions import plant_of
 from endoscope_explain.decide.decision import decide
 from endoscope_explain.fit.evidence import misfit
+from endoscope_explain.fit.family import family_at
 from endoscope_explain.fit.model import jacobian
 from endoscope_explain.fit.nominal import nominal_anchors
 from endoscope_explain.fit.simulated_joint import packed_joint, simulate_joint
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.candidate import (
+    LAGS,
     Candidate,
     effects,
     functions,
@@ -146,7 +148,8 @@ def _composition(evidence, *terms, found=None):
 
 def _level(evidences, null):
     """A level whose compositions are a function of the angle, its formulas, and a tracker's."""
-    function = replace(Candidate(FUNCTIONS['load_of_angle']), family=object())
+    place = FUNCTIONS['load_of_angle']
+    function = Candidate(place, family=family_at(place, (-1.0, 1.0)))
     terms = {
         'function': function,
         'gravity': Candidate(CATALOGUE['gravity']),
@@ -242,3 +245,23 @@ def test_a_device_that_joints_share_has_one_number_in_the_plant(anchors):
     # The second one shows it twice as well.
     assert [s.parameters['skew'] for s in plant.effects] == pytest.approx([0.011, 0.011])
     pack(plant)
+
+
+def test_an_argument_that_lags_is_tried_with_several_lags_and_the_fit_may_move_them(anchors):
+    refitted, _ = anchors()
+    lagging = [
+        term
+        for term in functions(refitted, refitted.residuals)
+        if term.id == 'length_of_lagging_tension'
+    ]
+    lags = [term.family.lag for term in lagging]
+    assert lags == sorted(lags)
+    assert len(set(lags)) == LAGS
+    # What lags the longer goes the less far.
+    reach = [term.family.high - term.family.low for term in lagging]
+    assert reach == sorted(reach, reverse=True)
+    model = lagging[0].added_to(refitted.model)
+    theta = model.begun_at(refitted.theta)
+    assert model.family_at(-1, theta).lag == pytest.approx(lags[0])
+    theta[-1] += 0.1
+    assert model.family_at(-1, theta).lag == pytest.approx(lags[0] * np.exp(0.1))

@@ -23,7 +23,7 @@ EFFECT = Effect(
         Parameter('slow_share', '-', 0.0, 1.0, 0.0, starts=(0.0, 0.3)),
         Parameter('slow_time_constant_s', 's', 1.0, 200.0, 8.0),
     ),
-    traits=Traits(resembles_time=True),
+    traits=Traits(resembles_time=True, families=('length_of_lagging_tension',)),
 )
 RATIO, TIME_CONSTANT, SLOW_SHARE, SLOW_TIME_CONSTANT = EFFECT.places
 FAST, SLOW = SLOTS.state_block(2), SLOTS.state_block(2)

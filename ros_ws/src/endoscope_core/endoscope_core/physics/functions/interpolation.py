@@ -15,6 +15,8 @@ NODES = 41
 is then off by less than 2 % of what it spans wherever its corners lie (a test measures it)."""
 LOW, HIGH, VALUES = 0, 1, 2
 """Places of the range's ends and of the first value within the function's block of parameters."""
+LAG = VALUES + NODES
+"""Place of the time constant of an argument that lags."""
 
 
 @compiled

@@ -7,6 +7,8 @@ from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.functions.interpolation import NODES
 from endoscope_core.physics.hooks import Fold, Hook
 
+LAGS_S = (0.05, 60.0)
+"""Time constants in s of arguments that lag: from ten long ticks to a minute."""
 LARGEST_SHARE = 3.0
 """By how many times itself a function may be larger, or smaller, by one that multiplies it."""
 SOURCE = (
@@ -35,6 +37,9 @@ class Argument:
     words, unit : str
     low, high : float
         Range of the table where nobody gives one.
+    lags : bool
+        Whether it follows a state of the plant as a first-order lag does, with a time constant of
+        its own: what nobody sees (Kelvin-Voigt: Findley, Lai, Onaran, Creep and Relaxation, 1976).
     """
 
     symbol: str
@@ -42,6 +47,7 @@ class Argument:
     unit: str
     low: float
     high: float
+    lags: bool = False
 
 
 @dataclass(frozen=True)
@@ -164,7 +170,9 @@ def _parameters(argument: Argument, unit: str, largest: float) -> tuple[Paramete
         return Parameter(name, unit, -largest, largest, 0.0, off=0.0)
 
     ends = [(name, getattr(argument, name)) for name in ('low', 'high')]
+    lag = (Parameter('lag_s', 's', *LAGS_S, typical=1.0),) if argument.lags else ()
     return (
         *(Parameter(name, argument.unit, -1e9, 1e9, end) for name, end in ends),
         *(value(f'value_{i}') for i in range(NODES)),
+        *lag,
     )

@@ -26,10 +26,14 @@ from endoscope_core.physics.hooks import (
 )
 from endoscope_core.physics.layout import (
     JOINT,
+    LAGGED_ANGLE,
+    LAGGED_LOAD,
+    LAGGED_SPEED,
     MEAN_TENSION,
     NOW,
     OTHER,
     PATH,
+    REST_TENSION,
     TENSION_DIFFERENCE,
 )
 
@@ -47,6 +51,11 @@ SHAFT_SPEED = Argument('w', "the shaft's speed", 'rad/s', -10.0, 10.0)
 COMMANDED = Argument('u', 'the command', 'rad', -2.0, 2.0)
 SERVO = Argument('e', "the servo's error", 'rad', -0.5, 0.5)
 WOUND = Argument('s', 'what the pulley has wound up', 'm', -0.005, 0.005)
+LAGGED_TENSION = Argument(
+    'F', 'the tension above that at rest, lagging', 'N', -15.0, 15.0, lags=True
+)
+LAGGED_SLIDING = Argument('y', 'the sliding speed, lagging', 'm/s', 0.0, 0.02, lags=True)
+RELAXING = Argument('z', "the joint's angle less itself lagging", 'rad', -1.0, 1.0, lags=True)
 READING = Argument('T', 'the tension at the motor', 'N', 0.0, 30.0)
 NEIGHBOUR = Argument('T', 'the tension of the other wire at the motor', 'N', 0.0, 30.0)
 CYCLE = Argument('t', 'time since the start, one cycle of it', 's', 0.0, 4.0)
@@ -97,6 +106,10 @@ def _transmission() -> None:
     place('exponent_of_other_angle', of, EXPONENT, what, OTHER_ANGLE, '-', 3.0, at=_OTHER)
     place('exponent_of_tension', of, EXPONENT, what, BOTH_TENSIONS, '-', 3.0, at=_BOTH)
     place(
+        'exponent_of_lagging_speed', of, EXPONENT, what,
+        LAGGED_SLIDING, '-', 3.0, at=f'x[{LAGGED_SPEED}]',
+    )  # fmt: skip
+    place(
         'exponent_of_distance', of, EXPONENT, what,
         DISTANCE, '-', 3.0, at=_PATH, depends_on_time=True,
     )  # fmt: skip
@@ -113,6 +126,11 @@ def _transmission() -> None:
     what = "What is added to both wires' lengths"
     place('length_of_time', of, LENGTH, what, TIME, 'm', 0.02, at='time', depends_on_time=True)
     place('length_of_angle', of, LENGTH, what, ANGLE, 'm', 0.02, at=_OWN_ANGLE, from_zero=True)
+    place(
+        'length_of_lagging_tension', of, LENGTH, "What is added to each wire's length",
+        LAGGED_TENSION, 'm', 0.02, at=f'x[{LAGGED_LOAD} + wire] - x[{REST_TENSION}]',
+        from_zero=True,
+    )  # fmt: skip
     place(
         'length_difference_of_time', of, LENGTH,
         "What is added to the positive wire's length and taken from the negative one's",
@@ -145,6 +163,10 @@ def _joint() -> None:
     place(
         'load_periodic', of, LOAD, what, CYCLE, 'N m', 0.1,
         at='time', shape=Shape.PERIODIC, depends_on_time=True,
+    )  # fmt: skip
+    place(
+        'load_of_relaxing_angle', of, LOAD, what, RELAXING, 'N m', 0.1,
+        at=f'angle - x[{LAGGED_ANGLE}]', by_step='1.0', shape=Shape.ODD,
     )  # fmt: skip
     place('load_of_other_angle', of, LOAD, what, OTHER_ANGLE, 'N m', 0.1, at='other')
     what = "Factor on the joint's friction"

@@ -16,7 +16,7 @@ from endoscope_core.physics.functions.interpolation import function_at
 from endoscope_core.physics.functions.place import Place, Shape
 from endoscope_core.physics.hooks import HOOKS
 
-MOST = 6
+MOST = 7
 """Places that can stand in a row."""
 
 
@@ -55,8 +55,9 @@ def sum_of_functions(
     a3: float,
     a4: float,
     a5: float,
+    a6: float,
 ) -> tuple[float, float, float, float]:
-    """Functions of `count` places from `number` of their row on, with the arguments `a0` to `a5`.
+    """Functions of `count` places from `number` of their row on, with the arguments `a0` to `a6`.
 
     Returns
     -------
@@ -76,5 +77,5 @@ def sum_of_functions(
             else:
                 value += found
                 slope += rise
-        a0, a1, a2, a3, a4 = a1, a2, a3, a4, a5
+        a0, a1, a2, a3, a4, a5 = a1, a2, a3, a4, a5, a6
     return value, slope, factor, steep

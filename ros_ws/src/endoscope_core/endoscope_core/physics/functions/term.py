@@ -2,7 +2,7 @@
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from endoscope_core.physics.description import TermSpec
 from endoscope_core.physics.functions import describe_place
 from endoscope_core.physics.functions.expression import evaluate
 from endoscope_core.physics.functions.interpolation import NODES, VALUES, function_at
-from endoscope_core.physics.functions.place import Place, Shape
+from endoscope_core.physics.functions.place import LAGS_S, Place, Shape
 
 Array = NDArray[np.float64]
 
@@ -29,8 +29,8 @@ class Table:
 
     Attributes
     ----------
-    numbers : array (VALUES + NODES,)
-        Both ends of the range, then the values.
+    numbers : array (VALUES + NODES or one more,)
+        Both ends of the range, then the values, then the time constant of an argument that lags.
     largest_error, rms_error : float
         Of the table against the formula, as shares of what the formula spans; 0 for given values.
     """
@@ -75,7 +75,19 @@ def _tabulated(term: TermSpec, place: Place) -> Table:
         numbers = np.array([low, high, *values])
         table = Table(numbers, *_errors(term.expression, place, numbers))
     _check_values(place, table, term.multiplies)
-    return table
+    return replace(table, numbers=np.append(table.numbers, _lag(term, place)))
+
+
+def _lag(term: TermSpec, place: Place) -> tuple[float, ...]:
+    if not place.argument.lags:
+        if term.lag_s is not None:
+            raise ValueError(f'lag_s is given: {place.argument.words} does not lag, leave it out')
+        return ()
+    low, high = LAGS_S
+    lag = place.parameters[-1].typical if term.lag_s is None else term.lag_s
+    if not low <= lag <= high:
+        raise ValueError(f'lag_s is {lag:g}: give a time from {low:g} to {high:g} s')
+    return (lag,)
 
 
 def _range(term: TermSpec, place: Place) -> tuple[float, float]:
@@ -131,7 +143,7 @@ def _check_shape(expression: str, place: Place, true: Array, span: float) -> Non
 
 
 def _check_values(place: Place, table: Table, multiplies: bool) -> None:
-    values = table.numbers[VALUES:]
+    values = table.numbers[VALUES : VALUES + NODES]
     extreme = float(values[np.argmax(np.abs(values))])
     largest = place.largest_of(multiplies)
     if abs(extreme) > largest:
