@@ -1,7 +1,7 @@
 from setuptools import find_packages, setup
 
 package_name = 'endoscope_core'
-shipped_suffixes = ('csv', 'css', 'j2', 'js', 'json', 'safetensors', 'svg', 'yaml')
+shipped_suffixes = ('csv', 'css', 'j2', 'js', 'json', 'safetensors', 'svg', 'uPlot', 'yaml')
 
 setup(
     name=package_name,
