@@ -107,6 +107,7 @@ def test_the_walk_finds_the_packages() -> None:
         'endoscope_bags',
         'endoscope_benchmarks',
         'endoscope_bringup',
+        'endoscope_console',
         'endoscope_core',
         'endoscope_devices',
         'endoscope_explain',

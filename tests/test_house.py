@@ -15,8 +15,9 @@ HOUSE: list[tuple[str, set[str]]] = [
     ('devices', {'core'}),
     ('explain', {'core', 'bags'}),
     ('nodes', {'core', 'bags', 'devices'}),
+    ('console', {'core', 'bags', 'nodes'}),
     ('bringup', {'core', 'bags', 'devices', 'explain', 'nodes'}),
-    ('benchmarks', {'core', 'bags', 'devices', 'explain', 'nodes', 'bringup'}),
+    ('benchmarks', {'core', 'bags', 'devices', 'explain', 'nodes', 'console', 'bringup'}),
 ]
 """Packages in their order, each with those before it that it and its tests may import."""
 

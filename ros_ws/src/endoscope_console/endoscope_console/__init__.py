@@ -1,0 +1,1 @@
+"""The operator console in the browser: a server between the graph and its page."""
