@@ -28,7 +28,7 @@ class Hand:
             self.ms * MS,
             [KeyEvent(e) if isinstance(e, str) else e for e in events],
             self.hindrance,
-            self.handle._position if self.follows else None,
+            self.handle.position if self.follows else None,
         )
         return self.last
 

@@ -3,6 +3,12 @@
 # A loop that stood still for longer has neither heard nor watched anything.
 STALL_NS = 100_000_000
 
+NEVER_HELD = 'not held yet'
+LET_GO = 'let go'
+SILENT = 'no sign of the operator'
+STALLED = 'this program was not run in time'
+"""Reasons of its own why a dead-man is not held."""
+
 
 class DeadMan:
     """Is held from a grip on, for as long as signs of that grip keep coming; all else lets go.
@@ -24,7 +30,7 @@ class DeadMan:
 
     def __init__(self) -> None:
         self.held = False
-        self.reason = 'not held yet'
+        self.reason = NEVER_HELD
         self._grip = 0
         self._spent = 0
         self._until_ns = 0
@@ -42,6 +48,9 @@ class DeadMan:
         lasts_ns
             Within what time the next sign has to come.
         """
+        if self.held and now_ns > self._until_ns:
+            # Between two turns; whoever fell silent has ended his grip.
+            self.let_go(SILENT)
         if grip != self._grip:
             self._spent = max(self._spent, self._grip)
         self._grip = grip
@@ -65,12 +74,12 @@ class DeadMan:
         late = self._turned_ns is not None and now_ns - self._turned_ns > STALL_NS
         self._turned_ns = now_ns
         if late:
-            self.let_go('this program was not run in time')
+            self.let_go(STALLED)
         elif self._grip <= self._spent:
             # No grip, or a late sign of one that has ended.
-            self.let_go('let go')
+            self.let_go(LET_GO)
         elif now_ns > self._until_ns:
-            self.let_go('no sign of the operator')
+            self.let_go(SILENT)
         elif hindrance:
             self.let_go(hindrance)
         else:
@@ -81,6 +90,6 @@ class DeadMan:
         """End the grip, whatever signs of it are still to come."""
         self._spent = max(self._spent, self._grip)
         self._grip = 0
-        if self.held or reason != 'let go':
+        if self.held or reason != LET_GO:
             self.reason = reason
         self.held = False

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from endoscope_core.teleop.dead_man import DeadMan
+from endoscope_core.teleop.running_angles import RunningAngles
 from endoscope_core.teleop.terminal_keys import FOCUS_LOST, KeyEvent, KeyEventKind
 
 # A keyboard repeats after 0.25 to 0.66 s for the first time, then 25 to 40 times a second. What
@@ -18,9 +19,6 @@ _SAME_NS = 5_000_000
 
 SPEEDS = (0.05, 1.0)
 _FASTER = 1.25
-# So long ahead of what the console says that it wants the hand waits: it is at a limit.
-_LEAD_S = 0.2
-_LEAD_RAD = 0.002
 
 HOME = 'h'
 MOVES = {
@@ -184,11 +182,15 @@ class KeyboardHandle:
         self.dead_man = DeadMan()
         self.speed = speed
         self._keys = _HeldKeys(told_apart)
-        self._position = [0.0] * joints
+        self._angles = RunningAngles(joints)
         self._turned_ns: int | None = None
-        self._start: tuple[Sequence[float], Sequence[float]] | None = None
         self._was_held = False
         self._asked = '', 0
+
+    @property
+    def position(self) -> tuple[float, ...]:
+        """Angles of the handle in rad, shape (J,)."""
+        return tuple(self._angles.position)
 
     def turn(
         self,
@@ -223,17 +225,16 @@ class KeyboardHandle:
         clutch = held and not homing
         elapsed = 0.0 if self._turned_ns is None else (now_ns - self._turned_ns) * 1e-9
         self._turned_ns = now_ns
-        at_limit = (False,) * len(self._position)
+        at_limit = (False,) * len(self.position)
         if not clutch or not self._was_held:
-            self._start = None
-        elif wanted is not None:
-            if self._start is None:
-                self._start = tuple(self._position), tuple(wanted)
-            at_limit = self._move(down, elapsed, wanted, scale)
+            self._angles.release()
+        else:
+            usual = (self.speed,) * len(at_limit)
+            at_limit = self._angles.run(self._speeds(down), usual, elapsed, wanted, scale)
         self._was_held = clutch
         if held:
             requests = [r for r in requests if r not in _ONLY_OPEN]
-        return Turn(tuple(self._position), clutch, homing, tuple(requests), at_limit)
+        return Turn(self.position, clutch, homing, tuple(requests), at_limit)
 
     def _take(self, now_ns: int, event: KeyEvent) -> Request | None:
         if event.key in _HOLDS:
@@ -256,21 +257,9 @@ class KeyboardHandle:
         repeated = key == event.key and now_ns - asked_ns <= FIRST_REPEAT_NS
         return None if repeated and request not in _ONLY_OPEN else request
 
-    def _move(
-        self, down: Iterable[str], elapsed: float, wanted: Sequence[float], scale: float
-    ) -> tuple[bool, ...]:
-        assert self._start is not None
-        begun, wanted_then = self._start
-        speed = [0.0] * len(self._position)
+    def _speeds(self, down: Iterable[str]) -> list[float]:
+        speeds = [0.0] * len(self.position)
         for key in down:
             joint, way = MOVES[key]
-            speed[joint] += way * self.speed
-        at_limit = [False] * len(speed)
-        for joint, v in enumerate(speed):
-            way = (v > 0.0) - (v < 0.0)
-            lead = scale * (self._position[joint] - begun[joint])
-            lead -= wanted[joint] - wanted_then[joint]
-            at_limit[joint] = bool(way) and way * lead > _LEAD_S * self.speed * scale + _LEAD_RAD
-            if not at_limit[joint]:
-                self._position[joint] += max(-self.speed, min(self.speed, v)) * elapsed
-        return tuple(at_limit)
+            speeds[joint] += way * self.speed
+        return [max(-self.speed, min(self.speed, v)) for v in speeds]

@@ -1,0 +1,231 @@
+"""Frames between a page and its server, little-endian: what a hand does, and what it is shown."""
+
+import math
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from endoscope_core.errors import EndoscopeError
+
+TELEMETRY, INPUT = 1, 2
+VERSION = 1
+POINTS = 40
+"""Of a polyline in a telemetry frame."""
+
+_INPUT = struct.Struct('<BBHIIIdff')
+_HEAD = struct.Struct('<BBHIdd')
+_PRESSED, _TURBO, _VISIBLE, _FOCUSED, _POSITION_MODE = 1, 2, 4, 8, 16
+_KNOWN_FLAGS = 31
+# 300 years: more is no time, and no number of ns that a float tells apart.
+_LAST_S = 1e10
+_F32 = np.dtype('<f4')
+_LINE = 3 * POINTS
+
+
+class MalformedFrameError(EndoscopeError, ValueError):
+    """A frame that is not one; the message says what is wrong with it."""
+
+
+class Source(IntEnum):
+    """By what a hand speaks."""
+
+    KEYBOARD = 0
+    POINTER = 1
+    GAMEPAD = 2
+    JOY = 3
+
+
+@dataclass(frozen=True)
+class InputFrame:
+    """What the operator's hand does now.
+
+    Attributes
+    ----------
+    pressed
+        Whether the dead-man is held.
+    turbo
+        Whether by its fast button.
+    visible, focused
+        Whether the page is shown, and the keyboard's.
+    position_mode
+        Whether `x` and `y` are angles and not speeds.
+    source
+        One of :class:`Source`.  The frame that ends a grip names the source of the grip; where it
+        names another, the device of the grip is gone.
+    seq
+        Number of the frame, counting up.
+    grip
+        Number of the grip, larger for every new one; what it is while nothing is pressed means
+        nothing.
+    seen
+        Number of the newest picture that was drawn.
+    t
+        Steady time of the page in s.
+    x, y
+        Deflection of either joint, -1 to 1; in position mode rad since the grip began.
+    """
+
+    pressed: bool
+    turbo: bool
+    visible: bool
+    focused: bool
+    position_mode: bool
+    source: int
+    seq: int
+    grip: int
+    seen: int
+    t: float
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class TelemetryFrame:
+    """One picture of the slave.
+
+    Attributes
+    ----------
+    seq
+        Its number.
+    stamp_s
+        Time in s of the graph.
+    age_s
+        Age in s of the newest sample in it.
+    ranges
+        Smallest, largest and last value of each signal since the frame before, shape (N, 3); NaN
+        where nothing came.
+    wanted, actual
+        Bending section in m, shape (`POINTS`, 3), as commanded and as measured; NaN where unknown.
+    """
+
+    seq: int
+    stamp_s: float
+    age_s: float
+    ranges: NDArray[np.float32]
+    wanted: NDArray[np.float32]
+    actual: NDArray[np.float32]
+
+
+def encode_input(frame: InputFrame) -> bytes:
+    """Write an input frame, 32 bytes: kind, flags, source, seq, grip, seen, t, x, y."""
+    flags = (
+        _PRESSED * frame.pressed
+        | _TURBO * frame.turbo
+        | _VISIBLE * frame.visible
+        | _FOCUSED * frame.focused
+        | _POSITION_MODE * frame.position_mode
+    )
+    numbers = frame.source, frame.seq, frame.grip, frame.seen, frame.t, frame.x, frame.y
+    return _INPUT.pack(INPUT, flags, *numbers)
+
+
+def decode_input(data: bytes) -> InputFrame:
+    """Read an input frame that came from a page.
+
+    Raises
+    ------
+    MalformedFrameError
+        If the length, the kind, a flag or the source is unknown, or a number is not finite.  The
+        source `Source.JOY` is unknown too: nobody speaks for the topic but the topic.
+    """
+    if len(data) != _INPUT.size:
+        raise MalformedFrameError(f'an input frame has {_INPUT.size} bytes, not {len(data)}')
+    kind, flags, source, seq, grip, seen, t, x, y = _INPUT.unpack(data)
+    if kind != INPUT:
+        raise MalformedFrameError(f'an input frame is of kind {INPUT}, not {kind}')
+    if flags & ~_KNOWN_FLAGS:
+        raise MalformedFrameError(f'an input frame has no flags {flags & ~_KNOWN_FLAGS:#x}')
+    if source >= Source.JOY:
+        raise MalformedFrameError(f'a page has no source {source}')
+    if not (abs(t) <= _LAST_S and math.isfinite(x) and math.isfinite(y)):
+        raise MalformedFrameError(f'no time in s and two angles: {t}, {x}, {y}')
+    return InputFrame(
+        pressed=bool(flags & _PRESSED),
+        turbo=bool(flags & _TURBO),
+        visible=bool(flags & _VISIBLE),
+        focused=bool(flags & _FOCUSED),
+        position_mode=bool(flags & _POSITION_MODE),
+        source=source,
+        seq=seq,
+        grip=grip,
+        seen=seen,
+        t=t,
+        x=x,
+        y=y,
+    )
+
+
+def encode_telemetry(
+    seq: int,
+    stamp_s: float,
+    age_s: float,
+    ranges: ArrayLike,
+    wanted: ArrayLike,
+    actual: ArrayLike,
+) -> bytes:
+    """Write a telemetry frame: kind, version, N, seq, stamp, age, N ranges and two polylines.
+
+    Parameters
+    ----------
+    seq
+        Number of the frame.
+    stamp_s
+        Time in s of the graph.
+    age_s
+        Age in s of the newest sample in it.
+    ranges
+        Smallest, largest and last value of each signal, shape (N, 3).
+    wanted, actual
+        Polylines in m, shape (`POINTS`, 3).
+
+    Returns
+    -------
+    bytes
+        24 + 12 N + 24 `POINTS` of them.
+
+    Raises
+    ------
+    ValueError
+        If an array has another shape.
+    """
+    of_signals, *lines = (np.asarray(array, dtype=_F32) for array in (ranges, wanted, actual))
+    if of_signals.ndim != 2 or of_signals.shape[1] != 3:
+        raise ValueError(f'ranges have shape (N, 3), not {of_signals.shape}')
+    for line in lines:
+        if line.shape != (POINTS, 3):
+            raise ValueError(f'a polyline has shape ({POINTS}, 3), not {line.shape}')
+    head = _HEAD.pack(TELEMETRY, VERSION, len(of_signals), seq, stamp_s, age_s)
+    return b''.join((head, of_signals.tobytes(), *(line.tobytes() for line in lines)))
+
+
+def decode_telemetry(data: bytes) -> TelemetryFrame:
+    """Read a telemetry frame.
+
+    Raises
+    ------
+    MalformedFrameError
+        If the kind or the version is another one, or the length does not fit.
+    """
+    if len(data) < _HEAD.size:
+        raise MalformedFrameError(f'a telemetry frame has at least {_HEAD.size} bytes')
+    kind, version, count, seq, stamp_s, age_s = _HEAD.unpack_from(data)
+    if (kind, version) != (TELEMETRY, VERSION):
+        raise MalformedFrameError(
+            f'a telemetry frame is of kind {TELEMETRY}, version {VERSION}, not {kind}, {version}'
+        )
+    size = _HEAD.size + _F32.itemsize * (3 * count + 2 * _LINE)
+    if len(data) != size:
+        raise MalformedFrameError(f'a frame of {count} signals has {size} bytes, not {len(data)}')
+    numbers = np.frombuffer(data, dtype=_F32, offset=_HEAD.size)
+    ranges, wanted, actual = np.split(numbers, (3 * count, 3 * count + _LINE))
+    return TelemetryFrame(
+        seq,
+        stamp_s,
+        age_s,
+        ranges.reshape(count, 3),
+        wanted.reshape(POINTS, 3),
+        actual.reshape(POINTS, 3),
+    )
