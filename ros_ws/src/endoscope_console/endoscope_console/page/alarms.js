@@ -1,0 +1,31 @@
+/** Which alarms stand, most urgent first: those of the server, and what only the page can know. */
+
+export const BLIND_S = 0.3;
+export const SILENT_STATE_S = 3.5;
+const ORDER = { high: 0, medium: 1, low: 2 };
+export const SIGN = { high: 'Danger', medium: 'Warning', low: 'Note' };
+
+/** Age of the picture in s: of its newest sample when it was sent, and since it came. */
+export const pictureAge = (picture, now) => (picture ? picture.age + (now - picture.arrived) : Infinity);
+
+/**
+ * @param server the alarms `{id, level, text, latched}` of the last state, or none
+ * @param own `{connected, everConnected, pictureAge, gamepadLost, ended}`: whether both sockets are open, and were;
+ *   age of the picture in s; a gamepad that does not answer any more; why the last grip was ended other than by hand
+ */
+export function standing(server, own) {
+  const alarms = [...(server ?? [])];
+  const add = (id, level, text) => {
+    if (!alarms.some((alarm) => alarm.id === id)) alarms.push({ id, level, text, latched: false });
+  };
+  if (own.everConnected && !own.connected) {
+    // What was heard before says nothing of now.
+    alarms.length = 0;
+    add('connection', 'medium', 'No connection to the console. The slave is held; it is being tried anew.');
+  } else if (own.connected && own.pictureAge > BLIND_S) {
+    const age = Number.isFinite(own.pictureAge) ? ` is ${own.pictureAge.toFixed(1)} s old` : ' has not come yet';
+    add('picture', 'medium', `The picture${age}. Nothing follows a hand that cannot see.`);
+  }
+  if (own.gamepadLost) add('gamepad', 'low', 'The gamepad is gone.');
+  return alarms.sort((a, b) => (ORDER[a.level] ?? 3) - (ORDER[b.level] ?? 3));
+}

@@ -1,0 +1,102 @@
+/** Explanations of recordings of this machine: asked for, followed, read, and their next experiment played. */
+
+import { $, each, make, toggle, write } from './elements.js';
+
+export class Explain {
+  constructor(app) {
+    this._app = app;
+    this._report = null;
+    this._asked = false;
+    $('ask').addEventListener('submit', (event) => {
+      event.preventDefault();
+      this._ask();
+    });
+    $('ask-again').addEventListener('click', () => this._look());
+  }
+
+  /** The page comes into view. */
+  shown() {
+    if (!this._asked) this._look();
+  }
+
+  render() {
+    const { state, mine } = this._app;
+    toggle($('ask-go'), 'disabled', !mine);
+    const explanations = state?.explanations ?? [];
+    each($('explanations'), explanations, (e) => e.id, (e) => this._card(e), (card, e) => {
+      write(card.querySelector('b'), e.bag);
+      write(card.querySelector('.sentence'), e.error || e.sentence || e.step || '');
+      const progress = card.querySelector('progress');
+      toggle(progress, 'hidden', !e.running);
+      progress.value = e.progress ?? 0;
+      toggle(card.querySelector('.open'), 'hidden', !e.report);
+      toggle(card.querySelector('.cancel'), 'hidden', !e.running);
+      toggle(card.querySelector('.cancel'), 'disabled', !mine);
+      toggle(card.querySelector('.play'), 'hidden', !e.experiment);
+      toggle(card.querySelector('.play'), 'disabled', !mine);
+      card.querySelector('.open').dataset.report = e.report ?? '';
+    });
+    const newest = explanations.find((e) => e.report);
+    if (this._report === null && newest) this._open(newest.report);
+  }
+
+  async _look() {
+    const answer = await this._app.orders.give({ op: 'bags' });
+    this._asked = answer.ok;
+    if (!answer.ok) {
+      write($('ask-answer'), `No recordings: ${answer.why}`);
+      return;
+    }
+    const bags = answer.bags ?? [];
+    const options = (first) => [...first, ...bags.map((bag) => ({ value: bag.name, text: nameOf(bag) }))];
+    const fill = (id, items) =>
+      each($(id), items, (item) => item.value, (item) => make('option', { value: item.value }), (option, item) => write(option, item.text));
+    fill('bag', options([]));
+    fill('baseline', options([{ value: '', text: 'no such recording' }]));
+    fill('validate', options([{ value: '', text: 'the end of the recording itself' }]));
+    fill('plants', (answer.plants ?? []).map((plant) => ({ value: plant, text: plant })));
+    write($('ask-answer'), bags.length ? '' : 'There is no recording yet. Press Record on the page Operate, and move.');
+  }
+
+  async _ask() {
+    const value = (id) => $(id).value || null;
+    const answer = await this._app.orders.give({
+      op: 'explain', bag: value('bag'), plant: value('plant'), baseline: value('baseline'), validate: value('validate'),
+    });
+    write($('ask-answer'), answer.ok ? 'Being explained; it may take some minutes.' : `Refused: ${answer.why}`);
+  }
+
+  _card(explanation) {
+    const button = (name, text, act) => {
+      const element = make('button', { class: name }, text);
+      element.addEventListener('click', act);
+      return element;
+    };
+    const { id } = explanation;
+    return make('li', { class: 'explanation' },
+      make('b'), make('p', { class: 'sentence', role: 'status' }), make('progress', { max: '1', 'aria-label': 'How far it is' }),
+      make('div', { class: 'row' },
+        button('open', 'Open the report', ({ target }) => this._open(target.dataset.report)),
+        button('play', 'Play the next experiment', () => this._play(id)),
+        button('cancel', 'Cancel', () => this._app.orders.give({ op: 'cancel', explanation: id }))));
+  }
+
+  async _play(id) {
+    const answer = await this._app.orders.give({ op: 'play', explanation: id });
+    write($('ask-answer'), answer.ok ? '' : `Refused: ${answer.why}`);
+    // What moves has to be seen: the dead-man counts only there.
+    if (answer.ok) this._app.show('operate');
+  }
+
+  _open(path) {
+    this._report = path;
+    $('report').replaceChildren(make('iframe', { src: path, sandbox: 'allow-scripts', title: 'Report of the explanation' }));
+  }
+}
+
+function nameOf(bag) {
+  const parts = [bag.name];
+  if (Number.isFinite(bag.duration)) parts.push(`${bag.duration.toFixed(0)} s`);
+  if (Number.isFinite(bag.size)) parts.push(`${(bag.size / 1e6).toFixed(0)} MB`);
+  return parts.join(' · ');
+}

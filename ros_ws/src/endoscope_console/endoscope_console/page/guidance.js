@@ -1,0 +1,65 @@
+/** What to press next, in words: from what the server says and what the hands do. */
+
+import { SILENT_STATE_S } from './alarms.js';
+
+/** Reasons of the dead-man in words; what is not listed is said as it comes. */
+const REASONS = {
+  released: 'let go', silent: 'no sign of the hand for 0.1 s', late: 'frames came late', order: 'frames out of order',
+  malformed: 'a malformed frame', flood: 'too many frames', hidden: 'page hidden', unfocused: 'page not in front',
+  closed: 'page closed', lost: 'controls lost', unplugged: 'gamepad unplugged', state: 'not enabled',
+  calibration: 'calibration', source: 'console follows something else', blind: 'picture too old',
+  stalled: 'the server was not run in time', 'hands on': 'let go first',
+};
+const ENDED_BY_HAND = new Set(['', 'released', 'let go']);
+
+export const inWords = (reason) => REASONS[reason] ?? (reason || '');
+
+/** Whether the last grip was ended by something else than the hand. */
+export const endedForHim = (reason) => !ENDED_BY_HAND.has(reason);
+
+/** FOLLOWING, HELD or OPEN, as the lamp has it. */
+export function lamp(state) {
+  const deadMan = state?.dead_man;
+  if (deadMan?.state === 'ENGAGED' && deadMan.following) return 'FOLLOWING';
+  if (deadMan?.state === 'ENGAGED') return 'HELD';
+  return 'OPEN';
+}
+
+/** Whether what the supervisor said last still counts. */
+export const stateIsFresh = (state, stateAge) => Boolean(state?.operating_state) && stateAge <= SILENT_STATE_S;
+
+/**
+ * The step that comes next, 0 to 4, and what to say:
+ * 0 cannot, 1 take the controls, 2 enable, 3 let go first, 4 hold and move.
+ */
+export function nextStep({ connected, role, mine, state, stateAge, busy, half, held, touch }) {
+  if (!connected) return { step: 0, text: 'Connecting to the console …' };
+  if (!state) return { step: 0, text: 'Waiting for the graph …' };
+  if (role !== 'operator') return { step: 0, text: 'You are looking on. To operate, open the operator’s address.' };
+  const { lease, calibration, playing, dead_man: deadMan } = state;
+  if (!mine && lease?.holder) return { step: 1, text: `${lease.holder} has the controls. Watch, or take over.` };
+  if (!mine) return { step: 1, text: 'Take the controls. Nothing moves yet.' };
+  if (!stateIsFresh(state, stateAge)) return { step: 0, text: 'The supervisor is silent. Nothing moves until it speaks.' };
+  if (calibration?.running) return { step: 0, text: 'Calibrating: the instrument moves by itself. Esc pauses it.' };
+  if (state.operating_state === 'FAULT') {
+    const causes = state.causes ?? [];
+    if (causes.length) return { step: 0, text: 'Held. Mend the cause of the fault, then enable.' };
+    return { step: 2, text: 'The cause of the fault is gone. Hold Enable for 1 s.' };
+  }
+  const orKey = touch ? '.' : ', or key E.';
+  const hold = touch ? 'Hold the left area and the pad' : 'Hold Space';
+  if (state.operating_state === 'PAUSED') return { step: 2, text: `Paused, position held. Hold Resume for 1 s${orKey}` };
+  if (state.operating_state !== 'ENABLED') return { step: 2, text: `Hold Enable for 1 s${orKey} The motors then hold.` };
+  if (deadMan?.state === 'ENGAGED') {
+    const verb = playing ? `Playing ${playing.what}` : 'Following';
+    return { step: 4, text: `${verb}. Let go, and it stops.` };
+  }
+  if (half) return { step: 4, text: 'One finger is down. Hold the left area and the pad together.' };
+  if (deadMan?.state === 'READY') {
+    if (playing) return { step: 4, text: `${hold}, and ${playing.what} plays. Let go, and it stops.` };
+    return { step: 4, text: touch ? 'Hold the left area, and drag on the pad.' : 'Hold Space and press an arrow key, or drag on the pad.' };
+  }
+  if (held || busy) return { step: 3, text: 'Let go of everything first, then take hold anew.' };
+  const missing = deadMan?.missing ?? deadMan?.reason ?? '';
+  return { step: 3, text: endedForHim(missing) ? `Not ready: ${inWords(missing)}.` : 'Getting ready …' };
+}

@@ -1,0 +1,321 @@
+/** The page on which one operates: orders, what became of them, and what the instrument says of itself. */
+
+import { SIGN, standing } from './alarms.js';
+import { keysAreTaken } from './dead_man.js';
+import { $, each, make, set, toggle, write } from './elements.js';
+import { inWords, lamp, nextStep, stateIsFresh } from './guidance.js';
+import { HoldButton } from './hold_button.js';
+
+const SCALES = [0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3];
+const ALARMS_SHOWN = 4;
+const ANSWER_S = 8;
+/** A protective stop is not unlocked by the hand that is still pressing. */
+const FAULT_REST_S = 2;
+
+const deg = (value, digits = 0) => (Number.isFinite(value) ? `${value.toFixed(digits)}°` : '–');
+
+/** The scale of the list that is nearest to a value. */
+export const nearestScale = (value) =>
+  SCALES.reduce((best, scale, k) => (Math.abs(Math.log(scale / value)) < Math.abs(Math.log(SCALES[best] / value)) ? k : best), 0);
+
+export class Operate {
+  /** @param app state of the page, see main.js */
+  constructor(app) {
+    this._app = app;
+    this._faultSince = null;
+    this._answered = 0;
+    this._scaleSent = null;
+    this._holds = {
+      KeyE: new HoldButton($('enable'), () => this._enable()),
+      KeyH: new HoldButton($('home'), () => this._order({ op: 'state', command: 'home' }, 'Home')),
+      KeyC: new HoldButton($('calibrate'), () => this._order({ op: 'calibrate' }, 'Calibrate')),
+    };
+    this._buttons();
+    this._keys();
+  }
+
+  /** Pause at once: what is held is let go of, and the server is told. */
+  pause() {
+    const { app } = this;
+    app.deadMan.letGo('paused');
+    if (app.mine) this._order({ op: 'state', command: 'pause' }, 'Pause');
+  }
+
+  /** What a gamepad's other buttons ask for. */
+  gamepadAsked(asked) {
+    const enable = this._holds.KeyE;
+    if (asked.includes('enable') && this._app.mine) enable.press('gamepad');
+    else enable.release('gamepad');
+    if (!this._app.mine) return;
+    if (asked.includes('pause')) this.pause();
+    if (asked.includes('mode')) this.toggleMode('gamepad');
+    if (asked.includes('faster')) this._stepScale(1);
+    if (asked.includes('slower')) this._stepScale(-1);
+  }
+
+  toggleMode(device) {
+    if (this._app.hands.toggleMode(device)) this.render();
+    else this.say('Let go first: the mode changes only while nothing is held.');
+  }
+
+  /** Tell in the line for answers. */
+  say(text) {
+    write($('answer'), text);
+    this._answered = performance.now();
+  }
+
+  /** Show the state of everything; several times a second, and at once on every change. */
+  render() {
+    const { app } = this;
+    const { state, mine, role, connected } = app;
+    const age = app.stateAge();
+    const fresh = stateIsFresh(state, age);
+    const word = fresh ? state.operating_state : state?.operating_state ? `${state.operating_state}?` : '…';
+    write($('state'), word);
+    set(document.body, 'data-state', fresh ? state.operating_state : 'UNKNOWN');
+    write($('state-why'), fresh ? reasonOf(state) : state ? `not heard for ${age.toFixed(0)} s` : 'waiting for the graph');
+    this._renderLamp();
+    this._renderSigns();
+    this._renderAlarms();
+    const next = nextStep({
+      connected, role, mine, state, stateAge: age, busy: app.hands.busy, half: app.hands.half, held: app.hands.held,
+      touch: app.touch,
+    });
+    write($('next'), next.text);
+    set(document.body, 'data-step', String(next.step));
+    for (const item of document.querySelectorAll('#guide li')) {
+      const step = Number(item.dataset.step);
+      set(item, 'data-is', step === next.step ? 'now' : step < next.step ? 'done' : 'later');
+    }
+    this._renderOrders(fresh);
+    this._renderHand();
+    if (state) this._renderTube(state);
+    if (this._answered && performance.now() - this._answered > 1000 * ANSWER_S) {
+      this._answered = 0;
+      write($('answer'), '');
+    }
+  }
+
+  get app() {
+    return this._app;
+  }
+
+  _renderLamp() {
+    const { app } = this;
+    const shown = app.connected ? lamp(app.state) : 'OPEN';
+    write($('lamp'), shown);
+    set($('lamp'), 'class', `lamp ${shown.toLowerCase()}`);
+    set($('view'), 'data-lamp', shown);
+    const deadMan = app.state?.dead_man;
+    let why = '';
+    if (shown === 'HELD') why = 'the hand holds; nothing follows yet';
+    else if (shown === 'FOLLOWING') why = app.state.playing ? 'as long as you hold on' : 'the hand';
+    else if (app.endedHere) why = app.endedHere;
+    else if (deadMan?.state === 'READY') why = 'ready';
+    else if (deadMan?.reason) why = inWords(deadMan.reason);
+    write($('lamp-why'), why);
+  }
+
+  _renderSigns() {
+    const { app } = this;
+    const holder = app.state?.lease?.holder;
+    write($('operator'), app.mine ? 'you' : holder || 'nobody');
+    const age = app.pictureAge();
+    write($('age'), Number.isFinite(age) ? (age < 10 ? `${Math.round(1000 * age)} ms` : 'old') : 'none');
+    set($('age'), 'data-old', String(age > 0.3));
+    const recorder = app.state?.recorder;
+    write($('recorder'), recorder ? (recorder.recording ? `● ${recorder.bag || 'recording'}` : 'off') : '–');
+    set($('recorder'), 'title', recorder?.message ?? '');
+  }
+
+  _renderAlarms() {
+    const { app } = this;
+    const alarms = standing(app.state?.alarms, {
+      connected: app.connected, everConnected: app.everConnected, pictureAge: app.pictureAge(),
+      gamepadLost: app.deadMan?.gamepadLost,
+    });
+    const shown = alarms.slice(0, ALARMS_SHOWN);
+    if (alarms.length > shown.length) {
+      shown.push({ id: ' more', level: 'low', text: `and ${alarms.length - shown.length} more, see the tab See` });
+    }
+    each($('alarms'), shown, (alarm) => `${alarm.id} ${alarm.level}`, (alarm) => {
+      const element = make('div', { class: `alarm ${alarm.level}` }, make('span', { class: 'visually-hidden' }, `${SIGN[alarm.level]}: `), make('span', { class: 'text' }));
+      if (alarm.latched) {
+        const button = make('button', { class: 'acknowledge' }, 'Seen');
+        button.addEventListener('click', () => this._order({ op: 'acknowledge', alarm: alarm.id }, 'Seen'));
+        element.append(button);
+      }
+      return element;
+    }, (element, alarm) => {
+      write(element.querySelector('.text'), alarm.text);
+      const button = element.querySelector('button');
+      if (button) toggle(button, 'disabled', !app.mine);
+    });
+  }
+
+  _renderOrders(fresh) {
+    const { app } = this;
+    const { state, mine } = app;
+    const now = fresh ? state.operating_state : null;
+    const busy = Boolean(state?.calibration?.running);
+    this._faultSince = now === 'FAULT' ? (this._faultSince ?? performance.now()) : null;
+    const faultOver = now !== 'FAULT'
+      || (performance.now() - this._faultSince > 1000 * FAULT_REST_S && !(state.causes?.length));
+    toggle($('pause'), 'disabled', !mine);
+    const claim = $('claim');
+    const holder = state?.lease?.holder;
+    write(claim, mine ? 'Give back' : holder ? 'Take over …' : 'Take the controls');
+    set(claim, 'class', mine ? '' : 'main');
+    toggle(claim, 'disabled', !app.connected || app.role !== 'operator');
+    this._holds.KeyE.enabled = mine && now !== null && now !== 'ENABLED' && faultOver;
+    write($('enable').querySelector('span'), now === 'PAUSED' ? 'Resume' : 'Enable');
+    this._holds.KeyH.enabled = mine && now === 'ENABLED' && !busy;
+    this._holds.KeyC.enabled = mine && now === 'ENABLED' && !busy;
+    toggle($('disable'), 'disabled', !mine || now === 'DISABLED');
+  }
+
+  _renderHand() {
+    const { hands, mine, state, deadMan } = this.app;
+    const free = mine && !hands.held;
+    set($('hand'), 'data-held', String(hands.held));
+    set($('hand'), 'data-live', String(mine));
+    set($('pad'), 'data-on', String(hands.held && hands.source === 'pad'));
+    set($('thumb'), 'data-on', String(hands.held));
+    const position = hands.modes.pad === 'position';
+    set($('mode-position'), 'aria-pressed', String(position));
+    set($('mode-speed'), 'aria-pressed', String(!position));
+    for (const id of ['mode-position', 'mode-speed', 'scale']) toggle($(id), 'disabled', !free);
+    const scale = state?.console?.scale;
+    write($('scale-value'), Number.isFinite(scale) ? String(Number(scale.toPrecision(2))) : '–');
+    if (Number.isFinite(scale) && document.activeElement !== $('scale')) $('scale').value = String(nearestScale(scale));
+    let device = this.app.touch ? '' : 'keys: arrows, or W A S D';
+    if (deadMan?.gamepadUnknown) device = 'this gamepad is none of the standard kind: use the topic joy';
+    else if (deadMan?.hasGamepad) device = `gamepad: hold RB; stick asks for ${hands.modes.gamepad}`;
+    write($('device'), device);
+  }
+
+  _renderTube(state) {
+    const { mine } = this.app;
+    const { calibration = {}, compensator = {}, recorder = {} } = state;
+    const { running, step, progress, result } = calibration;
+    toggle($('calibration-progress'), 'hidden', !running);
+    if (running) $('calibration-progress').value = progress ?? 0;
+    let text = 'Not calibrated yet.';
+    if (running) text = `${step || 'calibrating'}, ${Math.round(100 * (progress ?? 0))} %`;
+    else if (result) text = result.message || 'calibrated';
+    write($('calibration-text'), text);
+    write($('class'), result ? `${deg(result.class_deg)} (${Math.round(100 * (result.probability ?? 0))} %)` : '–');
+    write($('size'), result ? deg(result.size_deg, 1) : '–');
+    write($('interval'), result && Number.isFinite(result.low_deg) ? `${deg(result.low_deg, 1)} and ${deg(result.high_deg, 1)}` : '–');
+    const select = $('compensator');
+    const modes = this.app.modes;
+    each(select, modes, (mode) => mode, (mode) => make('option', { value: mode }, mode.replaceAll('_', ' ')), () => {});
+    if (document.activeElement !== select && compensator.wanted) select.value = compensator.wanted;
+    toggle(select, 'disabled', !mine);
+    set(select, 'title', compensator.mode && compensator.mode !== compensator.wanted ? `in force: ${compensator.mode}` : '');
+    toggle($('record'), 'disabled', !mine);
+    set($('record'), 'aria-pressed', String(Boolean(recorder.recording)));
+    write($('record'), recorder.recording ? 'Stop recording' : 'Record');
+  }
+
+  async _order(order, name) {
+    const answer = await this.app.orders.give(order);
+    this.say(answer.ok ? `${name}: done${answer.why ? `, ${answer.why}` : ''}` : `${name} refused: ${answer.why}`);
+    return answer;
+  }
+
+  _enable() {
+    const command = this.app.state?.operating_state === 'PAUSED' ? 'resume' : 'enable';
+    this._order({ op: 'state', command }, command === 'resume' ? 'Resume' : 'Enable');
+  }
+
+  async _claim() {
+    const { app } = this;
+    if (app.mine) {
+      app.deadMan.letGo('given back');
+      const answer = await this._order({ op: 'release' }, 'Give back');
+      if (answer.ok) app.lost('');
+      return;
+    }
+    const holder = app.state?.lease?.holder;
+    if (holder && !(await this._mayTake(holder))) return;
+    const answer = await this._order({ op: 'claim', take: Boolean(holder) }, 'Take the controls');
+    if (answer.ok) app.claimed();
+  }
+
+  _mayTake(holder) {
+    const dialog = $('take');
+    write($('take-from'), holder);
+    dialog.returnValue = 'no';
+    dialog.showModal();
+    return new Promise((resolve) => {
+      dialog.addEventListener('close', () => resolve(dialog.returnValue === 'take'), { once: true });
+    });
+  }
+
+  async _set(name, value) {
+    await this._order({ op: 'set', [name]: value }, name);
+  }
+
+  _stepScale(step) {
+    if (this.app.hands.held) {
+      this.say('Let go first: the scale changes only while nothing is held.');
+      return;
+    }
+    const now = this.app.state?.console?.scale;
+    if (!Number.isFinite(now)) return;
+    this._set('scale', SCALES[Math.max(0, Math.min(SCALES.length - 1, nearestScale(now) + step))]);
+  }
+
+  _buttons() {
+    const click = (id, act) => $(id).addEventListener('click', act);
+    $('pause').addEventListener('pointerdown', () => this.pause());
+    click('pause', (event) => {
+      // A click of the pointer has been obeyed when it went down.
+      if (event.detail === 0) this.pause();
+    });
+    click('claim', () => this._claim());
+    click('disable', () => {
+      this.app.deadMan.letGo('disabled');
+      this._order({ op: 'state', command: 'disable' }, 'Disable');
+    });
+    click('record', () => this._order({ op: 'record', on: !this.app.state?.recorder?.recording }, 'Record'));
+    click('mode-position', () => this._mode('position'));
+    click('mode-speed', () => this._mode('speed'));
+    $('compensator').addEventListener('change', ({ target }) => {
+      target.blur();
+      this._set('compensator', target.value);
+    });
+    $('scale').addEventListener('change', ({ target }) => {
+      target.blur();
+      this._set('scale', SCALES[Number(target.value)]);
+    });
+    click('help-open', () => $('help').showModal());
+  }
+
+  _mode(mode) {
+    if (this.app.hands.modes.pad !== mode) this.toggleMode('pad');
+  }
+
+  _keys() {
+    window.addEventListener('keydown', (event) => {
+      if (event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
+      // Pausing is never wrong, wherever the cursor stands.
+      if (event.code === 'Escape') this.pause();
+      if (keysAreTaken()) return;
+      if (event.key === '?') $('help').showModal();
+      if (!this.app.mine || !this.app.shown()) return;
+      this._holds[event.code]?.press(event.code);
+      if (event.code === 'KeyM') this.toggleMode('pad');
+      if (event.code === 'BracketLeft') this._stepScale(-1);
+      if (event.code === 'BracketRight') this._stepScale(1);
+    });
+    window.addEventListener('keyup', (event) => this._holds[event.code]?.release(event.code));
+  }
+}
+
+function reasonOf(state) {
+  if (state.why) return state.why;
+  if (state.operating_state === 'FAULT') return (state.causes ?? []).join('; ');
+  return { ENABLED: 'it may move', PAUSED: 'position held', DISABLED: 'motors off' }[state.operating_state] ?? '';
+}
