@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from endoscope_core.kinematics import bending_from_orientation, tip_pose
+from endoscope_core.kinematics import bending_from_orientation, centre_line, tip_pose
 
 angles = st.floats(-2.2, 2.2)
 
@@ -68,3 +68,14 @@ def test_refuses_what_has_no_bending(bad):
 def test_refuses_half_a_turn():
     with pytest.raises(ValueError, match='half a turn'):
         tip_pose((math.pi, 0.1), 0.02)
+
+
+@given(st.floats(-1.7, 1.7), st.floats(-1.7, 1.7), st.integers(1, 39))
+def test_a_centre_line_ends_where_a_shorter_section_would(x, y, k):
+    line = centre_line((x, y), 0.02, 40)
+    share = k / 39
+    tip, _ = tip_pose((share * x, share * y), share * 0.02)
+    np.testing.assert_allclose(line[0], 0.0, atol=1e-15)
+    np.testing.assert_allclose(line[k], tip, atol=1e-12)
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    assert np.ptp(steps) < 1e-9

@@ -1,6 +1,10 @@
 """From bending angles to the pose of the tip, and back; from a tracker's frame to the base's."""
 
-from endoscope_core.kinematics.constant_curvature import bending_from_orientation, tip_pose
+from endoscope_core.kinematics.constant_curvature import (
+    bending_from_orientation,
+    centre_line,
+    tip_pose,
+)
 from endoscope_core.kinematics.rotation import (
     about_z,
     angle_between,
@@ -24,6 +28,7 @@ __all__ = [
     'about_z',
     'angle_between',
     'bending_from_orientation',
+    'centre_line',
     'conjugate',
     'mean_orientation',
     'multiply',

@@ -55,6 +55,32 @@ def tip_pose(bending: ArrayLike, length: float) -> tuple[Array, Array]:
     return position, orientation
 
 
+def centre_line(bending: ArrayLike, length: float, points: int) -> Array:
+    """Points of the section from its base to its tip, as many and as far apart along it.
+
+    Parameters
+    ----------
+    bending
+        ``bend_x`` and ``bend_y`` in rad, shape (2,).
+    length
+        Length of the bending section in m.
+    points
+        How many, N.
+
+    Returns
+    -------
+    ndarray, shape (N, 3)
+        In m, in the frame of the instrument's base.
+    """
+    x, y = (float(v) for v in np.asarray(bending, dtype=float))
+    share = np.linspace(0.0, 1.0, points)
+    angle = math.hypot(x, y) * share
+    # The part up to a share of the length is bent by that share of the angles.
+    lateral = 0.5 * share**2 * np.sinc(angle / (2.0 * math.pi)) ** 2
+    along = share * np.sinc(angle / math.pi)
+    return np.stack([lateral * x, lateral * y, along], axis=1) * length
+
+
 def bending_from_orientation(orientation: ArrayLike) -> Array:
     """Bending angles that give the tip its orientation; the inverse of :func:`tip_pose`.
 
