@@ -15,8 +15,8 @@ SOLE_PUBLISHERS = {
     'motor/servo_jp': {'compensator'},
     'slave/operating_state': {'supervisor'},
     'slave/motion_session': {'supervisor'},
-    'slave/state_command': {'operator'},
-    'master/clutch': {'console', 'master'},
+    'slave/state_command': {'operator', 'console_web'},
+    'master/clutch': {'console', 'master', 'console_web'},
 }
 
 

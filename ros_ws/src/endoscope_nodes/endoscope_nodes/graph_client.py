@@ -43,6 +43,8 @@ _OPENS = {'enable': 'ENABLED', 'resume': 'ENABLED', 'disable': 'DISABLED', 'paus
 # What was refused is told at once; the same words a second later are an old story.
 _JUST_NOW_S = 0.1
 _REPEATED_AFTER_S = 1.0
+# An `enable` that brings a node's trouble to light is a fault within this time.
+_STEADY_S = 0.3
 # A result tells its duration with nine digits.
 _SAME_BEGIN_S = 1e-6
 # A loop that reads as seldom as this still hears every word.
@@ -276,6 +278,20 @@ class GraphClient(ClosedOnExit):
             patience_s,
         )
         return target
+
+    def ask_and_see(self, command: str, patience_s: float = PATIENCE_S) -> str:
+        """Give a state command, and see whether the state lasts; that state.
+
+        Raises
+        ------
+        GraphRefusedError
+            As of :meth:`ask`, or because a node's trouble came to light at once; with its cause.
+        """
+        state = self.ask(command, patience_s)
+        if state == 'ENABLED' and self.wait_until(lambda: self.state != state, _STEADY_S):
+            self.wait_until(lambda: bool(self.why), patience_s)
+            raise GraphRefusedError(f'{self.state}: {self.why}')
+        return state
 
     def _ask(self, command: str, done: Callable[[], bool], what: str, patience_s: float) -> None:
         """Give a command, again where it brought no answer, until it is done."""

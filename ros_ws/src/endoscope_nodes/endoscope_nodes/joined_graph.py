@@ -30,6 +30,31 @@ def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterat
     EndoscopeError
         The namespace or the domain cannot be one.
     """
+    with joined_node(name, namespace, domain) as node:
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+
+        def serve(seconds: float) -> None:
+            end = time.monotonic() + seconds
+            while (left := end - time.monotonic()) > 0.0:
+                executor.spin_once(timeout_sec=left)
+
+        try:
+            with GraphClient(node, serve) as client:
+                yield client
+        finally:
+            executor.shutdown()
+
+
+@contextmanager
+def joined_node(name: str, namespace: str, domain: int | None = None) -> Iterator[Node]:
+    """A node of this name in the namespace of a graph, which its owner has to serve.
+
+    Raises
+    ------
+    EndoscopeError
+        The namespace or the domain cannot be one.
+    """
     stay_on_this_machine()
     log_as_asked()
     given = os.environ.get('ROS_DOMAIN_ID', '')
@@ -43,19 +68,7 @@ def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterat
     )
     try:
         with _node(name, namespace, context) as node:
-            executor = SingleThreadedExecutor(context=context)
-            executor.add_node(node)
-
-            def serve(seconds: float) -> None:
-                end = time.monotonic() + seconds
-                while (left := end - time.monotonic()) > 0.0:
-                    executor.spin_once(timeout_sec=left)
-
-            try:
-                with GraphClient(node, serve) as client:
-                    yield client
-            finally:
-                executor.shutdown()
+            yield node
     finally:
         context.try_shutdown()
 

@@ -303,6 +303,15 @@ TOPICS = (
         heard_by=('supervisor', 'calibration'),
     ),
     Topic(
+        names.CONSOLE_LOG,
+        _DIAGNOSTICS,
+        'when somebody asks at a page',
+        'what was asked for at a page of `endoscope console`, and what became of it: status '
+        '`console_web: order` with `operator`, `address`, `order`, `answer` and `why`',
+        offered=EVENT,
+        asked=EVENT,
+    ),
+    Topic(
         names.SIMULATED_WIRES,
         _JOINT_STATE,
         _STREAM,

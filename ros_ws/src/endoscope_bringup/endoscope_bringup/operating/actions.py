@@ -24,8 +24,6 @@ _OF_A_DEVICE = {
     'reboot': MOTOR_REBOOT,
 }
 
-# An `enable` that brings a node's trouble to light is a fault within this time.
-_STEADY_S = 0.3
 _NEXT_WORD_S = 1.5
 
 
@@ -74,11 +72,8 @@ def act(client: GraphClient, args: argparse.Namespace) -> Reply:
         return _calibrate(client, patience_s)
     if action == 'home':
         return Reply((client.home(patience_s),))
-    state = client.ask(action, patience_s)
+    state = client.ask_and_see(action, patience_s)
     if state == 'ENABLED':
-        if client.wait_until(lambda: client.state != 'ENABLED', _STEADY_S):
-            client.wait_until(lambda: bool(client.why), patience_s)
-            raise GraphRefusedError(f'{client.state}: {client.why}')
         return Reply((f'{state}, {client.session}',), {'session': client.session})
     return Reply((state,))
 
