@@ -19,5 +19,5 @@ setup(
     maintainer_email='founders@endoscope.invalid',
     description='The operator console in the browser: endoscope console.',
     license='Apache-2.0',
-    entry_points={'endoscope.commands': []},
+    entry_points={'endoscope.commands': ['console = endoscope_console.command']},
 )

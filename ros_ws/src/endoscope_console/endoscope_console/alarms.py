@@ -1,0 +1,66 @@
+"""Alarms: what asks for attention, how urgently, and what stays until somebody has seen it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Level(StrEnum):
+    """How urgent an alarm is, by the priorities of IEC 60601-1-8; conformity is not claimed."""
+
+    HIGH = 'high'
+    MEDIUM = 'medium'
+    LOW = 'low'
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """What asks for attention.
+
+    Attributes
+    ----------
+    id
+        By which it is acknowledged.
+    level
+        How urgent it is.
+    text
+        In words.
+    latched
+        Whether it stays until it was acknowledged.
+    """
+
+    id: str
+    level: Level
+    text: str
+    latched: bool = False
+
+
+class Alarms:
+    """Those that are shown: what is present, and what latches and was not acknowledged.
+
+    Acknowledging says that somebody has seen it; it mends and enables nothing.
+    """
+
+    def __init__(self) -> None:
+        self._present: dict[str, Alarm] = {}
+        self._kept: dict[str, Alarm] = {}
+
+    def update(self, present: Mapping[str, Alarm]) -> tuple[Alarm, ...]:
+        """Take what is present now; those that are shown, most urgent first."""
+        for name, alarm in present.items():
+            if alarm.latched:
+                self._kept[name] = alarm
+        self._present = dict(present)
+        shown = self._kept | {n: a for n, a in present.items() if not a.latched}
+        order = list(Level)
+        return tuple(sorted(shown.values(), key=lambda a: (order.index(a.level), a.id)))
+
+    def acknowledge(self, name: str) -> str:
+        """Take note that an alarm was seen, which ends it where its cause has gone; the answer."""
+        alarm = self._kept.get(name)
+        if alarm is None:
+            return 'there is nothing to acknowledge'
+        if name in self._present:
+            return f'still present: {self._present[name].text}'
+        del self._kept[name]
+        return ''

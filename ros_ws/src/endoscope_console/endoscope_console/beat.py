@@ -1,0 +1,237 @@
+"""The beat of the handle: a thread that judges the dead-man and speaks for the handle, at 1 kHz.
+
+The deadline is judged here and not where the sockets are read: whatever holds those up releases the
+clutch instead of holding it.
+"""
+
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Self
+
+from rclpy.node import Node
+
+from endoscope_core.teleop.frames import InputFrame
+from endoscope_core.teleop.operator import Conditions, DeadManState, OperatorDeadMan, Reason
+from endoscope_core.teleop.pad import PadHandle
+from endoscope_nodes.handle_sender import HandleSender
+
+_BEAT_NS = 1_000_000
+_IDLE_NS = 20_000_000
+_WANTED_NS = 150_000_000
+_UNTIL_STOPPED_S = 2.0
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What the graph and the lease are like, as the other threads last said.
+
+    Attributes
+    ----------
+    holder
+        Client that holds the lease; empty for nobody.
+    speaks
+        Whether the handle's place is free and its own: only then it is a sender.
+    enabled, heard_ns
+        Whether the operating state is ``ENABLED``, and when it was heard.
+    calibrating
+        Whether a calibration or a way home has the slave.
+    source
+        Of the commands of the console.
+    pictures
+        Number of each of the last pictures and when it was made, shape (N, 2).
+    playing
+        Whether the console plays a motion that goes on only while the clutch is held.
+    wanted, wanted_ns
+        Angles in rad that the console asks of the slave, shape (J,), and when they were heard.
+    scale
+        Slave motion for one radian of the handle.
+    """
+
+    holder: str = ''
+    speaks: bool = False
+    enabled: bool = False
+    heard_ns: int = 0
+    calibrating: bool = False
+    source: str = ''
+    pictures: tuple[tuple[int, int], ...] = ()
+    playing: bool = False
+    wanted: tuple[float, ...] | None = None
+    wanted_ns: int = 0
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Said:
+    """Where the dead-man is, as of a beat.
+
+    Attributes
+    ----------
+    state, reason, missing
+        See :class:`OperatorDeadMan`.
+    since_ns
+        Since when it is in that state.
+    counts
+        How often each reason has ended a grip.
+    speaks
+        Whether the handle is spoken for.
+    """
+
+    state: DeadManState = DeadManState.OPEN
+    reason: Reason | None = None
+    missing: Reason | None = Reason.LOST
+    since_ns: int = 0
+    counts: dict[str, int] = field(default_factory=dict)
+    speaks: bool = False
+
+
+class Beat:
+    """The thread; it shares one-slot mailboxes and a queue of arrivals with the others.
+
+    Parameters
+    ----------
+    node
+        By which to speak.
+    handle
+        Turns frames into angles.
+
+    Attributes
+    ----------
+    situation
+        To be replaced by whoever knows a newer one.
+    said
+        What the dead-man said in the last beat in which it changed.
+    """
+
+    def __init__(self, node: Node, handle: PadHandle) -> None:
+        self.situation = Situation()
+        self.said = Said()
+        self._node = node
+        self._handle = handle
+        self._dead_man = OperatorDeadMan()
+        self._sender: HandleSender | None = None
+        self._arrivals: deque[tuple[str, InputFrame | Reason, int]] = deque()
+        self._engaged_ns = 0
+        self._asked = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='beat', daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Release the clutch and leave the handle's topics."""
+        self._asked.set()
+        self._thread.join(_UNTIL_STOPPED_S)
+
+    @property
+    def alive(self) -> bool:
+        """Whether the thread goes on; nothing moves where it does not."""
+        return self._thread.is_alive()
+
+    @property
+    def grips(self) -> int:
+        """Greatest number of a grip so far."""
+        return self._dead_man.grips
+
+    def hear(self, client: str, frame: InputFrame, arrived_ns: int) -> None:
+        """Take a frame of a client that arrived at a steady time in ns."""
+        self._arrivals.append((client, frame, arrived_ns))
+
+    def refuse(self, client: str, reason: Reason, now_ns: int) -> None:
+        """Take what is no frame, from a client at a steady time in ns; or that it is gone."""
+        self._arrivals.append((client, reason, now_ns))
+
+    def _run(self) -> None:
+        due_ns = time.monotonic_ns()
+        try:
+            while not self._asked.is_set():
+                now_ns = time.monotonic_ns()
+                self._turn(now_ns, self.situation)
+                period_ns = _BEAT_NS if self.situation.holder or self._sender else _IDLE_NS
+                due_ns = max(due_ns + period_ns, now_ns)
+                time.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
+        finally:
+            self._leave()
+
+    def _turn(self, now_ns: int, situation: Situation) -> None:
+        dead_man = self._dead_man
+        while self._arrivals:
+            client, what, arrived_ns = self._arrivals.popleft()
+            if isinstance(what, InputFrame):
+                dead_man.hear(what, arrived_ns, client)
+            elif what is Reason.CLOSED:
+                dead_man.closed(client)
+            else:
+                dead_man.refuse(what, client)
+        dead_man.turn(now_ns, _conditions(situation, now_ns))
+        self._speak(now_ns, situation)
+        self._say(now_ns)
+
+    def _speak(self, now_ns: int, situation: Situation) -> None:
+        """Say where the handle is and whether its clutch is held, while that is this one's part."""
+        if self._sender is None and situation.speaks:
+            self._sender = HandleSender(self._node)
+        elif self._sender is not None and not situation.speaks:
+            self._leave()
+        engaged = self._dead_man.engaged
+        if self._sender is None:
+            return
+        wall_ns = time.time_ns()
+        if self._sender.clutch and not engaged:
+            self._sender.press(False, wall_ns)
+        if not engaged:
+            self._engaged_ns = 0
+        fresh = situation.wanted_ns > max(self._engaged_ns, now_ns - _WANTED_NS)
+        position = self._handle.follow(
+            now_ns,
+            self._dead_man.frame if engaged else None,
+            situation.wanted if fresh else None,
+            situation.scale,
+        )
+        if engaged and not self._engaged_ns:
+            # The handle stands still in this beat; the clutch follows in the next one.
+            self._engaged_ns = now_ns
+        elif engaged and not self._sender.clutch:
+            self._sender.press(True, wall_ns)
+        self._sender.send(wall_ns, position)
+
+    def _leave(self) -> None:
+        if self._sender is not None:
+            self._sender.press(False, time.time_ns())
+            self._sender.close()
+            self._sender = None
+
+    def _say(self, now_ns: int) -> None:
+        dead_man, said = self._dead_man, self.said
+        now = (dead_man.state, dead_man.reason, dead_man.missing, self._sender is not None)
+        if now == (said.state, said.reason, said.missing, said.speaks):
+            return
+        since_ns = said.since_ns if said.state is dead_man.state else now_ns
+        self.said = Said(
+            dead_man.state,
+            dead_man.reason,
+            dead_man.missing,
+            since_ns,
+            {str(reason): count for reason, count in dead_man.counts.items()},
+            self._sender is not None,
+        )
+
+
+def _conditions(situation: Situation, now_ns: int) -> Conditions:
+    return Conditions(
+        holder=situation.holder,
+        state_enabled=situation.enabled,
+        state_age_ns=now_ns - situation.heard_ns,
+        calibrating=situation.calibrating,
+        source=situation.source,
+        pictures=situation.pictures,
+        playing=situation.playing,
+    )

@@ -1,0 +1,187 @@
+"""The pages that are connected: who may be, how much each may send, and what waits for each."""
+
+import asyncio
+from collections import Counter, deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from endoscope_console.access import VIEWER
+
+Kind = Literal['telemetry', 'command']
+
+HELLO_S = 2.0
+"""Within so long a socket must have said hello."""
+UNANSWERED = 8
+"""Sockets that may be open without having said it."""
+OF_A_KIND = 16
+VIEWERS_OF_A_KIND = 4
+FRAMES_A_SECOND = 200
+QUEUED = 2
+"""Pictures that wait for a slow client; older ones are dropped."""
+ORDERS_AT_ONCE = 8
+"""Orders of one client that are not answered yet."""
+
+_SECOND_NS = 1_000_000_000
+
+
+class FrameRate:
+    """Whether a client sends more than it may: an allowance that fills up again.
+
+    Parameters
+    ----------
+    limit
+        Frames a second, and at once.
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._left = float(limit)
+        self._at_ns: int | None = None
+
+    def exceeded(self, now_ns: int) -> bool:
+        """Take one more frame, at a steady time in ns; whether it is one too many."""
+        if self._at_ns is not None:
+            earned = (now_ns - self._at_ns) * self._limit / _SECOND_NS
+            self._left = min(float(self._limit), self._left + earned)
+        self._at_ns = now_ns
+        self._left -= 1.0
+        return self._left < 0.0
+
+
+class Outbox:
+    """What waits to be sent to a client: the newest pictures, and the newest state.
+
+    Attributes
+    ----------
+    dropped
+        Pictures that it never got, since newer ones came.
+    """
+
+    def __init__(self) -> None:
+        self.dropped = 0
+        self._pictures: deque[bytes] = deque()
+        self._state = ''
+        self._filled = asyncio.Event()
+
+    def put_picture(self, picture: bytes) -> None:
+        """Add a picture; the oldest gives way."""
+        if len(self._pictures) == QUEUED:
+            self._pictures.popleft()
+            self.dropped += 1
+        self._pictures.append(picture)
+        self._filled.set()
+
+    def put_state(self, state: str) -> None:
+        """Replace the state by a newer one."""
+        self._state = state
+        self._filled.set()
+
+    async def get(self) -> bytes | str:
+        """Wait for what comes next."""
+        while True:
+            if self._state:
+                state, self._state = self._state, ''
+                return state
+            if self._pictures:
+                return self._pictures.popleft()
+            self._filled.clear()
+            await self._filled.wait()
+
+
+@dataclass(eq=False)
+class Client:
+    """A socket that has said hello.
+
+    Attributes
+    ----------
+    id
+        Its name, ``c3``.
+    kind, role
+        Which socket, and what its bearer may be.
+    address
+        Of the machine it comes from.
+    rate
+        What it may send.
+    outbox
+        What waits for it, on the socket for telemetry.
+    tell
+        Sends it an object that it did not ask for, on the socket for commands.
+    orders
+        How many of its orders are not answered yet.
+    """
+
+    id: str
+    kind: Kind
+    role: str
+    address: str
+    rate: FrameRate = field(default_factory=lambda: FrameRate(FRAMES_A_SECOND))
+    outbox: Outbox = field(default_factory=Outbox)
+    tell: Callable[[dict[str, object]], None] = lambda message: None
+    orders: int = 0
+
+    @property
+    def label(self) -> str:
+        """Name for a person."""
+        return f'{self.id} at {self.address}'
+
+
+class Clients:
+    """All sockets, within the limits.
+
+    Parameters
+    ----------
+    counts
+        What is refused and dropped is counted here.
+    """
+
+    def __init__(self, counts: Counter[str]) -> None:
+        self.counts = counts
+        self._open: dict[str, Client] = {}
+        self._made = 0
+        self._unanswered = 0
+
+    def knock(self) -> bool:
+        """Note a socket that opens; false where too many have not said hello."""
+        if self._unanswered >= UNANSWERED:
+            self.counts['refused: too many sockets without hello'] += 1
+            return False
+        self._unanswered += 1
+        return True
+
+    def answered(self) -> None:
+        """Note that a socket has said hello, or is gone before it did."""
+        self._unanswered -= 1
+
+    def admit(self, kind: Kind, role: str, address: str) -> Client | str:
+        """Make a client of a socket that has said hello; or why not."""
+        of_kind = [client for client in self._open.values() if client.kind == kind]
+        if len(of_kind) >= OF_A_KIND:
+            self.counts['refused: too many clients'] += 1
+            return f'{OF_A_KIND} pages are connected already'
+        viewers = sum(client.role == VIEWER for client in of_kind)
+        if role == VIEWER and viewers >= VIEWERS_OF_A_KIND:
+            self.counts['refused: too many viewers'] += 1
+            return f'{VIEWERS_OF_A_KIND} viewers are connected already'
+        self._made += 1
+        client = Client(f'c{self._made}', kind, role, address)
+        self._open[client.id] = client
+        return client
+
+    def leave(self, client: Client) -> None:
+        """Forget one that is gone."""
+        del self._open[client.id]
+        self.counts['pictures dropped'] += client.outbox.dropped
+
+    def of(self, kind: Kind) -> list[Client]:
+        """Those of one kind, oldest first."""
+        return [client for client in self._open.values() if client.kind == kind]
+
+    def by_id(self, name: str) -> Client | None:
+        """The one of that name."""
+        return self._open.get(name)
+
+    @property
+    def dropped(self) -> int:
+        """Pictures that those who are connected never got."""
+        return sum(client.outbox.dropped for client in self._open.values())

@@ -1,0 +1,120 @@
+"""`endoscope console`: the page by which a person operates, and its server."""
+
+import argparse
+from pathlib import Path
+
+DEFAULT_PORT = 8642
+
+_EPILOG = """\
+The address that is printed carries a token: who has it may operate. It is for this machine alone;
+another one is let in by --host with an address of this machine, which needs a certificate. Ctrl-C
+ends the page and, where this command started it, the graph.
+
+A device of the topic joy (joy_node, in the namespace of the graph) operates by the same rules as a
+page. It has to repeat itself at least 20 times a second: autorepeat_rate 50.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `console`."""
+    parser = subparsers.add_parser(
+        'console',
+        help='operate by a page in the browser, with a graph started unless one runs',
+        description='Serves the page by which a person operates the slave, watches it and has '
+        'recordings explained, and prints its address. Starts a graph unless one answers.',
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        '--host',
+        default='127.0.0.1',
+        metavar='ADDRESS',
+        help='address of this machine at which the page is reached (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--port',
+        type=_port,
+        default=DEFAULT_PORT,
+        help='0 for any that is free (default: %(default)d)',
+    )
+    parser.add_argument(
+        '--certificate', type=Path, metavar='FILE', help='for https: certificate chain, PEM'
+    )
+    parser.add_argument('--key', type=Path, metavar='FILE', help='its private key, PEM')
+    parser.add_argument(
+        '--token-file',
+        type=Path,
+        metavar='FILE',
+        help='keep the tokens there, so that the addresses stay; by default they are new each time',
+    )
+    parser.add_argument(
+        '--origin',
+        action='append',
+        default=[],
+        metavar='URL',
+        help='another address under which the page is reached, for example that of a proxy',
+    )
+    parser.add_argument(
+        '--allow-no-origin',
+        action='store_true',
+        help='let programs that are no browsers open the sockets; they need the token too',
+    )
+    parser.add_argument(
+        '--no-graph', action='store_true', help='start no graph, wait for one to answer'
+    )
+    parser.add_argument(
+        '--graph',
+        default='',
+        metavar='ARGUMENTS',
+        help="further arguments for the graph that is started: '-p tick_rate:=500'",
+    )
+    parser.add_argument(
+        '--rig', type=Path, metavar='RIG.yaml', help="the graph's rig file; default as shipped"
+    )
+    parser.add_argument(
+        '--bags',
+        type=Path,
+        default=Path('bags'),
+        metavar='DIR',
+        help='recordings that can be explained, and where that goes (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--section-length',
+        type=_length,
+        default=0.02,
+        metavar='M',
+        help='length of the bending section, for its picture (default: %(default)g)',
+    )
+    parser.add_argument(
+        '--joy',
+        action='append',
+        default=[],
+        metavar='NAME=VALUE',
+        help='a parameter of the topic joy, by the names of teleop_twist_joy: enable_button=5, '
+        'axis_angular.bend_x=0, pause_button=8, ...',
+    )
+    parser.add_argument(
+        '--namespace', default='endoscope', help='of the graph (default: %(default)s)'
+    )
+    parser.add_argument('--open', action='store_true', help='open the page in a browser')
+
+
+def _port(text: str) -> int:
+    port = int(text)
+    if not 0 <= port < 65536:
+        raise ValueError(text)
+    return port
+
+
+def _length(text: str) -> float:
+    length = float(text)
+    if not 0.001 <= length <= 0.5:
+        raise ValueError(text)
+    return length
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until Ctrl-C; return 0."""
+    from endoscope_console.serving import serve
+
+    return serve(args)

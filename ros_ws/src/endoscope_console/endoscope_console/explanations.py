@@ -1,0 +1,260 @@
+"""Explanations of recordings on this machine, each in a process of its own that gives way."""
+
+import asyncio
+import json
+import os
+import secrets
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from endoscope_bags.errors import BagError
+from endoscope_bags.metadata import bag_files
+from endoscope_console.access import REPORTS
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.physics import PlantDescription
+from endoscope_core.physics.plant_file import save_plant
+
+REPORT_FILE = 'report.html'
+_STEPS = 7
+"""That `endoscope explain` names on the way, for two joints."""
+_REMARKS = ('note:', 'audit:')
+_NICE = 10
+_ENDED_S = 5.0
+_METADATA = 'metadata.yaml'
+
+
+class ExplanationRefusedError(EndoscopeError):
+    """What cannot be explained, played or ended; the message says why."""
+
+
+@dataclass
+class Explanation:
+    """One recording being explained, or explained.
+
+    Attributes
+    ----------
+    id
+        By which a page speaks of it.
+    bag
+        Name of the recording.
+    folder
+        Where report and improved plant are.
+    secret
+        Part of the report's address that nobody can guess.
+    running
+        Whether it is under way.
+    step
+        What is being done.
+    progress
+        Share that is done.
+    sentence
+        What was found; empty before.
+    error
+        Why nothing was; empty where something was.
+    experiment
+        Whether there is a motion that would tell more.
+    """
+
+    id: str
+    bag: str
+    folder: Path
+    secret: str
+    running: bool = True
+    step: str = 'reading'
+    progress: float = 0.0
+    sentence: str = ''
+    error: str = ''
+    experiment: bool = False
+
+    @property
+    def report(self) -> str | None:
+        """Path of the report's address; None where there is none."""
+        if self.running or not (self.folder / REPORT_FILE).is_file():
+            return None
+        return f'{REPORTS}{self.secret}/{REPORT_FILE}'
+
+    def as_mapping(self) -> dict[str, Any]:
+        """What a page is told of it."""
+        return {
+            'id': self.id,
+            'bag': self.bag,
+            'running': self.running,
+            'step': self.step,
+            'progress': self.progress,
+            'sentence': self.sentence,
+            'report': self.report,
+            'error': self.error or None,
+            'experiment': self.experiment,
+        }
+
+
+class Explanations:
+    """Recordings of one folder, and what explains them.
+
+    Parameters
+    ----------
+    folder
+        Where recordings and plants are, and where explanations go.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._all: dict[str, Explanation] = {}
+        self._process: asyncio.subprocess.Process | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    def as_list(self) -> list[dict[str, Any]]:
+        """What a page is told of all, newest first."""
+        return [one.as_mapping() for one in reversed(self._all.values())]
+
+    def listing(self) -> dict[str, Any]:
+        """Recordings with duration in s and size in bytes, newest first, and plants."""
+        bags = [
+            {'name': name, 'duration': _duration(path), 'size': _size(path)}
+            for name, path in sorted(self._bags().items(), reverse=True)
+        ]
+        return {'bags': bags, 'plants': sorted(self._plants())}
+
+    def _bags(self) -> dict[str, Path]:
+        found = {}
+        for path in self._folder.glob('*'):
+            is_bag = (path / _METADATA).is_file() if path.is_dir() else path.suffix == '.mcap'
+            if is_bag and not path.name.startswith('.'):
+                found[path.name] = path
+        return found
+
+    def _plants(self) -> dict[str, Path]:
+        found = {path.name: path for path in self._folder.glob('*.yaml')}
+        for one in self._all.values():
+            improved = one.folder / 'plant.yaml'
+            if not one.running and improved.is_file():
+                found[f'{one.folder.name}/plant.yaml'] = improved
+        return found
+
+    def file_of(self, secret: str) -> Path | None:
+        """The report whose address has this part; None for no report."""
+        for one in self._all.values():
+            if secrets.compare_digest(one.secret, secret) and one.report is not None:
+                return one.folder / REPORT_FILE
+        return None
+
+    async def begin(
+        self, bag: str, plant: str | None, baseline: str | None, validate: str | None
+    ) -> Mapping[str, Any]:
+        """Begin to explain a recording by a plant, the nominal one where none is named.
+
+        Raises
+        ------
+        ExplanationRefusedError
+            There is no such recording or plant, or another is being explained.
+        """
+        bags, plants = self._bags(), self._plants()
+        for kind, name, known in (
+            *(('recording', name, bags) for name in (bag, baseline, validate)),
+            ('plant', plant, plants),
+        ):
+            if name is not None and name not in known:
+                raise ExplanationRefusedError(f'there is no {kind} {name} in {self._folder}')
+        if self._task is not None and not self._task.done():
+            raise ExplanationRefusedError('another recording is being explained')
+        name = f'why-{bag.removesuffix(".mcap")}-{time.strftime("%Y%m%d-%H%M%S")}'
+        one = Explanation(
+            f'e{len(self._all) + 1}', bag, self._folder / name, secrets.token_urlsafe(16)
+        )
+        words = [str(bags[bag]), '--out', str(one.folder), '--jobs', '1']
+        for option, chosen in (('--baseline', baseline), ('--validate', validate)):
+            words += [option, str(bags[chosen])] if chosen is not None else []
+        self._all[one.id] = one
+        self._task = asyncio.get_running_loop().create_task(
+            self._explain(one, words, None if plant is None else plants[plant])
+        )
+        return {'explanation': one.id}
+
+    async def _explain(self, one: Explanation, words: list[str], plant: Path | None) -> None:
+        with tempfile.TemporaryDirectory() as scratch:
+            if plant is None:
+                plant = Path(scratch) / 'nominal.yaml'
+                save_plant(PlantDescription(), plant)
+            self._process = await asyncio.create_subprocess_exec(
+                *(sys.executable, '-m', 'endoscope_bringup.cli', 'explain', *words),
+                *('--plant', str(plant)),
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE,
+                start_new_session=True,
+            )
+            os.setpriority(os.PRIO_PROCESS, self._process.pid, _NICE)
+            said, _ = await asyncio.gather(
+                self._process.stdout.read(),  # type: ignore[union-attr]
+                self._follow(one, self._process.stderr),  # type: ignore[arg-type]
+            )
+            status = await self._process.wait()
+        one.running = False
+        if status:
+            one.error = one.error or one.step
+            return
+        one.sentence = said.decode(errors='replace').partition('\n')[0]
+        report = json.loads((one.folder / 'report.json').read_text('utf-8'))
+        one.experiment = report['next_experiment'] is not None
+        one.step, one.progress = '', 1.0
+
+    async def _follow(self, one: Explanation, lines: asyncio.StreamReader) -> None:
+        """Take the steps that it names; the last line of one that fails says why."""
+        done = 0
+        while line := await lines.readline():
+            text = line.decode(errors='replace').strip()
+            if text and not text.startswith(_REMARKS):
+                done += 1
+                one.step, one.progress = text, min(done / _STEPS, 0.95)
+
+    async def cancel(self, name: str) -> str:
+        """End one that is under way.
+
+        Raises
+        ------
+        ExplanationRefusedError
+            None of that name is.
+        """
+        one = self._all.get(name)
+        if one is None or not one.running:
+            raise ExplanationRefusedError(f'no explanation {name} is under way')
+        one.error = 'cancelled'
+        await self.close()
+        return ''
+
+    async def close(self) -> None:
+        """End what is under way, with all that it started."""
+        if self._task is None or self._task.done():
+            return
+        if self._process is not None and self._process.returncode is None:
+            os.killpg(self._process.pid, signal.SIGTERM)
+        _, late = await asyncio.wait({self._task}, timeout=_ENDED_S)
+        if late and self._process is not None:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            await self._task
+
+
+def _duration(path: Path) -> float | None:
+    """Of a recording in s; None where its metadata do not say."""
+    try:
+        text = (path / _METADATA).read_text('utf-8')
+        information = yaml.safe_load(text)['rosbag2_bagfile_information']
+        return float(information['duration']['nanoseconds']) * 1e-9
+    except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError):
+        return None
+
+
+def _size(path: Path) -> int | None:
+    """Of a recording in bytes; None where a file of it is missing."""
+    try:
+        return sum(file.stat().st_size for file in bag_files(path))
+    except (OSError, BagError):
+        return None

@@ -1,0 +1,227 @@
+"""The server's place in the graph: it hears in one thread, is served in another, asks from any."""
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import GetParameters
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.task import Future
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+
+from endoscope_console.pictures import Pictures
+from endoscope_nodes.diagnostics import OK, WARN, status
+from endoscope_nodes.graph_client import CONSOLE, PROCEDURE, GraphClient, GraphRefusedError
+from endoscope_nodes.joined_graph import joined_node
+from endoscope_nodes.names import (
+    CALIBRATION_COMMAND,
+    CONSOLE_LOG,
+    MASTER_CLUTCH,
+    MASTER_MEASURED,
+    PROCEDURE_WAITING,
+)
+from endoscope_nodes.qos import EVENT, profile
+from endoscope_nodes.topics import Qos
+
+NODE = 'console_web'
+PLAYS = ('motion', 'file')
+"""Sources of the console that move the slave by themselves."""
+
+_ASKED = ('source', 'scale')
+_POLL_S = 0.01
+_SETTINGS_NS = 1_000_000_000
+_CALIBRATING_NS = 150_000_000
+_SERVED_UNTIL_S = 5.0
+
+
+class _Client(GraphClient):
+    """Reads its topics in the thread that made it; other threads may wait for what it hears."""
+
+    def __init__(self, node: Node) -> None:
+        self._reader = threading.get_ident()
+        self.ends = threading.Event()
+        super().__init__(node, self._wait)
+
+    def _wait(self, seconds: float) -> None:
+        if self.ends.wait(min(seconds, _POLL_S)):
+            raise GraphRefusedError('the server of the page ends')
+
+    def hear(self) -> None:
+        """Take all that has come, in the one thread that may."""
+        if threading.get_ident() == self._reader:
+            super().hear()
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the console node was last known to be set to.
+
+    Attributes
+    ----------
+    source
+        Where its commands come from; empty before it was asked.
+    scale
+        Slave motion for one radian of the handle.
+    """
+
+    source: str = ''
+    scale: float = 1.0
+
+
+class GraphSide:
+    """What the server hears of a graph, and asks of it.
+
+    Parameters
+    ----------
+    client
+        Heard here.
+    pictures
+        Taken here.
+
+    Attributes
+    ----------
+    settings
+        Of the console node; asked for once a second, and by whoever has changed them.
+    heard_ns
+        When the operating state was heard, by a steady clock.
+    """
+
+    def __init__(self, client: _Client, pictures: Pictures) -> None:
+        self.client = client
+        self.pictures = pictures
+        self.settings = Settings()
+        self.heard_ns = 0
+        self._state_ns = 0
+        self._calibrating_ns = 0
+        self._asking: Future | None = None
+        self._asked_ns = 0
+        client.listen(
+            JointState,
+            CALIBRATION_COMMAND,
+            self._on_calibration,
+            qos=profile(Qos(1, reliable=False)),
+        )
+        self._log = client.node.create_publisher(DiagnosticArray, CONSOLE_LOG, EVENT)
+
+    def hear(self, now_ns: int) -> None:
+        """Take all that has come until now, a steady time in ns, and ask for the settings."""
+        client = self.client
+        client.hear()
+        if client.state_ns != self._state_ns:
+            self._state_ns = client.state_ns
+            self.heard_ns = now_ns - max(0, time.time_ns() - client.state_ns)
+        if now_ns - self._asked_ns > _SETTINGS_NS:
+            self.ask_for_settings(now_ns)
+
+    def ask_for_settings(self, now_ns: int) -> None:
+        """Ask the console node what it is set to, at a time in ns; the answer comes later."""
+        self._asked_ns = now_ns
+        asking = self.client.client(GetParameters, 'console/get_parameters')
+        if asking.service_is_ready():
+            if self._asking is not None and not self._asking.done():
+                asking.remove_pending_request(self._asking)
+            self._asking = asking.call_async(GetParameters.Request(names=list(_ASKED)))
+            self._asking.add_done_callback(self._on_settings)
+
+    def _on_settings(self, future: Future) -> None:
+        answer: Any = future.result()
+        if answer is not None and future is self._asking and len(answer.values) == len(_ASKED):
+            source, scale = map(parameter_value_to_python, answer.values)
+            self.settings = Settings(str(source), float(scale))
+
+    def _on_calibration(self, data: bytes, received_ns: int) -> None:
+        self._calibrating_ns = received_ns
+
+    @property
+    def calibrating(self) -> bool:
+        """Whether a calibration or a way home has the slave."""
+        return time.time_ns() - self._calibrating_ns < _CALIBRATING_NS or self.procedure != ''
+
+    @property
+    def procedure(self) -> str:
+        """What calibration does now, in its words; empty for nothing."""
+        said = self.client.health.get(PROCEDURE)
+        return '' if said is None or said.message == PROCEDURE_WAITING else said.message
+
+    @property
+    def plays(self) -> bool:
+        """Whether the console node moves the slave by itself."""
+        said = self.client.health.get(CONSOLE)
+        return self.settings.source in PLAYS and (said is None or said.message != 'finished')
+
+    def others_at_the_handle(self) -> list[str]:
+        """Names of other nodes that speak for the handle."""
+        node = self.client.node
+        own = node.get_name()
+        places = [node.resolve_topic_name(name) for name in (MASTER_MEASURED, MASTER_CLUTCH)]
+        found = [i.node_name for place in places for i in node.get_publishers_info_by_topic(place)]
+        return sorted({name for name in found if name != own})
+
+    def log(self, order: str, operator: str, address: str, ok: bool, why: str) -> None:
+        """Say in the graph what was asked for and what became of it."""
+        node = self.client.node
+        message = DiagnosticArray()
+        message.header.stamp = Time(nanoseconds=time.time_ns()).to_msg()
+        became = (why or 'done') if ok else f'refused: {why}'
+        message.status = [
+            status(
+                f'{node.get_fully_qualified_name()}: order',
+                OK if ok else WARN,
+                f'{order}: {became}',
+                {
+                    'operator': operator,
+                    'address': address,
+                    'order': order,
+                    'answer': 'done' if ok else 'refused',
+                    'why': why,
+                },
+            )
+        ]
+        self._log.publish(message)
+
+    def close(self) -> None:
+        """Hear and ask no more."""
+        self.client.ends.set()
+        self.client.node.destroy_publisher(self._log)
+        self.pictures.close()
+
+
+@contextmanager
+def graph_side(namespace: str, section_length: float) -> Iterator[GraphSide]:
+    """Join the graph of a namespace, to be heard by the calling thread.
+
+    Parameters
+    ----------
+    namespace
+        Of the graph.
+    section_length
+        Length of the bending section in m.
+    """
+    with ExitStack() as stack:
+        node = stack.enter_context(joined_node(NODE, namespace))
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        ended = Future(executor=executor)
+        thread = threading.Thread(
+            target=executor.spin_until_future_complete, args=(ended,), name='services', daemon=True
+        )
+        thread.start()
+
+        def stop() -> None:
+            ended.set_result(None)
+            executor.wake()
+            thread.join(_SERVED_UNTIL_S)
+            executor.shutdown()
+
+        stack.callback(stop)
+        client = stack.enter_context(_Client(node))
+        side = GraphSide(client, Pictures(node, section_length))
+        stack.callback(side.close)
+        yield side

@@ -1,0 +1,377 @@
+"""What is done for the operator: the lease, the handle's place in the graph, and every order."""
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import Callable, Coroutine, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from endoscope_console.access import OPERATOR
+from endoscope_console.alarms import Alarms
+from endoscope_console.beat import Beat, Situation
+from endoscope_console.clients import Client, Clients
+from endoscope_console.explanations import Explanations
+from endoscope_console.graph_side import PLAYS, GraphSide, Settings
+from endoscope_console.orders import (
+    Acknowledge,
+    Bags,
+    Calibrate,
+    Cancel,
+    Claim,
+    Explain,
+    Order,
+    Play,
+    Record,
+    Release,
+    Set,
+    State,
+    in_words,
+)
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.teleop.frames import InputFrame
+from endoscope_core.teleop.lease import Lease
+from endoscope_core.teleop.operator import FOLLOWED, DeadManState, Reason
+from endoscope_nodes.graph_client import GraphRefusedError
+from endoscope_nodes.graph_parameters import read_parameter, set_parameters
+from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
+
+_PATIENCE_S = 10.0
+_PLACE_S = 5.0
+_LOOK_S = 0.05
+# Until the supervisor knows that a sender of the handle has gone.
+_SETTLED_S = 0.2
+_SILENCED_S = 2.0
+_WAITING_ORDERS = 16
+_TAKEN_NS = 10_000_000_000
+_NO_LEASE = (Claim, Release, Bags, Explain, Cancel, Acknowledge)
+
+
+class OrderRefusedError(EndoscopeError):
+    """What was asked for is not done; the message says why."""
+
+
+@dataclass
+class _Holder:
+    """What the holder of the lease has begun."""
+
+    client: Client | None = None
+    moves: str = ''
+
+
+@dataclass
+class Operations:
+    """Obeys orders, one operator's at a time; lives in the thread of the sockets.
+
+    Attributes
+    ----------
+    graph, beat, clients, explanations, alarms
+        Which it is done with.
+    counts
+        Refusals are counted here.
+    lease
+        Of the one operator.
+    """
+
+    graph: GraphSide
+    beat: Beat
+    clients: Clients
+    explanations: Explanations
+    alarms: Alarms
+    counts: Counter[str]
+    lease: Lease = field(default_factory=Lease)
+
+    def __post_init__(self) -> None:
+        self._pool = ThreadPoolExecutor(_WAITING_ORDERS, thread_name_prefix='order')
+        self._place = asyncio.Lock()
+        self._speaks = False
+        self._given_back: str | None = None
+        self._holder = _Holder()
+        self._taken_ns = -_TAKEN_NS
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def lease_was_taken(self, now_ns: int) -> bool:
+        """Whether an operator took it from another just before now, a steady time in ns."""
+        return now_ns - self._taken_ns < _TAKEN_NS
+
+    @property
+    def holder(self) -> Client | None:
+        """Who operates."""
+        return self._holder.client if self.lease.holder else None
+
+    def hear(self, client: Client, frame: InputFrame, arrived_ns: int) -> None:
+        """Take a frame of a client's hand, that arrived at a steady time in ns."""
+        if client.id != self.lease.holder:
+            self.counts['frames of others'] += 1
+            return
+        self.lease.heard(client.id, arrived_ns)
+        self.beat.hear(client.id, frame, arrived_ns)
+
+    def refuse(self, client: Client, reason: Reason, now_ns: int) -> None:
+        """Take what is none, at a steady time in ns."""
+        self.counts[f'refused: {reason}'] += 1
+        self.beat.refuse(client.id, reason, now_ns)
+
+    def closed(self, client: Client) -> None:
+        """Take note that a client is gone."""
+        self.beat.refuse(client.id, Reason.CLOSED, time.monotonic_ns())
+        if client.id == self.lease.holder:
+            self.lease.closed(client.id)
+            self._lease_ended(client, 'its page was closed')
+
+    def turn(self, now_ns: int) -> None:
+        """End a silent lease, and tell the beat how things are; at a steady time in ns."""
+        silent = self.lease.turn(now_ns)
+        if silent and self._holder.client is not None:
+            why = 'its page was silent for 2 s'
+            self._holder.client.tell({'op': 'lost', 'by': '', 'why': why})
+            self._lease_ended(self._holder.client, why)
+        self._tell_beat()
+
+    def _tell_beat(self) -> None:
+        graph, pictures = self.graph, self.graph.pictures
+        self.beat.situation = Situation(
+            holder=self.lease.holder,
+            speaks=self._speaks and bool(self.lease.holder),
+            enabled=graph.client.state == 'ENABLED',
+            heard_ns=graph.heard_ns,
+            calibrating=graph.calibrating,
+            source=graph.settings.source if self._speaks else '',
+            pictures=pictures.made,
+            wanted=pictures.wanted,
+            wanted_ns=pictures.wanted_ns,
+            scale=graph.settings.scale,
+        )
+
+    async def obey(self, client: Client, order: Order) -> dict[str, Any]:
+        """Do what a client asks for; the answer, in which `ok` and `why` say what became of it."""
+        answer: dict[str, Any] = {}
+        try:
+            self._check(client, order)
+            told = await self._carry_out(client, order)
+            if isinstance(told, str):
+                why = told
+            else:
+                why, answer = '', dict(told)
+            ok = True
+        except EndoscopeError as error:
+            why, ok = str(error), False
+            self.counts['refused: orders'] += 1
+        if not isinstance(order, Bags):
+            self.graph.log(in_words(order), client.id, client.address, ok, why)
+        return {'op': 'answer', 'id': order.id, 'ok': ok, 'why': why, **answer}
+
+    def _check(self, client: Client, order: Order) -> None:
+        if client.role != OPERATOR:
+            raise OrderRefusedError('a viewer only looks on')
+        if isinstance(order, _NO_LEASE) or client.id == self.lease.holder:
+            return
+        holder = self.holder
+        who = 'nobody operates: take the controls first'
+        raise OrderRefusedError(f'{holder.label} operates' if holder else who)
+
+    async def _carry_out(self, client: Client, order: Order) -> str | Mapping[str, Any]:
+        match order:
+            case Claim():
+                return await self.claim(client, order.take)
+            case Release():
+                return self._release(client)
+            case State():
+                return await self._state(client, order.command)
+            case Calibrate():
+                return await self._moving(client, 'calibration', self._calibrate)
+            case Set():
+                return await self._set(order)
+            case Record():
+                service = RECORDER_START if order.on else RECORDER_STOP
+                return await self._ask(partial(self.graph.client.trigger, service, _PATIENCE_S))
+            case Acknowledge():
+                return self.alarms.acknowledge(order.alarm)
+            case Bags():
+                return await self._ask(self.explanations.listing)
+            case Explain():
+                return await self.explanations.begin(
+                    order.bag, order.plant, order.baseline, order.validate
+                )
+            case Cancel():
+                return await self.explanations.cancel(order.explanation)
+            case Play():
+                return await self._moving(client, 'motion', partial(self._play, order.explanation))
+
+    async def _ask[T](self, ask: Callable[[], T]) -> T:
+        """Wait for the graph in a thread of the pool: the sockets go on meanwhile."""
+        return await asyncio.get_running_loop().run_in_executor(self._pool, ask)
+
+    async def claim(self, client: Client, take: bool) -> str:
+        """Make a client the operator; what became of it.
+
+        Raises
+        ------
+        OrderRefusedError
+            Somebody else is, or somebody else speaks for the handle.
+        GraphRefusedError
+            The console node does not follow a handle.
+        """
+        if self.graph.plays and not self._speaks and not take:
+            raise OrderRefusedError(
+                f'the console plays (its source is {self.graph.settings.source}): taking the '
+                'controls would end that'
+            )
+        claim = self.lease.claim(client.id, take, time.monotonic_ns())
+        if not claim.granted:
+            raise OrderRefusedError(claim.why)
+        if claim.lost_by:
+            self._lost(claim.lost_by, client)
+        self._holder = _Holder(client)
+        self._tell_beat()
+        async with self._place:
+            try:
+                if not self._speaks:
+                    await self._take_the_place()
+            except EndoscopeError:
+                self.lease.release(client.id)
+                raise
+            if self.lease.holder != client.id:
+                self.soon(self._give_back())
+                raise OrderRefusedError('the controls were lost meanwhile')
+            self._tell_beat()
+        return ''
+
+    def _lost(self, holder: str, to: Client) -> None:
+        """Tell an operator that another took the lease."""
+        self._taken_ns = time.monotonic_ns()
+        self._pause_what_moves()
+        lost = self.clients.by_id(holder)
+        if lost is not None:
+            lost.tell({'op': 'lost', 'by': to.label, 'why': f'{to.label} took the controls'})
+            self.graph.log('lease', lost.id, lost.address, True, f'taken by {to.label}')
+
+    def _release(self, client: Client) -> str:
+        if client.id == self.lease.holder:
+            self.lease.release(client.id)
+            self._lease_ended(client, 'given back')
+        return ''
+
+    def _lease_ended(self, client: Client, why: str) -> None:
+        self._pause_what_moves()
+        self._holder = _Holder()
+        self._tell_beat()
+        self.graph.log('lease', client.id, client.address, True, f'ended: {why}')
+        self.soon(self._give_back())
+
+    def _pause_what_moves(self) -> None:
+        """Let nothing that an operator has begun go on without him."""
+        if self._holder.moves and self.graph.client.state == 'ENABLED':
+            self.graph.client.order('pause')
+
+    def soon(self, work: Coroutine[Any, Any, None]) -> None:
+        """Let something be done beside all else, whose end is waited for at the end."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _take_the_place(self) -> None:
+        """Become the one who speaks for the handle, and have the console follow it."""
+        graph = self.graph
+        settings = await self._ask(self._read_settings)
+        own = ('console',) if settings.source in PLAYS else ()
+        others = [name for name in graph.others_at_the_handle() if name not in own]
+        if others:
+            raise OrderRefusedError(
+                f'{" and ".join(others)} speaks for the handle already; two of them would be a '
+                'fault: end it first'
+            )
+        if settings.source != FOLLOWED:
+            await self._ask(partial(self._set_console, source=FOLLOWED))
+            end = time.monotonic() + _PLACE_S
+            while graph.others_at_the_handle() and time.monotonic() < end:
+                await asyncio.sleep(_LOOK_S)
+            others = graph.others_at_the_handle()
+            if others:
+                await self._ask(partial(self._set_console, source=settings.source))
+                raise OrderRefusedError(f'{" and ".join(others)} goes on speaking for the handle')
+        self._given_back = settings.source
+        graph.settings = Settings(FOLLOWED, settings.scale)
+        self._speaks = True
+
+    def _read_settings(self) -> Settings:
+        client = self.graph.client
+        source, scale = (
+            read_parameter(client, f'console.{name}', _PATIENCE_S).value
+            for name in ('source', 'scale')
+        )
+        return Settings(source, scale)
+
+    def _set_console(self, **values: Any) -> None:
+        set_parameters(self.graph.client, 'console', values, _PATIENCE_S)
+
+    async def _give_back(self) -> None:
+        """Leave the handle to others, and the console as it was found."""
+        async with self._place:
+            if self.lease.holder or not self._speaks:
+                return
+            self._speaks = False
+            self._tell_beat()
+            end = time.monotonic() + _SILENCED_S
+            while self.beat.said.speaks and time.monotonic() < end:
+                await asyncio.sleep(_LOOK_S)
+            await asyncio.sleep(_SETTLED_S)
+            source, self._given_back = self._given_back, None
+            try:
+                if source in PLAYS and self.graph.client.state == 'ENABLED':
+                    # It would begin anew with nobody looking.
+                    await self._ask(partial(self.graph.client.ask, 'pause', _PATIENCE_S))
+                if source is not None and source != FOLLOWED:
+                    await self._ask(partial(self._set_console, source=source))
+            except GraphRefusedError as error:
+                self.graph.log(f'console.source {source}', '', '', False, str(error))
+            self.graph.ask_for_settings(time.monotonic_ns())
+
+    async def _state(self, client: Client, command: str) -> str:
+        graph = self.graph.client
+        if command == 'home':
+            return await self._moving(client, 'home', partial(graph.home, _PATIENCE_S))
+        return await self._ask(partial(graph.ask_and_see, command, _PATIENCE_S))
+
+    async def _moving(self, client: Client, what: str, move: Callable[[], str]) -> str:
+        """Have the slave moved, for as long as the client operates."""
+        holder = self._holder
+        if holder.moves:
+            raise OrderRefusedError(f'{holder.moves} is under way')
+        holder.moves = what
+        try:
+            return await self._ask(move)
+        finally:
+            holder.moves = ''
+
+    def _calibrate(self) -> str:
+        return self.graph.client.calibrate(patience_s=_PATIENCE_S).message
+
+    def _play(self, explanation: str) -> str:
+        raise OrderRefusedError('played motions are not done from the page yet')
+
+    async def _set(self, order: Set) -> str:
+        if order.scale is not None:
+            if self.beat.said.state is DeadManState.ENGAGED:
+                raise OrderRefusedError('the scale changes only while nothing is held')
+            await self._ask(partial(self._set_console, scale=order.scale))
+            self.graph.settings = Settings(self.graph.settings.source, order.scale)
+        elif order.compensator is not None:
+            values = {'mode': order.compensator}
+            await self._ask(
+                partial(set_parameters, self.graph.client, 'compensator', values, _PATIENCE_S)
+            )
+        return ''
+
+    async def close(self) -> None:
+        """End the lease and give everything back."""
+        holder = self.holder
+        if holder is not None:
+            self.lease.release(holder.id)
+            self._lease_ended(holder, 'the server of the page ends')
+        while self._tasks:
+            await asyncio.wait(set(self._tasks))
+        self.graph.client.ends.set()
+        self._pool.shutdown(wait=True, cancel_futures=True)

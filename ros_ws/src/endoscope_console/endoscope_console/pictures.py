@@ -1,0 +1,201 @@
+"""Pictures of the slave: every sample that came, as ranges and two lines, thirty times a second."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from endoscope_bags.errors import MalformedMessageError
+from endoscope_core.kinematics import centre_line
+from endoscope_core.teleop.envelope import Envelope
+from endoscope_core.teleop.frames import POINTS, encode_telemetry
+from endoscope_nodes.joint_stream import JointReader, JointSample
+from endoscope_nodes.names import (
+    JOINTS,
+    MOTOR_COMMAND,
+    MOTOR_MEASURED,
+    MOTORS,
+    SLAVE_COMMAND,
+    SLAVE_MEASURED,
+    WIRES,
+    WIRES_MEASURED,
+)
+from endoscope_nodes.qos import profile
+from endoscope_nodes.raw_subscription import RawSubscription
+from endoscope_nodes.topics import Qos
+
+RATE_HZ = 30
+_STREAMS = (
+    (SLAVE_COMMAND, JOINTS, 'wanted', 'rad'),
+    (SLAVE_MEASURED, JOINTS, 'measured', 'rad'),
+    (MOTOR_COMMAND, MOTORS, 'wanted', 'rad'),
+    (MOTOR_MEASURED, MOTORS, 'measured', 'rad'),
+    (WIRES_MEASURED, WIRES, 'tension', 'N'),
+)
+SIGNALS = tuple(
+    {'name': f'{topic}:{name}', 'label': f'{name.replace("_", " ")}, {label}', 'unit': unit}
+    for topic, names, label, unit in _STREAMS
+    for name in names
+)
+"""What the ranges of a picture are of, in their order."""
+
+# At 1 kHz the queue holds what comes while this process is not run for six pictures.
+_QUEUE = profile(Qos(200, reliable=False))
+_FRESH_NS = 150_000_000
+_TRACKED_NS = 500_000_000
+_REMEMBERED = 16
+_NOTHING = np.full((POINTS, 3), np.nan)
+
+
+class Stream:
+    """A topic of joints, whose waiting samples are taken all at once.
+
+    Parameters
+    ----------
+    node
+        By which to listen.
+    topic
+        Its name.
+    names
+        The J joints, motors or wires.
+
+    Attributes
+    ----------
+    last
+        The newest sample; None before the first.
+    heard_ns
+        When it came, by this machine's clock.
+    malformed
+        Messages that were none.
+    """
+
+    def __init__(self, node: Node, topic: str, names: tuple[str, ...]) -> None:
+        self._reader = JointReader(names)
+        self._subscription = RawSubscription(node, JointState, topic, _QUEUE)
+        self._of_effort = names == WIRES
+        self.last: JointSample | None = None
+        self.heard_ns = 0
+        self.malformed = 0
+
+    def take(self) -> list[tuple[float, ...]]:
+        """Return the values of the samples that wait: rad, for wires N; each of shape (J,)."""
+        values = []
+        for data, info in self._subscription.take():
+            try:
+                sample = self._reader.read(data)
+            except MalformedMessageError:
+                self.malformed += 1
+                continue
+            of = sample.effort if self._of_effort else sample.position
+            if of:
+                values.append(of)
+                self.last, self.heard_ns = sample, info['received_timestamp']
+        return values
+
+    def position(self, now_ns: int, lasts_ns: int) -> tuple[float, ...] | None:
+        """The newest angles in rad, shape (J,); None where they came longer ago than they last."""
+        if self.last is None or now_ns - self.heard_ns > lasts_ns:
+            return None
+        return self.last.position
+
+    def close(self) -> None:
+        """Leave the topic."""
+        self._subscription.close()
+
+
+class Pictures:
+    """Takes what waits on all streams and makes a picture of it.
+
+    Parameters
+    ----------
+    node
+        By which to listen.
+    length
+        Of the bending section in m.
+
+    Attributes
+    ----------
+    seq
+        Number of the newest picture.
+    made
+        Numbers of the last pictures and when each was made by a steady clock, shape (N, 2).
+    tensions
+        Newest tension of each wire in N, shape (4,); empty before the first.
+    wanted, wanted_ns
+        Angles in rad that the console asks of the slave, shape (J,), and when by a steady clock
+        they were found here; None where it asks for nothing.
+    tracked_age_s
+        How long ago the tracker was heard, in s; infinite before.
+    """
+
+    def __init__(self, node: Node, length: float) -> None:
+        self._length = length
+        self._streams = [Stream(node, topic, names) for topic, names, _, _ in _STREAMS]
+        self._envelope = Envelope(len(SIGNALS))
+        self.seq = 0
+        self.made: tuple[tuple[int, int], ...] = ()
+        self.tensions: tuple[float, ...] = ()
+        self.wanted: tuple[float, ...] | None = None
+        self.wanted_ns = 0
+        self.tracked_age_s = math.inf
+
+    def make(self, now_ns: int, wall_ns: int) -> bytes:
+        """Make one of all that has come since the last one.
+
+        Parameters
+        ----------
+        now_ns, wall_ns
+            Now in ns, by a steady clock and by this machine's.
+        """
+        for signal, stream in self._of_signals():
+            values = stream.take()
+            if values:
+                columns: NDArray[np.float64] = np.array(values, dtype=float).T
+                for k, column in enumerate(columns):
+                    self._envelope.take(signal + k, column)
+        command, measured, _, _, wires = self._streams
+        self.wanted = command.position(wall_ns, _FRESH_NS)
+        if self.wanted is not None:
+            self.wanted_ns = now_ns - max(0, wall_ns - command.heard_ns)
+        if wires.last is not None:
+            self.tensions = wires.last.effort
+        if measured.last is not None:
+            self.tracked_age_s = (wall_ns - measured.heard_ns) * 1e-9
+        newest = max(self._streams, key=lambda stream: stream.heard_ns)
+        stamp_s = newest.last.stamp_ns * 1e-9 if newest.last is not None else math.nan
+        age_s = max(0, wall_ns - newest.heard_ns) * 1e-9 if newest.last is not None else math.nan
+        self.seq += 1
+        # It stands here before anybody is sent it: who says that he saw it is believed.
+        self.made = (*self.made[1 - _REMEMBERED :], (self.seq, now_ns))
+        return encode_telemetry(
+            self.seq,
+            stamp_s,
+            age_s,
+            self._envelope.close(),
+            self._line(self.wanted),
+            self._line(measured.position(wall_ns, _TRACKED_NS)),
+        )
+
+    def _of_signals(self) -> Iterator[tuple[int, Stream]]:
+        signal = 0
+        for stream, (_, names, _, _) in zip(self._streams, _STREAMS, strict=True):
+            yield signal, stream
+            signal += len(names)
+
+    def _line(self, bending: tuple[float, ...] | None) -> NDArray[np.float64]:
+        if bending is None or not all(map(math.isfinite, bending)):
+            return _NOTHING
+        return centre_line(bending, self._length, POINTS)
+
+    @property
+    def malformed(self) -> int:
+        """Messages that were no joint states."""
+        return sum(stream.malformed for stream in self._streams)
+
+    def close(self) -> None:
+        """Leave all topics."""
+        for stream in self._streams:
+            stream.close()

@@ -1,0 +1,307 @@
+"""The server between the graph and its pages: files, two sockets, and thirty pictures a second."""
+
+import asyncio
+import json
+import mimetypes
+import time
+from collections import Counter
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+
+import endoscope_core.pages
+from endoscope_console.access import REPORTS, Admission, Gate, Tokens
+from endoscope_console.clients import HELLO_S, ORDERS_AT_ONCE, Client, Clients, Kind
+from endoscope_console.explanations import REPORT_FILE
+from endoscope_console.graph_side import GraphSide
+from endoscope_console.joy import JoyHand
+from endoscope_console.operations import Operations
+from endoscope_console.orders import MalformedOrderError, read_hello, read_order
+from endoscope_console.pictures import RATE_HZ, SIGNALS
+from endoscope_console.view import View
+from endoscope_core.choices import MODES
+from endoscope_core.rig import Rig
+from endoscope_core.teleop.frames import POINTS, VERSION, MalformedFrameError, decode_input
+from endoscope_core.teleop.operator import Reason
+from endoscope_nodes.names import JOINTS
+
+PAGE = Path(__file__).with_name('page')
+SHARED = Path(endoscope_core.pages.__file__).parent
+_SERVED = ('.css', '.html', '.js', '.svg')
+_PERIOD_NS = round(1e9 / RATE_HZ)
+_UNWATCHED_NS = 3 * _PERIOD_NS
+_JOY_S = 0.01
+_JOY_SOUGHT_S = 0.5
+_MALFORMED, _AGAIN, _TOO_LARGE = 1008, 1013, 1009
+
+
+@dataclass
+class Console:
+    """Everything that the sockets need; lives in the thread of the sockets.
+
+    Attributes
+    ----------
+    graph, operations, clients, view, joy
+        What is heard, done and told.
+    tokens
+        Who may do what.
+    rig
+        Whose limits a page is told.
+    section_length
+        In m.
+    counts
+        Of what was refused and dropped.
+    """
+
+    graph: GraphSide
+    operations: Operations
+    clients: Clients
+    view: View
+    joy: JoyHand
+    tokens: Tokens
+    rig: Rig
+    section_length: float
+    counts: Counter[str]
+
+    def app(self, admission: Admission) -> Gate:
+        """The application, behind the one layer that all passes."""
+        return Gate(Starlette(routes=self.routes()), admission, self.counts)
+
+    def routes(self) -> list[BaseRoute]:
+        """All that is answered: each file by its own route, the sockets and the reports."""
+        files: dict[str, Path] = {
+            **_files(PAGE, '/'),
+            **_files(SHARED, '/static/'),
+        }
+        if '/index.html' in files:
+            files['/'] = files['/index.html']
+        return [
+            *(Route(path, _file(file), methods=['GET']) for path, file in files.items()),
+            Route(f'{REPORTS}{{secret}}/{REPORT_FILE}', self._report, methods=['GET']),
+            WebSocketRoute('/telemetry', self._telemetry),
+            WebSocketRoute('/command', self._command),
+        ]
+
+    async def _report(self, request: Request) -> Response:
+        file = self.operations.explanations.file_of(request.path_params['secret'])
+        if file is None:
+            return PlainTextResponse('there is no such report\n', 404)
+        return FileResponse(file, media_type='text/html')
+
+    async def _greet(self, socket: WebSocket, kind: Kind) -> Client | None:
+        """Take the first words of a socket; its client, or None where it may not be one."""
+        if not self.clients.knock():
+            await socket.close(_AGAIN)
+            return None
+        try:
+            await socket.accept()
+            try:
+                async with asyncio.timeout(HELLO_S):
+                    message = await socket.receive()
+            except TimeoutError:
+                await self._turn_away(socket, 'hello', f'no hello for {HELLO_S:g} s')
+                return None
+        finally:
+            self.clients.answered()
+        if message['type'] == 'websocket.disconnect':
+            self._note_end(message)
+            return None
+        try:
+            hello = read_hello(message.get('text') or '')
+        except MalformedOrderError as error:
+            await self._turn_away(socket, 'hello', str(error))
+            return None
+        role = self.tokens.role(hello.token)
+        if not role:
+            await self._turn_away(socket, 'token', 'this token opens nothing here')
+            return None
+        address = socket.client.host if socket.client else ''
+        client = self.clients.admit(kind, role, address)
+        if isinstance(client, str):
+            await socket.close(_AGAIN, client)
+            return None
+        return client
+
+    async def _turn_away(self, socket: WebSocket, check: str, why: str) -> None:
+        self.counts[f'refused: {check}'] += 1
+        await socket.close(_MALFORMED, why[:120])
+
+    def _note_end(self, message: Mapping[str, Any]) -> None:
+        if message.get('code') == _TOO_LARGE:
+            self.counts['refused: frame too large'] += 1
+
+    def _welcome(self, client: Client) -> str:
+        return json.dumps(
+            {
+                'op': 'hello',
+                'version': VERSION,
+                'you': client.id,
+                'role': client.role,
+                'token_role': client.role,
+                'grips': self.operations.beat.grips,
+                'signals': SIGNALS,
+                'joints': JOINTS,
+                'limits': {
+                    'reach': self.rig.joints.reach,
+                    'tension_ceiling': self.rig.tension.ceiling,
+                },
+                'section_length': self.section_length,
+                'points': POINTS,
+                'rate': RATE_HZ,
+                'modes': MODES,
+            }
+        )
+
+    async def _telemetry(self, socket: WebSocket) -> None:
+        client = await self._greet(socket, 'telemetry')
+        if client is None:
+            return
+        await socket.send_text(self._welcome(client))
+        client.outbox.put_state(self.view.whole(time.monotonic_ns()))
+        sending = asyncio.create_task(_send(socket, client))
+        try:
+            message = await socket.receive()
+            self._note_end(message)
+            if message['type'] != 'websocket.disconnect':
+                await self._turn_away(socket, 'words on telemetry', 'nothing is heard here')
+        finally:
+            self.clients.leave(client)
+            sending.cancel()
+            await asyncio.wait({sending})
+
+    async def _command(self, socket: WebSocket) -> None:
+        client = await self._greet(socket, 'command')
+        if client is None:
+            return
+        await socket.send_text(self._welcome(client))
+        tasks: set[asyncio.Task[None]] = set()
+
+        def start(work: Callable[..., Awaitable[None]], *words: Any) -> None:
+            task = asyncio.ensure_future(work(*words))
+            tasks.add(task)
+            task.add_done_callback(tasks.discard)
+
+        client.tell = lambda message: start(_tell, socket, message)
+        try:
+            while True:
+                message = await socket.receive()
+                arrived_ns = time.monotonic_ns()
+                if message['type'] == 'websocket.disconnect':
+                    self._note_end(message)
+                    return
+                if client.rate.exceeded(arrived_ns):
+                    self.operations.refuse(client, Reason.FLOOD, arrived_ns)
+                    await socket.close(_MALFORMED, 'too many frames')
+                    return
+                try:
+                    if message.get('bytes') is not None:
+                        frame = decode_input(message['bytes'])
+                        self.operations.hear(client, frame, arrived_ns)
+                    else:
+                        order = read_order(message.get('text') or '')
+                        start(self._obey, socket, client, order)
+                except (MalformedFrameError, MalformedOrderError) as error:
+                    self.operations.refuse(client, Reason.MALFORMED, arrived_ns)
+                    await socket.close(_MALFORMED, str(error)[:120])
+                    return
+        finally:
+            client.tell = _nobody
+            self.clients.leave(client)
+            self.operations.closed(client)
+
+    async def _obey(self, socket: WebSocket, client: Client, order: Any) -> None:
+        if client.orders >= ORDERS_AT_ONCE:
+            why = f'{ORDERS_AT_ONCE} orders are not done yet'
+            answer: dict[str, Any] = {'op': 'answer', 'id': order.id, 'ok': False, 'why': why}
+        else:
+            client.orders += 1
+            try:
+                answer = await self.operations.obey(client, order)
+            finally:
+                client.orders -= 1
+        await _tell(socket, answer)
+
+    async def make_pictures(self) -> None:
+        """Hear the graph, and show it to all, until cancelled.
+
+        Raises
+        ------
+        RuntimeError
+            The thread of the handle has ended, which it never should.
+        """
+        due_ns = time.monotonic_ns()
+        while True:
+            now_ns = time.monotonic_ns()
+            if not self.operations.beat.alive:
+                raise RuntimeError('the thread that speaks for the handle has ended')
+            self.graph.hear(now_ns)
+            picture = self.graph.pictures.make(now_ns, time.time_ns())
+            self.operations.turn(now_ns)
+            state = self.view.news(now_ns)
+            watching = self.clients.of('telemetry')
+            for client in watching:
+                client.outbox.put_picture(picture)
+                if state:
+                    client.outbox.put_state(state)
+            watched = watching or self.operations.lease.holder
+            due_ns = max(due_ns + (_PERIOD_NS if watched else _UNWATCHED_NS), now_ns)
+            await asyncio.sleep((due_ns - time.monotonic_ns()) * 1e-9)
+
+    async def hear_joy(self) -> None:
+        """Take the topic of a gamepad while there is one, until cancelled."""
+        while True:
+            if self.joy.connected:
+                self.joy.turn(time.monotonic_ns(), time.time_ns())
+                await asyncio.sleep(_JOY_S)
+            else:
+                await asyncio.sleep(_JOY_SOUGHT_S)
+
+
+def _files(folder: Path, below: str) -> dict[str, Path]:
+    """Files of a folder by the path of their address."""
+    return {
+        f'{below}{path.relative_to(folder).as_posix()}': path
+        for path in sorted(folder.rglob('*'))
+        if path.is_file() and path.suffix in _SERVED
+    }
+
+
+def _file(path: Path) -> Callable[[Request], Awaitable[Response]]:
+    kind = mimetypes.guess_type(path.name)[0]
+
+    async def answer(_: Request) -> Response:
+        return Response(path.read_bytes(), media_type=kind)
+
+    return answer
+
+
+def _nobody(message: dict[str, object]) -> None:
+    """Say nothing to one that is gone."""
+
+
+async def _send(socket: WebSocket, client: Client) -> None:
+    """Send what waits for a client, one after the other, as fast as it takes it."""
+    try:
+        while socket.application_state is WebSocketState.CONNECTED:
+            what = await client.outbox.get()
+            if isinstance(what, bytes):
+                await socket.send_bytes(what)
+            else:
+                await socket.send_text(what)
+    except WebSocketDisconnect:
+        # It is gone; the socket's reader knows, and sees to it.
+        return
+
+
+async def _tell(socket: WebSocket, message: Mapping[str, Any]) -> None:
+    if socket.application_state is WebSocketState.CONNECTED:
+        with suppress(WebSocketDisconnect):
+            await socket.send_text(json.dumps(message))

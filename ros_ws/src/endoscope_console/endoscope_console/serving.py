@@ -1,0 +1,291 @@
+"""Serves the page from the first word on the terminal to the last: graph, threads, signals."""
+
+import argparse
+import asyncio
+import gc
+import ipaddress
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+import webbrowser
+from collections import Counter
+from collections.abc import Iterable
+from contextlib import nullcontext, suppress
+from typing import Any
+
+import uvicorn
+import yaml
+
+from endoscope_console.access import Admission, Tokens
+from endoscope_console.alarms import Alarms
+from endoscope_console.beat import Beat
+from endoscope_console.clients import Clients
+from endoscope_console.connections import limited
+from endoscope_console.explanations import Explanations
+from endoscope_console.graph_side import GraphSide, graph_side
+from endoscope_console.joy import JoyHand
+from endoscope_console.operations import Operations
+from endoscope_console.orders import LARGEST_BYTES
+from endoscope_console.server import Console
+from endoscope_console.view import View
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.rig import Rig, load_rig
+from endoscope_core.teleop.joy_mapping import JoyMapping, JoyMappingError
+from endoscope_core.teleop.pad import PadHandle
+from endoscope_nodes.names import JOINTS
+from endoscope_nodes.runtime import GC_THRESHOLDS, SWITCH_INTERVAL_S
+
+_GRAPH = 'import sys; from endoscope_nodes.program import graph; sys.exit(graph())'
+_ANSWERS_S = 1.5
+_LOOK_S = 0.1
+_ENDS_S = 20.0
+_DROPPED_S = 2
+_STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class ServingError(EndoscopeError):
+    """The page cannot be served like that; the message says why."""
+
+
+class _Server(uvicorn.Server):
+    """Leaves signals to whoever serves."""
+
+    def capture_signals(self) -> Any:
+        """Capture none."""
+        return nullcontext()
+
+
+class _Graph:
+    """The graph that this command starts, where none answers."""
+
+    def __init__(self, args: argparse.Namespace) -> None:
+        self._words = ['--ros-args', '-p', 'source:=master']
+        if args.namespace.strip('/') != 'endoscope':
+            self._words += ['-r', f'__ns:=/{args.namespace.strip("/")}']
+        if args.rig is not None:
+            self._words += ['-p', f'rig_file:={args.rig.resolve()}']
+        self._words += shlex.split(args.graph)
+        self._process: subprocess.Popen | None = None
+
+    async def start_unless_one_answers(self, graph: GraphSide) -> None:
+        """Start it, if nobody is there within 1.5 s."""
+        for _ in range(round(_ANSWERS_S / _LOOK_S)):
+            if graph.client.state or graph.client.nodes():
+                return
+            await asyncio.sleep(_LOOK_S)
+        # Ctrl-C at the terminal is for the page first, which then ends the graph.
+        self._process = subprocess.Popen(
+            [sys.executable, '-c', _GRAPH, *self._words],
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    async def watch(self) -> None:
+        """Say when it has ended by itself."""
+        while self._process is None or self._process.poll() is None:
+            await asyncio.sleep(_LOOK_S)
+        print(f'console: the graph has ended with status {self._process.returncode}', flush=True)
+
+    def end(self) -> None:
+        """End it as Ctrl-C does, and wait for it."""
+        if self._process is None or self._process.poll() is not None:
+            return
+        self._process.send_signal(signal.SIGINT)
+        try:
+            self._process.wait(_ENDS_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            print('console: the graph did not end when asked to, and was killed', flush=True)
+
+
+def serve(args: argparse.Namespace) -> int:
+    """Serve the page until a signal asks to end; 0.
+
+    Raises
+    ------
+    EndoscopeError
+        What was asked for cannot be; with what to do instead.
+    """
+    rig = load_rig(args.rig)
+    mapping = JoyMapping(_joy_parameters(args.joy))
+    tokens = Tokens.of_file(args.token_file) if args.token_file else Tokens.new()
+    _check_privacy(args)
+    listening = _listen(args.host, args.port)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    started = _Graph(args)
+    with listening, graph_side(args.namespace, args.section_length) as graph:
+        try:
+            asyncio.run(_serve(args, listening, graph, started, rig, mapping, tokens))
+        finally:
+            started.end()
+    return 0
+
+
+async def _serve(
+    args: argparse.Namespace,
+    listening: socket.socket,
+    graph: GraphSide,
+    started: _Graph,
+    rig: Rig,
+    mapping: JoyMapping,
+    tokens: Tokens,
+) -> None:
+    counts: Counter[str] = Counter()
+    clients = Clients(counts)
+    explanations = Explanations(args.bags)
+    limits = (rig.joints.hand_speed,) * len(JOINTS)
+    with Beat(graph.client.node, PadHandle(len(JOINTS), mapping.speeds, limits)) as beat:
+        operations = Operations(graph, beat, clients, explanations, Alarms(), counts)
+        view = View(operations, rig, counts)
+        joy = JoyHand(graph, operations, mapping)
+        console = Console(
+            graph, operations, clients, view, joy, tokens, rig, args.section_length, counts
+        )
+        address = _address(args, listening)
+        admission = Admission(frozenset((address, *args.origin)), args.allow_no_origin)
+        server = _Server(_configuration(args, console, admission, counts))
+        stop = asyncio.Event()
+        for number in _STOPPING:
+            asyncio.get_running_loop().add_signal_handler(number, stop.set)
+        gc.collect()
+        gc.freeze()
+        gc.set_threshold(*GC_THRESHOLDS)
+        answering = asyncio.create_task(server.serve(sockets=[listening]))
+        others = {
+            asyncio.create_task(console.make_pictures()),
+            asyncio.create_task(console.hear_joy()),
+            asyncio.create_task(_announce(args, address, tokens, graph, started)),
+            asyncio.create_task(_asked(stop)),
+        }
+        try:
+            await _until_one_ends({answering, *others})
+        finally:
+            await operations.close()
+            await explanations.close()
+            server.should_exit = True
+            await asyncio.wait({answering})
+            for task in others:
+                task.cancel()
+            await asyncio.wait(others)
+            joy.close()
+
+
+async def _asked(stop: asyncio.Event) -> None:
+    await stop.wait()
+
+
+async def _until_one_ends(tasks: Iterable[asyncio.Task[None]]) -> None:
+    """Wait for the first of them; raise what it raised."""
+    done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    for task in done:
+        task.result()
+
+
+async def _announce(
+    args: argparse.Namespace, address: str, tokens: Tokens, graph: GraphSide, started: _Graph
+) -> None:
+    """Print the addresses, have a graph, and say when it answers."""
+    page = f'{address}/#token={tokens.operator}'
+    print(f'operate at    {page}')
+    print(f'look on at    {address}/#token={tokens.viewer}', flush=True)
+    if args.open:
+        await asyncio.to_thread(webbrowser.open, page)
+    if not args.no_graph:
+        await started.start_unless_one_answers(graph)
+    watching = asyncio.ensure_future(started.watch())
+    try:
+        while not graph.client.state:
+            await asyncio.sleep(_LOOK_S)
+        print(f'ready         slave {graph.client.state}; Ctrl-C ends', flush=True)
+        await asyncio.Event().wait()
+    finally:
+        watching.cancel()
+
+
+def _configuration(
+    args: argparse.Namespace, console: Console, admission: Admission, counts: Counter[str]
+) -> uvicorn.Config:
+    requests, sockets = limited(counts)
+    return uvicorn.Config(
+        console.app(admission),
+        http=requests,
+        ws=sockets,
+        lifespan='off',
+        log_config=None,
+        log_level='error',
+        access_log=False,
+        proxy_headers=False,
+        server_header=False,
+        date_header=False,
+        ws_max_size=LARGEST_BYTES,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=_DROPPED_S,
+        ssl_certfile=args.certificate,
+        ssl_keyfile=args.key,
+    )
+
+
+def _check_privacy(args: argparse.Namespace) -> None:
+    """Refuse to send tokens in the clear to other machines."""
+    if (args.certificate is None) != (args.key is None):
+        raise ServingError('--certificate and --key belong together')
+    for file in (args.certificate, args.key):
+        if file is not None and not file.is_file():
+            raise ServingError(f'{file}: no such file')
+    try:
+        address = ipaddress.ip_address(args.host)
+    except ValueError:
+        address = None
+    if address is not None and address.is_unspecified:
+        raise ServingError(
+            f'--host {args.host}: give the one address of this machine that browsers call'
+        )
+    here = args.host == 'localhost' or (address is not None and address.is_loopback)
+    if not here and args.certificate is None:
+        raise ServingError(
+            f'--host {args.host}: other machines would send the token for all to read; give '
+            '--certificate and --key'
+        )
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """Listen at one address.
+
+    Raises
+    ------
+    ServingError
+        Somebody else does, or this machine has no such address.
+    """
+    family = socket.AF_INET6 if ':' in host else socket.AF_INET
+    listening = socket.socket(family, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((host, port))
+        listening.listen(128)
+    except OSError as error:
+        listening.close()
+        raise ServingError(
+            f'cannot listen at {host}:{port}: {error.strerror}; give another --host or --port'
+        ) from error
+    return listening
+
+
+def _address(args: argparse.Namespace, listening: socket.socket) -> str:
+    scheme, usual = ('https', 443) if args.certificate else ('http', 80)
+    host = f'[{args.host}]' if ':' in args.host else args.host
+    port = listening.getsockname()[1]
+    return f'{scheme}://{host}' + (f':{port}' if port != usual else '')
+
+
+def _joy_parameters(given: Iterable[str]) -> dict[str, Any]:
+    parameters = {}
+    for text in given:
+        name, found, value = text.partition('=')
+        if not found:
+            raise JoyMappingError(f'--joy {text}: give NAME=VALUE')
+        with suppress(yaml.YAMLError):
+            parameters[name] = yaml.safe_load(value)
+    return parameters

@@ -1,0 +1,268 @@
+"""What all pages are told of the graph, the lease and the dead-man, as one object of JSON."""
+
+import math
+import time
+from collections import Counter
+from typing import Any
+
+import msgspec
+
+from endoscope_console.alarms import Alarm, Level
+from endoscope_console.graph_side import GraphSide
+from endoscope_console.operations import Operations
+from endoscope_core.rig import Rig
+from endoscope_core.teleop.operator import DeadManState, Reason
+from endoscope_nodes.graph_client import CONSOLE, PROCEDURE, GraphClient, Health
+from endoscope_nodes.names import WIRES
+
+SUPERVISED_S = 3.5
+"""The operating state counts as unknown after so long a silence."""
+
+_LEVELS = ('ok', 'warning', 'error', 'stale')
+_RECORDER = 'recorder: recording'
+_TENSE = 0.9
+_LOST_S = 0.5
+_REPEATED_NS = 1_000_000_000
+_NOT_RECORDING = 'not recording'
+_encode = msgspec.json.Encoder().encode
+
+
+class View:
+    """Puts the state together, and says when there is news.
+
+    Parameters
+    ----------
+    operations
+        What is told of.
+    rig
+        Whose limits hold.
+    counts
+        Of what was refused and dropped.
+    """
+
+    def __init__(self, operations: Operations, rig: Rig, counts: Counter[str]) -> None:
+        self._operations = operations
+        self._rig = rig
+        self._counts = counts
+        self._told: dict[str, Any] = {}
+        self._told_ns = 0
+
+    def news(self, now_ns: int) -> str:
+        """The state as JSON where it has changed, and once a second; else empty.
+
+        Parameters
+        ----------
+        now_ns
+            Now, by a steady clock.
+        """
+        now = self._steady(now_ns)
+        if now == self._told and now_ns - self._told_ns < _REPEATED_NS:
+            return ''
+        self._told, self._told_ns = now, now_ns
+        return self.whole(now_ns)
+
+    def whole(self, now_ns: int) -> str:
+        """The whole state as JSON, at a steady time in ns."""
+        steady = self._told or self._steady(now_ns)
+        recorder = self._client.health.get(_RECORDER)
+        return _encode(
+            {
+                **steady,
+                'stamp': time.time(),
+                'state_age': self._state_age_s(now_ns),
+                'recorder': {
+                    **steady['recorder'],
+                    'messages': None if recorder is None else _number(recorder, 'messages'),
+                },
+                'nodes': self._nodes(),
+                'counters': dict(self._counts)
+                | {
+                    'pictures': self._graph.pictures.seq,
+                    'pictures dropped': self._counts['pictures dropped']
+                    + self._operations.clients.dropped,
+                    'malformed messages': self._graph.pictures.malformed,
+                },
+            }
+        ).decode()
+
+    @property
+    def _graph(self) -> GraphSide:
+        return self._operations.graph
+
+    @property
+    def _client(self) -> GraphClient:
+        return self._operations.graph.client
+
+    def _state_age_s(self, now_ns: int) -> float | None:
+        heard_ns = self._graph.heard_ns
+        return (now_ns - heard_ns) * 1e-9 if heard_ns else None
+
+    def _steady(self, now_ns: int) -> dict[str, Any]:
+        """All that is news when it changes."""
+        operations, client = self._operations, self._client
+        said = operations.beat.said
+        engaged = said.state is DeadManState.ENGAGED
+        alarms = operations.alarms.update({a.id: a for a in self._alarms(now_ns)})
+        settings = self._graph.settings
+        return {
+            'op': 'state',
+            'operating_state': client.state,
+            'session': client.session,
+            'why': client.why,
+            'causes': self._causes(),
+            'lease': {
+                'holder': operations.lease.holder,
+                'since': operations.lease.since_ns * 1e-9,
+                'operators': [
+                    {'name': c.id, 'label': c.label, 'role': c.role}
+                    for c in operations.clients.of('command')
+                ],
+            },
+            'dead_man': {
+                'state': said.state,
+                'reason': said.reason or '',
+                'missing': said.missing or '',
+                'following': engaged and self._graph.pictures.wanted is not None,
+                'counts': said.counts,
+            },
+            'calibration': {
+                'running': bool(self._graph.procedure),
+                'step': self._graph.procedure,
+                'progress': self._progress(),
+                'result': _result(client.calibration),
+            },
+            'compensator': _compensator(client.compensator),
+            'recorder': _recorder(client.health.get(_RECORDER)),
+            'console': {'source': settings.source, 'scale': settings.scale},
+            'playing': self._playing(),
+            'alarms': [_alarm(a) for a in alarms],
+            'explanations': operations.explanations.as_list(),
+        }
+
+    def _causes(self) -> list[str]:
+        said = self._client.health.get('supervisor: operating state')
+        text = '' if said is None else said.values.get('present causes', '')
+        return [cause for cause in text.split('; ') if cause]
+
+    def _progress(self) -> float:
+        said = self._client.health.get(PROCEDURE)
+        return 0.0 if said is None else _number(said, 'progress') or 0.0
+
+    def _playing(self) -> dict[str, Any] | None:
+        if not self._graph.plays:
+            return None
+        said = self._client.health.get(CONSOLE)
+        done, length = (
+            None if said is None else _number(said, f'{key} [s]') for key in ('progress', 'length')
+        )
+        share = done / length if done is not None and length else 0.0
+        return {'what': self._graph.settings.source, 'progress': share}
+
+    def _nodes(self) -> list[dict[str, Any]]:
+        now_ns = time.time_ns()
+        nodes: dict[str, dict[str, Any]] = {}
+        for part, said in sorted(self._client.health.items()):
+            name, _, subcomponent = part.partition(': ')
+            told = f'{subcomponent}: {said.message}' if said.level else 'ok'
+            node = nodes.setdefault(
+                name, {'name': name, 'level': _LEVELS[0], 'message': 'ok', 'age': 0.0}
+            )
+            if said.level > _LEVELS.index(node['level']):
+                node |= {'level': _LEVELS[said.level], 'message': told}
+            node['age'] = (now_ns - self._client.heard_ns[name]) * 1e-9
+        return list(nodes.values())
+
+    def _alarms(self, now_ns: int) -> list[Alarm]:
+        """What asks for attention now."""
+        client, operations = self._client, self._operations
+        age_s = self._state_age_s(now_ns)
+        enabled = client.state == 'ENABLED'
+        silent = age_s is None or age_s > SUPERVISED_S
+        tension = max(zip(self._graph.pictures.tensions, WIRES, strict=False), default=None)
+        recorder = client.health.get(_RECORDER)
+        compensator = client.compensator
+        reason = operations.beat.said.reason
+        found = [
+            (
+                client.state == 'FAULT',
+                Alarm('fault', Level.HIGH, client.why or 'the slave is in FAULT', latched=True),
+            ),
+            (silent and enabled, Alarm('supervisor', Level.HIGH, 'the supervisor is silent')),
+            (silent and not enabled, Alarm('graph', Level.LOW, 'no supervisor is heard')),
+            (
+                self._graph.pictures.tracked_age_s > _LOST_S and not silent,
+                Alarm('tracker', Level.MEDIUM, 'the tracker is silent'),
+            ),
+            (
+                reason in (Reason.SILENT, Reason.LATE, Reason.BLIND, Reason.STALLED),
+                Alarm('dead_man', Level.MEDIUM, f'the dead-man was released: {reason}'),
+            ),
+            (
+                operations.lease_was_taken(now_ns),
+                Alarm('lease', Level.MEDIUM, 'another operator took the controls'),
+            ),
+            (
+                client.calibration is None and not silent,
+                Alarm('calibration', Level.LOW, 'not calibrated'),
+            ),
+            (
+                compensator is not None and compensator.values.get('mode') == 'none',
+                Alarm('compensator', Level.LOW, 'nothing is compensated'),
+            ),
+        ]
+        if tension is not None and tension[0] > _TENSE * self._rig.tension.ceiling:
+            text = f'{tension[1]} is above {_TENSE * self._rig.tension.ceiling:.0f} N'
+            found.append((True, Alarm('tension', Level.HIGH, text)))
+        if recorder is not None and recorder.level:
+            found.append((True, Alarm('recorder', Level.MEDIUM, recorder.message)))
+        return [alarm for is_so, alarm in found if is_so]
+
+
+def _alarm(alarm: Alarm) -> dict[str, Any]:
+    return {
+        'id': alarm.id,
+        'level': alarm.level,
+        'text': alarm.text,
+        'latched': alarm.latched,
+    }
+
+
+def _number(said: Health, key: str) -> float | None:
+    try:
+        value = float(said.values[key])
+    except (KeyError, ValueError):
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _result(said: Health | None) -> dict[str, Any] | None:
+    """The last calibration, for a person: in degrees."""
+    if said is None:
+        return None
+    size, low, high = (
+        None if (value := _number(said, f'regressed_size{end}')) is None else math.degrees(value)
+        for end in ('', '_low', '_high')
+    )
+    return {
+        'class_deg': _number(said, 'class_deg'),
+        'probability': _number(said, 'probability'),
+        'size_deg': _number(said, 'backlash_size_deg') if size is None else size,
+        'low_deg': low,
+        'high_deg': high,
+        'level': _LEVELS[said.level],
+        'message': said.message,
+    }
+
+
+def _compensator(said: Health | None) -> dict[str, Any]:
+    values = {} if said is None else said.values
+    mode = values.get('mode', '')
+    return {'mode': mode, 'wanted': values.get('wanted_mode', mode)}
+
+
+def _recorder(said: Health | None) -> dict[str, Any]:
+    return {
+        'recording': said is not None and said.message != _NOT_RECORDING,
+        'bag': '' if said is None else said.values.get('bag', ''),
+        'message': 'silent' if said is None else said.message,
+    }
