@@ -1,0 +1,217 @@
+"""Plots of a self-contained page under the hands of a reader, in a real browser."""
+
+from collections.abc import Iterator
+from html import escape
+from typing import Literal
+
+import numpy as np
+import pytest
+from chromium import drawn
+from playwright.sync_api import Frame, Locator, Page, expect
+
+from endoscope_core.pages.zoomable import Curve, Plot, figure_html, head, scripts
+
+TIME = 1e-3 * np.arange(20_000)
+ANGLE = 60.0 * np.sin(TIME)
+LATE = 60.0 * np.sin(TIME - 0.4)
+POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+
+
+def page_of_plots() -> str:
+    """A loop and two plots over time of 20 s at 1 kHz; the second has a gap and a fault."""
+    readings = 0.1 * np.cos(50.0 * TIME)
+    readings[8000:9000] = np.nan
+    readings[12_345] = 5.0
+    plots = [
+        Plot('loop (deg)', 'command (deg)', (Curve('tip', ANGLE, LATE, time=TIME),), loop=True),
+        Plot(
+            'angle (deg)',
+            'time (s)',
+            (
+                Curve('tip', TIME[::10], LATE[::10], 'curve-1', to='command'),
+                Curve('command', TIME[::10], ANGLE[::10], 'wanted', dash=(6.0, 4.0)),
+            ),
+        ),
+        Plot('reading (N)', 'time (s)', (Curve('cell', TIME, readings, 'curve-2'),)),
+    ]
+    return (
+        f'<!doctype html><html lang="en" class="report"><head><title>plots</title>'
+        f'<link rel="icon" href="data:,">{head()}</head>'
+        f'<body>{figure_html(plots)}{scripts()}</body></html>'
+    )
+
+
+@pytest.fixture
+def page() -> Iterator[Page]:
+    with drawn(page_of_plots()) as (page, complaints):
+        yield page
+        assert complaints == []
+
+
+def across(page: Page | Frame, plot: int) -> list[float]:
+    """What a plot shows from left to right."""
+    seen = page.locator('.plot').nth(plot).get_attribute('data-across')
+    assert seen
+    return [float(end) for end in seen.split()]
+
+
+def drag(page: Page, over: Locator, begin: float, end: float) -> None:
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    assert box
+    height = box['y'] + box['height'] / 2
+    page.mouse.move(box['x'] + begin * box['width'], height)
+    page.mouse.down()
+    page.mouse.move(box['x'] + end * box['width'], height + 2, steps=4)
+    page.mouse.up()
+
+
+def inked(page: Page | Frame, plot: int, colour: str = 'actual') -> tuple[int, int]:
+    """How many pixels of a plot a colour has, and the row of its highest one."""
+    canvas = page.locator('.plot canvas').nth(plot)
+    count, top = canvas.evaluate(
+        """(canvas, name) => {
+            const {width, height} = canvas;
+            const context = new OffscreenCanvas(width, height).getContext('2d');
+            context.drawImage(canvas, 0, 0);
+            const {data} = context.getImageData(0, 0, width, height);
+            const ink = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+            const [r, g, b] = [1, 3, 5].map(k => parseInt(ink.slice(k, k + 2), 16));
+            const far = k => Math.hypot(data[k] - r, data[k + 1] - g, data[k + 2] - b);
+            let count = 0, top = height;
+            for (let k = 0; k < data.length; k += 4) {
+                if (far(k) > 40 || data[k + 3] < 90) continue;
+                count += 1;
+                top = Math.min(top, Math.floor(k / 4 / width));
+            }
+            return [count, top];
+        }""",
+        f'--{colour}',
+    )
+    return int(count), int(top)
+
+
+def test_a_drag_zooms_all_plots_over_time_and_a_double_click_shows_all(page: Page) -> None:
+    everything = page.locator('.plots').get_by_label('show all')
+    expect(everything).to_be_hidden()
+    over = page.locator('.u-over').nth(1)
+    drag(page, over, 0.25, 0.5)
+    expect(everything).to_be_visible()
+    for plot in (1, 2):
+        assert across(page, plot) == pytest.approx([5.0, 10.0], abs=0.1)
+    over.dblclick()
+    expect(everything).to_be_hidden()
+    for plot in (1, 2):
+        assert across(page, plot) == pytest.approx([0.0, 20.0], abs=0.02)
+
+
+def test_shift_and_drag_moves_what_is_zoomed(page: Page) -> None:
+    over = page.locator('.u-over').nth(1)
+    drag(page, over, 0.25, 0.5)
+    first, last = across(page, 1)
+    page.keyboard.down('Shift')
+    drag(page, over, 0.8, 0.3)
+    page.keyboard.up('Shift')
+    assert across(page, 1) == pytest.approx(
+        [first + 0.5 * (last - first), last + 0.5 * (last - first)], abs=0.1
+    )
+
+
+def test_a_loop_fades_where_it_is_outside_the_time_that_is_zoomed(page: Page) -> None:
+    whole, _ = inked(page, 0)
+    drag(page, page.locator('.u-over').nth(1), 0.0, 0.05)
+    expect(page.get_by_label('show all')).to_be_visible()
+    part, _ = inked(page, 0)
+    assert 0 < part < 0.7 * whole
+    page.get_by_label('show all').click()
+    assert inked(page, 0)[0] == whole
+
+
+def test_the_cursor_reads_all_plots_out(page: Page) -> None:
+    over = page.locator('.u-over').nth(1)
+    over.scroll_into_view_if_needed()
+    over.hover()
+    told = page.locator('.plot-read')
+    expect(told.nth(1)).to_contain_text('10.00 s')
+    expect(told.nth(1)).to_contain_text(f'{60.0 * np.sin(10.0 - 0.4):.1f}')
+    loop = told.nth(0).locator('div').text_content()
+    assert float(loop or 'nan') == pytest.approx(60.0 * np.sin(10.0 - 0.4), abs=0.6)
+    expect(page.locator('.plot-dot:visible')).to_have_count(4)
+    page.mouse.move(1, 1)
+    expect(told.nth(1)).to_be_hidden()
+
+
+def test_a_single_wrong_reading_among_thousands_is_seen(page: Page) -> None:
+    """A millisecond of twenty seconds is less than a pixel, and reaches to the top all the same."""
+    _, top = inked(page, 2, 'curve-2')
+    assert top < 30
+
+
+def test_keys_zoom_and_move_and_read_out(page: Page) -> None:
+    page.locator('.plot').nth(1).focus()
+    page.keyboard.press('+')
+    assert across(page, 1) == pytest.approx([5.0, 15.0], abs=0.02)
+    page.keyboard.press('Shift+ArrowRight')
+    assert across(page, 2) == pytest.approx([6.0, 16.0], abs=0.02)
+    page.keyboard.press('ArrowRight')
+    expect(page.locator('.plot-read').nth(1)).to_be_visible()
+    page.keyboard.press('0')
+    assert across(page, 1) == pytest.approx([0.0, 20.0], abs=0.02)
+
+
+def test_a_curve_can_be_left_out(page: Page) -> None:
+    assert inked(page, 1, 'wanted')[0] > 0
+    page.get_by_role('button', name='command').click()
+    expect(page.get_by_role('button', name='command')).to_have_attribute('aria-pressed', 'false')
+    assert inked(page, 1, 'wanted')[0] == 0
+
+
+@pytest.mark.parametrize(
+    ('scheme', 'media', 'ground'),
+    [
+        ('dark', 'screen', 'rgb(20, 22, 26)'),
+        ('light', 'screen', 'rgb(255, 255, 255)'),
+        ('dark', 'print', 'rgb(255, 255, 255)'),
+    ],
+)
+def test_the_look_follows_the_reader_and_paper_is_light(
+    page: Page,
+    scheme: Literal['dark', 'light'],
+    media: Literal['screen', 'print'],
+    ground: str,
+) -> None:
+    """What is drawn, too: its colour is that of the scheme."""
+    page.emulate_media(color_scheme='light', media='screen')
+    page.emulate_media(color_scheme=scheme, media=media)
+    assert page.evaluate('getComputedStyle(document.body).backgroundColor') == ground
+    assert inked(page, 1, 'wanted')[0] > 0
+
+
+def test_it_works_in_a_sandboxed_frame_that_allows_scripts_alone() -> None:
+    policy = f'<meta http-equiv="content-security-policy" content="{POLICY}">'
+    framed = page_of_plots().replace('<head>', f'<head>{policy}')
+    outside = (
+        '<link rel="icon" href="data:,"><iframe sandbox="allow-scripts" width="1000" height="800" '
+        f'srcdoc="{escape(framed)}"></iframe>'
+    )
+    with drawn(outside) as (page, complaints):
+        frame = page.frames[1]
+        drag(page, frame.locator('.u-over').nth(1), 0.25, 0.5)
+        assert across(frame, 2) == pytest.approx([5.0, 10.0], abs=0.1)
+        assert inked(frame, 2, 'curve-2')[0] > 0
+    assert complaints == []
+
+
+def test_it_works_under_the_policy_of_a_server() -> None:
+    with drawn(page_of_plots(), {'content-security-policy': POLICY}) as (page, complaints):
+        expect(page.locator('.plots.is-drawn')).to_have_count(1)
+        assert inked(page, 1, 'wanted')[0] > 0
+    assert complaints == []
+
+
+def test_without_javascript_it_says_so_and_has_the_numbers() -> None:
+    with drawn(page_of_plots(), java_script_enabled=False) as (page, complaints):
+        expect(page.get_by_text('Without JavaScript')).to_be_visible()
+        page.get_by_text('Numbers', exact=True).click()
+        expect(page.get_by_role('cell', name='20000')).to_be_visible()
+    assert complaints == []
