@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from chromium import LARGEST_PAGE, drawn
 
 from endoscope_bringup.demo import sentences
 from endoscope_bringup.demo.analysis import (
@@ -59,6 +60,7 @@ def calibration(tube: str) -> CalibrationOutcome:
         time,
         5.0 + np.outer(np.sin(time), [1.0, -1.0, 1.0, -1.0]),
         ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg'),
+        time,
         90.0 * np.sin(both),
         90.0 * np.sin(both - 0.4),
     )
@@ -104,6 +106,14 @@ def test_the_page_needs_no_other_file(page):
     assert not re.search(r'url\((?!["\']?(#|data:))', page)
 
 
+def test_the_page_is_drawn_without_a_complaint(page):
+    assert len(page) < LARGEST_PAGE
+    with drawn(page) as (seen, complaints):
+        assert seen.locator('.plots.is-drawn').count() == page.count('<figure class="plots">')
+        assert seen.locator('.plot canvas').count() == page.count('class="plot"')
+    assert complaints == []
+
+
 def test_headings_alone_tell_what_was_wrong_and_what_became_better(page, results):
     headings = re.findall(r'<h[12]>(.*?)</h[12]>', page)
     rows = table_rows(results)
@@ -125,13 +135,14 @@ def test_every_picture_has_a_caption_and_every_method_one_name(page, results):
     assert (
         page.count('<figure') == page.count('<figcaption>') == 1 + len(TUBES) * (2 + len(MOTIONS))
     )
-    assert page.count('<svg') == page.count('<figure')
+    assert page.count('<figure class="plots">') == len(TUBES) * (2 + len(MOTIONS))
     terminal = ' '.join(figures_table(table_rows(results)).split())
     for method in Method:
         assert f'</span>{method}</th>' in page
         assert method.split()[0] in terminal
     for wire in ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg'):
-        assert page.count(f'>{wire}<') == len(TUBES)
+        # In the legend, and in the table of the numbers.
+        assert page.count(f'>{wire}<') == 2 * len(TUBES)
     for text in ('61234', '2026-11-21 08:00 UTC', '10.5 s'):
         assert text in page
 

@@ -11,19 +11,18 @@ from matplotlib.figure import Figure
 from endoscope_benchmarks.real.explained import Number, State, Tubes
 from endoscope_benchmarks.real.rig import Told
 from endoscope_benchmarks.real.takes import between_cycles
+from endoscope_core.pages.still_pictures import INK, STYLE, svg, thinned
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.decide.conclusions import NOMINAL_UNITS
-from endoscope_explain.report.figures.style import (
-    RUNG_COLOUR,
-    RUNG_STYLE,
-    RUNG_TITLE,
-    STYLE,
-    svg,
-    thinned,
-)
-from endoscope_explain.report.numbers import digits, in_degrees
+from endoscope_explain.report.numbers import MODELS, digits, in_degrees
 
 PLANTS = ('nominal', 'refitted', 'augmented')
+LINE = {
+    'measured': ('-', INK),
+    'nominal': ('-', '#c2571a'),
+    'refitted': ('--', '#2f6fb7'),
+    'augmented': ('-.', '#1a8a66'),
+}
 UNITS = {
     **NOMINAL_UNITS,
     **{f'{e.id}.{p.name}': p.unit for e in CATALOGUE.values() for p in e.parameters},
@@ -179,11 +178,11 @@ def loops(told: Told, last: str) -> str:
             ):
                 axis.plot(
                     *thinned(command[seen], factor * values[seen]),
-                    RUNG_STYLE[name],
-                    color=RUNG_COLOUR[name],
+                    LINE[name][0],
+                    color=LINE[name][1],
                     lw=2.2 if name == 'measured' else 1.0,
                     zorder=1 if name == 'measured' else 2,
-                    label=last if name == 'augmented' else RUNG_TITLE[name],
+                    label=last if name == 'augmented' else MODELS.get(name, name),
                 )
             unit = 'deg' if channel.quantity == 'bending' else 'N'
             axis.set_title(f'{take.name}: {channel.signal.partition(":")[2]} ({unit})')

@@ -280,6 +280,7 @@ def _calibration(
         wire_time[recorded],
         wires.require('effort')[recorded],
         wires.names,
+        own.time[steady],
         np.column_stack([desired] * len(JOINTS)),
         np.degrees(own.actual[steady]),
     )

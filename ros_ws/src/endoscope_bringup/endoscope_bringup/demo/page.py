@@ -11,9 +11,10 @@ from endoscope_bringup.demo.figures import (
     loops_figure,
     tracking_figure,
 )
-from endoscope_bringup.demo.procedure import MEANING, MOTION_TITLE, MOTIONS, Method
+from endoscope_bringup.demo.procedure import MEANING, MOTIONS, Method
 from endoscope_bringup.demo.results import DemoResults
 from endoscope_bringup.demo.table import ranking, table_rows
+from endoscope_core.pages import zoomable
 
 
 def endoscope_picture() -> str:
@@ -49,18 +50,32 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
         {
             'calibration': calibration,
             'title': calibration.facts.tube.capitalize(),
-            'none': results.run(calibration.facts.tube, shown, Method.NONE),
-            'best': results.run(calibration.facts.tube, shown, best),
-            'calibration_svg': calibration_figure(calibration),
-            'loops_svg': loops_figure(results, calibration.facts.tube, shown, best),
+            'calibration_figure': calibration_figure(
+                calibration, sentences.of_calibration(calibration.facts)
+            ),
+            'loops_figure': loops_figure(
+                results,
+                calibration.facts.tube,
+                shown,
+                best,
+                sentences.of_loops(results, calibration.facts.tube, shown, best),
+            ),
             'tracking': [
-                (MOTION_TITLE[m], tracking_figure(results, calibration.facts.tube, m, order))
+                tracking_figure(
+                    results,
+                    calibration.facts.tube,
+                    m,
+                    order,
+                    sentences.of_tracking(results, calibration.facts.tube, m, order),
+                )
                 for m in MOTIONS
             ],
         }
         for calibration in results.calibrations
     ]
     return environment.get_template('report.html.j2').render(
+        head=zoomable.head(),
+        scripts=zoomable.scripts(),
         picture=endoscope_picture(),
         headline=sentences.headline(rows),
         wrong=sentences.what_is_wrong(rows),
@@ -72,7 +87,6 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
         best=best,
         meaning=MEANING,
         colour=COLOUR,
-        shown=MOTION_TITLE[shown],
         rows=rows,
         tubes=tubes,
         facts=facts,

@@ -24,6 +24,8 @@ class CalibrationOutcome:
     tension : array (N, 4)
         Load cells in N, in the order of `wires`.
     wires : tuple of str
+    tracked_at : array (M,)
+        Stamps of the tracker on the same clock.
     desired_deg, actual_deg : array (M, J)
         Commanded and tracked angle of each joint.
     """
@@ -32,6 +34,7 @@ class CalibrationOutcome:
     time: Array
     tension: Array
     wires: tuple[str, ...]
+    tracked_at: Array
     desired_deg: Array
     actual_deg: Array
 

@@ -143,6 +143,37 @@ def where_signals_were_cut(results: DemoResults, best: Method) -> list[str]:
     return sentences
 
 
+def of_loops(results: DemoResults, tube: str, motion: str, best: Method) -> str:
+    """What a tube's loops show."""
+    said = f'{tube.capitalize()}, {MOTION_TITLE[motion]}. A perfect tip stays on the dotted line.'
+    if best is Method.NONE:
+        return said
+    none, with_best = (results.run(tube, motion, m).backlash_deg for m in (Method.NONE, best))
+    return f'{said} Uncompensated its loop is {none:.0f}° wide, by {best} {with_best:.1f}°.'
+
+
+def of_tracking(results: DemoResults, tube: str, motion: str, methods: Sequence[Method]) -> str:
+    """What the runs of one motion show."""
+    runs = [results.run(tube, motion, method) for method in methods]
+    figures = '; '.join(
+        f'{run.method} RMSE {run.rmse_deg:.2f}°, largest {run.largest_deg:.1f}°' for run in runs
+    )
+    return (
+        f'{MOTION_TITLE[motion]}: dashed what each joint was asked for in that run, in colour '
+        f'where the tip was. The filled area is the error: {figures}.'
+    )
+
+
+def of_calibration(facts: CalibrationFacts) -> str:
+    """What a calibration shows."""
+    return (
+        f'{facts.tube.capitalize()}, calibration: the tensions of the four wires put the tube in '
+        f'class {facts.class_deg:.0f}° with probability '
+        f'{facts.probabilities[int(facts.class_deg)]:.2f} and gave its plant, '
+        f"{facts.duration:.1f} s after the request. The loop is the tracker's, which neither sees."
+    )
+
+
 def _whole_signal(run: TrackingRun) -> Array:
     motion = motion_by_name(run.motion)
     return np.degrees(motion.sample(run.time)[0])

@@ -12,7 +12,7 @@ from endoscope_core.atomic_output import atomic_directory
 from endoscope_core.classifier.grouped_folds import CrossValidation
 from endoscope_core.classifier.size_training import SizeValidation
 from endoscope_core.dataset import CLASSES_DEG
-from endoscope_explain.report.figures.style import GUILTY, INK, STYLE, svg
+from endoscope_core.pages.still_pictures import GUILTY, INK, STYLE, svg
 
 _BLUE = '#2f6fb7'
 _LEVELS = np.linspace(0.05, 0.99, 48)

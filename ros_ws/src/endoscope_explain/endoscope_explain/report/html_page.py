@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from endoscope_core.pages import zoomable
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.case import ExplainedCase, Ladder
 from endoscope_explain.explanation import Explanation, Verdict
@@ -16,9 +17,8 @@ from endoscope_explain.recording.signals import gear
 from endoscope_explain.report.figures.experiment import experiment_figure, unknown_figure
 from endoscope_explain.report.figures.ladder import ladder_figure
 from endoscope_explain.report.figures.loops import (
-    loops_figure,
+    passage_figure,
     shown_plants,
-    signals_figure,
     telling_passage,
 )
 from endoscope_explain.report.figures.timeline import timeline_figure
@@ -46,16 +46,17 @@ from endoscope_explain.report.sentences import (
 )
 from endoscope_explain.search.repeated_motion import motion_repeats
 
-GREEN, BLUE, AMBER, RED, GREY = '#136b4f', '#2f6fb7', '#a15c00', '#b3261e', '#52606d'
 COLOURS = {
-    Verdict.CONSISTENT: GREEN,
-    Verdict.PARAMETERS_DIFFER: BLUE,
-    Verdict.MISSING_PHYSICS: RED,
-    Verdict.SENSOR_FAULT: AMBER,
-    Verdict.RECORDING_FAULT: AMBER,
-    Verdict.UNKNOWN_PHYSICS: RED,
-    Verdict.INSUFFICIENT_DATA: GREY,
+    Verdict.CONSISTENT: 'good',
+    Verdict.PARAMETERS_DIFFER: 'curve-1',
+    Verdict.MISSING_PHYSICS: 'finding',
+    Verdict.SENSOR_FAULT: 'curve-5',
+    Verdict.RECORDING_FAULT: 'curve-5',
+    Verdict.UNKNOWN_PHYSICS: 'finding',
+    Verdict.INSUFFICIENT_DATA: 'quiet',
 }
+"""Names of look.css."""
+
 EFFECTS_TITLE = {
     Verdict.MISSING_PHYSICS: 'What was left out',
     Verdict.SENSOR_FAULT: 'What is at fault',
@@ -71,7 +72,7 @@ CHAIN = {
 }
 """From command to recording: what each stage is called, and what is read of it."""
 
-DRAWINGS = ('unknown', 'timeline', 'loops', 'signals', 'ladder', 'experiment')
+DRAWINGS = ('unknown', 'timeline', 'loops', 'ladder', 'experiment')
 
 
 def html_page(case: ExplainedCase) -> str:
@@ -92,6 +93,8 @@ def html_page(case: ExplainedCase) -> str:
     environment.filters.update(digits=digits, plain=plain)
     return environment.get_template('report.html.j2').render(
         case=case,
+        head=zoomable.head(),
+        scripts=zoomable.scripts(),
         headline=HEADLINES[case.verdict],
         colour=COLOURS[case.verdict],
         sentence=verdict_sentence(case),
@@ -140,7 +143,7 @@ def _joint_of_interest(case: ExplainedCase, recorded: RecordedView) -> str:
 def _drawings(
     case: ExplainedCase, recorded: RecordedView, joint: str, ladder: Ladder
 ) -> dict[str, Any]:
-    """The drawings that can be made, as SVG by their names, and the passage that they show."""
+    """The drawings that can be made, as HTML by their names, and the passage that they show."""
     drawn: dict[str, Any] = dict.fromkeys(DRAWINGS, '')
     # Where a sensor repeats one reading, none of its samples is judged.
     if any(v.quantity == 'bending' for v in recorded.of_joint(joint)):
@@ -151,8 +154,7 @@ def _drawings(
         drawn['timeline'] = timeline_figure(recorded, command, joint, shaded)
         if joint in moving_joints(case.recording):
             passage = drawn['passage'] = telling_passage(recorded, joint)
-            drawn['loops'] = loops_figure(recorded, command, joint, passage)
-            drawn['signals'] = signals_figure(recorded, joint, passage)
+            drawn['loops'] = passage_figure(recorded, command, joint, passage)
     if case.explanation.unknown is not None:
         drawn['unknown'] = unknown_figure(case.explanation.unknown)
     if ladder:

@@ -1,62 +1,99 @@
-"""The ladder of fits."""
+"""The ladder of fits, an SVG in the colours of the page."""
 
-import numpy as np
+import math
+from html import escape
 
 from endoscope_explain.case import Ladder
-from endoscope_explain.report.figures.style import (
-    INK,
-    RUNG_COLOUR,
-    RUNG_TITLE,
-    page_figure,
-    svg,
-)
+from endoscope_explain.report.figures.style import COLOUR, LABEL
+from endoscope_explain.report.numbers import digits
 from endoscope_explain.report.sentences import plain
 
 MARKERS = {
-    'nominal': 'o',
-    'refitted': 's',
-    'augmented': 'D',
-    'gaussian_process': '^',
-    'neural_network': 'v',
+    'nominal': 'M-4.5 0A4.5 4.5 0 1 0 4.5 0A4.5 4.5 0 1 0-4.5 0Z',
+    'refitted': 'M-4-4H4V4H-4Z',
+    'augmented': 'M0-6L6 0L0 6L-6 0Z',
+    'gaussian_process': 'M0-5.5L5.5 4.5H-5.5Z',
+    'neural_network': 'M0 5.5L5.5-4.5H-5.5Z',
 }
+"""Paths around the origin, px."""
 
+HOLLOW = ('gaussian_process', 'neural_network')
 LEAST = 0.1
 """What is less than this share of the noise is drawn here."""
 
+WIDTH, LEFT, RIGHT, ROW, TOP = 1000.0, 200.0, 20.0, 32.0, 40.0
+
 
 def ladder_figure(ladder: Ladder) -> str:
-    """Plot rmse / noise of every signal for every model, on samples not used for fitting."""
+    """Draw rmse / noise of every signal for every model, on samples not used for fitting."""
     rungs = list(ladder)
     signals = list(ladder[rungs[0]])
-    with page_figure(0.30 * len(signals) + 1.1) as figure:
-        axis = figure.subplots()
-        rows = np.arange(len(signals))[::-1]
-        for number, name in enumerate(rungs):
-            # Beside each other, so that none is hidden where two models are as good.
-            beside = rows + 0.17 * (0.5 * (len(rungs) - 1) - number)
-            known = [(r, s) for r, s in zip(beside, signals, strict=True) if s in ladder[name]]
-            axis.plot(
-                [max(ladder[name][s].ratio, LEAST) for _, s in known],
-                [r for r, _ in known],
-                MARKERS[name],
-                color=RUNG_COLOUR[name],
-                ms=6.5,
-                label=RUNG_TITLE[name],
-                mfc='none' if name in ('gaussian_process', 'neural_network') else None,
-            )
-        axis.axvline(1.0, color=INK, lw=0.8, ls=':')
-        axis.annotate(
-            'noise',
-            (1.0, 1.0),
-            xycoords=('data', 'axes fraction'),
-            fontsize=8,
-            xytext=(3, -2),
-            textcoords='offset points',
-            va='top',
+    known = [max(fit.ratio, LEAST) for fits in ladder.values() for fit in fits.values()]
+    low, high = math.log10(min(*known, 1.0) / 1.3), math.log10(max(*known, 1.0) * 1.3)
+    bottom = TOP + ROW * len(signals)
+
+    def across(ratio: float) -> float:
+        share = (math.log10(max(ratio, LEAST)) - low) / (high - low)
+        return LEFT + (WIDTH - LEFT - RIGHT) * share
+
+    drawn = [_keys(rungs)]
+    for ratio in _ticks(10.0**low, 10.0**high):
+        x = across(ratio)
+        noise = ratio == 1.0
+        line = 'stroke="var(--quiet)" stroke-dasharray="2 3"' if noise else 'stroke="var(--line)"'
+        drawn.append(
+            f'<path d="M{x:.1f} {TOP:g}V{bottom:g}" {line}/>'
+            f'<text x="{x:.1f}" y="{bottom + 18:g}" text-anchor="middle">'
+            f'{"noise" if noise else digits(ratio)}</text>'
         )
-        axis.set_xscale('log')
-        axis.set_yticks(rows, [plain(s) for s in signals])
-        axis.set_ylim(-0.6, len(signals) - 0.2)
-        axis.set_xlabel('rmse / noise on held-out samples')
-        figure.legend(loc='outside upper left', ncols=3)
-        return svg(figure)
+    for number, signal in enumerate(signals):
+        middle = TOP + ROW * (number + 0.5)
+        drawn.append(
+            f'<text x="{LEFT - 14:g}" y="{middle + 5:g}" text-anchor="end" fill="var(--ink)">'
+            f'{escape(plain(signal))}</text>'
+        )
+        for place, name in enumerate(rungs):
+            fit = ladder[name].get(signal)
+            if fit is None:
+                continue
+            # Beside each other, so that none is hidden where two models are as good.
+            y = middle + 0.17 * ROW * (place - 0.5 * (len(rungs) - 1))
+            said = f'{LABEL[name]}, {plain(signal)}: {digits(fit.ratio)} times the noise'
+            drawn.append(_marker(name, across(fit.ratio), y, said))
+    drawn.append(
+        f'<text x="{WIDTH - RIGHT:g}" y="{bottom + 36:g}" text-anchor="end">'
+        'rmse / noise on held-out samples</text>'
+    )
+    return (
+        f'<svg viewBox="0 0 {WIDTH:g} {bottom + 44:g}" role="img" font-size="14" '
+        f'fill="var(--quiet)" aria-label="The ladder of fits; its numbers are in the table">'
+        f'{"".join(drawn)}</svg>'
+    )
+
+
+def _keys(rungs: list[str]) -> str:
+    """The legend, in one line above the rows."""
+    drawn, x = [], LEFT
+    for name in rungs:
+        drawn.append(
+            f'{_marker(name, x + 6, 14, LABEL[name])}<text x="{x + 18:g}" y="19">'
+            f'{escape(LABEL[name])}</text>'
+        )
+        x += 44.0 + 8.2 * len(LABEL[name])
+    return ''.join(drawn)
+
+
+def _marker(name: str, x: float, y: float, said: str) -> str:
+    colour = f'var(--{COLOUR[name]})'
+    return (
+        f'<path d="{MARKERS[name]}" transform="translate({x:.1f} {y:.1f})" stroke="{colour}" '
+        f'stroke-width="1.5" fill="{"none" if name in HOLLOW else colour}">'
+        f'<title>{escape(said)}</title></path>'
+    )
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """One, two and five times the powers of ten in a range."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    ticks = [float(f'{k}e{power}') for power in powers for k in (1, 2, 5)]
+    return [tick for tick in ticks if low <= tick <= high]

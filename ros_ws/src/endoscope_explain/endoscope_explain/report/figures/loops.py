@@ -1,11 +1,11 @@
 """Hysteresis loops and signals in the passage that tells most."""
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from endoscope_core.pages.zoomable import COLUMNS, Curve, Plot, figure_html
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
-from endoscope_explain.report.figures.style import ABOVE, look, page_figure, svg, thinned
+from endoscope_explain.report.figures.style import TIME, look
 
 Array = NDArray[np.float64]
 
@@ -33,53 +33,59 @@ def telling_passage(recorded: RecordedView, joint: str) -> tuple[float, float]:
     return begin, begin + PASSAGE_S
 
 
-def loops_figure(
+def passage_figure(
     recorded: RecordedView, command: tuple[Array, Array], joint: str, passage: tuple[float, float]
 ) -> str:
-    """Plot angle and tensions against the command, measured and predicted.
+    """Plot angle and tensions, measured and predicted: against the command, and over time.
 
-    The command has stamps (N,) in s and angles (N,) in rad, joint-equivalent.
+    Beside them, what each plant misses. The command has stamps (N,) in s and angles (N,) in rad,
+    joint-equivalent.
     """
-    views = _shown(recorded, joint)
-    with page_figure(3.5) as figure:
-        for axis, one in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
-            inside = (one.time >= passage[0]) & (one.time <= passage[1])
-            time = one.time[inside]
-            angle = np.degrees(np.interp(time, *command))
-            for name, values, width in _curves(one, inside):
-                _draw(axis, angle, name, values, width)
-            axis.set_title(_title(one))
-            axis.set_xlabel('command (deg)')
-        figure.legend(
-            *axis.get_legend_handles_labels(), loc='outside upper right', ncols=3, fontsize=8
+    order = {'bending': 0, 'tension': 1}
+    shown = [v for v in recorded.of_joint(joint) if v.quantity in order]
+    views = sorted(shown, key=lambda v: order[v.quantity])
+    loops, signals = [], []
+    for one in views:
+        inside = (one.time >= passage[0]) & (one.time <= passage[1])
+        time = one.time[inside]
+        angle = np.degrees(np.interp(time, *command))
+        measured, *predicted = _curves(one, inside)
+        loops.append(
+            Plot(
+                _title(one),
+                'command (deg)',
+                tuple(
+                    Curve(x=angle, y=values, width=width, time=time, **look(name))
+                    for name, values, width in (measured, *predicted)
+                ),
+                columns=COLUMNS // len(views),
+                loop=True,
+                height=250,
+            )
         )
-        return svg(figure)
-
-
-def signals_figure(recorded: RecordedView, joint: str, passage: tuple[float, float]) -> str:
-    """Plot angle and tensions over time, measured and predicted, and what each plant misses."""
-    views = _shown(recorded, joint)
-    with page_figure(1.5 * len(views) + 0.4) as figure:
-        axes = figure.subplots(len(views), 2, sharex=True, squeeze=False, width_ratios=(1.6, 1.0))
-        for (axis, missed), one in zip(axes, views, strict=True):
-            inside = (one.time >= passage[0]) & (one.time <= passage[1])
-            curves = _curves(one, inside)
-            for name, values, width in curves:
-                _draw(axis, one.time[inside], name, values, width)
-                if name != 'measured':
-                    _draw(missed, one.time[inside], name, curves[0][1] - values, width)
-            axis.set_title(_title(one))
-            missed.set_title('measured - predicted')
-        axes[0, 0].legend(**ABOVE, ncols=3)
-        for axis in axes[-1]:
-            axis.set_xlabel('time (s)')
-            axis.set_xlim(passage)
-        return svg(figure)
-
-
-def _draw(axis: Axes, across: Array, name: str, values: Array, width: float) -> None:
-    behind = 1 if name == 'measured' else 2
-    axis.plot(*thinned(across, values), **look(name), lw=width, zorder=behind)
+        signals += [
+            Plot(
+                _title(one),
+                TIME,
+                tuple(
+                    Curve(x=time, y=values, width=width, **look(name))
+                    for name, values, width in (measured, *predicted)
+                ),
+                columns=7,
+                height=130,
+            ),
+            Plot(
+                'measured - predicted',
+                TIME,
+                tuple(
+                    Curve(x=time, y=measured[1] - values, width=width, **look(name))
+                    for name, values, width in predicted
+                ),
+                columns=5,
+                height=130,
+            ),
+        ]
+    return figure_html(loops + signals)
 
 
 def shown_plants(one: SignalView) -> tuple[str, ...]:
@@ -87,16 +93,10 @@ def shown_plants(one: SignalView) -> tuple[str, ...]:
     return tuple(dict.fromkeys((next(iter(one.predicted)), list(one.predicted)[-1])))
 
 
-def _shown(recorded: RecordedView, joint: str) -> list[SignalView]:
-    order = {'bending': 0, 'tension': 1}
-    views = [v for v in recorded.of_joint(joint) if v.quantity in order]
-    return sorted(views, key=lambda v: order[v.quantity])
-
-
 def _curves(one: SignalView, inside: NDArray[np.bool_]) -> list[tuple[str, Array, float]]:
     convert = np.degrees if one.quantity == 'bending' else np.asarray
-    curves = [('measured', convert(one.measured[inside]), 2.2)]
-    curves += [(name, convert(one.predicted[name][inside]), 1.0) for name in shown_plants(one)]
+    curves = [('measured', convert(one.measured[inside]), 2.4)]
+    curves += [(name, convert(one.predicted[name][inside]), 1.3) for name in shown_plants(one)]
     return curves
 
 
