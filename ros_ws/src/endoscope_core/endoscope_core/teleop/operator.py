@@ -191,9 +191,10 @@ class OperatorDeadMan:
         sender = self._senders.setdefault(client, _Sender())
         fault = sender.fault(frame, now_ns)
         self._dead_man.hear(now_ns, self._number(sender, frame), SILENCE_NS - 1)
-        if self.engaged and not self._dead_man.held:
-            self._open(Reason.SILENT)
-        ended = fault or (self._ended_by(frame) if self.engaged else None)
+        ended = fault
+        if self.engaged:
+            silent = None if self._dead_man.held else Reason.SILENT
+            ended = silent or fault or self._ended_by(frame)
         if fault is not Reason.ORDER:
             self.frame = frame
         if ended is not None:
@@ -269,7 +270,8 @@ class OperatorDeadMan:
         self._dead_man.let_go(reason)
         self._hands_off = False
         if self.state is not DeadManState.OPEN:
-            self.counts[reason] += self.engaged
+            if self.engaged:
+                self.counts[reason] += 1
             self.state, self.reason, self.missing = DeadManState.OPEN, reason, Reason.HANDS_ON
 
     def _ended_by(self, frame: InputFrame) -> Reason | None:
