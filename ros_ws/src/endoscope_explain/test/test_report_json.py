@@ -4,10 +4,12 @@ import dataclasses
 import json
 import math
 
+import numpy as np
 import pytest
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.plant_file import load_plant
+from endoscope_core.signals.command_file import read_command_file
 from endoscope_explain.audit import AuditReport, Finding, Severity
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.decide.combine import combined_effects, combined_verdict
@@ -163,7 +165,10 @@ def test_the_written_plant_holds_the_effect_and_the_motion_is_beside_it(stribeck
     report = json.loads((tmp_path / 'report.json').read_text())
     check_report(report)
     assert load_plant(tmp_path / 'plant.yaml') == stribeck_case.plant
-    assert (tmp_path / report['next_experiment']['command']['file']).is_file()
+    table = read_command_file(tmp_path / report['next_experiment']['command']['file'])
+    assert table.joints == experiment.joints
+    np.testing.assert_allclose(table.time, experiment.time)
+    np.testing.assert_allclose(table.angle, experiment.command)
 
 
 def finding(effect_id, stage):

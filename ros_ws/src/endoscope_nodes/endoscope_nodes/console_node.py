@@ -51,6 +51,9 @@ from endoscope_nodes.watches import (
 # A hand that rests on a handle moves it by less than half a degree.
 _MOTION_RAD = 0.01
 
+WAITING = 'goes on while the clutch is held'
+"""Message of the diagnostics while a motion waits for the operator's hand."""
+
 
 class ConsoleNode(EndoscopeNode):
     """Publishes ``slave/servo_jp`` at 1 kHz, and ``master/clutch`` while it plays.
@@ -59,7 +62,8 @@ class ConsoleNode(EndoscopeNode):
     approached from there, goes on where it stood still, and is held at its end; a handle is
     followed from there whenever the clutch is engaged or the handle was silent. While a
     calibration or a way home has the slave, the console rests. With source ``none`` it leaves both
-    topics to somebody else.
+    topics to somebody else. With ``hold_to_play`` it leaves him the clutch alone, and plays while
+    that is held.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -154,9 +158,10 @@ class ConsoleNode(EndoscopeNode):
         elif self._commands is not None and self._settings.source == 'none':
             self._commands.close()
             self._commands = None
-        if self._clutch_out is None and self._played is not None:
+        speaks = self._played is not None and not self._settings.hold_to_play
+        if self._clutch_out is None and speaks:
             self._clutch_out = self.create_publisher(Joy, MASTER_CLUTCH, EVENT)
-        elif self._clutch_out is not None and self._played is None:
+        elif self._clutch_out is not None and not speaks:
             self.destroy_publisher(self._clutch_out)
             self._clutch_out = None
 
@@ -233,6 +238,10 @@ class ConsoleNode(EndoscopeNode):
             self.rig.timeouts.command_ns
         )
 
+    @property
+    def _waits_for_the_clutch(self) -> bool:
+        return self._settings.hold_to_play and not self._clutch.held
+
     def _begin(self) -> bool:
         """Begin a stream, but not before the compensator knows that the last one has ended.
 
@@ -262,6 +271,10 @@ class ConsoleNode(EndoscopeNode):
     def _play(
         self, commands: JointPublisher, motion: SampledMotion, stamp_ns: int, periods: int
     ) -> None:
+        if self._waits_for_the_clutch:
+            if self._moving:
+                self._rest()
+            return
         if not self._moving:
             pose = self._pose.bending()
             if pose is None or not self._begin():
@@ -351,7 +364,9 @@ class ConsoleNode(EndoscopeNode):
         if self._played is not None:
             values['progress [s]'] = min(self._next, len(self._played)) * TICK_S
             values['length [s]'] = len(self._played) * TICK_S
-            return OK, 'finished' if self.finished else 'playing', values
+            if self.finished:
+                return OK, 'finished', values
+            return OK, WAITING if self._waits_for_the_clutch else 'playing', values
         if source == FOLLOW_THE_HANDLE and not handle.alive(self.ticker.monotonic_ns()):
             return WARN, f'{MASTER_MEASURED} is silent', values
         return OK, source, values

@@ -301,6 +301,12 @@ class ConsoleParameters:
     command_file: str = parameter(
         '', 'CSV file that is played, columns time [s], bend_x and bend_y [rad]', dynamic=True
     )
+    hold_to_play: bool = parameter(
+        False,
+        'whether a motion or file goes on only while the clutch is held, which another program '
+        'then speaks for',
+        dynamic=True,
+    )
     scale: float = parameter(
         1.0, 'slave motion for one radian of handle motion', low=0.01, high=10.0, dynamic=True
     )

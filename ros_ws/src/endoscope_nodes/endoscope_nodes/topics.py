@@ -129,7 +129,8 @@ TOPICS = (
         names.MASTER_CLUTCH,
         'sensor_msgs/msg/Joy',
         'on change and 10 Hz',
-        "`buttons[0]` = 1: follow the handle; the console's own while it plays a motion",
+        '`buttons[0]` = 1: follow the handle, or go on with a motion that waits for it '
+        "(`hold_to_play`); the console's own while it plays any other motion",
         offered=EVENT,
         asked=EVENT,
         said_by=('console',),
