@@ -1,0 +1,62 @@
+"""A participant of another DDS implementation, in a process of its own.
+
+It is made of what the page for other people's programs shows, in the folder named first. It speaks
+for the handle at 100 Hz, tells on stdout what it hears, as JSON, and obeys the lines on stdin:
+`hold`, `release`, `move RAD` (at half a radian per second), `order WORD`.
+"""
+
+import json
+import sys
+import threading
+import time
+
+sys.path.insert(0, sys.argv[1])
+from handle import LATCHED, JointState, Joy, Participant, String, say
+
+_STREAMS = ('motor/measured_js', 'wires/measured_js', 'slave/measured_js')
+_STATE = 'slave/operating_state'
+_STEP_S, _STEP_RAD = 0.01, 0.005
+_MANY = 10_000
+
+participant = Participant()
+streams = {topic: participant.reader(topic, JointState) for topic in _STREAMS}
+state = participant.reader(_STATE, String, LATCHED)
+handle = participant.writer('master/measured_js', JointState)
+clutch = participant.writer('master/clutch', Joy)
+orders = participant.writer('slave/state_command', String)
+wanted = {'held': False, 'angle': 0.0}
+
+
+def obey() -> None:
+    for line in sys.stdin:
+        word, *values = line.split()
+        if word == 'move':
+            wanted['angle'] = float(values[0])
+        elif word == 'order':
+            orders.write(String(values[0]))
+        else:
+            wanted['held'] = word == 'hold'
+    wanted.clear()
+
+
+def tell(topic: str, values: object) -> None:
+    print(json.dumps([topic, values]), flush=True)
+
+
+def sample(message: JointState) -> list:
+    stamp = message.header.stamp
+    fields = (message.position, message.velocity, message.effort)
+    return [stamp.sec * 10**9 + stamp.nanosec, list(message.name), *map(list, fields)]
+
+
+threading.Thread(target=obey, daemon=True).start()
+angle = 0.0
+while now := dict(wanted):
+    for message in state.take(_MANY):
+        tell(_STATE, message.data)
+    for topic, reader in streams.items():
+        if heard := [sample(message) for message in reader.take(_MANY)]:
+            tell(topic, heard)
+    angle += min(max(now['angle'] - angle, -_STEP_RAD), _STEP_RAD)
+    say(now['held'], angle, handle, clutch)
+    time.sleep(_STEP_S)
