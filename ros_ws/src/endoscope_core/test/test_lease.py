@@ -108,4 +108,4 @@ class OneOperator(RuleBasedStateMachine):
 
 
 TestOneOperator = OneOperator.TestCase
-TestOneOperator.settings = settings(max_examples=100, stateful_step_count=20, deadline=None)
+TestOneOperator.settings = settings(max_examples=100, stateful_step_count=20)

@@ -314,7 +314,7 @@ class AnOperator(RuleBasedStateMachine):
 def test_over_1000_sequences_it_is_what_has_happened_and_nothing_else():
     EVER.clear()
     run_state_machine_as_test(
-        AnOperator, settings=settings(max_examples=1000, stateful_step_count=30, deadline=None)
+        AnOperator, settings=settings(max_examples=1000, stateful_step_count=30)
     )
     assert EVER[ENGAGED] > 100
     assert len(EVER) > 10
