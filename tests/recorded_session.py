@@ -10,7 +10,7 @@ from private_domain import private_domain
 from probed_runtime import ProbedRuntime
 from rclpy.context import Context
 from sensor_msgs.msg import JointState, Joy
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_poses
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
@@ -73,6 +73,7 @@ WIRES = '/endoscope/wires/measured_js'
 TRACKER = '/endoscope/tracker/measured_cp'
 CLUTCH = '/endoscope/master/clutch'
 STATE = '/endoscope/slave/operating_state'
+SESSION = '/endoscope/slave/motion_session'
 DIAGNOSTICS = '/diagnostics'
 N = 400
 
@@ -82,7 +83,7 @@ def record_all_types(path: Path):
 
     The state is published before the recorder starts, as latched states are.
     """
-    sent = {topic: [] for topic in (SERVO, WIRES, TRACKER, CLUTCH, STATE)}
+    sent = {topic: [] for topic in (SERVO, WIRES, TRACKER, CLUTCH, STATE, SESSION)}
     with RecordedSession(bag=str(path), autostart=False) as session:
         state = session.probe.create_publisher(String, STATE, RESULT)
         state.publish(String(data='ENABLED'))
@@ -94,6 +95,7 @@ def record_all_types(path: Path):
         wires = session.publisher(JointState, WIRES, SENSOR_OFFERED)
         tracker = session.publisher(PoseStamped, TRACKER, SENSOR_OFFERED)
         clutch = session.publisher(Joy, CLUTCH, EVENT)
+        motion = session.publisher(Header, SESSION, EVENT)
         diagnostics = session.publisher(DiagnosticArray, DIAGNOSTICS, EVENT)
         diagnostics.publish(DiagnosticArray())
 
@@ -114,6 +116,8 @@ def record_all_types(path: Path):
             if k % 100 == 0:
                 sent[CLUTCH].append(k // 100 % 2)
                 clutch.publish(Joy(buttons=[k // 100 % 2]))
+                sent[SESSION].append(f'session-{k}')
+                motion.publish(Header(frame_id=sent[SESSION][-1]))
 
         session.probe.create_timer(0.001, publish)
         session.wait(lambda: len(sent[SERVO]) == N)

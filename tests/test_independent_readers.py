@@ -7,11 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded_session import CLUTCH, SERVO, STATE, TRACKER, WIRES, N, record_all_types
+from recorded_session import (
+    CLUTCH,
+    SERVO,
+    SESSION,
+    STATE,
+    TRACKER,
+    WIRES,
+    N,
+    record_all_types,
+)
 from rosbags.highlevel import AnyReader
 
 from endoscope_bags import open_bag
 from endoscope_bags.message_types import message_type
+from endoscope_nodes.topics import TOPICS
 
 READERS = Path(__file__).parent / 'independent_readers'
 
@@ -57,6 +67,13 @@ def foxglove(recorded, tmp_path_factory):
     return json.loads(done.stdout)
 
 
+def test_the_recording_has_every_type_that_is_recorded(recorded):
+    recorded_types = {topic.type for topic in TOPICS if topic.recorded}
+    assert {t.type for t in open_bag(recorded[1]).topics.values() if t.message_count} == (
+        recorded_types
+    )
+
+
 @pytest.mark.parametrize('bare', [False, True])
 def test_rosbags_reads_every_message(recorded, bare):
     sent, path = recorded
@@ -73,6 +90,7 @@ def test_rosbags_reads_every_message(recorded, bare):
     assert [m.effort.tolist() for _, m in messages[WIRES]] == [e for _, e in sent[WIRES]]
     assert [m.pose.position.x for _, m in messages[TRACKER]] == [p[0] for _, p in sent[TRACKER]]
     assert [m.data for _, m in messages[STATE]] == sent[STATE]
+    assert [m.frame_id for _, m in messages[SESSION]] == sent[SESSION]
     assert [log for log, _ in messages[SERVO]] == open_bag(path).times(SERVO).log_ns.tolist()
 
 
@@ -101,6 +119,7 @@ def test_foxglove_reads_every_message(recorded, foxglove):
     assert last['header']['stamp']['sec'] * 10**9 + last['header']['stamp']['nanosec'] == stamp
     assert topics[STATE]['first']['decoded'] == {'data': 'ENABLED'}
     assert topics[CLUTCH]['last']['decoded']['buttons'] == [sent[CLUTCH][-1]]
+    assert topics[SESSION]['last']['decoded']['frame_id'] == sent[SESSION][-1]
     assert topics[TRACKER]['first']['decoded']['header']['frame_id'] == 'base'
 
 
@@ -109,6 +128,7 @@ def test_foxglove_finds_index_and_checksums_right(recorded, foxglove):
     header, statistics = foxglove['index']['header'], foxglove['index']['statistics']
     assert header['profile'] == 'ros2'
     assert int(statistics['messageCount']) == bag.message_count
+    assert foxglove['index']['compressions'] == ['zstd']
     assert int(statistics['messageStartTime']) == bag.start_ns
     assert int(statistics['messageEndTime']) == bag.end_ns
     stream = foxglove['stream']

@@ -49,7 +49,8 @@ async function throughIndex(path, decompressHandlers) {
     topic.last = { logTime: message.logTime, publishTime: message.publishTime, decoded };
   }
   await file.close();
-  return { header: reader.header, statistics: reader.statistics, topics };
+  const compressions = [...new Set(reader.chunkIndexes.map((chunk) => chunk.compression))];
+  return { header: reader.header, statistics: reader.statistics, compressions, topics };
 }
 
 async function asStream(path, decompressHandlers) {
