@@ -154,14 +154,14 @@ class Beat:
         try:
             while not self._asked.is_set():
                 now_ns = time.monotonic_ns()
-                self._turn(now_ns, self.situation)
+                self._turn(now_ns)
                 period_ns = _BEAT_NS if self.situation.holder or self._sender else _IDLE_NS
                 due_ns = max(due_ns + period_ns, now_ns)
                 time.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
         finally:
             self._leave()
 
-    def _turn(self, now_ns: int, situation: Situation) -> None:
+    def _turn(self, now_ns: int) -> None:
         dead_man = self._dead_man
         while self._arrivals:
             client, what, arrived_ns = self._arrivals.popleft()
@@ -171,6 +171,8 @@ class Beat:
                 dead_man.closed(client)
             else:
                 dead_man.refuse(what, client)
+        # Read only now: a frame may tell of a picture that was not there before it was heard.
+        situation = self.situation
         dead_man.turn(now_ns, _conditions(situation, now_ns))
         self._speak(now_ns, situation)
         self._say(now_ns)
