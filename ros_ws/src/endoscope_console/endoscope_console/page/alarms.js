@@ -6,7 +6,7 @@ const ORDER = { high: 0, medium: 1, low: 2 };
 export const SIGN = { high: 'Danger', medium: 'Warning', low: 'Note' };
 
 /** Age of the picture in s: of its newest sample when it was sent, and since it came. */
-export const pictureAge = (picture, now) => (picture ? picture.age + (now - picture.arrived) : Infinity);
+export const pictureAge = (picture, now) => (Number.isFinite(picture?.age) ? picture.age + (now - picture.arrived) : Infinity);
 
 /**
  * @param server the alarms `{id, level, text, latched}` of the last state, or none

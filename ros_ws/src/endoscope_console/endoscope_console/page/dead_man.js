@@ -20,7 +20,7 @@ export class DeadMan {
   /**
    * @param hands what is pressed and pulled
    * @param areas `{pad, thumb}`: elements
-   * @param page `mine()`: whether this page has the controls; `shown()`: whether the section can be seen;
+   * @param page `mine()`: whether this page has the controls, `speaks()`: or is about to; `shown()`: whether the section can be seen;
    *   `seen()`: last picture drawn; `send(frame)`; `asked(what)`: a gamepad's button; `ended(reason)`: a grip was ended
    */
   constructor(hands, areas, page) {
@@ -49,9 +49,9 @@ export class DeadMan {
     if (was) this._page.ended(reason);
   }
 
-  /** Send a frame now, if this page has the controls. */
+  /** Send a frame now, if anybody wants to hear it. */
   send() {
-    if (!this._page.mine()) return;
+    if (!this._page.speaks()) return;
     this._sent = performance.now();
     this._page.send(this._hands.frame(this._sent / 1000, {
       visible: document.visibilityState === 'visible' && this._page.shown(),

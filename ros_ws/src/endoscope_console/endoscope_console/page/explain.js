@@ -20,8 +20,9 @@ export class Explain {
   }
 
   render() {
-    const { state, mine } = this._app;
-    toggle($('ask-go'), 'disabled', !mine);
+    const { state, mine, role } = this._app;
+    const mayAsk = role === 'operator';
+    toggle($('ask-go'), 'disabled', !mayAsk);
     const explanations = state?.explanations ?? [];
     each($('explanations'), explanations, (e) => e.id, (e) => this._card(e), (card, e) => {
       write(card.querySelector('b'), e.bag);
@@ -31,7 +32,7 @@ export class Explain {
       progress.value = e.progress ?? 0;
       toggle(card.querySelector('.open'), 'hidden', !e.report);
       toggle(card.querySelector('.cancel'), 'hidden', !e.running);
-      toggle(card.querySelector('.cancel'), 'disabled', !mine);
+      toggle(card.querySelector('.cancel'), 'disabled', !mayAsk);
       toggle(card.querySelector('.play'), 'hidden', !e.experiment);
       toggle(card.querySelector('.play'), 'disabled', !mine);
       card.querySelector('.open').dataset.report = e.report ?? '';

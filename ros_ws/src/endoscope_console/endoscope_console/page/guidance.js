@@ -10,9 +10,18 @@ const REASONS = {
   calibration: 'calibration', source: 'console follows something else', blind: 'picture too old',
   stalled: 'the server was not run in time', 'hands on': 'let go first',
 };
+const PLAYED = { file: 'the experiment', motion: 'the motion' };
 const ENDED_BY_HAND = new Set(['', 'released', 'let go']);
 
 export const inWords = (reason) => REASONS[reason] ?? (reason || '');
+
+/** Name of a client as people know it; empty for nobody. */
+export function nameOf(client, state) {
+  return state?.lease?.operators?.find(({ name }) => name === client)?.label ?? client ?? '';
+}
+
+/** What the console plays, in words; empty while it follows a hand. */
+export const played = (state) => PLAYED[state?.console?.source] ?? '';
 
 /** Whether the last grip was ended by something else than the hand. */
 export const endedForHim = (reason) => !ENDED_BY_HAND.has(reason);
@@ -37,7 +46,7 @@ export function nextStep({ connected, role, mine, state, stateAge, busy, half, h
   if (!state) return { step: 0, text: 'Waiting for the graph …' };
   if (role !== 'operator') return { step: 0, text: 'You are looking on. To operate, open the operator’s address.' };
   const { lease, calibration, playing, dead_man: deadMan } = state;
-  if (!mine && lease?.holder) return { step: 1, text: `${lease.holder} has the controls. Watch, or take over.` };
+  if (!mine && lease?.holder) return { step: 1, text: `${nameOf(lease.holder, state)} has the controls. Watch, or take over.` };
   if (!mine) return { step: 1, text: 'Take the controls. Nothing moves yet.' };
   if (!stateIsFresh(state, stateAge)) return { step: 0, text: 'The supervisor is silent. Nothing moves until it speaks.' };
   if (calibration?.running) return { step: 0, text: 'Calibrating: the instrument moves by itself. Esc pauses it.' };
@@ -51,12 +60,12 @@ export function nextStep({ connected, role, mine, state, stateAge, busy, half, h
   if (state.operating_state === 'PAUSED') return { step: 2, text: `Paused, position held. Hold Resume for 1 s${orKey}` };
   if (state.operating_state !== 'ENABLED') return { step: 2, text: `Hold Enable for 1 s${orKey} The motors then hold.` };
   if (deadMan?.state === 'ENGAGED') {
-    const verb = playing ? `Playing ${playing.what}` : 'Following';
+    const verb = playing ? `Playing ${played(state)}` : 'Following';
     return { step: 4, text: `${verb}. Let go, and it stops.` };
   }
   if (half) return { step: 4, text: 'One finger is down. Hold the left area and the pad together.' };
   if (deadMan?.state === 'READY') {
-    if (playing) return { step: 4, text: `${hold}, and ${playing.what} plays. Let go, and it stops.` };
+    if (playing) return { step: 4, text: `${hold}, and ${played(state)} plays. Let go, and it stops.` };
     return { step: 4, text: touch ? 'Hold the left area, and drag on the pad.' : 'Hold Space and press an arrow key, or drag on the pad.' };
   }
   if (held || busy) return { step: 3, text: 'Let go of everything first, then take hold anew.' };

@@ -38,6 +38,7 @@ export class History {
 
   /** Take one picture: `ranges` holds min, max and last of each signal. */
   take(stamp, ranges) {
+    if (!Number.isFinite(stamp)) return;
     const newest = this.time.at(-1);
     // Time that goes back is another run of the graph.
     if (newest !== undefined && stamp < newest - 1) this.clear();

@@ -38,7 +38,7 @@ const now = () => performance.now() / 1000;
 const app = {
   hands: new Hands(), deadMan: null, orders: new Orders(command),
   state: null, picture: null, signals: [], modes: [], ceiling: 60, you: null, role: null,
-  mine: false, connected: false, everConnected: false, endedHere: '', pictures: 0, picturesLost: 0,
+  mine: false, claiming: false, connected: false, everConnected: false, endedHere: '', pictures: 0, picturesLost: 0,
   touch: matchMedia('(pointer: coarse)').matches,
   claimedAt: 0, stateArrived: 0, tab: 'operate',
   sinceState: () => now() - app.stateArrived,
@@ -77,6 +77,7 @@ let spotted = '';
 
 app.deadMan = new DeadMan(app.hands, { pad: $('pad'), thumb: $('thumb') }, {
   mine: () => app.mine,
+  speaks: () => app.mine || app.claiming,
   shown: app.shown,
   seen: () => drawn,
   send: (frame) => command.send(encodeInput(frame)),
@@ -112,7 +113,7 @@ command.addEventListener('closed', () => {
   connection();
 });
 command.addEventListener('message', ({ detail }) => {
-  if (detail.op === 'lost') app.lost(`${detail.by || 'Another operator'} has taken the controls${detail.why ? `: ${detail.why}` : ''}.`);
+  if (detail.op === 'lost') app.lost(`The controls are lost: ${detail.why || detail.by}.`);
 });
 telemetry.addEventListener('hello', ({ detail }) => {
   app.signals = detail.signals;
@@ -147,7 +148,7 @@ telemetry.addEventListener('message', ({ detail }) => {
   see.take(detail);
   const settled = performance.now() - app.claimedAt > CLAIM_SETTLES_MS;
   if (app.mine && settled && detail.lease?.holder !== app.you) {
-    app.lost(detail.lease?.holder ? `${detail.lease.holder} has the controls.` : 'The controls were given up for you.');
+    app.lost('The controls are lost.');
   }
   // Once the server tells of a newer grip, what ended the last one here is an old story.
   if (detail.dead_man?.state === 'ENGAGED') app.endedHere = '';

@@ -3,12 +3,13 @@
 import { SIGN, standing } from './alarms.js';
 import { keysAreTaken } from './dead_man.js';
 import { $, each, make, set, toggle, write } from './elements.js';
-import { inWords, lamp, nextStep, stateIsFresh } from './guidance.js';
+import { inWords, lamp, nameOf, nextStep, played, stateIsFresh } from './guidance.js';
 import { HoldButton } from './hold_button.js';
 
 const SCALES = [0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3];
 const ALARMS_SHOWN = 4;
 const ANSWER_S = 8;
+const SLIDING_MS = 1000;
 /** A protective stop is not unlocked by the hand that is still pressing. */
 const FAULT_REST_S = 2;
 
@@ -24,7 +25,7 @@ export class Operate {
     this._app = app;
     this._faultSince = null;
     this._answered = 0;
-    this._scaleSent = null;
+    this._sliding = 0;
     this._holds = {
       KeyE: new HoldButton($('enable'), () => this._enable()),
       KeyH: new HoldButton($('home'), () => this._order({ op: 'state', command: 'home' }, 'Home')),
@@ -74,6 +75,7 @@ export class Operate {
     write($('state'), word);
     set(document.body, 'data-state', fresh ? state.operating_state : 'UNKNOWN');
     write($('state-why'), fresh ? reasonOf(state) : state ? `not heard for ${age.toFixed(0)} s` : 'waiting for the graph');
+    set($('state-why'), 'title', $('state-why').textContent);
     this._renderLamp();
     this._renderSigns();
     this._renderAlarms();
@@ -119,13 +121,13 @@ export class Operate {
   _renderSigns() {
     const { app } = this;
     const holder = app.state?.lease?.holder;
-    write($('operator'), app.mine ? 'you' : holder || 'nobody');
+    write($('operator'), app.mine ? 'you' : nameOf(holder, app.state) || 'nobody');
     const age = app.pictureAge();
     write($('age'), Number.isFinite(age) ? (age < 10 ? `${Math.round(1000 * age)} ms` : 'old') : 'none');
     set($('age'), 'data-old', String(age > 0.3));
     const recorder = app.state?.recorder;
-    write($('recorder'), recorder ? (recorder.recording ? `● ${recorder.bag || 'recording'}` : 'off') : '–');
-    set($('recorder'), 'title', recorder?.message ?? '');
+    write($('recorder'), recorder ? (recorder.recording ? `● ${recorder.bag?.split('/').at(-1) || 'recording'}` : 'off') : '–');
+    set($('recorder'), 'title', recorder?.bag ?? '');
   }
 
   _renderAlarms() {
@@ -149,7 +151,7 @@ export class Operate {
     }, (element, alarm) => {
       write(element.querySelector('.text'), alarm.text);
       const button = element.querySelector('button');
-      if (button) toggle(button, 'disabled', !app.mine);
+      if (button) toggle(button, 'disabled', app.role !== 'operator');
     });
   }
 
@@ -187,7 +189,7 @@ export class Operate {
     for (const id of ['mode-position', 'mode-speed', 'scale']) toggle($(id), 'disabled', !free);
     const scale = state?.console?.scale;
     write($('scale-value'), Number.isFinite(scale) ? String(Number(scale.toPrecision(2))) : '–');
-    if (Number.isFinite(scale) && document.activeElement !== $('scale')) $('scale').value = String(nearestScale(scale));
+    if (Number.isFinite(scale) && performance.now() > this._sliding) $('scale').value = String(nearestScale(scale));
     let device = this.app.touch ? '' : 'keys: arrows, or W A S D';
     if (deadMan?.gamepadUnknown) device = 'this gamepad is none of the standard kind: use the topic joy';
     else if (deadMan?.hasGamepad) device = `gamepad: hold RB; stick asks for ${hands.modes.gamepad}`;
@@ -237,15 +239,18 @@ export class Operate {
       if (answer.ok) app.lost('');
       return;
     }
-    const holder = app.state?.lease?.holder;
-    if (holder && !(await this._mayTake(holder))) return;
-    const answer = await this._order({ op: 'claim', take: Boolean(holder) }, 'Take the controls');
+    const from = nameOf(app.state?.lease?.holder, app.state) || played(app.state);
+    if (from && !(await this._mayTake(from))) return;
+    // Frames have to come from the start: who is silent for 2 s loses the controls, before he is told that he has them.
+    app.claiming = true;
+    const answer = await this._order({ op: 'claim', take: Boolean(from) }, 'Take the controls');
+    app.claiming = false;
     if (answer.ok) app.claimed();
   }
 
-  _mayTake(holder) {
+  _mayTake(from) {
     const dialog = $('take');
-    write($('take-from'), holder);
+    write($('take-from'), from);
     dialog.returnValue = 'no';
     dialog.showModal();
     return new Promise((resolve) => {
@@ -285,6 +290,10 @@ export class Operate {
     $('compensator').addEventListener('change', ({ target }) => {
       target.blur();
       this._set('compensator', target.value);
+    });
+    // What comes from the graph meanwhile must not pull the slider from under the hand.
+    $('scale').addEventListener('input', () => {
+      this._sliding = performance.now() + SLIDING_MS;
     });
     $('scale').addEventListener('change', ({ target }) => {
       target.blur();

@@ -2,7 +2,7 @@
 
 import { $, each, make, set, write } from './elements.js';
 
-const LEVELS = { 0: ['good', 'ok'], 1: ['warning', '! warning'], 2: ['error', '!!! error'], 3: ['stale', 'stale'] };
+const LEVELS = { ok: ['good', 'ok'], warning: ['warning', '! warning'], error: ['error', '!!! error'], stale: ['stale', 'stale'] };
 const STATES_KEPT = 200;
 const LATE_S = 3.5;
 
@@ -31,7 +31,7 @@ export class See {
       make('td', { class: 'l health' }), make('td', { class: 'l' }), make('td', { class: 'l w' }), make('td')),
     (row, node) => {
       const age = node.age + since;
-      const [kind, word] = age > LATE_S ? ['stale', 'silent'] : LEVELS[node.level] ?? LEVELS[3];
+      const [kind, word] = age > LATE_S ? ['stale', 'silent'] : LEVELS[node.level] ?? LEVELS.stale;
       set(row, 'data-health', kind);
       [word, node.name, node.message, seconds(age)].forEach((text, k) => write(row.children[k], text));
     });

@@ -31,6 +31,7 @@ test('without a connection only that is said', () => {
 test('age of a picture counts from its newest sample', () => {
   assert.ok(Math.abs(pictureAge({ age: 0.1, arrived: 5 }, 5.25) - 0.35) < 1e-9);
   assert.equal(pictureAge(null, 5), Infinity);
+  assert.equal(pictureAge({ age: NaN, arrived: 5 }, 5), Infinity);
 });
 
 const base = { connected: true, role: 'operator', mine: true, stateAge: 0.1, busy: false, half: false, held: false, touch: false };
@@ -39,7 +40,7 @@ const state = (more = {}) => ({ operating_state: 'ENABLED', lease: { holder: '' 
 test('a stranger is led to the first motion step by step', () => {
   const steps = [
     [{ mine: false }, state({ operating_state: 'DISABLED' }), 1, 'Take the controls'],
-    [{ mine: false }, state({ lease: { holder: 'c7' } }), 1, 'c7'],
+    [{ mine: false }, state({ lease: { holder: 'c7', operators: [{ name: 'c7', label: 'operator 7' }] } }), 1, 'operator 7'],
     [{}, state({ operating_state: 'DISABLED' }), 2, 'Hold Enable'],
     [{}, state({ operating_state: 'PAUSED' }), 2, 'Hold Resume'],
     [{ busy: true }, state(), 3, 'Let go'],
@@ -48,7 +49,7 @@ test('a stranger is led to the first motion step by step', () => {
     [{ touch: true }, state({ dead_man: { state: 'READY', reason: '' } }), 4, 'left area'],
     [{ half: true }, state({ dead_man: { state: 'READY', reason: '' } }), 4, 'together'],
     [{}, state({ dead_man: { state: 'ENGAGED' } }), 4, 'Following'],
-    [{}, state({ dead_man: { state: 'READY' }, playing: { what: 'next_experiment.csv' } }), 4, 'next_experiment.csv plays'],
+    [{}, state({ dead_man: { state: 'READY' }, playing: { what: 'file' }, console: { source: 'file' } }), 4, 'the experiment plays'],
   ];
   for (const [more, said, step, words] of steps) {
     const next = nextStep({ ...base, ...more, state: said });
