@@ -8,6 +8,7 @@ _IN_REAL_TIME = {
     'test_aurora_clients',
     'test_aurora_tracker',
     'test_calibration_on_a_line',
+    'test_console_page',
     'test_documentation',
     'test_dynamixel_line_faults',
     'test_faults',
