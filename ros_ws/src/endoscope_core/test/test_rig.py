@@ -36,6 +36,8 @@ def test_what_a_file_does_not_say_is_as_shipped(tmp_path):
         ('simulation: {seed: -1}', 'simulation.seed is -1: give a whole number from 0 on'),
         ('simulation: {seed: 1.5}', 'simulation.seed is 1.5: give a whole number'),
         ('simulation: {plant: 3}', 'simulation.plant is 3: give a text'),
+        ('instrument: {section_length: 20}', 'section_length is 20: give a number from 0.001 to'),
+        ('instrument: {base_frame: /base}', "base_frame is '/base': give a name of letters"),
         ('- 1', 'has to be a mapping'),
         ('motors: {speed: 1.0, speed: 2.0}', 'speed'),
     ],

@@ -5,6 +5,7 @@ from endoscope_core.kinematics.constant_curvature import (
     centre_line,
     tip_pose,
 )
+from endoscope_core.kinematics.robot_description import robot_description
 from endoscope_core.kinematics.rotation import (
     about_z,
     angle_between,
@@ -20,11 +21,15 @@ from endoscope_core.kinematics.straight_registration import (
     StraightRegistration,
     register_straight,
 )
+from endoscope_core.kinematics.vertebrae import Hinge, Transform, Vertebrae
 
 __all__ = [
+    'Hinge',
     'RegistrationError',
     'StillnessLimits',
     'StraightRegistration',
+    'Transform',
+    'Vertebrae',
     'about_z',
     'angle_between',
     'bending_from_orientation',
@@ -33,6 +38,7 @@ __all__ = [
     'mean_orientation',
     'multiply',
     'register_straight',
+    'robot_description',
     'rotate',
     'tip_pose',
     'unit_quaternion',

@@ -4,6 +4,7 @@ from endoscope_core.choices import LOAD_CELL_DEVICES, MOTOR_DEVICES, TRACKER_DEV
 from endoscope_core.rig.facts import (
     DeviceFacts,
     HandleFacts,
+    InstrumentFacts,
     JointFacts,
     MotorFacts,
     Rig,
@@ -20,6 +21,7 @@ __all__ = [
     'TRACKER_DEVICES',
     'DeviceFacts',
     'HandleFacts',
+    'InstrumentFacts',
     'JointFacts',
     'MotorFacts',
     'Rig',

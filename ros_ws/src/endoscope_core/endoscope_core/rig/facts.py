@@ -1,5 +1,6 @@
 """rig.yaml: gear, limits, time-outs and devices of a rig, said once for every node."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
@@ -44,6 +45,15 @@ def _text(value: Any) -> str:
     if not isinstance(value, str):
         raise ValueError('give a text')
     return value
+
+
+def _name() -> Any:
+    def checked(value: Any) -> str:
+        if not isinstance(value, str) or not re.fullmatch('[A-Za-z][A-Za-z0-9_]*', value):
+            raise ValueError('give a name of letters, digits and underscores')
+        return value
+
+    return field(metadata={'checked': checked})
 
 
 def _count(value: Any) -> int:
@@ -167,6 +177,22 @@ class HandleFacts:
 
 
 @dataclass(frozen=True)
+class InstrumentFacts:
+    """The instrument's end.
+
+    Attributes
+    ----------
+    section_length
+        Length of the bending section in m.
+    base_frame
+        Frame of its beginning, z along the straight instrument: that of all poses.
+    """
+
+    section_length: float = _fact(0.001, 0.5)
+    base_frame: str = _name()
+
+
+@dataclass(frozen=True)
 class DeviceFacts:
     """What stands on the table and what is simulated.
 
@@ -212,6 +238,7 @@ class Rig:
     timeouts: Timeouts
     tension: TensionFacts
     handle: HandleFacts
+    instrument: InstrumentFacts
     devices: DeviceFacts
     simulation: SimulationFacts
 
