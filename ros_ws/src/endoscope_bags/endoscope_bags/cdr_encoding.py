@@ -16,6 +16,8 @@ from endoscope_bags.message_types import DIAGNOSTIC_ARRAY, STRING, typestore
 
 _LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 _NANOSECONDS = 1_000_000_000
+_STAMP = struct.Struct('<iI')
+_POSE = struct.Struct('<7d')
 
 
 def encode_joint_states(
@@ -131,9 +133,51 @@ def encode_poses(
     return _filled(prefix, stamps, [(start, np.hstack(parts))])
 
 
+class TransformEncoder:
+    """Writes `tf2_msgs/msg/TFMessage` about the same frames again and again.
+
+    Parameters
+    ----------
+    frames
+        Parent and child of each of the N transforms.
+    """
+
+    def __init__(self, frames: Sequence[tuple[str, str]]) -> None:
+        self._message = bytearray(_LITTLE_ENDIAN)
+        self._places: list[tuple[int, int]] = []
+        _append_count(self._message, len(frames))
+        for parent, child in frames:
+            stamp = len(self._message)
+            self._message += bytes(8)
+            _append_string(self._message, parent)
+            _append_string(self._message, child)
+            _align(self._message, 8)
+            self._places.append((stamp, len(self._message)))
+            self._message += bytes(56)
+
+    def encode(
+        self, stamp_ns: int, poses: Sequence[tuple[Sequence[float], Sequence[float]]]
+    ) -> bytes:
+        """Write one message.
+
+        Parameters
+        ----------
+        stamp_ns
+            Of all transforms, ns since the epoch.
+        poses
+            Translation in m, shape (3,), and unit quaternion x, y, z, w, shape (4,), of each child
+            in its parent's frame; N of them.
+        """
+        stamp = divmod(stamp_ns, _NANOSECONDS)
+        for (at, values), (translation, rotation) in zip(self._places, poses, strict=True):
+            _STAMP.pack_into(self._message, at, *stamp)
+            _POSE.pack_into(self._message, values, *translation, *rotation)
+        return bytes(self._message)
+
+
 def encode_clock(time_ns: int) -> bytes:
     """Encode one `rosgraph_msgs/msg/Clock`, `time_ns` in ns."""
-    return _LITTLE_ENDIAN + struct.pack('<iI', *divmod(time_ns, _NANOSECONDS))
+    return _LITTLE_ENDIAN + _STAMP.pack(*divmod(time_ns, _NANOSECONDS))
 
 
 def encode_string(text: str) -> bytes:

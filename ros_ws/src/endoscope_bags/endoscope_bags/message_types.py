@@ -1,8 +1,9 @@
 """Message definitions as `ros2msg` text and RIHS01 hashes, without ROS.
 
-The definitions of common_interfaces come with `rosbags`; any other type is read from the ``.msg``
-files of the installed ROS packages (``share/PACKAGE/msg/TYPE.msg``). Their generated ``TYPE.json``
-has the last word on the hash, because `rosbags` hashes the rare fields of type char otherwise.
+The definitions of common_interfaces and of tf2_msgs come with `rosbags`; any other type is read
+from the ``.msg`` files of the installed ROS packages (``share/PACKAGE/msg/TYPE.msg``). Their
+generated ``TYPE.json`` has the last word on the hash, because `rosbags` hashes the rare fields of
+type char otherwise.
 """
 
 import functools
@@ -25,6 +26,7 @@ JOY = 'sensor_msgs/msg/Joy'
 STRING = 'std_msgs/msg/String'
 DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
 CLOCK = 'rosgraph_msgs/msg/Clock'
+TF_MESSAGE = 'tf2_msgs/msg/TFMessage'
 # The name of a type comes out of files and becomes that of a file.
 _NAME = re.compile('[A-Za-z][A-Za-z0-9_]{0,99}/msg/[A-Za-z][A-Za-z0-9_]{0,99}')
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from endoscope_bags.cdr_decoding import Payloads
 from endoscope_bags.cdr_encoding import (
+    TransformEncoder,
     encode_clock,
     encode_diagnostics,
     encode_joint_state,
@@ -22,6 +23,7 @@ from endoscope_bags.message_types import (
     JOINT_STATE,
     POSE_STAMPED,
     STRING,
+    TF_MESSAGE,
     typestore,
 )
 
@@ -117,6 +119,32 @@ def test_poses_survive_the_round_trip_and_rosbags_reads_them(samples, frame_id):
     pose = typestore().deserialize_cdr(messages[0], POSE_STAMPED)
     assert (pose.pose.position.x, pose.pose.orientation.w) == (numbers[0, 0], numbers[0, 6])
     assert pose.header.frame_id == frame_id
+
+
+@given(st.lists(st.tuples(TEXT, TEXT), max_size=4), st.lists(STAMP, min_size=1), st.data())
+@settings(max_examples=50)
+def test_transforms_are_encoded_as_rosbags_does(frames, stamps, data):
+    encoder, types = TransformEncoder(frames), typestore().types
+    numbers = st.lists(NUMBER, min_size=7, max_size=7)
+    for stamp_ns in stamps:
+        values = [data.draw(numbers) for _ in frames]
+        seconds, nanoseconds = divmod(stamp_ns, 10**9)
+        stamp = types['builtin_interfaces/msg/Time'](sec=seconds, nanosec=nanoseconds)
+        message = types[TF_MESSAGE](
+            transforms=[
+                types['geometry_msgs/msg/TransformStamped'](
+                    header=types['std_msgs/msg/Header'](stamp=stamp, frame_id=parent),
+                    child_frame_id=child,
+                    transform=types['geometry_msgs/msg/Transform'](
+                        translation=types['geometry_msgs/msg/Vector3'](*row[:3]),
+                        rotation=types['geometry_msgs/msg/Quaternion'](*row[3:]),
+                    ),
+                )
+                for (parent, child), row in zip(frames, values, strict=True)
+            ]
+        )
+        encoded = encoder.encode(stamp_ns, [(row[:3], row[3:]) for row in values])
+        assert encoded == bytes(typestore().serialize_cdr(message, TF_MESSAGE))
 
 
 def test_the_other_messages_are_read_back_by_rosbags():

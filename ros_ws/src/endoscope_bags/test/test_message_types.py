@@ -15,11 +15,12 @@ from endoscope_bags.message_types import (
     JOY,
     POSE_STAMPED,
     STRING,
+    TF_MESSAGE,
     begins_with_header,
     message_type,
 )
 
-INTERFACE_TYPES = (JOINT_STATE, POSE_STAMPED, JOY, STRING, DIAGNOSTIC_ARRAY, CLOCK)
+INTERFACE_TYPES = (JOINT_STATE, POSE_STAMPED, JOY, STRING, DIAGNOSTIC_ARRAY, CLOCK, TF_MESSAGE)
 
 
 @pytest.mark.parametrize('name', INTERFACE_TYPES)
