@@ -13,7 +13,7 @@ from endoscope_nodes.topics import TOPICS
 DOC = WORKSPACE / 'doc'
 NODES = {
     *('console', 'compensator', 'controller', 'calibration', 'supervisor'),
-    *('motor_driver', 'load_cells', 'em_tracker'),
+    *('motor_driver', 'load_cells', 'em_tracker', 'instrument_model'),
 }
 
 

@@ -29,6 +29,7 @@ setup(
             'compensator = endoscope_nodes.program:compensator',
             'controller = endoscope_nodes.program:controller',
             'supervisor = endoscope_nodes.program:supervisor',
+            'instrument_model = endoscope_nodes.program:instrument_model',
             'recorder = endoscope_nodes.program:recorder',
             'replay = endoscope_nodes.program:replay',
             'conductor = endoscope_nodes.program:conductor',

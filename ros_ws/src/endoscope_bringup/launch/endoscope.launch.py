@@ -15,7 +15,10 @@ from launch_ros.actions import Node, SetParameter
 from launch_ros.substitutions import FindPackageShare
 
 SIMULATED_DEVICES = ('motor_driver', 'load_cells', 'em_tracker')
-OTHERS = ('supervisor', 'compensator', 'controller', 'calibration', 'console', 'recorder')
+OTHERS = (
+    *('supervisor', 'compensator', 'controller', 'calibration', 'console'),
+    *('instrument_model', 'recorder'),
+)
 
 
 def _if(name: str, value: str) -> IfCondition:

@@ -79,13 +79,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='recordings that can be explained, and where that goes (default: %(default)s)',
     )
     parser.add_argument(
-        '--section-length',
-        type=_length,
-        default=0.02,
-        metavar='M',
-        help='length of the bending section, for its picture (default: %(default)g)',
-    )
-    parser.add_argument(
         '--joy',
         action='append',
         default=[],
@@ -104,13 +97,6 @@ def _port(text: str) -> int:
     if not 0 <= port < 65536:
         raise ValueError(text)
     return port
-
-
-def _length(text: str) -> float:
-    length = float(text)
-    if not 0.001 <= length <= 0.5:
-        raise ValueError(text)
-    return length
 
 
 def run(args: argparse.Namespace) -> int:

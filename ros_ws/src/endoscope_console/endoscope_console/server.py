@@ -54,9 +54,7 @@ class Console:
     tokens
         Who may do what.
     rig
-        Whose limits a page is told.
-    section_length
-        In m.
+        Whose limits and measures a page is told.
     counts
         Of what was refused and dropped.
     """
@@ -68,7 +66,6 @@ class Console:
     joy: JoyHand
     tokens: Tokens
     rig: Rig
-    section_length: float
     counts: Counter[str]
 
     def app(self, admission: Admission) -> Gate:
@@ -153,7 +150,7 @@ class Console:
                     'reach': self.rig.joints.reach,
                     'tension_ceiling': self.rig.tension.ceiling,
                 },
-                'section_length': self.section_length,
+                'section_length': self.rig.instrument.section_length,
                 'points': POINTS,
                 'rate': RATE_HZ,
                 'modes': MODES,

@@ -116,7 +116,7 @@ def serve(args: argparse.Namespace) -> int:
     listening = _listen(args.host, args.port)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     started = _Graph(args)
-    with listening, graph_side(args.namespace, args.section_length) as graph:
+    with listening, graph_side(args.namespace, rig.instrument.section_length) as graph:
         try:
             asyncio.run(_serve(args, listening, graph, started, rig, mapping, tokens))
         finally:
@@ -141,9 +141,7 @@ async def _serve(
         operations = Operations(graph, beat, clients, explanations, Alarms(), counts)
         view = View(operations, rig, counts)
         joy = JoyHand(graph, operations, mapping)
-        console = Console(
-            graph, operations, clients, view, joy, tokens, rig, args.section_length, counts
-        )
+        console = Console(graph, operations, clients, view, joy, tokens, rig, counts)
         address = _address(args, listening)
         admission = Admission(frozenset((address, *args.origin)), args.allow_no_origin)
         server = _Server(_configuration(args, console, admission, counts))

@@ -57,7 +57,7 @@ class EmTrackerNode(EndoscopeNode):
         self._window = RegistrationWindow()
         self._registration: StraightRegistration | None = None
         self._pose = PoseStamped()
-        self._pose.header.frame_id = p.base_frame
+        self._pose.header.frame_id = self.rig.instrument.base_frame
         self._poses = self.create_publisher(PoseStamped, TRACKER_POSE, SENSOR_OFFERED)
         self._measured = JointPublisher(self, SLAVE_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
         device = self._device_name = p.device or self.rig.devices.tracker
@@ -107,7 +107,7 @@ class EmTrackerNode(EndoscopeNode):
         if np.hypot(*reading) >= np.pi:
             self._out_of_reach += 1
             return
-        self._publish(sample.stamp_ns, *tip_pose(reading, self._settings.section_length))
+        self._publish(sample.stamp_ns, *tip_pose(reading, self.rig.instrument.section_length))
 
     def _on_tick(self, _stamp_ns: int, _periods: int) -> None:
         if self._tracker is None:
@@ -125,7 +125,7 @@ class EmTrackerNode(EndoscopeNode):
             reading.position,
             reading.orientation,
             roll=self._settings.sensor_roll,
-            length=self._settings.section_length,
+            length=self.rig.instrument.section_length,
         )
         self._publish(reading.time_ns + to_stamp_ns, position, orientation)
 

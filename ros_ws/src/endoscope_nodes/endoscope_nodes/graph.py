@@ -6,6 +6,7 @@ from endoscope_nodes.conductor_node import SelfStartingConductor
 from endoscope_nodes.console_node import ConsoleNode
 from endoscope_nodes.controller_node import ControllerNode
 from endoscope_nodes.em_tracker_node import EmTrackerNode
+from endoscope_nodes.instrument_model_node import InstrumentModelNode
 from endoscope_nodes.load_cells_node import LoadCellsNode
 from endoscope_nodes.motor_driver_node import MotorDriverNode
 from endoscope_nodes.recorder_node import RecorderNode
@@ -15,7 +16,8 @@ from endoscope_nodes.supervisor_node import SupervisorNode
 # The motor driver beats first: the plant advances under the command of the tick before.
 SLAVE_NODES = (MotorDriverNode, LoadCellsNode, EmTrackerNode, SupervisorNode)
 CONTROL_NODES = (CompensatorNode, ControllerNode, CalibrationNode, ConsoleNode)
-ALL_NODES = (*SLAVE_NODES, *CONTROL_NODES, RecorderNode)
+SHOWING_NODES = (InstrumentModelNode,)
+ALL_NODES = (*SLAVE_NODES, *CONTROL_NODES, *SHOWING_NODES, RecorderNode)
 
 
 def compose(runtime: Runtime) -> None:

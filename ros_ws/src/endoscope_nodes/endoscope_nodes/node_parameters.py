@@ -180,10 +180,6 @@ class EmTrackerParameters:
     registration_file: str = parameter(
         '', 'where the pose of the straight instrument is kept; empty to forget it'
     )
-    section_length: float = parameter(
-        0.02, 'length of the bending section', unit='m', low=0.001, high=0.5
-    )
-    base_frame: str = parameter('endoscope_base', 'frame of the poses')
     in_volume: bool = parameter(
         True,
         'false makes the simulated tracker lose its sensor, which then is silent',
@@ -397,6 +393,7 @@ OF_NODE: dict[str, tuple[type, ...]] = {
     'controller': (ControllerParameters,),
     'calibration': (CalibrationParameters,),
     'console': (ConsoleParameters,),
+    'instrument_model': (),
     'recorder': (RecorderParameters,),
     'replay': (ReplayParameters,),
     'conductor': (ConductorParameters,),

@@ -134,6 +134,12 @@ calibration = Program(
     'Moves the slave as a calibration asks, finds the hysteresis class of its tube from the '
     'tensions, and takes the slave home.',
 )
+instrument_model = Program(
+    'instrument_model',
+    'instrument_model_node',
+    'Shows other programs the instrument and its bending: a description as URDF, the angles of its '
+    'joints, and where its links are.',
+)
 recorder = Program(
     'recorder',
     'recorder_node',
@@ -152,7 +158,7 @@ conductor = Program(
 
 _COMPOSED = (
     *(motor_driver, load_cells, em_tracker, supervisor),
-    *(compensator, controller, calibration, console, recorder),
+    *(compensator, controller, calibration, console, instrument_model, recorder),
 )
 NODES = tuple(program.name for program in (*_COMPOSED, replay, conductor))
 """Names of all nodes that the package has."""

@@ -28,6 +28,15 @@ def message_class(type_name: str) -> type:
     return kind
 
 
+def is_installed(type_name: str) -> bool:
+    """Tell whether this process can send and hear a message type."""
+    try:
+        message_class(type_name)
+    except UnknownTypeError:
+        return False
+    return True
+
+
 def suitable_qos(latched: bool, publishers: Sequence[TopicEndpointInfo]) -> QoSProfile:
     """Return the QoS that hears every publisher, and latched messages where all are latched.
 

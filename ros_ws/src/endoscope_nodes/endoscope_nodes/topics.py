@@ -157,7 +157,7 @@ TOPICS = (
         offered=SENSOR_OFFERED,
         asked=SENSOR_ASKED,
         said_by=('em_tracker',),
-        heard_by=('console', 'compensator', 'controller', 'calibration'),
+        heard_by=('console', 'compensator', 'controller', 'calibration', 'instrument_model'),
         one_sender=True,
     ),
     Topic(
@@ -333,6 +333,45 @@ TOPICS = (
         said_by=('motor_driver',),
         heard_by=('em_tracker',),
         recorded=False,
+    ),
+    Topic(
+        names.ROBOT_DESCRIPTION,
+        'std_msgs/msg/String',
+        'once, latched',
+        'the instrument as URDF for programs that draw robots: insertion tube, bending section as '
+        'a chain of vertebrae, tip and wires, of cylinders and spheres alone',
+        offered=RESULT,
+        asked=RESULT,
+        said_by=('instrument_model',),
+    ),
+    Topic(
+        names.ROBOT_DESCRIPTION_OF_ALL,
+        'std_msgs/msg/String',
+        'once, latched',
+        'the same where viewers look for it first',
+        offered=RESULT,
+        asked=RESULT,
+        said_by=('instrument_model',),
+    ),
+    Topic(
+        names.JOINT_STATES,
+        _JOINT_STATE,
+        '20 Hz',
+        'the measured bending as `position` in rad of every joint of `robot_description`, '
+        '`vertebra_01_x` and so on',
+        offered=SENSOR_OFFERED,
+        asked=SENSOR_ASKED,
+        said_by=('instrument_model',),
+    ),
+    Topic(
+        names.TRANSFORMS,
+        'tf2_msgs/msg/TFMessage',
+        '20 Hz',
+        'where every link of `robot_description` is, from the base to the tip of the instrument; '
+        'without an installed `tf2_msgs` only in recordings and by `endoscope console --viewers`',
+        offered=SENSOR_OFFERED,
+        asked=SENSOR_OFFERED,
+        said_by=('instrument_model',),
     ),
     Topic(
         names.DIAGNOSTICS,

@@ -28,7 +28,7 @@ from endoscope_core.signals import calibration_sinusoid, motion_by_name
 from endoscope_nodes.calibration_result import REACH
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
+from endoscope_nodes.graph import CONTROL_NODES, SHOWING_NODES, SLAVE_NODES
 from endoscope_nodes.graph_client import GraphClient, GraphRefusedError
 from endoscope_nodes.graph_parameters import set_parameters
 from endoscope_nodes.names import CALIBRATION_COMMAND, JOINTS
@@ -121,7 +121,7 @@ class _GraphSession:
                 'conductor': {'timeout': PATIENCE_OF_TIME_S},
             },
         )
-        for factory in (*SLAVE_NODES, *CONTROL_NODES):
+        for factory in (*SLAVE_NODES, *CONTROL_NODES, *SHOWING_NODES):
             self._runtime.add(factory)
         self._recorder = self._runtime.add(RecorderNode)
         self._node = self._runtime.add(lambda runtime: EndoscopeNode('operator', runtime))
