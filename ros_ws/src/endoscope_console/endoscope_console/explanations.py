@@ -23,6 +23,7 @@ from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.plant_file import save_plant
 
 REPORT_FILE = 'report.html'
+EXPERIMENT_FILE = 'next_experiment.csv'
 _STEPS = 7
 """That `endoscope explain` names on the way, for two joints."""
 _REMARKS = ('note:', 'audit:')
@@ -146,6 +147,19 @@ class Explanations:
                 return one.folder / REPORT_FILE
         return None
 
+    def experiment_of(self, name: str) -> Path:
+        """File with the motion that would tell more.
+
+        Raises
+        ------
+        ExplanationRefusedError
+            There is none.
+        """
+        one = self._all.get(name)
+        if one is None or not one.experiment:
+            raise ExplanationRefusedError(f'there is no experiment of an explanation {name}')
+        return (one.folder / EXPERIMENT_FILE).resolve()
+
     async def begin(
         self, bag: str, plant: str | None, baseline: str | None, validate: str | None
     ) -> Mapping[str, Any]:
@@ -203,7 +217,8 @@ class Explanations:
             return
         one.sentence = said.decode(errors='replace').partition('\n')[0]
         report = json.loads((one.folder / 'report.json').read_text('utf-8'))
-        one.experiment = report['next_experiment'] is not None
+        planned = report['next_experiment'] is not None
+        one.experiment = planned and (one.folder / EXPERIMENT_FILE).is_file()
         one.step, one.progress = '', 1.0
 
     async def _follow(self, one: Explanation, lines: asyncio.StreamReader) -> None:

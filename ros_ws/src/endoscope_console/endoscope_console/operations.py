@@ -5,6 +5,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -34,7 +35,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.teleop.frames import InputFrame
 from endoscope_core.teleop.lease import Lease
 from endoscope_core.teleop.operator import FOLLOWED, DeadManState, Reason
-from endoscope_nodes.graph_client import GraphRefusedError
+from endoscope_nodes.graph_client import CONSOLE, GraphRefusedError
 from endoscope_nodes.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
 
@@ -46,6 +47,9 @@ _SETTLED_S = 0.2
 _SILENCED_S = 2.0
 _WAITING_ORDERS = 16
 _TAKEN_NS = 10_000_000_000
+# The console tells once a second how far it is; a word from before it was asked means nothing.
+_NEXT_WORD_NS = 1_500_000_000
+_EXPERIMENT = 'an experiment'
 _NO_LEASE = (Claim, Release, Bags, Explain, Cancel, Acknowledge)
 
 
@@ -59,6 +63,14 @@ class _Holder:
 
     client: Client | None = None
     moves: str = ''
+
+
+@dataclass
+class _Played:
+    """An experiment that the console plays while the operator holds on."""
+
+    begun_ns: int
+    ends: bool = False
 
 
 @dataclass
@@ -88,6 +100,7 @@ class Operations:
         self._place = asyncio.Lock()
         self._speaks = False
         self._given_back: str | None = None
+        self._played: _Played | None = None
         self._holder = _Holder()
         self._taken_ns = -_TAKEN_NS
         self._tasks: set[asyncio.Task[None]] = set()
@@ -128,7 +141,17 @@ class Operations:
             why = 'its page was silent for 2 s'
             self._holder.client.tell({'op': 'lost', 'by': '', 'why': why})
             self._lease_ended(self._holder.client, why)
+        played = self._played
+        if played is not None and not played.ends and self._is_over(played):
+            played.ends = True
+            self.soon(self._end_of_play())
         self._tell_beat()
+
+    def _is_over(self, played: _Played) -> bool:
+        """Whether the console has said, since it was asked to play, that it is at the end."""
+        said = self.graph.client.health.get(CONSOLE)
+        heard = said is not None and said.message == 'finished'
+        return heard and time.monotonic_ns() - played.begun_ns > _NEXT_WORD_NS
 
     def _tell_beat(self) -> None:
         graph, pictures = self.graph, self.graph.pictures
@@ -140,6 +163,7 @@ class Operations:
             calibrating=graph.calibrating,
             source=graph.settings.source if self._speaks else '',
             pictures=pictures.made,
+            playing=self._played is not None,
             wanted=pictures.wanted,
             wanted_ns=pictures.wanted_ns,
             scale=graph.settings.scale,
@@ -198,7 +222,7 @@ class Operations:
             case Cancel():
                 return await self.explanations.cancel(order.explanation)
             case Play():
-                return await self._moving(client, 'motion', partial(self._play, order.explanation))
+                return await self._play(order.explanation)
 
     async def _ask[T](self, ask: Callable[[], T]) -> T:
         """Wait for the graph in a thread of the pool: the sockets go on meanwhile."""
@@ -214,11 +238,6 @@ class Operations:
         GraphRefusedError
             The console node does not follow a handle.
         """
-        if self.graph.plays and not self._speaks and not take:
-            raise OrderRefusedError(
-                f'the console plays (its source is {self.graph.settings.source}): taking the '
-                'controls would end that'
-            )
         claim = self.lease.claim(client.id, take, time.monotonic_ns())
         if not claim.granted:
             raise OrderRefusedError(claim.why)
@@ -229,9 +248,12 @@ class Operations:
         async with self._place:
             try:
                 if not self._speaks:
-                    await self._take_the_place()
+                    await self._take_the_place(take)
             except EndoscopeError:
-                self.lease.release(client.id)
+                if self.lease.holder == client.id:
+                    self.lease.release(client.id)
+                    self._holder = _Holder()
+                    self._tell_beat()
                 raise
             if self.lease.holder != client.id:
                 self.soon(self._give_back())
@@ -272,10 +294,15 @@ class Operations:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _take_the_place(self) -> None:
+    async def _take_the_place(self, take: bool) -> None:
         """Become the one who speaks for the handle, and have the console follow it."""
         graph = self.graph
-        settings = await self._ask(self._read_settings)
+        settings = graph.settings = await self._ask(self._read_settings)
+        if graph.plays and not take:
+            raise OrderRefusedError(
+                f'the console plays (its source is {settings.source}): taking the controls would '
+                'end that'
+            )
         own = ('console',) if settings.source in PLAYS else ()
         others = [name for name in graph.others_at_the_handle() if name not in own]
         if others:
@@ -318,13 +345,17 @@ class Operations:
             while self.beat.said.speaks and time.monotonic() < end:
                 await asyncio.sleep(_LOOK_S)
             await asyncio.sleep(_SETTLED_S)
-            source, self._given_back = self._given_back, None
+            source, self._given_back = self._given_back or FOLLOWED, None
             try:
                 if source in PLAYS and self.graph.client.state == 'ENABLED':
                     # It would begin anew with nobody looking.
                     await self._ask(partial(self.graph.client.ask, 'pause', _PATIENCE_S))
-                if source is not None and source != FOLLOWED:
-                    await self._ask(partial(self._set_console, source=source))
+                values: dict[str, Any] = {}
+                if self._played is not None:
+                    self._played = None
+                    values['hold_to_play'] = False
+                if source != FOLLOWED or values:
+                    await self._ask(partial(self._set_console, source=source, **values))
             except GraphRefusedError as error:
                 self.graph.log(f'console.source {source}', '', '', False, str(error))
             self.graph.ask_for_settings(time.monotonic_ns())
@@ -349,8 +380,30 @@ class Operations:
     def _calibrate(self) -> str:
         return self.graph.client.calibrate(patience_s=_PATIENCE_S).message
 
-    def _play(self, explanation: str) -> str:
-        raise OrderRefusedError('played motions are not done from the page yet')
+    async def _play(self, explanation: str) -> str:
+        """Have the console play an experiment for as long as the operator holds on."""
+        file = self.explanations.experiment_of(explanation)
+        if self._holder.moves:
+            raise OrderRefusedError(f'{self._holder.moves} is under way')
+        if self.graph.client.state != 'ENABLED':
+            raise OrderRefusedError(f'the slave is {self.graph.client.state}: enable it first')
+        values = {'command_file': str(file), 'hold_to_play': True, 'source': 'file'}
+        await self._ask(partial(self._set_console, **values))
+        self._holder.moves = _EXPERIMENT
+        self.graph.settings = Settings('file', self.graph.settings.scale)
+        self._played = _Played(time.monotonic_ns())
+        return 'hold on: it plays while the dead-man is held'
+
+    async def _end_of_play(self) -> None:
+        """Have the console follow the handle again."""
+        async with self._place:
+            if self._played is None:
+                return
+            self._played = None
+            self._holder.moves = ''
+            with suppress(GraphRefusedError):
+                await self._ask(partial(self._set_console, source=FOLLOWED, hold_to_play=False))
+            self.graph.ask_for_settings(time.monotonic_ns())
 
     async def _set(self, order: Set) -> str:
         if order.scale is not None:

@@ -35,9 +35,17 @@ from endoscope_core.rig import Rig, load_rig
 from endoscope_core.teleop.joy_mapping import JoyMapping, JoyMappingError
 from endoscope_core.teleop.pad import PadHandle
 from endoscope_nodes.names import JOINTS
+from endoscope_nodes.program import NODES
 from endoscope_nodes.runtime import GC_THRESHOLDS, SWITCH_INTERVAL_S
 
-_GRAPH = 'import sys; from endoscope_nodes.program import graph; sys.exit(graph())'
+# Where this process is killed, the graph ends as it does by Ctrl-C.
+_GRAPH = """
+import ctypes, signal, sys
+PR_SET_PDEATHSIG = 1
+ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
+from endoscope_nodes.program import graph
+sys.exit(graph())
+"""
 _ANSWERS_S = 1.5
 _LOOK_S = 0.1
 _ENDS_S = 20.0
@@ -72,7 +80,7 @@ class _Graph:
     async def start_unless_one_answers(self, graph: GraphSide) -> None:
         """Start it, if nobody is there within 1.5 s."""
         for _ in range(round(_ANSWERS_S / _LOOK_S)):
-            if graph.client.state or graph.client.nodes():
+            if graph.client.state or set(graph.client.nodes()) & set(NODES):
                 return
             await asyncio.sleep(_LOOK_S)
         # Ctrl-C at the terminal is for the page first, which then ends the graph.
@@ -82,11 +90,10 @@ class _Graph:
             start_new_session=True,
         )
 
-    async def watch(self) -> None:
-        """Say when it has ended by itself."""
-        while self._process is None or self._process.poll() is None:
-            await asyncio.sleep(_LOOK_S)
-        print(f'console: the graph has ended with status {self._process.returncode}', flush=True)
+    @property
+    def ended(self) -> int | None:
+        """Status with which it has ended by itself; None while it runs, or was never started."""
+        return None if self._process is None else self._process.poll()
 
     def end(self) -> None:
         """End it as Ctrl-C does, and wait for it."""
@@ -193,14 +200,15 @@ async def _announce(
         await asyncio.to_thread(webbrowser.open, page)
     if not args.no_graph:
         await started.start_unless_one_answers(graph)
-    watching = asyncio.ensure_future(started.watch())
-    try:
-        while not graph.client.state:
-            await asyncio.sleep(_LOOK_S)
-        print(f'ready         slave {graph.client.state}; Ctrl-C ends', flush=True)
-        await asyncio.Event().wait()
-    finally:
-        watching.cancel()
+    while not graph.client.state:
+        if started.ended is not None:
+            raise ServingError(f'the graph has ended with status {started.ended}, as it says above')
+        await asyncio.sleep(_LOOK_S)
+    print(f'ready         slave {graph.client.state}; Ctrl-C ends', flush=True)
+    while started.ended is None:
+        await asyncio.sleep(_LOOK_S)
+    print(f'console: the graph has ended with status {started.ended}', flush=True)
+    await asyncio.Event().wait()
 
 
 def _configuration(

@@ -1,0 +1,72 @@
+"""What a page may say: a few orders, and nothing else."""
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from endoscope_console.orders import (
+    Claim,
+    Explain,
+    MalformedOrderError,
+    Set,
+    State,
+    in_words,
+    read_hello,
+    read_order,
+)
+
+
+def test_orders_are_read():
+    assert read_order('{"op":"claim","id":1}') == Claim(1)
+    assert read_order('{"op":"claim","id":2,"take":true}') == Claim(2, take=True)
+    assert read_order('{"op":"state","id":3,"command":"home"}') == State(3, 'home')
+    assert read_order('{"op":"set","id":4,"scale":0.5}') == Set(4, scale=0.5)
+    assert read_order('{"op":"explain","id":5,"bag":"b","plant":null}') == Explain(5, 'b')
+    assert read_hello('{"op":"hello","token":"x"}').token == 'x'
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        '',
+        'claim',
+        '{}',
+        '[]',
+        '{"op":"claim"}',
+        '{"op":"claim","id":-1}',
+        '{"op":"claim","id":1,"take":1}',
+        '{"op":"claim","id":1,"more":1}',
+        '{"op":"shutdown","id":1}',
+        '{"op":"hello","token":"x"}',
+        '{"op":"state","id":1,"command":"fly"}',
+        '{"op":"set","id":1}',
+        '{"op":"set","id":1,"scale":0.5,"mode":"speed"}',
+        '{"op":"set","id":1,"scale":NaN}',
+        '{"op":"set","id":1,"scale":1e9}',
+        '{"op":"set","id":1,"scale":"0.5"}',
+        '{"op":"set","id":1,"compensator":"magic"}',
+        '{"op":"record","id":1,"on":"yes"}',
+        '{"op":"explain","id":1,"bag":""}',
+        '{"op":"claim","id":1' + '[' * 4000,
+    ],
+)
+def test_anything_else_is_none(text):
+    with pytest.raises(MalformedOrderError, match='no order'):
+        read_order(text)
+
+
+@given(st.text() | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(json.dumps))
+def test_no_text_gets_any_further(text):
+    with pytest.raises(MalformedOrderError):
+        read_order(text)
+    with pytest.raises(MalformedOrderError):
+        read_hello(text)
+
+
+def test_an_order_in_words():
+    assert in_words(Claim(1)) == 'claim'
+    assert in_words(Claim(1, take=True)) == 'claim take'
+    assert in_words(State(1, 'enable')) == 'state command enable'
+    assert in_words(Set(1, compensator='physical')) == 'set compensator physical'
