@@ -3,7 +3,7 @@
 import json
 import threading
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 
 from websockets.exceptions import ConnectionClosed
@@ -49,7 +49,7 @@ class Page:
     """
 
     def __init__(self, address, token, *, origin=None, telemetry=True) -> None:
-        self._sockets = []
+        self._sockets = ExitStack()
         self._threads = []
         self._answers = {}
         self._news = threading.Condition()
@@ -77,8 +77,7 @@ class Page:
         self._start(self._send)
 
     def _connect(self, url, origin, token):
-        socket = connect(url, origin=origin, compression=None)
-        self._sockets.append(socket)
+        socket = self._sockets.enter_context(connect(url, origin=origin, compression=None))
         socket.send(json.dumps({'op': 'hello', 'token': token}))
         return socket
 
@@ -179,7 +178,6 @@ class Page:
 
     def close(self) -> None:
         self._open = False
-        for socket in self._sockets:
-            socket.close()
+        self._sockets.close()
         for thread in self._threads:
             thread.join()
