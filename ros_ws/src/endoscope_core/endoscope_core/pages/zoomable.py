@@ -23,10 +23,7 @@ Array = NDArray[np.float64]
 
 COLUMNS = 12
 _SCRIPTS = ('uPlot.iife.min.js', 'drawing.js', 'zoomable.js')
-_HINT = (
-    '<span class="by-mouse">Drag to zoom, Shift and drag to move, double click to see all.</span>'
-    '<span class="by-touch">Two fingers zoom, one moves.</span>'
-)
+_HINT = 'Drag to zoom, Shift and drag to move, double click to see all.'
 _NOT_DRAWN = (
     '<p class="note plot-none">Without JavaScript no curves are drawn. Their numbers are in the '
     'table.</p>'
@@ -315,7 +312,7 @@ def _tools() -> str:
         '</button>'
         for do, sign, words in _ACTIONS
     )
-    return f'<div class="plot-tools">{_HINT}{buttons}</div>'
+    return f'<div class="plot-tools"><span>{_HINT}</span>{buttons}</div>'
 
 
 def _numbers(plots: Sequence[Plot]) -> str:
