@@ -23,7 +23,10 @@ Array = NDArray[np.float64]
 
 COLUMNS = 12
 _SCRIPTS = ('uPlot.iife.min.js', 'drawing.js', 'zoomable.js')
-_HINT = 'Drag to zoom, Shift and drag to move, double click to see all.'
+_HINT = (
+    '<span class="by-mouse">Drag to zoom, Shift and drag to move, double click to see all.</span>'
+    '<span class="by-touch">Two fingers zoom, one moves.</span>'
+)
 _NOT_DRAWN = (
     '<p class="note plot-none">Without JavaScript no curves are drawn. Their numbers are in the '
     'table.</p>'
@@ -312,7 +315,7 @@ def _tools() -> str:
         '</button>'
         for do, sign, words in _ACTIONS
     )
-    return f'<div class="plot-tools"><span>{_HINT}</span>{buttons}</div>'
+    return f'<div class="plot-tools">{_HINT}{buttons}</div>'
 
 
 def _numbers(plots: Sequence[Plot]) -> str:
