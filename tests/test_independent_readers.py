@@ -13,6 +13,7 @@ from recorded_session import (
     SESSION,
     STATE,
     TRACKER,
+    TRANSFORMS,
     WIRES,
     N,
     record_all_types,
@@ -120,6 +121,9 @@ def test_foxglove_reads_every_message(recorded, foxglove):
     assert topics[STATE]['first']['decoded'] == {'data': 'ENABLED'}
     assert topics[CLUTCH]['last']['decoded']['buttons'] == [sent[CLUTCH][-1]]
     assert topics[SESSION]['last']['decoded']['frame_id'] == sent[SESSION][-1]
+    transforms = topics[TRANSFORMS]['first']['decoded']['transforms']
+    assert transforms[0]['header']['frame_id'] == 'endoscope_base'
+    assert transforms[-1]['child_frame_id'] == 'endoscope_tip'
     assert topics[TRACKER]['first']['decoded']['header']['frame_id'] == 'base'
 
 
