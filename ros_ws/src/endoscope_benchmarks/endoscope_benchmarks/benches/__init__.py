@@ -2,7 +2,6 @@
 
 BENCHES: tuple[str, ...] = (
     'graph',
-    'console',
     'recorder',
     'explain',
     'concealed',

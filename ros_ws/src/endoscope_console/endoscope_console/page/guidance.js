@@ -41,8 +41,8 @@ export const stateIsFresh = (state, stateAge) => Boolean(state?.operating_state)
  * The step that comes next, 0 to 4, and what to say:
  * 0 cannot, 1 take the controls, 2 enable, 3 let go first, 4 hold and move.
  */
-export function nextStep({ connected, role, mine, state, stateAge, busy, half, held, touch }) {
-  if (!connected) return { step: 0, text: 'Connecting to the console …' };
+export function nextStep({ connected, role, mine, state, stateAge, busy, half, held, touch, why }) {
+  if (!connected) return { step: 0, text: `Connecting to the console …${why ? ` It said: ${why}.` : ''}` };
   if (!state) return { step: 0, text: 'Waiting for the graph …' };
   if (role !== 'operator') return { step: 0, text: 'You are looking on. To operate, open the operator’s address.' };
   const { lease, calibration, playing, dead_man: deadMan } = state;
@@ -60,7 +60,7 @@ export function nextStep({ connected, role, mine, state, stateAge, busy, half, h
   if (state.operating_state === 'PAUSED') return { step: 2, text: `Paused, position held. Hold Resume for 1 s${orKey}` };
   if (state.operating_state !== 'ENABLED') return { step: 2, text: `Hold Enable for 1 s${orKey} The motors then hold.` };
   if (deadMan?.state === 'ENGAGED') {
-    const verb = playing ? `Playing ${played(state)}` : 'Following';
+    const verb = playing ? `Playing ${played(state)}, ${Math.round(100 * (playing.progress ?? 0))} % done` : 'Following';
     return { step: 4, text: `${verb}. Let go, and it stops.` };
   }
   if (half) return { step: 4, text: 'One finger is down. Hold the left area and the pad together.' };
@@ -68,7 +68,7 @@ export function nextStep({ connected, role, mine, state, stateAge, busy, half, h
     if (playing) return { step: 4, text: `${hold}, and ${played(state)} plays. Let go, and it stops.` };
     return { step: 4, text: touch ? 'Hold the left area, and drag on the pad.' : 'Hold Space and press an arrow key, or drag on the pad.' };
   }
-  if (held || busy) return { step: 3, text: 'Let go of everything first, then take hold anew.' };
-  const missing = deadMan?.missing ?? deadMan?.reason ?? '';
+  const missing = deadMan?.missing || deadMan?.reason || '';
+  if (held || busy || missing === 'hands on') return { step: 3, text: 'Let go of everything first, then take hold anew.' };
   return { step: 3, text: endedForHim(missing) ? `Not ready: ${inWords(missing)}.` : 'Getting ready …' };
 }

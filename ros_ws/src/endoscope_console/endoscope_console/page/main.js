@@ -40,7 +40,7 @@ const app = {
   state: null, picture: null, signals: [], modes: [], ceiling: 60, you: null, role: null,
   mine: false, claiming: false, connected: false, everConnected: false, endedHere: '', pictures: 0, picturesLost: 0,
   touch: matchMedia('(pointer: coarse)').matches,
-  claimedAt: 0, stateArrived: 0, tab: 'operate',
+  whyClosed: '', claimedAt: 0, stateArrived: 0, tab: 'operate',
   sinceState: () => now() - app.stateArrived,
   stateAge: () => (app.state?.state_age ?? Infinity) + app.sinceState(),
   pictureAge: () => pictureAge(app.picture, now()),
@@ -108,7 +108,8 @@ command.addEventListener('hello', ({ detail }) => {
   app.hands.told(detail.grips ?? 0);
   connection();
 });
-command.addEventListener('closed', () => {
+command.addEventListener('closed', ({ detail }) => {
+  app.whyClosed = detail;
   app.lost('The connection was lost, and the controls with it.');
   connection();
 });

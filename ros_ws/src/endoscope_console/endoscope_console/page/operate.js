@@ -81,7 +81,7 @@ export class Operate {
     this._renderAlarms();
     const next = nextStep({
       connected, role, mine, state, stateAge: age, busy: app.hands.busy, half: app.hands.half, held: app.hands.held,
-      touch: app.touch,
+      touch: app.touch, why: app.whyClosed,
     });
     write($('next'), next.text);
     set(document.body, 'data-step', String(next.step));
@@ -149,7 +149,8 @@ export class Operate {
       }
       return element;
     }, (element, alarm) => {
-      write(element.querySelector('.text'), alarm.text);
+      const why = inWords(app.state?.dead_man?.reason);
+      write(element.querySelector('.text'), alarm.id === 'dead_man' && why ? `The hand was let go of: ${why}.` : alarm.text);
       const button = element.querySelector('button');
       if (button) toggle(button, 'disabled', app.role !== 'operator');
     });
@@ -179,10 +180,13 @@ export class Operate {
   _renderHand() {
     const { hands, mine, state, deadMan } = this.app;
     const free = mine && !hands.held;
-    set($('hand'), 'data-held', String(hands.held));
+    set($('hand'), 'data-held', String(Boolean(hands.held && state?.dead_man?.state === 'ENGAGED')));
     set($('hand'), 'data-live', String(mine));
-    set($('pad'), 'data-on', String(hands.held && hands.source === 'pad'));
-    set($('thumb'), 'data-on', String(hands.held));
+    // A grip that was ended looks ended, however long it is still pressed.
+    const engaged = hands.held && state?.dead_man?.state === 'ENGAGED';
+    const looks = hands.held ? (engaged ? 'following' : 'spent') : 'off';
+    set($('pad'), 'data-on', hands.source === 'pad' ? looks : 'off');
+    set($('thumb'), 'data-on', looks);
     const position = hands.modes.pad === 'position';
     set($('mode-position'), 'aria-pressed', String(position));
     set($('mode-speed'), 'aria-pressed', String(!position));

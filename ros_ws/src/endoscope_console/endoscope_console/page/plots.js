@@ -13,7 +13,7 @@ export function holding(steps, low, high) {
   return steps.find((step) => step >= most) ?? most;
 }
 
-const both = (steps) => (_, low, high) => {
+const around = (steps) => (_, low, high) => {
   const most = holding(steps, low, high);
   return [-most, most];
 };
@@ -40,11 +40,12 @@ export class Plots {
     this._boxes = boxes;
     this._turn = true;
     const wires = ['wire-x-pos', 'wire-x-neg', 'wire-y-pos', 'wire-y-neg'];
-    const pair = [['wanted', [6, 4], true], ['actual', [], true]];
+    // What is wanted lies on top: where both agree, its dashes still show.
+    const pair = [['actual', [], true], ['wanted', [6, 4], true]];
     this._plots = [
-      this._plot(boxes[0], pair, both(STEPS_DEG), false),
-      this._plot(boxes[1], pair, both(STEPS_DEG), false),
-      this._plot(boxes[2], [['curve-1', [], false], ['curve-5', [], false]], both(STEPS_ERROR), false),
+      this._plot(boxes[0], pair, around(STEPS_DEG), false),
+      this._plot(boxes[1], pair, around(STEPS_DEG), false),
+      this._plot(boxes[2], [['curve-1', [], false], ['curve-5', [], false]], around(STEPS_ERROR), false),
       this._plot(boxes[3], wires.map((name) => [name, [], true]), upwards(STEPS_N), true),
     ];
     this._values = boxes.map((box) => [...box.querySelectorAll('[data-value]')]);
@@ -73,8 +74,8 @@ export class Plots {
     };
     if (this._turn) {
       [0, 1].forEach((j) => {
-        const pair = [wanted[j], actual[j]];
-        plot(j, history.window(pair).slice(1), pair.map((s) => history.last(s)));
+        const both = [wanted[j], actual[j]];
+        plot(j, history.window(both.toReversed()).slice(1), both.map((s) => history.last(s)));
       });
     } else {
       const errors = [0, 1].map((j) => history.difference(wanted[j], actual[j]));
@@ -113,7 +114,7 @@ export class Plots {
         series.push(hidden, { ...hidden });
       }
       // A line of one pixel costs a third of a wider one.
-      series.push({ stroke: colour, width: 1, dash, points: { show: false } });
+      series.push({ stroke: colour, width: dash.length ? 1.5 : 1, dash, points: { show: false } });
     }
     return new window.uPlot({
       width: Math.max(target.clientWidth, 100),

@@ -56,7 +56,7 @@ export class Socket extends EventTarget {
 
   /** Close and stay closed. */
   close() {
-    this._wanted = false;
+    this._wanted = this.ready = false;
     clearTimeout(this._timer);
     this._socket?.close(1000);
   }
