@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 
 DEFAULT_PORT = 8642
+DEFAULT_VIEWERS_PORT = 8765
+"""Where viewers look for a server first."""
 
 _EPILOG = """\
 The address that is printed carries a token: who has it may operate. It is for this machine alone;
@@ -88,6 +90,18 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--namespace', default='endoscope', help='of the graph (default: %(default)s)'
+    )
+    parser.add_argument(
+        '--viewers',
+        action='store_true',
+        help='let Foxglove and Lichtblick on this machine read the topics too; they need no token',
+    )
+    parser.add_argument(
+        '--viewers-port',
+        type=_port,
+        default=DEFAULT_VIEWERS_PORT,
+        metavar='PORT',
+        help='0 for any that is free (default: %(default)d)',
     )
     parser.add_argument('--open', action='store_true', help='open the page in a browser')
 

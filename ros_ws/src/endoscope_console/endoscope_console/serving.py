@@ -12,7 +12,7 @@ import sys
 import webbrowser
 from collections import Counter
 from collections.abc import Iterable
-from contextlib import nullcontext, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from typing import Any
 
 import uvicorn
@@ -123,11 +123,17 @@ def serve(args: argparse.Namespace) -> int:
     listening = _listen(args.host, args.port)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     started = _Graph(args)
-    with listening, graph_side(args.namespace, rig.instrument.section_length) as graph:
-        try:
-            asyncio.run(_serve(args, listening, graph, started, rig, mapping, tokens))
-        finally:
-            started.end()
+    with ExitStack() as stack:
+        stack.enter_context(listening)
+        graph = stack.enter_context(graph_side(args.namespace, rig.instrument.section_length))
+        if args.viewers:
+            # Its SDK is large, and few ask for it.
+            from endoscope_console.viewers import viewers
+
+            seen = stack.enter_context(viewers(args.namespace, rig.instrument, args.viewers_port))
+            print(f'viewers read  {seen}')
+        stack.callback(started.end)
+        asyncio.run(_serve(args, listening, graph, started, rig, mapping, tokens))
     return 0
 
 

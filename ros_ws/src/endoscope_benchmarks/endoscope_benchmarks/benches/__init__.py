@@ -2,6 +2,7 @@
 
 BENCHES: tuple[str, ...] = (
     'graph',
+    'console',
     'recorder',
     'explain',
     'concealed',

@@ -6,7 +6,7 @@ the same angle and all y hinges by another one, which is constant curvature.  Tw
 ``X(a) Y(2 b) X(a)``, whose axis has no share along the instrument, so that the tip has exactly the
 orientation of :func:`~endoscope_core.kinematics.constant_curvature.tip_pose`.  Its place is that
 of a polygon of the arc's length: with ``d`` rad in each vertebra it is too near to the base by
-``(d/2)^2 / 3`` of their distance, which is 0.4 % where both angles are at the shipped reach.
+``(d/2)^2 / 3`` of their distance, which is 0.35 % where both angles are at the shipped reach.
 """
 
 import math

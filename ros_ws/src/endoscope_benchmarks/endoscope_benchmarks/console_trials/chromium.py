@@ -1,0 +1,200 @@
+"""The installed Chromium without a window, spoken to by its DevTools protocol.
+
+Test frameworks keep their pages in front, focused and at full speed, whatever happens to them.  A
+page that is hidden, frozen or killed as it would be on a desk takes the protocol itself.
+"""
+
+import itertools
+import json
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.errors import EndoscopeError
+
+_ARGUMENTS = (
+    *('--headless=new', '--no-sandbox', '--no-first-run', '--disable-extensions'),
+    *('--remote-debugging-port=0', '--window-size=1440,900'),
+)
+_PATIENCE_S = 60.0
+_LOOK_S = 0.02
+KEYS = {'Space': (' ', 32), 'ArrowLeft': ('ArrowLeft', 37), 'ArrowRight': ('ArrowRight', 39)}
+"""Keys by their place on the keyboard: what they type, and their number."""
+
+
+class BrowserError(EndoscopeError, RuntimeError):
+    """The browser is not there, does not answer, or does not do what it is told."""
+
+
+class Chromium(ClosedOnExit):
+    """A browser with a profile of its own, which ends and is removed with it.
+
+    Raises
+    ------
+    BrowserError
+        There is none, or it does not start.
+    """
+
+    def __init__(self) -> None:
+        program = shutil.which('chromium')
+        if program is None:
+            raise BrowserError('no chromium here: apt install chromium fonts-dejavu-core')
+        self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        self._process = subprocess.Popen(
+            [program, *_ARGUMENTS, f'--user-data-dir={self._folder.name}', 'about:blank'],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        self._numbers = itertools.count(1)
+        try:
+            self._socket = self._connected()
+        except BaseException:
+            self.kill()
+            self._folder.cleanup()
+            raise
+
+    def _connected(self) -> ClientConnection:
+        place = Path(self._folder.name) / 'DevToolsActivePort'
+        end = time.monotonic() + _PATIENCE_S
+        while not (place.exists() and len(lines := place.read_text().splitlines()) == 2):
+            if self._process.poll() is not None or time.monotonic() > end:
+                raise BrowserError(f'chromium does not start; its status is {self._process.poll()}')
+            time.sleep(_LOOK_S)
+        return connect(f'ws://127.0.0.1:{lines[0]}{lines[1]}', max_size=None, compression=None)
+
+    def post(self, method: str, session: str = '', **parameters: Any) -> int:
+        """Order something and do not wait for the answer; the order's number."""
+        number = next(self._numbers)
+        message = {'id': number, 'method': method, 'params': parameters}
+        self._socket.send(json.dumps(message | ({'sessionId': session} if session else {})))
+        return number
+
+    def call(self, method: str, session: str = '', **parameters: Any) -> dict[str, Any]:
+        """Order something of the browser, or of the tab of a session; the answer.
+
+        Raises
+        ------
+        BrowserError
+            It is refused, or there is no answer within a minute.
+        """
+        number = self.post(method, session, **parameters)
+        end = time.monotonic() + _PATIENCE_S
+        while True:
+            try:
+                told = json.loads(self._socket.recv(timeout=max(0.0, end - time.monotonic())))
+            except (TimeoutError, ConnectionClosed) as error:
+                raise BrowserError(f'chromium does not answer {method}: {error}') from error
+            if told.get('id') == number:
+                break
+        if 'error' in told:
+            raise BrowserError(f'{method}: {told["error"]["message"]}')
+        return dict(told['result'])
+
+    def tab(self, address: str) -> 'Tab':
+        """Open an address in a tab in front of all others."""
+        return Tab(self, address)
+
+    def close_others(self, tab: 'Tab') -> None:
+        """Close every tab but one."""
+        for target in self.call('Target.getTargets')['targetInfos']:
+            if target['type'] == 'page' and target['targetId'] != tab.target:
+                self.call('Target.closeTarget', targetId=target['targetId'])
+
+    def page_processes(self) -> list[int]:
+        """Numbers of the processes that run pages."""
+        found = self.call('SystemInfo.getProcessInfo')['processInfo']
+        return [process['id'] for process in found if process['type'] == 'renderer']
+
+    def kill(self) -> None:
+        """End it at once, as the kernel does where memory is short."""
+        with suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+
+    def close(self) -> None:
+        """End it and remove its profile."""
+        self._socket.close()
+        self.kill()
+        self._folder.cleanup()
+
+
+class Tab:
+    """A tab.
+
+    Parameters
+    ----------
+    browser
+        To which it belongs.
+    address
+        That it shows.
+    """
+
+    def __init__(self, browser: Chromium, address: str) -> None:
+        self._browser = browser
+        self.target: str = browser.call('Target.createTarget', url=address)['targetId']
+        attached = browser.call('Target.attachToTarget', targetId=self.target, flatten=True)
+        self._session: str = attached['sessionId']
+        self.to_front()
+
+    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """Order something of the tab, as :meth:`Chromium.call`."""
+        return self._browser.call(method, self._session, **parameters)
+
+    def post(self, method: str, **parameters: Any) -> None:
+        """Order something of the tab and do not wait for the answer."""
+        self._browser.post(method, self._session, **parameters)
+
+    def to_front(self) -> None:
+        """Put it in front of all others."""
+        self._browser.call('Target.activateTarget', targetId=self.target)
+
+    def key(self, code: str, down: bool, *, repeats: bool = False) -> None:
+        """Press a key of :data:`KEYS`, have the keyboard repeat it, or let go of it."""
+        key, number = KEYS[code]
+        self.call(
+            'Input.dispatchKeyEvent',
+            type='rawKeyDown' if down else 'keyUp',
+            code=code,
+            key=key,
+            windowsVirtualKeyCode=number,
+            autoRepeat=repeats,
+        )
+
+    def value(self, expression: str) -> Any:
+        """What an expression, or the promise that it makes, comes to in the page.
+
+        Raises
+        ------
+        BrowserError
+            It throws.
+        """
+        told = self.call(
+            'Runtime.evaluate', expression=expression, returnByValue=True, awaitPromise=True
+        )
+        if 'exceptionDetails' in told:
+            raise BrowserError(f'{expression}: {told["exceptionDetails"]}')
+        return told['result'].get('value')
+
+    def minimise(self, minimised: bool = True) -> None:
+        """Minimise the window, or have it back."""
+        window = self._browser.call('Browser.getWindowForTarget', targetId=self.target)
+        state = 'minimized' if minimised else 'normal'
+        self._browser.call(
+            'Browser.setWindowBounds', windowId=window['windowId'], bounds={'windowState': state}
+        )
+
+    def close(self) -> None:
+        """Close it, as its cross does."""
+        self._browser.call('Target.closeTarget', targetId=self.target)

@@ -1,0 +1,128 @@
+"""What the console costs, and how soon an input reaches the motors."""
+
+import json
+import os
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
+
+from endoscope_benchmarks.benches.process_cpu import cpu_seconds
+from endoscope_benchmarks.console_trials.hand import Hand
+from endoscope_benchmarks.console_trials.served_console import ServedConsole
+
+VIEWERS = 4
+_STILL_S = 0.3
+_SEEN_S = 2.0
+_DIAGNOSTICS_S = 1.5
+_FRAMES = """new Promise((done) => {
+  const begin = performance.now();
+  let frames = 0;
+  const count = () => {
+    frames += 1;
+    const seconds = (performance.now() - begin) / 1000;
+    if (seconds < 5) requestAnimationFrame(count);
+    else done(frames / seconds);
+  };
+  requestAnimationFrame(count);
+})"""
+
+
+def input_latency(hand: Hand, inputs: int) -> str:
+    """From a key that is pressed to the first change of ``motor/servo_jp``, in words.
+
+    Parameters
+    ----------
+    hand
+        Of the operator, who has Space down and the slave at rest before each.
+    inputs
+        How many.
+    """
+    console = hand.console
+    took_ms: list[float] = []
+    while len(took_ms) < inputs:
+        console.forget()
+        hand.let_go()
+        hand.hold('Space')
+        console.passes(_STILL_S)
+        if hand.moves:
+            continue
+        key = 'ArrowLeft' if console.goals and console.goals[-1][0] > 0.0 else 'ArrowRight'
+        at_ns = time.time_ns()
+        hand.press(key)
+        console.passes(_STILL_S)
+        changes = console.changes_ns()
+        if (changes > at_ns).any():
+            took_ms.append((int(changes[changes > at_ns][0]) - at_ns) * 1e-6)
+    hand.let_go()
+    took_ms.sort()
+    return (
+        f'key to motor/servo_jp, {inputs} inputs: median {took_ms[inputs // 2]:.0f} ms, 99 % '
+        f'{took_ms[inputs * 99 // 100]:.0f} ms, load average {os.getloadavg()[0]:.1f}'
+    )
+
+
+def costs(hand: Hand, seconds: float) -> Iterator[str]:
+    """CPU time of the server and ticks of the graph, without and with viewers; frames of the page.
+
+    Parameters
+    ----------
+    hand
+        Of the operator, whose page is the first client.
+    seconds
+        Of each figure.
+
+    Yields
+    ------
+    str
+        Each figure in words.
+    """
+    console = hand.console
+    yield _cost(console, seconds, 'one page')
+    with ExitStack() as stack:
+        for _ in range(VIEWERS):
+            _view(console, stack)
+        yield _cost(console, seconds, f'one page and {VIEWERS} viewers')
+    frames = hand.tab.value(_FRAMES)
+    yield f'page: {frames:.0f} animation frames/s, load average {os.getloadavg()[0]:.1f}'
+
+
+def _cost(console: ServedConsole, seconds: float, what: str) -> str:
+    ticks, missed = _ticks(console)
+    cpu, began = cpu_seconds(console.pid), time.monotonic()
+    console.passes(seconds)
+    share = (cpu_seconds(console.pid) - cpu) / (time.monotonic() - began)
+    after, missed_after = _ticks(console)
+    made = after - ticks
+    return (
+        f'{what}: server {100 * share:.1f} % of a core, graph '
+        f'{100 * made / (made + missed_after - missed):.1f} % of its ticks, {seconds:.0f} s, '
+        f'load average {os.getloadavg()[0]:.1f}'
+    )
+
+
+def _ticks(console: ServedConsole) -> tuple[int, int]:
+    """Ticks of the graph so far, and those that it missed, as it says once a second."""
+    console.passes(_DIAGNOSTICS_S)
+    values = console.client.health['motor_driver: device'].values
+    return int(values['ticks']), int(values['missed ticks'])
+
+
+def _view(console: ServedConsole, stack: ExitStack) -> None:
+    """Look on as one more page does, and drop what comes."""
+    socket = connect(
+        f'ws://127.0.0.1:{console.port}/telemetry', origin=Origin(console.address), compression=None
+    )
+    stack.callback(socket.close)
+    socket.send(json.dumps({'op': 'hello', 'token': console.viewer_token}))
+    threading.Thread(target=_drain, args=(socket,), daemon=True).start()
+
+
+def _drain(socket: ClientConnection) -> None:
+    with suppress(ConnectionClosed):
+        for _ in socket:
+            continue

@@ -1,0 +1,177 @@
+"""`endoscope console` with its graph, as a person starts it, and what its motors are told."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from bisect import bisect_right
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState, Joy
+
+from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.errors import EndoscopeError
+from endoscope_nodes.joined_graph import joined_graph
+from endoscope_nodes.joint_stream import JointReader
+from endoscope_nodes.names import MASTER_CLUTCH, MOTOR_COMMAND, MOTORS
+from endoscope_nodes.qos import EVENT, profile
+from endoscope_nodes.topics import Qos
+
+PATIENCE_S = 150.0
+SAME_RAD = 1e-9
+"""Goals of a shaft that are nearer to each other are the same."""
+_COMMAND = (sys.executable, '-m', 'endoscope_bringup.cli', 'console', '--port', '0')
+_DEEP = profile(Qos(20_000, reliable=False))
+
+
+class ConsoleError(EndoscopeError, RuntimeError):
+    """The program does not start, or what is waited for does not come."""
+
+
+class ServedConsole(ClosedOnExit):
+    """The program in a process of its own, and a node that looks on.
+
+    Parameters
+    ----------
+    folder
+        Where it is started, and writes its bag.
+    domain
+        ROS domain.
+    graph
+        Further arguments of the graph.
+    origins
+        Addresses of relays under which the page is reached, too.
+
+    Attributes
+    ----------
+    address, token, viewer_token
+        By which one operates, and looks on.
+    client
+        The node's side of the graph.
+    heard_ns, goals
+        When each command of the motors was received, and the angles of the shafts in rad.
+    clutches
+        When the clutch was spoken of, and whether it was held.
+    """
+
+    def __init__(
+        self, folder: Path, domain: int, graph: str = '', origins: tuple[str, ...] = ()
+    ) -> None:
+        words = [f'--origin={origin}' for origin in origins]
+        self.log = folder / 'console.log'
+        with self.log.open('w') as log:
+            self._process = subprocess.Popen(
+                [*_COMMAND, *words, f'--graph={graph}'],
+                cwd=folder,
+                env=os.environ | {'ROS_DOMAIN_ID': str(domain)},
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+        self.heard_ns: list[int] = []
+        self.goals: list[tuple[float, ...]] = []
+        self.clutches: list[tuple[int, bool]] = []
+        self._reader = JointReader(MOTORS)
+        self._stack = ExitStack()
+        self._stack.callback(self._end)
+        try:
+            self._await_graph()
+            # Another node in the namespace would pass for a graph that answers.
+            self.client = self._stack.enter_context(joined_graph('looker_on', 'endoscope', domain))
+            self.client.listen(JointState, MOTOR_COMMAND, self._on_goal, qos=_DEEP)
+            self.client.listen(Joy, MASTER_CLUTCH, self._on_clutch, qos=EVENT)
+            operate, look_on = self.log.read_text().splitlines()[:2]
+            self.address, _, self.token = operate.split()[-1].partition('/#token=')
+            self.viewer_token = look_on.partition('#token=')[2].strip()
+            self.until(lambda: len(self.client.heard_ns) >= 9, 'all nodes')
+        except BaseException:
+            self.close()
+            raise
+
+    def _await_graph(self) -> None:
+        end = time.monotonic() + PATIENCE_S
+        while 'ready ' not in self.log.read_text():
+            if time.monotonic() > end or self._process.poll() is not None:
+                raise ConsoleError(f'the console does not start: {self.log.read_text()[-2000:]}')
+            time.sleep(0.1)
+
+    @property
+    def pid(self) -> int:
+        """Number of the server's process."""
+        return self._process.pid
+
+    @property
+    def port(self) -> int:
+        """At which the server listens."""
+        return int(self.address.rpartition(':')[2])
+
+    def _on_goal(self, data: bytes, received_ns: int) -> None:
+        self.goals.append(self._reader.read(data).position)
+        self.heard_ns.append(received_ns)
+
+    def _on_clutch(self, data: bytes, received_ns: int) -> None:
+        self.clutches.append((received_ns, deserialize_message(data, Joy).buttons[0] == 1))
+
+    def forget(self) -> None:
+        """Keep only what is heard from now on, and the last before."""
+        self.client.hear()
+        del self.heard_ns[:-1], self.goals[:-1], self.clutches[:-1]
+
+    def passes(self, seconds: float) -> None:
+        """Listen for so long."""
+        self.client.wait_until(lambda: False, seconds)
+
+    def until(
+        self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
+    ) -> None:
+        """Listen until something has come true.
+
+        Raises
+        ------
+        ConsoleError
+            It has not in time, or the program has ended.
+        """
+        end = time.monotonic() + patience_s
+        while not self.client.wait_until(condition, 0.5):
+            if time.monotonic() > end or self._process.poll() is not None:
+                raise ConsoleError(
+                    f'{what} does not come; {self.client.state} {self.client.why}; the console '
+                    f'said {self.log.read_text()[-2000:]}'
+                )
+
+    def changes_ns(self) -> NDArray[np.int64]:
+        """When a goal came that differs from the one before, ns since the epoch, shape (N,)."""
+        if len(self.goals) < 2:
+            return np.empty(0, dtype=np.int64)
+        steps = np.abs(np.diff(self.goals, axis=0)).max(axis=1)
+        return np.asarray(self.heard_ns[1:], dtype=np.int64)[steps > SAME_RAD]
+
+    def travel_since(self, since_ns: int) -> float:
+        """How far a shaft's goal has been from the one in force then, at most, rad."""
+        first = max(0, bisect_right(self.heard_ns, since_ns) - 1)
+        if not self.goals:
+            return 0.0
+        return float(np.abs(np.subtract(self.goals[first:], self.goals[first])).max())
+
+    def released_ns(self, since_ns: int) -> int | None:
+        """When the clutch was first said to be free after a time; None where it was not."""
+        return next((at for at, held in self.clutches if at >= since_ns and not held), None)
+
+    def _end(self) -> None:
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGINT)
+            try:
+                self._process.wait(PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+
+    def close(self) -> None:
+        """End program and graph as Ctrl-C does."""
+        self._stack.close()

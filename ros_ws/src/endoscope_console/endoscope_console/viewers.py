@@ -1,0 +1,198 @@
+"""What other people's viewers see: the topics of a graph for Foxglove and Lichtblick, to be read.
+
+The server of the Foxglove SDK asks nobody who he is: it looks at neither Origin nor Host and knows
+no token, so every program of this machine, and a page that its browser lets at 127.0.0.1, can read
+along.  That is why it is started only when asked for, listens nowhere else, and offers no
+capability by which anything could be sent to the graph.
+"""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import foxglove
+from foxglove import Channel, Context, Schema
+from foxglove.websocket import ChannelView, Client, ServerListener
+from rclpy.node import Node
+
+from endoscope_bags.errors import MalformedMessageError
+from endoscope_bags.message_types import JOINT_STATE, TF_MESSAGE, message_type
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.rig import InstrumentFacts
+from endoscope_nodes.joined_graph import joined_node
+from endoscope_nodes.joint_transforms import JointTransforms, section_of
+from endoscope_nodes.names import JOINT_STATES, TRANSFORMS
+from endoscope_nodes.qos import profile
+from endoscope_nodes.raw_subscription import RawSubscription
+from endoscope_nodes.recorded_topics import is_installed, message_class
+from endoscope_nodes.topics import BY_NAME, TOPICS, Qos, Topic
+
+NODE = 'console_viewers'
+HOST = '127.0.0.1'
+
+_PERIOD_S = 0.01
+_ENDS_S = 5.0
+# Of a stream only the newest counts. What comes rarely is passed on to the last message.
+_STREAM = Qos(1, reliable=False)
+_EVENTS = Qos(100)
+
+
+class ViewedTopic:
+    """A topic that viewers can see, and that is heard while one of them does.
+
+    Parameters
+    ----------
+    node
+        By which it is heard.
+    topic
+        What is shown.
+    heard
+        What is heard: the same, or what it is made of.
+    transforms
+        How it is made of that; None where it is passed on as it is.
+    context
+        Of the server.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topic: Topic,
+        heard: Topic,
+        transforms: JointTransforms | None,
+        context: Context,
+    ) -> None:
+        self._node = node
+        self._heard = heard
+        self._transforms = transforms
+        self._subscription: RawSubscription | None = None
+        self._last: bytes | None = None
+        self._asked = threading.Event()
+        kind = message_type(topic.type)
+        self.channel = Channel(
+            node.resolve_topic_name(topic.name),
+            schema=Schema(name=kind.name, encoding='ros2msg', data=kind.definition.encode('utf-8')),
+            message_encoding='cdr',
+            context=context,
+        )
+
+    def ask_again(self) -> None:
+        """Show what is latched to one more viewer; may be called from any thread."""
+        self._asked.set()
+
+    def pass_on(self) -> None:
+        """Show what has come, as far as somebody looks."""
+        if not self.channel.has_sinks():
+            self.close()
+            return
+        asked = self._asked.is_set()
+        self._asked.clear()
+        if self._subscription is None:
+            self._subscription = self._subscribe()
+        elif asked and self._last is not None:
+            self.channel.log(self._last)
+        for data, info in self._subscription.take():
+            if self._transforms is not None:
+                try:
+                    data = self._transforms.of_message(data)
+                except MalformedMessageError as error:
+                    self._node.get_logger().error(f'{self._heard.name} {error}', once=True)
+                    continue
+            self._show(data, info)
+
+    def _subscribe(self) -> RawSubscription:
+        latched = self._heard.asked.latched
+        stream = self._heard.type == JOINT_STATE and not latched
+        qos = _STREAM if stream else Qos(_EVENTS.depth, latched=latched)
+        return RawSubscription(
+            self._node, message_class(self._heard.type), self._heard.name, profile(qos)
+        )
+
+    def _show(self, data: bytes, info: dict[str, int]) -> None:
+        if self._heard.asked.latched:
+            self._last = data
+        self.channel.log(data, log_time=info['received_timestamp'])
+
+    def close(self) -> None:
+        """Hear the topic no more."""
+        if self._subscription is not None:
+            self._subscription.close()
+            self._subscription, self._last = None, None
+
+
+class _Listener(ServerListener):
+    def __init__(self, topics: dict[int, ViewedTopic]) -> None:
+        self._topics = topics
+
+    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
+        """Show a new viewer what is latched."""
+        self._topics[channel.id].ask_again()
+
+
+@contextmanager
+def viewers(namespace: str, instrument: InstrumentFacts, port: int) -> Iterator[str]:
+    """Let viewers read the topics of a graph, a hundred times a second at most.
+
+    Parameters
+    ----------
+    namespace
+        Of the graph.
+    instrument
+        What `/tf` is made by where no package of its type is installed.
+    port
+        At 127.0.0.1; 0 for any that is free.
+
+    Yields
+    ------
+    str
+        The address, which viewers are given as a Foxglove WebSocket.
+
+    Raises
+    ------
+    EndoscopeError
+        The port is taken.
+    """
+    context = Context()
+    with joined_node(NODE, namespace) as node:
+        topics = [_viewed(node, topic, instrument, context) for topic in TOPICS if topic.recorded]
+        listener = _Listener({topic.channel.id(): topic for topic in topics})
+        try:
+            server = foxglove.start_server(
+                name=f'endoscope {node.get_namespace()}',
+                host=HOST,
+                port=port,
+                capabilities=[],
+                server_listener=listener,
+                context=context,
+            )
+        except (RuntimeError, OSError) as error:
+            raise EndoscopeError(
+                f'no viewers at {HOST}:{port}: {error}; give another --viewers-port'
+            ) from error
+        ended = threading.Event()
+        thread = threading.Thread(
+            target=_pass_on, args=(topics, ended), name='viewers', daemon=True
+        )
+        thread.start()
+        try:
+            yield f'ws://{HOST}:{server.port}'
+        finally:
+            ended.set()
+            thread.join(_ENDS_S)
+            server.stop()
+            for topic in topics:
+                topic.close()
+                topic.channel.close()
+
+
+def _viewed(node: Node, topic: Topic, instrument: InstrumentFacts, context: Context) -> ViewedTopic:
+    if topic.name == TRANSFORMS and not is_installed(TF_MESSAGE):
+        transforms = JointTransforms(section_of(instrument))
+        return ViewedTopic(node, topic, BY_NAME[JOINT_STATES], transforms, context)
+    return ViewedTopic(node, topic, topic, None, context)
+
+
+def _pass_on(topics: list[ViewedTopic], ended: threading.Event) -> None:
+    while not ended.wait(_PERIOD_S):
+        for topic in topics:
+            topic.pass_on()

@@ -1,0 +1,48 @@
+"""Whatever happens to the page of an operator who holds on, the slave stops and stays there."""
+
+import time
+
+import pytest
+from private_domain import private_domain
+
+from endoscope_benchmarks.console_trials.events import EVENTS, undergo
+from endoscope_benchmarks.console_trials.hand import Hand
+from endoscope_benchmarks.console_trials.relay import Relay
+from endoscope_benchmarks.console_trials.served_console import SAME_RAD, ServedConsole
+
+# In real time, a busy machine would end the motion session.
+IN_SIMULATED_TIME = '-p use_sim_time:=true -p speed:=1.0'
+WATCHED_S = 0.5
+
+
+@pytest.fixture(scope='module')
+def hand(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('console')
+    with (
+        Relay() as network,
+        ServedConsole(folder, private_domain(), IN_SIMULATED_TIME, (network.address,)) as console,
+    ):
+        network.target = console.port
+        with Hand(console, network) as hand:
+            yield hand
+
+
+@pytest.mark.parametrize('name', EVENTS)
+def test_it_stops_the_slave_and_nothing_moves_without_a_new_grip(hand, name):
+    console, event = hand.console, EVENTS[name]
+    outcome = undergo(event, hand, WATCHED_S)
+    print(f'{name}: {outcome}')
+    assert outcome.crept <= SAME_RAD
+    # The page is there again, and the operator has held on all the time.
+    over_ns = time.time_ns()
+    event.is_over(hand)
+    console.passes(WATCHED_S)
+    if name != 'dead-man let go':
+        hand.repeats()
+    console.passes(WATCHED_S)
+    assert console.travel_since(over_ns) <= SAME_RAD
+    assert not any(held for at, held in console.clutches if at >= over_ns)
+    # Without such a grip it would have passed, too.
+    console.forget()
+    hand.move()
+    hand.let_go()
