@@ -23,6 +23,7 @@ NOT_SOURCE = {'__pycache__', '.mypy_cache', '.pytest_cache', '.ruff_cache'}
 IMPORT_NAMES = {
     'autora-theorist-bms': 'autora',
     'dynamixel-sdk': 'dynamixel_sdk',
+    'foxglove-sdk': 'foxglove',
     'gp-elite': 'gp_elite',
     'ndicapi': 'ndicapy',
     'pyserial': 'serial',
