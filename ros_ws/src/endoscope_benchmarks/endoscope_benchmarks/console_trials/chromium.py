@@ -72,7 +72,8 @@ class Chromium(ClosedOnExit):
             if self._process.poll() is not None or time.monotonic() > end:
                 raise BrowserError(f'chromium does not start; its status is {self._process.poll()}')
             time.sleep(_LOOK_S)
-        return connect(f'ws://127.0.0.1:{lines[0]}{lines[1]}', max_size=None, compression=None)
+        address = f'ws://127.0.0.1:{lines[0]}{lines[1]}'
+        return connect(address, max_size=None, compression=None, legacy=True)
 
     def post(self, method: str, session: str = '', **parameters: Any) -> int:
         """Order something and do not wait for the answer; the order's number."""

@@ -114,10 +114,8 @@ def _ticks(console: ServedConsole) -> tuple[int, int]:
 
 def _view(console: ServedConsole, stack: ExitStack) -> None:
     """Look on as one more page does, and drop what comes."""
-    socket = connect(
-        f'ws://127.0.0.1:{console.port}/telemetry', origin=Origin(console.address), compression=None
-    )
-    stack.callback(socket.close)
+    address = f'ws://127.0.0.1:{console.port}/telemetry'
+    socket = stack.enter_context(connect(address, origin=Origin(console.address), compression=None))
     socket.send(json.dumps({'op': 'hello', 'token': console.viewer_token}))
     threading.Thread(target=_drain, args=(socket,), daemon=True).start()
 
