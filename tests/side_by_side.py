@@ -10,6 +10,7 @@ _IN_REAL_TIME = {
     'test_calibration_on_a_line',
     'test_console',
     'test_console_browser_events',
+    'test_console_hostile',
     'test_console_page',
     'test_dynamixel_line_faults',
     'test_faults',

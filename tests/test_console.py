@@ -2,6 +2,7 @@
 
 import signal
 import time
+import urllib.request
 from contextlib import suppress
 
 import numpy as np
@@ -11,7 +12,9 @@ from console_rig import ConsoleRig, engage, ready
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Joy
+from short_bags import PLANT, one_joint, write_short_bag
 
+from endoscope_core.physics import EffectSpec, save_plant
 from endoscope_nodes.graph_client import GraphRefusedError
 from endoscope_nodes.names import CONSOLE_LOG, MASTER_CLUTCH, RECORDER_STOP
 from endoscope_nodes.qos import EVENT
@@ -314,6 +317,31 @@ class Device:
 
     def close(self) -> None:
         self._rig.client.node.destroy_publisher(self._sender)
+
+
+def test_a_recording_is_explained_and_its_report_opens(rig):
+    bags = rig.folder / 'bags'
+    bags.mkdir(exist_ok=True)
+    stop = one_joint(EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.12}))
+    write_short_bag(bags / 'stopped.mcap', stop, seed=2)
+    save_plant(PLANT, bags / 'rig.yaml')
+    with rig.page() as page:
+        listed = page.order('bags')
+        assert 'stopped.mcap' in [bag['name'] for bag in listed['bags']]
+        begun = page.order('explain', bag='stopped.mcap', plant='rig.yaml')
+        assert begun['ok'], begun
+
+        def told():
+            known = {each['id']: each for each in page.state.get('explanations', [])}
+            return known.get(begun['explanation'], {'running': True})
+
+        rig.until(lambda: not told()['running'], 'the explanation')
+        assert 'joint_stop' in told()['sentence'], told()
+        with urllib.request.urlopen(rig.server.address + told()['report']) as answer:
+            assert 'sandbox' in answer.headers['content-security-policy']
+            assert 'joint_stop' in answer.read().decode()
+        refused = page.order('play', explanation=begun['explanation'])
+        assert not refused['ok']
 
 
 def test_a_gamepad_on_the_topic_joy_obeys_the_same_rules(rig):

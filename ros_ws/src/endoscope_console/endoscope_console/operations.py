@@ -5,7 +5,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -243,7 +242,8 @@ class Operations:
             raise OrderRefusedError(claim.why)
         if claim.lost_by:
             self._lost(claim.lost_by, client)
-        self._holder = _Holder(client)
+        if self._holder.client is not client:
+            self._holder = _Holder(client)
         self._tell_beat()
         async with self._place:
             try:
@@ -264,7 +264,7 @@ class Operations:
     def _lost(self, holder: str, to: Client) -> None:
         """Tell an operator that another took the lease."""
         self._taken_ns = time.monotonic_ns()
-        self._pause_what_moves()
+        self._end_what_moves()
         lost = self.clients.by_id(holder)
         if lost is not None:
             lost.tell({'op': 'lost', 'by': to.label, 'why': f'{to.label} took the controls'})
@@ -277,16 +277,19 @@ class Operations:
         return ''
 
     def _lease_ended(self, client: Client, why: str) -> None:
-        self._pause_what_moves()
+        self._end_what_moves()
         self._holder = _Holder()
         self._tell_beat()
         self.graph.log('lease', client.id, client.address, True, f'ended: {why}')
         self.soon(self._give_back())
 
-    def _pause_what_moves(self) -> None:
+    def _end_what_moves(self) -> None:
         """Let nothing that an operator has begun go on without him."""
         if self._holder.moves and self.graph.client.state == 'ENABLED':
             self.graph.client.order('pause')
+        if self._played is not None:
+            # The next operator's hand is no hand for what this one had played.
+            self.soon(self._end_of_play())
 
     def soon(self, work: Coroutine[Any, Any, None]) -> None:
         """Let something be done beside all else, whose end is waited for at the end."""
@@ -350,12 +353,8 @@ class Operations:
                 if source in PLAYS and self.graph.client.state == 'ENABLED':
                     # It would begin anew with nobody looking.
                     await self._ask(partial(self.graph.client.ask, 'pause', _PATIENCE_S))
-                values: dict[str, Any] = {}
-                if self._played is not None:
-                    self._played = None
-                    values['hold_to_play'] = False
-                if source != FOLLOWED or values:
-                    await self._ask(partial(self._set_console, source=source, **values))
+                if source != FOLLOWED:
+                    await self._ask(partial(self._set_console, source=source))
             except GraphRefusedError as error:
                 self.graph.log(f'console.source {source}', '', '', False, str(error))
             self.graph.ask_for_settings(time.monotonic_ns())
@@ -400,9 +399,12 @@ class Operations:
             if self._played is None:
                 return
             self._played = None
-            self._holder.moves = ''
-            with suppress(GraphRefusedError):
+            if self._holder.moves == _EXPERIMENT:
+                self._holder.moves = ''
+            try:
                 await self._ask(partial(self._set_console, source=FOLLOWED, hold_to_play=False))
+            except GraphRefusedError as error:
+                self.graph.log(f'console.source {FOLLOWED}', '', '', False, str(error))
             self.graph.ask_for_settings(time.monotonic_ns())
 
     async def _set(self, order: Set) -> str:
