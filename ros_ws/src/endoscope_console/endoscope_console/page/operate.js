@@ -10,6 +10,8 @@ const SCALES = [0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3];
 const ALARMS_SHOWN = 4;
 const ANSWER_S = 8;
 const SLIDING_MS = 1000;
+/** Within so long the state tells of a scale that was asked for. */
+const SCALE_TOLD_MS = 1500;
 /** A protective stop is not unlocked by the hand that is still pressing. */
 const FAULT_REST_S = 2;
 
@@ -26,6 +28,8 @@ export class Operate {
     this._faultSince = null;
     this._answered = 0;
     this._sliding = 0;
+    this._scaleAsked = NaN;
+    this._scaleAskedAt = -Infinity;
     this._holds = {
       KeyE: new HoldButton($('enable'), () => this._enable()),
       KeyH: new HoldButton($('home'), () => this._order({ op: 'state', command: 'home' }, 'Home')),
@@ -263,7 +267,8 @@ export class Operate {
   }
 
   async _set(name, value) {
-    await this._order({ op: 'set', [name]: value }, name);
+    const answer = await this._order({ op: 'set', [name]: value }, name);
+    if (name === 'scale' && !answer.ok) this._scaleAskedAt = -Infinity;
   }
 
   _stepScale(step) {
@@ -271,9 +276,13 @@ export class Operate {
       this.say('Let go first: the scale changes only while nothing is held.');
       return;
     }
-    const now = this.app.state?.console?.scale;
+    // What was asked for just now is not in the state yet.
+    const fresh = performance.now() - this._scaleAskedAt < SCALE_TOLD_MS;
+    const now = fresh ? this._scaleAsked : this.app.state?.console?.scale;
     if (!Number.isFinite(now)) return;
-    this._set('scale', SCALES[Math.max(0, Math.min(SCALES.length - 1, nearestScale(now) + step))]);
+    this._scaleAsked = SCALES[Math.max(0, Math.min(SCALES.length - 1, nearestScale(now) + step))];
+    this._scaleAskedAt = performance.now();
+    this._set('scale', this._scaleAsked);
   }
 
   _buttons() {
