@@ -17,22 +17,20 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
 from endoscope_console.pictures import Pictures
+from endoscope_core.choices import PLAYS
 from endoscope_nodes.diagnostics import OK, WARN, status
 from endoscope_nodes.graph_client import CONSOLE, PROCEDURE, GraphClient, GraphRefusedError
+from endoscope_nodes.handle_sender import handle_senders
 from endoscope_nodes.joined_graph import joined_node
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
     CONSOLE_LOG,
-    MASTER_CLUTCH,
-    MASTER_MEASURED,
     PROCEDURE_WAITING,
 )
 from endoscope_nodes.qos import EVENT, profile
 from endoscope_nodes.topics import Qos
 
 NODE = 'console_web'
-PLAYS = ('motion', 'file')
-"""Sources of the console that move the slave by themselves."""
 
 _ASKED = ('source', 'scale')
 _POLL_S = 0.01
@@ -159,10 +157,7 @@ class GraphSide:
     def others_at_the_handle(self) -> list[str]:
         """Names of other nodes that speak for the handle."""
         node = self.client.node
-        own = node.get_name()
-        places = [node.resolve_topic_name(name) for name in (MASTER_MEASURED, MASTER_CLUTCH)]
-        found = [i.node_name for place in places for i in node.get_publishers_info_by_topic(place)]
-        return sorted({name for name in found if name != own})
+        return [name for name in handle_senders(node) if name != node.get_name()]
 
     def log(self, order: str, operator: str, address: str, ok: bool, why: str) -> None:
         """Say in the graph what was asked for and what became of it."""

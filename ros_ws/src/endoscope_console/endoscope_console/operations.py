@@ -14,7 +14,7 @@ from endoscope_console.alarms import Alarms
 from endoscope_console.beat import Beat, Situation
 from endoscope_console.clients import Client, Clients
 from endoscope_console.explanations import Explanations
-from endoscope_console.graph_side import PLAYS, GraphSide, Settings
+from endoscope_console.graph_side import GraphSide, Settings
 from endoscope_console.orders import (
     Acknowledge,
     Bags,
@@ -30,10 +30,11 @@ from endoscope_console.orders import (
     State,
     in_words,
 )
+from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.teleop.frames import InputFrame
 from endoscope_core.teleop.lease import Lease
-from endoscope_core.teleop.operator import FOLLOWED, DeadManState, Reason
+from endoscope_core.teleop.operator import DeadManState, Reason
 from endoscope_nodes.graph_client import CONSOLE, GraphRefusedError
 from endoscope_nodes.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
@@ -313,8 +314,8 @@ class Operations:
                 f'{" and ".join(others)} speaks for the handle already; two of them would be a '
                 'fault: end it first'
             )
-        if settings.source != FOLLOWED:
-            await self._ask(partial(self._set_console, source=FOLLOWED))
+        if settings.source != FOLLOW_THE_HANDLE:
+            await self._ask(partial(self._set_console, source=FOLLOW_THE_HANDLE))
             end = time.monotonic() + _PLACE_S
             while graph.others_at_the_handle() and time.monotonic() < end:
                 await asyncio.sleep(_LOOK_S)
@@ -323,7 +324,7 @@ class Operations:
                 await self._ask(partial(self._set_console, source=settings.source))
                 raise OrderRefusedError(f'{" and ".join(others)} goes on speaking for the handle')
         self._given_back = settings.source
-        graph.settings = Settings(FOLLOWED, settings.scale)
+        graph.settings = Settings(FOLLOW_THE_HANDLE, settings.scale)
         self._speaks = True
 
     def _read_settings(self) -> Settings:
@@ -348,12 +349,12 @@ class Operations:
             while self.beat.said.speaks and time.monotonic() < end:
                 await asyncio.sleep(_LOOK_S)
             await asyncio.sleep(_SETTLED_S)
-            source, self._given_back = self._given_back or FOLLOWED, None
+            source, self._given_back = self._given_back or FOLLOW_THE_HANDLE, None
             try:
                 if source in PLAYS and self.graph.client.state == 'ENABLED':
                     # It would begin anew with nobody looking.
                     await self._ask(partial(self.graph.client.ask, 'pause', _PATIENCE_S))
-                if source != FOLLOWED:
+                if source != FOLLOW_THE_HANDLE:
                     await self._ask(partial(self._set_console, source=source))
             except GraphRefusedError as error:
                 self.graph.log(f'console.source {source}', '', '', False, str(error))
@@ -402,9 +403,11 @@ class Operations:
             if self._holder.moves == _EXPERIMENT:
                 self._holder.moves = ''
             try:
-                await self._ask(partial(self._set_console, source=FOLLOWED, hold_to_play=False))
+                await self._ask(
+                    partial(self._set_console, source=FOLLOW_THE_HANDLE, hold_to_play=False)
+                )
             except GraphRefusedError as error:
-                self.graph.log(f'console.source {FOLLOWED}', '', '', False, str(error))
+                self.graph.log(f'console.source {FOLLOW_THE_HANDLE}', '', '', False, str(error))
             self.graph.ask_for_settings(time.monotonic_ns())
 
     async def _set(self, order: Set) -> str:

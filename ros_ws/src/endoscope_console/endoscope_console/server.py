@@ -142,7 +142,6 @@ class Console:
                 'version': VERSION,
                 'you': client.id,
                 'role': client.role,
-                'token_role': client.role,
                 'grips': self.operations.beat.grips,
                 'signals': SIGNALS,
                 'joints': JOINTS,

@@ -11,12 +11,9 @@ from endoscope_console.alarms import Alarm, Level
 from endoscope_console.graph_side import GraphSide
 from endoscope_console.operations import Operations
 from endoscope_core.rig import Rig
-from endoscope_core.teleop.operator import DeadManState, Reason
+from endoscope_core.teleop.operator import STATE_NS, DeadManState, Reason
 from endoscope_nodes.graph_client import CONSOLE, PROCEDURE, GraphClient, Health
 from endoscope_nodes.names import WIRES
-
-SUPERVISED_S = 3.5
-"""The operating state counts as unknown after so long a silence."""
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')
 _RECORDER = 'recorder: recording'
@@ -177,7 +174,7 @@ class View:
         client, operations = self._client, self._operations
         age_s = self._state_age_s(now_ns)
         enabled = client.state == 'ENABLED'
-        silent = age_s is None or age_s > SUPERVISED_S
+        silent = age_s is None or age_s > 1e-9 * STATE_NS
         tension = max(zip(self._graph.pictures.tensions, WIRES, strict=False), default=None)
         recorder = client.health.get(_RECORDER)
         compensator = client.compensator

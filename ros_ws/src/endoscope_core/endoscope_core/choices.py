@@ -28,6 +28,12 @@ CALIBRATION_MOTIONS = (SINUSOID, BRIEF)
 PLAYED_MOTIONS = ('calibration', 'periodic', 'non_periodic', 'commissioning')
 """Motions that the console plays."""
 
+FOLLOW_THE_HANDLE = 'master'
+PLAYS = ('motion', 'file')
+"""Sources of the console by which it moves the slave by itself."""
+SOURCES = ('none', *PLAYS, FOLLOW_THE_HANDLE)
+"""Where the console's commands come from."""
+
 SIMULATED = 'simulated'
 MOTOR_DEVICES = (SIMULATED, 'dynamixel')
 LOAD_CELL_DEVICES = (SIMULATED, 'modbus_rtu', 'modbus_tcp')

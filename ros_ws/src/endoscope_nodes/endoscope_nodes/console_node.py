@@ -8,6 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState, Joy
 
+from endoscope_core.choices import FOLLOW_THE_HANDLE
 from endoscope_core.control import (
     Handle,
     HandleRefusal,
@@ -37,7 +38,7 @@ from endoscope_nodes.names import (
     MASTER_MEASURED,
     SLAVE_COMMAND,
 )
-from endoscope_nodes.node_parameters import FOLLOW_THE_HANDLE, ConsoleParameters
+from endoscope_nodes.node_parameters import ConsoleParameters
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes

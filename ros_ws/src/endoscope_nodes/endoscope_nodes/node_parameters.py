@@ -17,6 +17,7 @@ from endoscope_core.choices import (
     PLAYED_MOTIONS,
     SELECTIONS,
     SINUSOID,
+    SOURCES,
     TRACKER_DEVICES,
 )
 from endoscope_nodes.names import (
@@ -275,9 +276,6 @@ class ControllerParameters:
     )
 
 
-FOLLOW_THE_HANDLE = 'master'
-
-
 @dataclass(frozen=True)
 class ConsoleParameters:
     """Parameters of the console."""
@@ -285,7 +283,7 @@ class ConsoleParameters:
     source: str = parameter(
         'none',
         'where commands come from; setting it starts a motion or file anew',
-        choices=('none', 'motion', 'file', FOLLOW_THE_HANDLE),
+        choices=SOURCES,
         dynamic=True,
     )
     motion: str = parameter(

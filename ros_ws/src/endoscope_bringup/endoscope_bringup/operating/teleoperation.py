@@ -14,11 +14,12 @@ from sensor_msgs.msg import JointState
 
 from endoscope_bags.errors import MalformedMessageError
 from endoscope_bringup.operating.terminal import Terminal, TerminalLostError
+from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import printable
 from endoscope_core.teleop import KeyboardHandle, Request, Turn
 from endoscope_nodes.graph_client import CONSOLE, PROCEDURE, GraphClient, GraphRefusedError
 from endoscope_nodes.graph_parameters import read_parameter, request_parameters, set_parameters
-from endoscope_nodes.handle_sender import HandleSender
+from endoscope_nodes.handle_sender import HandleSender, handle_senders
 from endoscope_nodes.joint_stream import JointReader
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
@@ -41,7 +42,6 @@ _SETTLED_S = 0.2
 _SCALES = (0.01, 10.0)
 _LARGER = 1.25
 _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-_PLAYS = ('motion', 'file')
 
 
 def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
@@ -62,8 +62,8 @@ def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
         before: dict[str, str | float] = {}
         stack.callback(_give_back, client, terminal, before, args.timeout)
         asked: dict[str, str | float] = {}
-        if source != 'master':
-            asked['source'], before['source'] = 'master', source
+        if source != FOLLOW_THE_HANDLE:
+            asked['source'], before['source'] = FOLLOW_THE_HANDLE, source
         if args.scale is not None:
             asked['scale'], before['scale'] = args.scale, scale
         if asked:
@@ -79,9 +79,9 @@ def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
 
 
 def _check_consent(source: str, taken: bool) -> None:
-    if source == 'master' or taken:
+    if source == FOLLOW_THE_HANDLE or taken:
         return
-    plays = '; what it plays ends' if source in _PLAYS else ''
+    plays = '; what it plays ends' if source in PLAYS else ''
     print(f'console.source is {source}: the console follows no handle.')
     try:
         answer = input(f'Set it to master until teleop ends{plays}? [y/N] ')
@@ -99,16 +99,11 @@ def _wait_for_the_handles_place(client: GraphClient) -> None:
     GraphRefusedError
         Somebody else speaks for it.
     """
-    places = [client.node.resolve_topic_name(name) for name in (MASTER_MEASURED, MASTER_CLUTCH)]
-
-    def senders() -> list[str]:
-        found = [i for place in places for i in client.node.get_publishers_info_by_topic(place)]
-        return sorted({info.node_name for info in found})
-
-    if not client.wait_until(lambda: not senders(), _GONE_S):
+    if not client.wait_until(lambda: not handle_senders(client.node), _GONE_S):
+        others = ' and '.join(handle_senders(client.node))
         raise GraphRefusedError(
-            f'{" and ".join(senders())} speaks for the handle already, on {MASTER_MEASURED} or '
-            f'{MASTER_CLUTCH}; two of them would be a fault'
+            f'{others} speaks for the handle already, on {MASTER_MEASURED} or {MASTER_CLUTCH}; two '
+            'of them would be a fault'
         )
 
 
@@ -121,7 +116,7 @@ def _give_back(
     # The supervisor has to know that this handle is gone.
     client.wait_until(lambda: False, _SETTLED_S)
     source = before.get('source')
-    if source in _PLAYS and client.state == 'ENABLED':
+    if source in PLAYS and client.state == 'ENABLED':
         client.ask('pause', patience_s)
         terminal.say(f'paused: console.source {source} begins anew when you resume')
     set_parameters(client, 'console', before, patience_s)
@@ -289,8 +284,8 @@ class _Teleoperation:
             return client.why or todo
         console = client.health.get(CONSOLE)
         if console is not None and console.received_ns > self._taken_ns + 2 * _SUPERVISED_NS:
-            source = console.values.get('source', 'master')
-            if source != 'master':
+            source = console.values.get('source', FOLLOW_THE_HANDLE)
+            if source != FOLLOW_THE_HANDLE:
                 return f'console.source is {source}'
         if not self._home_ns and self._calibrating.since(wall_ns - _FRESH_NS):
             return 'a calibration or a way home has the slave'

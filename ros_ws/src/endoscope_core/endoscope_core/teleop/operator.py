@@ -4,6 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 from enum import StrEnum
 
+from endoscope_core.choices import FOLLOW_THE_HANDLE
 from endoscope_core.teleop import dead_man as rule
 from endoscope_core.teleop.dead_man import DeadMan
 from endoscope_core.teleop.frames import InputFrame, Source
@@ -16,8 +17,6 @@ BLIND_NS = 300_000_000
 """Who was drawn no newer picture is blind."""
 STATE_NS = 3_500_000_000
 """The operating state counts as unknown after three repetitions that did not come."""
-FOLLOWED = 'master'
-"""Source of the console that follows a handle."""
 
 # What a hand that rests on a stick may leave.
 _REST = 0.1
@@ -303,7 +302,7 @@ class OperatorDeadMan:
         if conditions.calibrating:
             return Reason.CALIBRATION
         of_console = conditions.source, conditions.playing
-        follows = conditions.source == FOLLOWED or conditions.playing
+        follows = conditions.source == FOLLOW_THE_HANDLE or conditions.playing
         if not follows or (self.engaged and of_console != self._of_console):
             return Reason.SOURCE
         # Whoever holds a device of the topic `joy` need not look at a page.
