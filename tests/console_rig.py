@@ -194,7 +194,7 @@ class ConsoleRig:
 def ready(rig, page) -> None:
     """Take the controls, enable, and wait until a grip counts."""
     answer = page.order('claim', take=True)
-    assert answer['ok'], answer
+    assert answer['ok'], (answer, rig.server.lines)
     if rig.client.state != 'ENABLED':
         answer = page.order('state', command='enable')
         assert answer['ok'], answer

@@ -144,10 +144,7 @@ def test_another_speaker_for_the_handle_is_left_alone(rig):
 
 def test_silence_of_the_page_ends_the_grip_and_then_the_lease(rig):
     with rig.page() as page:
-        follows(rig, page)
-        page.sends = False
-        stopped(rig, page)
-        assert page.state['dead_man']['reason'] in ('silent', 'stalled')
+        ended(rig, page, lambda: setattr(page, 'sends', False), 'silent', 'stalled')
         rig.until(lambda: page.lost, 'the end of the lease')
         assert 'silent' in page.lost[0]['why']
         # A page that wakes up has to ask anew.

@@ -74,23 +74,24 @@ def closed(opened) -> int:
 
 
 @pytest.mark.parametrize(
-    ('sent', 'code', 'check'),
+    ('sent', 'codes', 'check'),
     [
-        (b'\x02' * _TEN_MEGABYTES, 1009, 'frame too large'),
-        (b'\x02short', 1008, 'malformed'),
-        (random.Random(1).randbytes(32), 1008, 'malformed'),
-        ('{"op": "claim"', 1008, 'malformed'),
-        ('{"op": "format_the_disk", "id": 1}', 1008, 'malformed'),
-        ('{"op": "set", "id": 1, "scale": 1e999}', 1008, 'malformed'),
+        # Of a sender that goes on sending, TCP may drop what it was told in the end.
+        (b'\x02' * _TEN_MEGABYTES, {1009, 1006}, 'frame too large'),
+        (b'\x02short', {1008}, 'malformed'),
+        (random.Random(1).randbytes(32), {1008}, 'malformed'),
+        ('{"op": "claim"', {1008}, 'malformed'),
+        ('{"op": "format_the_disk", "id": 1}', {1008}, 'malformed'),
+        ('{"op": "set", "id": 1, "scale": 1e999}', {1008}, 'malformed'),
     ],
     ids=['ten megabytes', 'short', 'noise', 'half JSON', 'unknown', 'infinite'],
 )
-def test_what_is_no_frame_and_no_order_ends_its_sender(rig, operator, sent, code, check):
+def test_what_is_no_frame_and_no_order_ends_its_sender(rig, operator, sent, codes, check):
     with ExitStack() as stack:
         other = greeted(rig, stack)
         with suppress(ConnectionClosed):
             other.send(sent)
-        assert closed(other) == code
+        assert closed(other) in codes
     counted(rig, operator, check)
 
 

@@ -82,6 +82,8 @@ class GraphSide:
         Heard here.
     pictures
         Taken here.
+    services
+        The thread that takes answers of services.
 
     Attributes
     ----------
@@ -91,7 +93,8 @@ class GraphSide:
         When the operating state was heard, by a steady clock.
     """
 
-    def __init__(self, client: _Client, pictures: Pictures) -> None:
+    def __init__(self, client: _Client, pictures: Pictures, services: threading.Thread) -> None:
+        self._services = services
         self.client = client
         self.pictures = pictures
         self.settings = Settings()
@@ -109,7 +112,15 @@ class GraphSide:
         self._log = client.node.create_publisher(DiagnosticArray, CONSOLE_LOG, EVENT)
 
     def hear(self, now_ns: int) -> None:
-        """Take all that has come until now, a steady time in ns, and ask for the settings."""
+        """Take all that has come until now, a steady time in ns, and ask for the settings.
+
+        Raises
+        ------
+        RuntimeError
+            The thread that takes answers of services has ended, which it never should.
+        """
+        if not self._services.is_alive():
+            raise RuntimeError('the thread that takes answers of services has ended')
         client = self.client
         client.hear()
         if client.state_ns != self._state_ns:
@@ -207,6 +218,9 @@ def graph_side(namespace: str, section_length: float) -> Iterator[GraphSide]:
         thread = threading.Thread(
             target=executor.spin_until_future_complete, args=(ended,), name='services', daemon=True
         )
+        client = stack.enter_context(_Client(node))
+        side = GraphSide(client, Pictures(node, section_length), thread)
+        stack.callback(side.close)
         thread.start()
 
         def stop() -> None:
@@ -215,8 +229,6 @@ def graph_side(namespace: str, section_length: float) -> Iterator[GraphSide]:
             thread.join(_SERVED_UNTIL_S)
             executor.shutdown()
 
+        # First of all at the end: it must not wait for what is closed by then.
         stack.callback(stop)
-        client = stack.enter_context(_Client(node))
-        side = GraphSide(client, Pictures(node, section_length))
-        stack.callback(side.close)
         yield side

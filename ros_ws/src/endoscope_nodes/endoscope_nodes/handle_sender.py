@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from sensor_msgs.msg import Joy
 
@@ -12,6 +13,8 @@ from endoscope_nodes.qos import EVENT, SENSOR_OFFERED
 
 CLUTCH_PERIOD_NS = 100_000_000
 _RECEIVED = Duration(seconds=0.5)
+# An executor that waits for events of a publisher fails where another thread closes it.
+_NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 
 
 def handle_senders(node: Node) -> list[str]:
@@ -22,7 +25,7 @@ def handle_senders(node: Node) -> list[str]:
 
 
 class HandleSender:
-    """The one sender of ``master/measured_js`` and ``master/clutch``.
+    """The one sender of ``master/measured_js`` and ``master/clutch``, in whichever thread.
 
     Parameters
     ----------
@@ -37,8 +40,10 @@ class HandleSender:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._angles = JointPublisher(node, MASTER_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
-        self._clutch = node.create_publisher(Joy, MASTER_CLUTCH, EVENT)
+        self._angles = JointPublisher(
+            node, MASTER_MEASURED, JOINTS, ('position',), SENSOR_OFFERED, _NO_EVENTS
+        )
+        self._clutch = node.create_publisher(Joy, MASTER_CLUTCH, EVENT, event_callbacks=_NO_EVENTS)
         self._said_ns = 0
         self.clutch = False
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
@@ -55,16 +56,24 @@ class JointPublisher:
         The J joints.
     fields
         Which of ``position``, ``velocity``, ``effort`` the messages carry, in this order.
+    events
+        What of the topic the node's executor is to be told; as usual where None.
     """
 
     def __init__(
-        self, node: Node, topic: str, names: Sequence[str], fields: Sequence[str], qos: QoSProfile
+        self,
+        node: Node,
+        topic: str,
+        names: Sequence[str],
+        fields: Sequence[str],
+        qos: QoSProfile,
+        events: PublisherEventCallbacks | None = None,
     ) -> None:
         self._names, self._fields = names, fields
         self._pack = struct.Struct(f'<{len(names)}d').pack_into
         self._stamp = struct.Struct('<iI')
         self._node = node
-        self._publisher = node.create_publisher(JointState, topic, qos)
+        self._publisher = node.create_publisher(JointState, topic, qos, event_callbacks=events)
         self.count = 0
         self._session = ''
         self._lay_out()

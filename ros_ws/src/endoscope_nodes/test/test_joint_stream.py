@@ -27,7 +27,7 @@ class Recorder:
     def __init__(self, sent):
         self._sent = sent
 
-    def create_publisher(self, kind, topic, qos):
+    def create_publisher(self, kind, topic, qos, **_):
         assert kind is JointState
         return SimpleNamespace(handle=SimpleNamespace(publish_raw=self._sent.append))
 
