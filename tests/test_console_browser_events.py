@@ -40,7 +40,7 @@ def test_it_stops_the_slave_and_nothing_moves_without_a_new_grip(hand, name):
     if name != 'dead-man let go':
         hand.repeats()
     console.passes(WATCHED_S)
-    assert console.travel_since(over_ns) <= SAME_RAD
+    assert console.motors.travel_since(over_ns) <= SAME_RAD
     assert not any(held for at, held in console.clutches if at >= over_ns)
     # Without such a grip it would have passed, too.
     console.forget()

@@ -1,4 +1,4 @@
-"""The beat of the handle: a thread that judges the dead-man and speaks for the handle, at 1 kHz.
+"""The beat of the handle: a thread that judges the dead-man and speaks for the handle, at 250 Hz.
 
 The deadline is judged here and not where the sockets are read: whatever holds those up releases the
 clutch instead of holding it.
@@ -18,7 +18,7 @@ from endoscope_core.teleop.operator import Conditions, DeadManState, OperatorDea
 from endoscope_core.teleop.pad import PadHandle
 from endoscope_nodes.handle_sender import HandleSender
 
-_BEAT_NS = 1_000_000
+_BEAT_NS = 4_000_000
 _IDLE_NS = 20_000_000
 _WANTED_NS = 150_000_000
 _UNTIL_STOPPED_S = 2.0

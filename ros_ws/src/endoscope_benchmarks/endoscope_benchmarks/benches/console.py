@@ -90,7 +90,9 @@ def run(args: argparse.Namespace) -> int:
                 print(_row(name, outcomes), flush=True)
                 crept += sum(outcome.crept > SAME_RAD for outcome in outcomes)
             if args.inputs:
-                print(f'\n{input_latency(hand, args.inputs)}', flush=True)
+                print()
+                for line in input_latency(hand, args.inputs):
+                    print(line, flush=True)
             if args.seconds:
                 for line in costs(hand, args.seconds):
                     print(line, flush=True)

@@ -1,12 +1,14 @@
 """What the console costs, and how soon an input reaches the motors."""
 
 import json
+import math
 import os
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 
+import numpy as np
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
@@ -32,8 +34,8 @@ _FRAMES = """new Promise((done) => {
 })"""
 
 
-def input_latency(hand: Hand, inputs: int) -> str:
-    """From a key that is pressed to the first change of ``motor/servo_jp``, in words.
+def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
+    """From a key that is pressed to the first change of the handle, and of ``motor/servo_jp``.
 
     Parameters
     ----------
@@ -41,29 +43,37 @@ def input_latency(hand: Hand, inputs: int) -> str:
         Of the operator, who has Space down and the slave at rest before each.
     inputs
         How many.
+
+    Yields
+    ------
+    str
+        Each in words.
     """
     console = hand.console
-    took_ms: list[float] = []
-    while len(took_ms) < inputs:
+    took_ms: dict[str, list[float]] = {'master/measured_js': [], 'motor/servo_jp': []}
+    while min(map(len, took_ms.values())) < inputs:
         console.forget()
         hand.let_go()
         hand.hold('Space')
         console.passes(_STILL_S)
         if hand.moves:
             continue
-        key = 'ArrowLeft' if console.goals and console.goals[-1][0] > 0.0 else 'ArrowRight'
+        goals = console.motors.angles
+        key = 'ArrowLeft' if goals and goals[-1][0] > 0.0 else 'ArrowRight'
         at_ns = time.time_ns()
         hand.press(key)
         console.passes(_STILL_S)
-        changes = console.changes_ns()
-        if (changes > at_ns).any():
-            took_ms.append((int(changes[changes > at_ns][0]) - at_ns) * 1e-6)
+        first = [heard.first_change_ms(at_ns) for heard in (console.handle, console.motors)]
+        if not any(map(math.isnan, first)):
+            for took, ms in zip(took_ms.values(), first, strict=True):
+                took.append(ms)
     hand.let_go()
-    took_ms.sort()
-    return (
-        f'key to motor/servo_jp, {inputs} inputs: median {took_ms[inputs // 2]:.0f} ms, 99 % '
-        f'{took_ms[inputs * 99 // 100]:.0f} ms, load average {os.getloadavg()[0]:.1f}'
-    )
+    for topic, took in took_ms.items():
+        median, most = np.percentile(took, (50, 99))
+        yield (
+            f'key to {topic}, {inputs} inputs: median {median:.0f} ms, 99 % {most:.0f} ms, '
+            f'load average {os.getloadavg()[0]:.1f}'
+        )
 
 
 def costs(hand: Hand, seconds: float) -> Iterator[str]:
@@ -82,11 +92,14 @@ def costs(hand: Hand, seconds: float) -> Iterator[str]:
         Each figure in words.
     """
     console = hand.console
-    yield _cost(console, seconds, 'one page')
+    hand.take_controls()
+    yield _cost(console, seconds, 'one page that operates')
+    hand.give_back()
+    yield _cost(console, seconds, 'one page that looks on')
     with ExitStack() as stack:
         for _ in range(VIEWERS):
             _view(console, stack)
-        yield _cost(console, seconds, f'one page and {VIEWERS} viewers')
+        yield _cost(console, seconds, f'{VIEWERS + 1} pages that look on')
     frames = hand.tab.value(_FRAMES)
     yield f'page: {frames:.0f} animation frames/s, load average {os.getloadavg()[0]:.1f}'
 

@@ -149,11 +149,11 @@ def undergo(event: Event, hand: Hand, watched_s: float) -> Outcome:
     released_ns = console.released_ns(at_ns) or at_ns
     settled_ns = released_ns + round(1e9 * SETTLED_S)
     console.passes(SETTLED_S + watched_s)
-    changes = console.changes_ns()
+    changes = console.motors.changes_ns()
     before = changes[changes <= settled_ns]
     return Outcome(
         last_change_ms=(int(before[-1]) - at_ns) * 1e-6,
         clutch_ms=(released_ns - at_ns) * 1e-6,
-        crept=console.travel_since(settled_ns),
+        crept=console.motors.travel_since(settled_ns),
         load=os.getloadavg()[0],
     )

@@ -86,6 +86,12 @@ class Hand(ClosedOnExit):
         if client.state != 'ENABLED':
             client.ask('resume' if client.state == 'PAUSED' else 'enable')
 
+    def give_back(self) -> None:
+        """Look on only, from now on."""
+        self.let_go()
+        if self._seen(_MINE):
+            self._seen(f'{_CLAIM}.click()')
+
     def press(self, code: str) -> None:
         """Press a key and keep it down."""
         self.tab.key(code, True)
@@ -127,7 +133,7 @@ class Hand(ClosedOnExit):
         """Hold on until the slave is in motion, towards the middle or away from it."""
         last = time.monotonic() + PATIENCE_S
         while time.monotonic() < last:
-            goals = self.console.goals
+            goals = self.console.motors.angles
             outside = bool(goals) and goals[-1][0] > 0.0
             self.hold('Space', 'ArrowLeft' if outside else 'ArrowRight')
             end = time.monotonic() + _FOLLOWED_S
@@ -148,9 +154,9 @@ class Hand(ClosedOnExit):
         """Whether the clutch is held, and the newest goals of the shafts changed."""
         console = self.console
         console.client.hear()
-        changes = console.changes_ns()
+        changes = console.motors.changes_ns()
         held = bool(console.clutches) and console.clutches[-1][1]
-        fresh = bool(changes.size) and console.heard_ns[-1] - int(changes[-1]) < _MOVING_NS
+        fresh = bool(changes.size) and console.motors.at_ns[-1] - int(changes[-1]) < _MOVING_NS
         return held and fresh
 
     def close(self) -> None:

@@ -1,12 +1,13 @@
 """`endoscope console` with its graph, as a person starts it, and what its motors are told."""
 
+import math
 import os
 import signal
 import subprocess
 import sys
 import time
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -19,19 +20,76 @@ from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.joined_graph import joined_graph
 from endoscope_nodes.joint_stream import JointReader
-from endoscope_nodes.names import MASTER_CLUTCH, MOTOR_COMMAND, MOTORS
+from endoscope_nodes.names import (
+    JOINTS,
+    MASTER_CLUTCH,
+    MASTER_MEASURED,
+    MOTOR_COMMAND,
+    MOTORS,
+)
 from endoscope_nodes.qos import EVENT, profile
 from endoscope_nodes.topics import Qos
 
 PATIENCE_S = 150.0
 SAME_RAD = 1e-9
-"""Goals of a shaft that are nearer to each other are the same."""
+"""Angles that are nearer to each other are the same."""
 _COMMAND = (sys.executable, '-m', 'endoscope_bringup.cli', 'console', '--port', '0')
 _DEEP = profile(Qos(20_000, reliable=False))
 
 
 class ConsoleError(EndoscopeError, RuntimeError):
     """The program does not start, or what is waited for does not come."""
+
+
+class Heard:
+    """Angles of a topic as they came.
+
+    Parameters
+    ----------
+    names
+        The J joints or motors.
+
+    Attributes
+    ----------
+    at_ns
+        When each message was received, ns since the epoch.
+    angles
+        What it said, in rad, each of shape (J,).
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._reader = JointReader(names)
+        self.at_ns: list[int] = []
+        self.angles: list[tuple[float, ...]] = []
+
+    def take(self, data: bytes, received_ns: int) -> None:
+        """Take a message."""
+        self.angles.append(self._reader.read(data).position)
+        self.at_ns.append(received_ns)
+
+    def forget(self) -> None:
+        """Keep the last one only."""
+        del self.at_ns[:-1], self.angles[:-1]
+
+    def changes_ns(self) -> NDArray[np.int64]:
+        """When angles came that differ from the ones before, ns since the epoch, shape (N,)."""
+        if len(self.angles) < 2:
+            return np.empty(0, dtype=np.int64)
+        steps = np.abs(np.diff(self.angles, axis=0)).max(axis=1)
+        return np.asarray(self.at_ns[1:], dtype=np.int64)[steps > SAME_RAD]
+
+    def first_change_ms(self, since_ns: int) -> float:
+        """How long after a time in ns angles first changed, in ms; NaN where they did not."""
+        changes = self.changes_ns()
+        after = changes[changes > since_ns]
+        return (int(after[0]) - since_ns) * 1e-6 if after.size else math.nan
+
+    def travel_since(self, since_ns: int) -> float:
+        """How far an angle has been from the one in force at a time in ns, at most, rad."""
+        first = max(0, bisect_right(self.at_ns, since_ns) - 1)
+        if not self.angles:
+            return 0.0
+        return float(np.abs(np.subtract(self.angles[first:], self.angles[first])).max())
 
 
 class ServedConsole(ClosedOnExit):
@@ -54,8 +112,8 @@ class ServedConsole(ClosedOnExit):
         By which one operates, and looks on.
     client
         The node's side of the graph.
-    heard_ns, goals
-        When each command of the motors was received, and the angles of the shafts in rad.
+    handle, motors
+        Where the handle was said to be, and what the motors were told.
     clutches
         When the clutch was spoken of, and whether it was held.
     """
@@ -74,17 +132,16 @@ class ServedConsole(ClosedOnExit):
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )
-        self.heard_ns: list[int] = []
-        self.goals: list[tuple[float, ...]] = []
+        self.handle, self.motors = Heard(JOINTS), Heard(MOTORS)
         self.clutches: list[tuple[int, bool]] = []
-        self._reader = JointReader(MOTORS)
         self._stack = ExitStack()
         self._stack.callback(self._end)
         try:
             self._await_graph()
             # Another node in the namespace would pass for a graph that answers.
             self.client = self._stack.enter_context(joined_graph('looker_on', 'endoscope', domain))
-            self.client.listen(JointState, MOTOR_COMMAND, self._on_goal, qos=_DEEP)
+            for topic, heard in ((MASTER_MEASURED, self.handle), (MOTOR_COMMAND, self.motors)):
+                self.client.listen(JointState, topic, heard.take, qos=_DEEP)
             self.client.listen(Joy, MASTER_CLUTCH, self._on_clutch, qos=EVENT)
             operate, look_on = self.log.read_text().splitlines()[:2]
             self.address, _, self.token = operate.split()[-1].partition('/#token=')
@@ -111,17 +168,15 @@ class ServedConsole(ClosedOnExit):
         """At which the server listens."""
         return int(self.address.rpartition(':')[2])
 
-    def _on_goal(self, data: bytes, received_ns: int) -> None:
-        self.goals.append(self._reader.read(data).position)
-        self.heard_ns.append(received_ns)
-
     def _on_clutch(self, data: bytes, received_ns: int) -> None:
         self.clutches.append((received_ns, deserialize_message(data, Joy).buttons[0] == 1))
 
     def forget(self) -> None:
         """Keep only what is heard from now on, and the last before."""
         self.client.hear()
-        del self.heard_ns[:-1], self.goals[:-1], self.clutches[:-1]
+        self.handle.forget()
+        self.motors.forget()
+        del self.clutches[:-1]
 
     def passes(self, seconds: float) -> None:
         """Listen for so long."""
@@ -144,20 +199,6 @@ class ServedConsole(ClosedOnExit):
                     f'{what} does not come; {self.client.state} {self.client.why}; the console '
                     f'said {self.log.read_text()[-2000:]}'
                 )
-
-    def changes_ns(self) -> NDArray[np.int64]:
-        """When a goal came that differs from the one before, ns since the epoch, shape (N,)."""
-        if len(self.goals) < 2:
-            return np.empty(0, dtype=np.int64)
-        steps = np.abs(np.diff(self.goals, axis=0)).max(axis=1)
-        return np.asarray(self.heard_ns[1:], dtype=np.int64)[steps > SAME_RAD]
-
-    def travel_since(self, since_ns: int) -> float:
-        """How far a shaft's goal has been from the one in force then, at most, rad."""
-        first = max(0, bisect_right(self.heard_ns, since_ns) - 1)
-        if not self.goals:
-            return 0.0
-        return float(np.abs(np.subtract(self.goals[first:], self.goals[first])).max())
 
     def released_ns(self, since_ns: int) -> int | None:
         """When the clutch was first said to be free after a time; None where it was not."""
