@@ -1,5 +1,6 @@
 """The server of the console, operated by pages without a browser: what moves, and what does not."""
 
+import json
 import signal
 import time
 import urllib.request
@@ -14,7 +15,9 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Joy
 from short_bags import PLANT, one_joint, write_short_bag
 
+from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import EffectSpec, save_plant
+from endoscope_core.signals.command_file import write_command_file
 from endoscope_nodes.graph_client import GraphRefusedError
 from endoscope_nodes.names import CONSOLE_LOG, MASTER_CLUTCH, RECORDER_STOP
 from endoscope_nodes.qos import EVENT
@@ -339,6 +342,43 @@ def test_a_recording_is_explained_and_its_report_opens(rig):
             assert 'joint_stop' in answer.read().decode()
         refused = page.order('play', explanation=begun['explanation'])
         assert not refused['ok']
+
+
+def test_an_experiment_of_an_earlier_explanation_is_played_while_one_holds_on(rig):
+    earlier, broken = rig.folder / 'bags' / 'why-it-stops', rig.folder / 'bags' / 'why-not'
+    for folder in (earlier, broken):
+        folder.mkdir(parents=True)
+        (folder / REPORT_FILE).write_text('<p>rivals')
+    effects = [{'id': 'joint_stop', 'joint': 'bend_x'}]
+    result = {'verdict': 'missing_physics', 'effects': effects, 'next_experiment': {'why': ''}}
+    (earlier / 'report.json').write_text(json.dumps(result))
+    (broken / 'report.json').write_text('{"verdict"')
+    at = np.linspace(0.0, 4.0, 401)
+    bending = np.column_stack([0.2 * np.sin(at), np.zeros(at.size)])
+    write_command_file(earlier / EXPERIMENT_FILE, at, bending)
+    rig.restart()
+    with rig.page() as page:
+        ready(rig, page)
+        told = {each['bag']: each for each in page.state['explanations']}
+        assert 'why-not/report.json' in told['why-not']['error']
+        assert told['why-it-stops']['sentence'] == 'missing physics: joint_stop (bend_x)'
+        with urllib.request.urlopen(rig.server.address + told['why-it-stops']['report']) as answer:
+            assert answer.read() == b'<p>rivals'
+        answer = page.order('play', explanation=told['why-it-stops']['id'])
+        assert answer['ok'], answer
+        rig.until(lambda: page.state['playing'] is not None, 'the experiment')
+        assert rig.stands()
+        rig.wanted.clear()
+        while abs(moved(rig)[0]) < FAR:
+            engage(rig, page)
+            rig.passes(0.1)
+        page.does(pressed=False)
+        stopped(rig, page)
+        while page.state['playing'] is not None:
+            engage(rig, page)
+            rig.passes(0.1)
+        rig.until(lambda: rig.setting('console.source') == 'master', 'the end of it')
+        assert max(wanted[0] for wanted in rig.wanted) == pytest.approx(0.2, abs=0.02)
 
 
 def test_a_gamepad_on_the_topic_joy_obeys_the_same_rules(rig):

@@ -23,6 +23,7 @@ from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.plant_file import save_plant
 
 REPORT_FILE = 'report.html'
+_RESULT_FILE = 'report.json'
 EXPERIMENT_FILE = 'next_experiment.csv'
 _STEPS = 7
 """That `endoscope explain` names on the way, for two joints."""
@@ -62,6 +63,8 @@ class Explanation:
         Why nothing was; empty where something was.
     experiment
         Whether there is a motion that would tell more.
+    report
+        Path of its report's address; None where there is none.
     """
 
     id: str
@@ -74,13 +77,21 @@ class Explanation:
     sentence: str = ''
     error: str = ''
     experiment: bool = False
+    report: str | None = None
 
-    @property
-    def report(self) -> str | None:
-        """Path of the report's address; None where there is none."""
-        if self.running or not (self.folder / REPORT_FILE).is_file():
-            return None
-        return f'{REPORTS}{self.secret}/{REPORT_FILE}'
+    def ended(self, sentence: str = '') -> None:
+        """Take what was found from its folder, in words where the program has said none."""
+        self.running, self.step, self.progress = False, '', 1.0
+        try:
+            result = json.loads((self.folder / _RESULT_FILE).read_text('utf-8'))
+            self.sentence = sentence or _in_short(result)
+            planned = result['next_experiment'] is not None
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            self.error = f'{self.folder / _RESULT_FILE} is no result of an explanation: {error}'
+            return
+        self.experiment = planned and (self.folder / EXPERIMENT_FILE).is_file()
+        if (self.folder / REPORT_FILE).is_file():
+            self.report = f'{REPORTS}{self.secret}/{REPORT_FILE}'
 
     def as_mapping(self) -> dict[str, Any]:
         """What a page is told of it."""
@@ -103,12 +114,15 @@ class Explanations:
     Parameters
     ----------
     folder
-        Where recordings and plants are, and where explanations go.
+        Where recordings and plants are, and explanations: those that are there can be read again.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._all: dict[str, Explanation] = {}
+        found = sorted(folder.glob(f'*/{_RESULT_FILE}'), key=lambda file: file.stat().st_mtime)
+        for file in found:
+            self._new(file.parent.name, file.parent).ended()
         self._process: asyncio.subprocess.Process | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -180,17 +194,19 @@ class Explanations:
         if self._task is not None and not self._task.done():
             raise ExplanationRefusedError('another recording is being explained')
         name = f'why-{bag.removesuffix(".mcap")}-{time.strftime("%Y%m%d-%H%M%S")}'
-        one = Explanation(
-            f'e{len(self._all) + 1}', bag, self._folder / name, secrets.token_urlsafe(16)
-        )
+        one = self._new(bag, self._folder / name)
         words = [str(bags[bag]), '--out', str(one.folder), '--jobs', '1']
         for option, chosen in (('--baseline', baseline), ('--validate', validate)):
             words += [option, str(bags[chosen])] if chosen is not None else []
-        self._all[one.id] = one
         self._task = asyncio.get_running_loop().create_task(
             self._explain(one, words, None if plant is None else plants[plant])
         )
         return {'explanation': one.id}
+
+    def _new(self, bag: str, folder: Path) -> Explanation:
+        one = Explanation(f'e{len(self._all) + 1}', bag, folder, secrets.token_urlsafe(16))
+        self._all[one.id] = one
+        return one
 
     async def _explain(self, one: Explanation, words: list[str], plant: Path | None) -> None:
         with tempfile.TemporaryDirectory() as scratch:
@@ -211,15 +227,10 @@ class Explanations:
                 self._follow(one, self._process.stderr),  # type: ignore[arg-type]
             )
             status = await self._process.wait()
-        one.running = False
         if status:
-            one.error = one.error or one.step
-            return
-        one.sentence = said.decode(errors='replace').partition('\n')[0]
-        report = json.loads((one.folder / 'report.json').read_text('utf-8'))
-        planned = report['next_experiment'] is not None
-        one.experiment = planned and (one.folder / EXPERIMENT_FILE).is_file()
-        one.step, one.progress = '', 1.0
+            one.running, one.error = False, one.error or one.step
+        else:
+            one.ended(said.decode(errors='replace').partition('\n')[0])
 
     async def _follow(self, one: Explanation, lines: asyncio.StreamReader) -> None:
         """Take the steps that it names; the last line of one that fails says why."""
@@ -255,6 +266,12 @@ class Explanations:
         if late and self._process is not None:
             os.killpg(self._process.pid, signal.SIGKILL)
             await self._task
+
+
+def _in_short(result: Mapping[str, Any]) -> str:
+    """The verdict of a result, and what it names."""
+    effects = ', '.join(f'{effect["id"]} ({effect["joint"]})' for effect in result['effects'])
+    return result['verdict'].replace('_', ' ') + (f': {effects}' if effects else '')
 
 
 def _duration(path: Path) -> float | None:

@@ -38,7 +38,8 @@ export class Explain {
       card.querySelector('.open').dataset.report = e.report ?? '';
     });
     const newest = explanations.find((e) => e.report);
-    if (this._report === null && newest) this._open(newest.report);
+    // A report is large: it is fetched when it can be seen.
+    if (this._report === null && newest && $('report').checkVisibility()) this._open(newest.report);
   }
 
   async _look() {

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from endoscope_core.physics.plant_file import save_plant
-from endoscope_core.signals.command_file import write_command_file
+from endoscope_core.signals.command_file import JOINTS, write_command_file
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.report_mapping import EXPERIMENT_FILE, report_mapping
@@ -30,6 +30,9 @@ def write_report(case: ExplainedCase, folder: Path) -> None:
     save_plant(case.plant, folder / PLANT_YAML)
     if case.next_experiment is not None:
         experiment = case.next_experiment
-        write_command_file(
-            folder / EXPERIMENT_FILE, experiment.time, experiment.command, experiment.joints
-        )
+        columns = dict(zip(experiment.joints, zip(*experiment.command, strict=True), strict=True))
+        # A console plays all joints; one that was not recorded stays at zero.
+        joints = tuple(dict.fromkeys((*JOINTS, *experiment.joints)))
+        still = (0.0,) * len(experiment.time)
+        command = list(zip(*(columns.get(joint, still) for joint in joints), strict=True))
+        write_command_file(folder / EXPERIMENT_FILE, experiment.time, command, joints)
