@@ -7,6 +7,7 @@ import ipaddress
 import shlex
 import signal
 import socket
+import ssl
 import subprocess
 import sys
 import webbrowser
@@ -247,6 +248,17 @@ def _check_privacy(args: argparse.Namespace) -> None:
     for file in (args.certificate, args.key):
         if file is not None and not file.is_file():
             raise ServingError(f'{file}: no such file')
+    if args.certificate is not None:
+        try:
+            # A key that asks for a password would wait for one at the terminal.
+            ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(
+                args.certificate, args.key, password=''
+            )
+        except (ssl.SSLError, OSError) as error:
+            raise ServingError(
+                f'{args.certificate} and {args.key} are no certificate in PEM and its key without '
+                f'a password: {error}'
+            ) from error
     try:
         address = ipaddress.ip_address(args.host)
     except ValueError:
