@@ -42,7 +42,7 @@ from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
 _PATIENCE_S = 10.0
 _PLACE_S = 5.0
 _LOOK_S = 0.05
-# Until the supervisor knows that a sender of the handle has gone.
+# Until all nodes know that a sender of the handle has gone.
 _SETTLED_S = 0.2
 _SILENCED_S = 2.0
 _WAITING_ORDERS = 16
@@ -323,6 +323,8 @@ class Operations:
             if others:
                 await self._ask(partial(self._set_console, source=settings.source))
                 raise OrderRefusedError(f'{" and ".join(others)} goes on speaking for the handle')
+            # A session that begins while a node still knows of the old sender ends as a fault.
+            await asyncio.sleep(_SETTLED_S)
         self._given_back = settings.source
         graph.settings = Settings(FOLLOW_THE_HANDLE, settings.scale)
         self._speaks = True

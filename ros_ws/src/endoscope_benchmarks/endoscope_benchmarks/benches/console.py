@@ -53,7 +53,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print a row for each event and a line for each other figure; 1 if something crept."""
-    from endoscope_benchmarks.console_trials.costs import costs, input_latency
+    from endoscope_benchmarks.console_trials.costs import (
+        costs_of_viewers,
+        costs_with_browser,
+        input_latency,
+    )
     from endoscope_benchmarks.console_trials.events import EVENTS, undergo
     from endoscope_benchmarks.console_trials.hand import Hand
     from endoscope_benchmarks.console_trials.relay import Relay
@@ -81,8 +85,9 @@ def run(args: argparse.Namespace) -> int:
         ) as console,
     ):
         network.target = console.port
+        costs = list(costs_of_viewers(console, args.seconds)) if args.seconds else []
         with Hand(console, network) as hand:
-            for name in names:
+            for name in names if args.repetitions else ():
                 outcomes = []
                 for _ in range(args.repetitions):
                     outcomes.append(undergo(EVENTS[name], hand, 0.3))
@@ -94,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
                 for line in input_latency(hand, args.inputs):
                     print(line, flush=True)
             if args.seconds:
-                for line in costs(hand, args.seconds):
+                for line in (*costs, *costs_with_browser(hand, args.seconds)):
                     print(line, flush=True)
     return 1 if crept else 0
 

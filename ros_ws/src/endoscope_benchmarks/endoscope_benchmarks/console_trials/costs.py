@@ -76,8 +76,30 @@ def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
         )
 
 
-def costs(hand: Hand, seconds: float) -> Iterator[str]:
-    """CPU time of the server and ticks of the graph, without and with viewers; frames of the page.
+def costs_of_viewers(console: ServedConsole, seconds: float) -> Iterator[str]:
+    """CPU time of the server and ticks of the graph, while no browser runs on the machine.
+
+    Parameters
+    ----------
+    console
+        That nobody operates.
+    seconds
+        Of each figure.
+
+    Yields
+    ------
+    str
+        Each figure in words.
+    """
+    yield _cost(console, seconds, 'nobody looks on')
+    with ExitStack() as stack:
+        for _ in range(VIEWERS):
+            _view(console, stack)
+        yield _cost(console, seconds, f'{VIEWERS} pages look on')
+
+
+def costs_with_browser(hand: Hand, seconds: float) -> Iterator[str]:
+    """CPU time of the server, ticks of the graph and frames of a page beside the browser.
 
     Parameters
     ----------
@@ -93,13 +115,9 @@ def costs(hand: Hand, seconds: float) -> Iterator[str]:
     """
     console = hand.console
     hand.take_controls()
-    yield _cost(console, seconds, 'one page that operates')
+    yield _cost(console, seconds, 'the browser operates')
     hand.give_back()
-    yield _cost(console, seconds, 'one page that looks on')
-    with ExitStack() as stack:
-        for _ in range(VIEWERS):
-            _view(console, stack)
-        yield _cost(console, seconds, f'{VIEWERS + 1} pages that look on')
+    yield _cost(console, seconds, 'the browser looks on')
     frames = hand.tab.value(_FRAMES)
     yield f'page: {frames:.0f} animation frames/s, load average {os.getloadavg()[0]:.1f}'
 
