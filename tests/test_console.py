@@ -380,7 +380,7 @@ def test_an_experiment_of_an_earlier_explanation_is_played_while_one_holds_on(ri
             engage(rig, page)
             rig.passes(0.1)
         rig.until(lambda: rig.setting('console.source') == 'master', 'the end of it')
-        assert max(wanted[0] for wanted in rig.wanted) == pytest.approx(0.2, abs=0.02)
+        assert rig.wanted[-1] == pytest.approx(bending[-1], abs=0.005)
 
 
 def test_a_gamepad_on_the_topic_joy_obeys_the_same_rules(rig):
