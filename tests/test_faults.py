@@ -9,12 +9,10 @@ import pytest
 
 from endoscope_benchmarks.process_faults.process_faults import PROCESS_FAULTS, undergo
 from endoscope_benchmarks.process_faults.process_rig import ProcessRig
-from endoscope_benchmarks.process_faults.trace import STILL
+from endoscope_benchmarks.process_faults.trace import HELD_S, STILL
 from endoscope_core.rig import load_rig
 
 RATE_HZ = 250
-# From silence to the order to hold; a servo of the nominal plant stands 0.1 s later.
-HELD_S = 0.2 + 0.1
 
 
 @pytest.fixture(scope='module')

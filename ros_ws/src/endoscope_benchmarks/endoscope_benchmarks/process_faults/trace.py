@@ -12,9 +12,14 @@ from endoscope_nodes.joint_stream import JointSample
 STILL = 2.0 * 2.0 * np.pi / 4096
 """Two counts of the encoder, in rad: what readings of a shaft at rest may differ by."""
 
+HELD_S = 0.2 + 0.1
+"""From silence to the order to hold, and to a servo of the nominal plant that stands.
+
+It is told to hold a pose that was measured while it ran, overshoots it and comes back.
+"""
+
 # The slowest motion of the bench leaves STILL within this, its reversals included.
 _WINDOW_NS = 300_000_000
-_HOLD_NS = 200_000_000
 _STREAM_NS = 100_000_000
 _SPEED_NS = 10_000_000
 
@@ -97,7 +102,7 @@ class ShaftTrace:
         tuple
             Seconds from ``since_ns`` to the first reading from which on the shafts stayed for 0.3
             s, None if they never did; and the largest distance in rad that they went until the
-            enable once they had come to rest and no session had been open for 0.2 s.
+            enable once they had come to rest and no session had been open for `HELD_S`.
         """
         inside = (self._stamps >= since_ns) & (self._stamps < until_ns)
         stamps, angles = self._stamps[inside], self._angles[inside]
@@ -107,7 +112,7 @@ class ShaftTrace:
                 break
             if np.abs(angles[k:end] - angles[k]).max() <= STILL:
                 # Within an open session a hand that was not heard for a while may go on.
-                closed = max(k, int(np.searchsorted(stamps, open_ns + _HOLD_NS)))
+                closed = max(k, int(np.searchsorted(stamps, open_ns + HELD_S * 1e9)))
                 gone = np.abs(angles[closed:] - angles[closed : closed + 1]).max(initial=0.0)
                 return float(stamps[k] - since_ns) * 1e-9, float(gone)
         return None, 0.0
