@@ -21,6 +21,7 @@ VIEWERS = 4
 _STILL_S = 0.3
 _SEEN_S = 2.0
 _DIAGNOSTICS_S = 1.5
+_PAINTED = "performance.getEntriesByName('first-contentful-paint')[0]?.startTime"
 _FRAMES = """new Promise((done) => {
   const begin = performance.now();
   let frames = 0;
@@ -32,6 +33,26 @@ _FRAMES = """new Promise((done) => {
   };
   requestAnimationFrame(count);
 })"""
+
+
+def first_motion(hand: Hand, began_s: float) -> str:
+    """How long it takes from the start of the program to a slave in motion, in words.
+
+    Parameters
+    ----------
+    hand
+        Whose browser was started when all nodes were heard.
+    began_s
+        When the program was started, by the monotonic clock.
+    """
+    hand.move()
+    took_s = time.monotonic() - began_s
+    painted_ms = hand.tab.value(_PAINTED)
+    hand.let_go()
+    return (
+        f'from the start of the program, and of a browser when its graph runs, to a slave in '
+        f'motion {took_s:.1f} s; first paint of the page {painted_ms:.0f} ms'
+    )
 
 
 def input_latency(hand: Hand, inputs: int) -> Iterator[str]:

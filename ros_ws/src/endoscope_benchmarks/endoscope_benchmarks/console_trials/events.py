@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from endoscope_benchmarks.console_trials.hand import Hand
 
-SETTLED_S = 1.0
-"""After the word on the clutch: what moves within it is still counted to the motion."""
 _TRIES = 20
 _RELEASED_S = 10.0
 
@@ -41,7 +39,7 @@ class Outcome:
     clutch_ms
         From the event to the word that the clutch is free.
     crept
-        How far a shaft's goal went in the time watched after both, rad.
+        How far a shaft's goal went in the time watched, rad.
     load
         Load average of the machine.
     """
@@ -117,7 +115,7 @@ EVENTS = {
 """By what a bystander would say of them."""
 
 
-def undergo(event: Event, hand: Hand, watched_s: float) -> Outcome:
+def undergo(event: Event, hand: Hand, settled_s: float, watched_s: float) -> Outcome:
     """Let something happen to an operator who holds the slave in motion.
 
     Parameters
@@ -126,8 +124,10 @@ def undergo(event: Event, hand: Hand, watched_s: float) -> Outcome:
         That happens.
     hand
         Of the operator.
+    settled_s
+        After the word on the clutch: what moves within it still counts to the motion.
     watched_s
-        For how long the motors are watched after their last change, s.
+        For how long the motors are watched after that.
 
     Raises
     ------
@@ -147,8 +147,8 @@ def undergo(event: Event, hand: Hand, watched_s: float) -> Outcome:
         lambda: console.released_ns(at_ns) is not None, 'a clutch that is free', _RELEASED_S
     )
     released_ns = console.released_ns(at_ns) or at_ns
-    settled_ns = released_ns + round(1e9 * SETTLED_S)
-    console.passes(SETTLED_S + watched_s)
+    settled_ns = released_ns + round(1e9 * settled_s)
+    console.passes(settled_s + watched_s)
     changes = console.motors.changes_ns()
     before = changes[changes <= settled_ns]
     return Outcome(
