@@ -85,6 +85,40 @@ def test_a_result_that_was_there_before_is_not_taken(graph):
     assert second.stamp_ns - float(second.values['duration']) * 1e9 >= first.stamp_ns
 
 
+class Unheard(GraphClient):
+    """A client whose orders are lost on the way, beside whose waiting something happens once."""
+
+    def __init__(self, graph, happens):
+        super().__init__(graph.probe, self._live, lambda: graph.conductor.now_ns * 1e-9)
+        self._graph = graph
+        self._happens = happens
+        self.given = []
+
+    def order(self, command):
+        self.given.append(command)
+
+    def _live(self, seconds):
+        if self.given and self._happens is not None:
+            happens, self._happens = self._happens, None
+            happens()
+        self._graph.advance(seconds)
+
+
+@pytest.mark.parametrize(
+    ('happens', 'withdrawn', 'said'),
+    [('disable', False, 'DISABLED instead of ENABLED'), ('pause', True, 'resume was withdrawn')],
+)
+def test_an_order_to_move_is_not_given_again_after_what_ended_motion(
+    graph, happens, withdrawn, said
+):
+    graph.command('pause')
+    with Unheard(graph, lambda: graph.command(happens)) as asker:
+        asker.wait_for(lambda: asker.state == 'PAUSED', 'the pause')
+        with pytest.raises(GraphRefusedError, match=said):
+            asker.ask_and_see('resume', 5.0, lambda: withdrawn and bool(asker.given))
+        assert asker.given == ['resume']
+
+
 @pytest.mark.parametrize('given', ['abc', '-1', '233'])
 def test_a_domain_that_cannot_be_is_refused(monkeypatch, given):
     monkeypatch.setenv('ROS_DOMAIN_ID', given)

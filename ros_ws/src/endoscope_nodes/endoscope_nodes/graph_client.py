@@ -40,6 +40,7 @@ SUPERVISOR = 'supervisor: operating state'
 PROCEDURE = 'calibration: procedure'
 CONSOLE = 'console: commands'
 _OPENS = {'enable': 'ENABLED', 'resume': 'ENABLED', 'disable': 'DISABLED', 'pause': 'PAUSED'}
+_TO_MOTION = ('enable', 'resume', 'home')
 # What was refused is told at once; the same words a second later are an old story.
 _JUST_NOW_S = 0.1
 _REPEATED_AFTER_S = 1.0
@@ -186,11 +187,13 @@ class GraphClient(ClosedOnExit):
 
     def _on_result(self, data: bytes, received_ns: int) -> None:
         message = deserialize_message(data, DiagnosticArray)
-        self.calibration = _health(message, message.status[0], received_ns)
+        if message.status:
+            self.calibration = _health(message, message.status[0], received_ns)
 
     def _on_model(self, data: bytes, received_ns: int) -> None:
         message = deserialize_message(data, DiagnosticArray)
-        self.compensator = _health(message, message.status[0], received_ns)
+        if message.status:
+            self.compensator = _health(message, message.status[0], received_ns)
 
     @property
     def why(self) -> str:
@@ -261,8 +264,15 @@ class GraphClient(ClosedOnExit):
         """Give a state command and wait for nothing."""
         self._orders.publish(String(data=command))
 
-    def ask(self, command: str, patience_s: float = PATIENCE_S) -> str:
+    def ask(
+        self,
+        command: str,
+        patience_s: float = PATIENCE_S,
+        withdrawn: Callable[[], bool] = lambda: False,
+    ) -> str:
         """Give a state command and wait for the state that it leads to; that state.
+
+        Parameters are those of :meth:`ask_and_see`.
 
         Raises
         ------
@@ -276,28 +286,56 @@ class GraphClient(ClosedOnExit):
             lambda: self.state == target and self.state_ns > asked_ns,
             target,
             patience_s,
+            withdrawn,
         )
         return target
 
-    def ask_and_see(self, command: str, patience_s: float = PATIENCE_S) -> str:
+    def ask_and_see(
+        self,
+        command: str,
+        patience_s: float = PATIENCE_S,
+        withdrawn: Callable[[], bool] = lambda: False,
+    ) -> str:
         """Give a state command, and see whether the state lasts; that state.
+
+        Parameters
+        ----------
+        command
+            Of the supervisor.
+        patience_s
+            For how long to wait.
+        withdrawn
+            Whether it is not wanted any more, so that it is not given again.
 
         Raises
         ------
         GraphRefusedError
             As of :meth:`ask`, or because a node's trouble came to light at once; with its cause.
         """
-        state = self.ask(command, patience_s)
+        state = self.ask(command, patience_s, withdrawn)
         if state == 'ENABLED' and self.wait_until(lambda: self.state != state, _STEADY_S):
             self.wait_until(lambda: bool(self.why), patience_s)
             raise GraphRefusedError(f'{self.state}: {self.why}')
         return state
 
-    def _ask(self, command: str, done: Callable[[], bool], what: str, patience_s: float) -> None:
+    def _ask(
+        self,
+        command: str,
+        done: Callable[[], bool],
+        what: str,
+        patience_s: float,
+        withdrawn: Callable[[], bool],
+    ) -> None:
         """Give a command, again where it brought no answer, until it is done."""
         asked_ns = time.time_ns()
+        begun_in = self.state
         end = self._clock() + patience_s
         while self._clock() <= end:
+            if withdrawn():
+                raise GraphRefusedError(f'{command} was withdrawn before it was answered')
+            if command in _TO_MOTION and begun_in and self.state != begun_in:
+                # What has ended motion meanwhile must not be undone by an order from before it.
+                raise GraphRefusedError(f'{self.state} instead of {what}: {self.why or "no cause"}')
             self.order(command)
             if self.wait_until(lambda: done() or bool(self._refused(asked_ns)), _REPEATED_AFTER_S):
                 refused = self._refused(asked_ns)
@@ -320,8 +358,12 @@ class GraphClient(ClosedOnExit):
                 return words
         return ''
 
-    def home(self, patience_s: float = PATIENCE_S) -> str:
+    def home(
+        self, patience_s: float = PATIENCE_S, withdrawn: Callable[[], bool] = lambda: False
+    ) -> str:
         """Go home, and wait until the slave is there; what calibration says of it.
+
+        Parameters are those of :meth:`ask_and_see`.
 
         Raises
         ------
@@ -335,6 +377,7 @@ class GraphClient(ClosedOnExit):
             lambda: self._begun(asked_ns),
             'the way home: calibration does not begin it',
             patience_s,
+            withdrawn,
         )
         said = self._procedure_to_its_end(patience_s)
         if said != HOME_REACHED:
