@@ -4,7 +4,7 @@ import json
 import signal
 import time
 import urllib.request
-from contextlib import suppress
+from contextlib import closing, suppress
 
 import numpy as np
 import pytest
@@ -19,6 +19,8 @@ from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import EffectSpec, save_plant
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_nodes.graph_client import GraphRefusedError
+from endoscope_nodes.handle_sender import HandleSender
+from endoscope_nodes.joined_graph import joined_graph
 from endoscope_nodes.names import CONSOLE_LOG, MASTER_CLUTCH, RECORDER_STOP
 from endoscope_nodes.qos import EVENT
 from endoscope_nodes.topics import RECORDED
@@ -228,8 +230,34 @@ def test_a_viewer_looks_on(rig):
             refused = page.order(order, **fields)
             assert not refused['ok']
             assert 'viewer' in refused['why']
+        with rig.page() as other:
+            other.order('claim')
+            rig.until(lambda: any(one['operator'] == other.you for one in rig.orders))
+        assert not any(one['operator'] == page.you for one in rig.orders), 'it fills no recording'
         rig.until(lambda: page.pictures > 3)
         assert rig.client.state == 'DISABLED'
+
+
+def test_nothing_moves_by_itself_under_a_hand_that_holds(rig):
+    with rig.page() as page:
+        follows(rig, page)
+        while (refused := page.order('calibrate'))['ok'] or 'let go' not in refused['why']:
+            ready(rig, page)
+            engage(rig, page)
+        page.does(pressed=False)
+
+
+def test_another_server_of_a_page_at_the_handle_is_another_sender(rig):
+    with (
+        joined_graph('console_web', 'endoscope', rig.domain) as another,
+        closing(HandleSender(another.node)),
+        rig.page() as page,
+    ):
+        rig.until(lambda: rig.handle_senders() == ['console_web'], 'the other one')
+        # A server of which nobody knows yet cannot be refused.
+        rig.passes(1.0)
+        said = 'console_web speaks for the handle already'
+        rig.until(lambda: said in page.order('claim')['why'], said)
 
 
 @pytest.mark.parametrize('order', [('calibrate', {}), ('state', {'command': 'home'})])
@@ -380,6 +408,8 @@ def test_an_experiment_of_an_earlier_explanation_is_played_while_one_holds_on(ri
             engage(rig, page)
             rig.passes(0.1)
         rig.until(lambda: rig.setting('console.source') == 'master', 'the end of it')
+        assert not rig.setting('console.hold_to_play')
+        assert rig.setting('console.command_file') == ''
         assert rig.wanted[-1] == pytest.approx(bending[-1], abs=0.005)
 
 

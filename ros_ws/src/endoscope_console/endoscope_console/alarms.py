@@ -4,6 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from endoscope_core.errors import EndoscopeError
+
+
+class AlarmStandsError(EndoscopeError):
+    """An alarm cannot be acknowledged; the message says why."""
+
 
 class Level(StrEnum):
     """How urgent an alarm is, by the priorities of IEC 60601-1-8; conformity is not claimed."""
@@ -55,12 +61,16 @@ class Alarms:
         order = list(Level)
         return tuple(sorted(shown.values(), key=lambda a: (order.index(a.level), a.id)))
 
-    def acknowledge(self, name: str) -> str:
-        """Take note that an alarm was seen, which ends it where its cause has gone; the answer."""
-        alarm = self._kept.get(name)
-        if alarm is None:
-            return 'there is nothing to acknowledge'
+    def acknowledge(self, name: str) -> None:
+        """Take note that an alarm was seen, which ends it.
+
+        Raises
+        ------
+        AlarmStandsError
+            Its cause is still present, or there is none.
+        """
+        if name not in self._kept:
+            raise AlarmStandsError('there is nothing to acknowledge')
         if name in self._present:
-            return f'still present: {self._present[name].text}'
+            raise AlarmStandsError(f'still present: {self._present[name].text}')
         del self._kept[name]
-        return ''

@@ -25,39 +25,20 @@ _UNTIL_STOPPED_S = 2.0
 
 
 @dataclass(frozen=True)
-class Situation:
+class Situation(Conditions):
     """What the graph and the lease are like, as the other threads last said.
 
     Attributes
     ----------
-    holder
-        Client that holds the lease; empty for nobody.
     speaks
         Whether the handle's place is free and its own: only then it is a sender.
-    enabled, heard_ns
-        Whether the operating state is ``ENABLED``, and when it was heard.
-    calibrating
-        Whether a calibration or a way home has the slave.
-    source
-        Of the commands of the console.
-    pictures
-        Number of each of the last pictures and when it was made, shape (N, 2).
-    playing
-        Whether the console plays a motion that goes on only while the clutch is held.
     wanted, wanted_ns
         Angles in rad that the console asks of the slave, shape (J,), and when they were heard.
     scale
         Slave motion for one radian of the handle.
     """
 
-    holder: str = ''
     speaks: bool = False
-    enabled: bool = False
-    heard_ns: int = 0
-    calibrating: bool = False
-    source: str = ''
-    pictures: tuple[tuple[int, int], ...] = ()
-    playing: bool = False
     wanted: tuple[float, ...] | None = None
     wanted_ns: int = 0
     scale: float = 1.0
@@ -71,8 +52,6 @@ class Said:
     ----------
     state, reason, missing
         See :class:`OperatorDeadMan`.
-    since_ns
-        Since when it is in that state.
     counts
         How often each reason has ended a grip.
     speaks
@@ -82,7 +61,6 @@ class Said:
     state: DeadManState = DeadManState.OPEN
     reason: Reason | None = None
     missing: Reason | None = Reason.LOST
-    since_ns: int = 0
     counts: dict[str, int] = field(default_factory=dict)
     speaks: bool = False
 
@@ -173,9 +151,9 @@ class Beat:
                 dead_man.refuse(what, client)
         # Read only now: a frame may tell of a picture that was not there before it was heard.
         situation = self.situation
-        dead_man.turn(now_ns, _conditions(situation, now_ns))
+        dead_man.turn(now_ns, situation)
         self._speak(now_ns, situation)
-        self._say(now_ns)
+        self._say()
 
     def _speak(self, now_ns: int, situation: Situation) -> None:
         """Say where the handle is and whether its clutch is held, while that is this one's part."""
@@ -194,7 +172,8 @@ class Beat:
         fresh = situation.wanted_ns > max(self._engaged_ns, now_ns - _WANTED_NS)
         position = self._handle.follow(
             now_ns,
-            self._dead_man.frame if engaged else None,
+            # What plays meanwhile is not moved by the hand that lets it play.
+            self._dead_man.frame if engaged and not situation.playing else None,
             situation.wanted if fresh else None,
             situation.scale,
         )
@@ -211,29 +190,15 @@ class Beat:
             self._sender.close()
             self._sender = None
 
-    def _say(self, now_ns: int) -> None:
+    def _say(self) -> None:
         dead_man, said = self._dead_man, self.said
         now = (dead_man.state, dead_man.reason, dead_man.missing, self._sender is not None)
         if now == (said.state, said.reason, said.missing, said.speaks):
             return
-        since_ns = said.since_ns if said.state is dead_man.state else now_ns
         self.said = Said(
             dead_man.state,
             dead_man.reason,
             dead_man.missing,
-            since_ns,
             {str(reason): count for reason, count in dead_man.counts.items()},
             self._sender is not None,
         )
-
-
-def _conditions(situation: Situation, now_ns: int) -> Conditions:
-    return Conditions(
-        holder=situation.holder,
-        state_enabled=situation.enabled,
-        state_age_ns=now_ns - situation.heard_ns,
-        calibrating=situation.calibrating,
-        source=situation.source,
-        pictures=situation.pictures,
-        playing=situation.playing,
-    )

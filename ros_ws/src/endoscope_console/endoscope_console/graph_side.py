@@ -166,9 +166,11 @@ class GraphSide:
         return self.settings.source in PLAYS and (said is None or said.message != 'finished')
 
     def others_at_the_handle(self) -> list[str]:
-        """Names of other nodes that speak for the handle."""
-        node = self.client.node
-        return [name for name in handle_senders(node) if name != node.get_name()]
+        """Names of nodes that speak for the handle while this one does not.
+
+        Another server of a page has the same name.
+        """
+        return handle_senders(self.client.node)
 
     def log(self, order: str, operator: str, address: str, ok: bool, why: str) -> None:
         """Say in the graph what was asked for and what became of it."""

@@ -41,6 +41,7 @@ class JoyHand:
         self._graph = graph
         self._pressed_ns = 0
         self._claiming = False
+        self._claimed = 0
 
     @property
     def connected(self) -> bool:
@@ -63,7 +64,10 @@ class JoyHand:
                 continue
             if frame.pressed:
                 self._pressed_ns = arrived_ns
-                if not self._operations.lease.holder and not self._claiming:
+                free = not self._operations.lease.holder and not self._claiming
+                # Who was refused, or has lost it, asks with a new grip.
+                if free and frame.grip != self._claimed:
+                    self._claimed = frame.grip
                     self._claim()
             holds = self._operations.lease.holder == self._client.id
             if holds:
@@ -73,7 +77,7 @@ class JoyHand:
                 self._graph.log('state pause', self._client.id, self._client.address, True, '')
         idle = now_ns - self._pressed_ns > _LET_GO_NS
         if idle and not self._claiming and self._operations.lease.holder == self._client.id:
-            self._operations.closed(self._client)
+            self._operations.closed(self._client, 'nobody has held on for 10 s')
 
     def _claim(self) -> None:
         self._claiming = True

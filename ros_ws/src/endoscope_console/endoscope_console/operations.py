@@ -16,6 +16,7 @@ from endoscope_console.clients import Client, Clients
 from endoscope_console.explanations import Explanations
 from endoscope_console.graph_side import GraphSide, Settings
 from endoscope_console.orders import (
+    HALTS,
     Acknowledge,
     Bags,
     Calibrate,
@@ -59,17 +60,22 @@ class OrderRefusedError(EndoscopeError):
 
 @dataclass
 class _Holder:
-    """What the holder of the lease has begun."""
+    """What the holder of the lease has begun, and whether its end is still waited for."""
 
     client: Client | None = None
     moves: str = ''
+    waits: bool = False
 
 
 @dataclass
 class _Played:
-    """An experiment that the console plays while the operator holds on."""
+    """An experiment that the console plays while the operator holds on.
+
+    `before` is what the console was set to for a file of its own.
+    """
 
     begun_ns: int
+    before: Mapping[str, Any]
     ends: bool = False
 
 
@@ -103,6 +109,8 @@ class Operations:
         self._played: _Played | None = None
         self._holder = _Holder()
         self._taken_ns = -_TAKEN_NS
+        self._halts = 0
+        self._closing = False
         self._tasks: set[asyncio.Task[None]] = set()
 
     def lease_was_taken(self, now_ns: int) -> bool:
@@ -127,12 +135,12 @@ class Operations:
         self.counts[f'refused: {reason}'] += 1
         self.beat.refuse(client.id, reason, now_ns)
 
-    def closed(self, client: Client) -> None:
-        """Take note that a client is gone."""
+    def closed(self, client: Client, why: str = 'its page was closed') -> None:
+        """Take note that a client is gone, and why."""
         self.beat.refuse(client.id, Reason.CLOSED, time.monotonic_ns())
         if client.id == self.lease.holder:
-            self.lease.closed(client.id)
-            self._lease_ended(client, 'its page was closed')
+            self.lease.release(client.id)
+            self._lease_ended(client, why)
 
     def turn(self, now_ns: int) -> None:
         """End a silent lease, and tell the beat how things are; at a steady time in ns."""
@@ -141,6 +149,8 @@ class Operations:
             why = 'its page was silent for 2 s'
             self._holder.client.tell({'op': 'lost', 'by': '', 'why': why})
             self._lease_ended(self._holder.client, why)
+        if self._holder.moves and not self._holder.waits and not self.graph.calibrating:
+            self._holder.moves = ''
         played = self._played
         if played is not None and not played.ends and self._is_over(played):
             played.ends = True
@@ -158,8 +168,8 @@ class Operations:
         self.beat.situation = Situation(
             holder=self.lease.holder,
             speaks=self._speaks and bool(self.lease.holder),
-            enabled=graph.client.state == 'ENABLED',
-            heard_ns=graph.heard_ns,
+            state_enabled=graph.client.state == 'ENABLED',
+            state_ns=graph.heard_ns,
             calibrating=graph.calibrating,
             source=graph.settings.source if self._speaks else '',
             pictures=pictures.made,
@@ -183,7 +193,8 @@ class Operations:
         except EndoscopeError as error:
             why, ok = str(error), False
             self.counts['refused: orders'] += 1
-        if not isinstance(order, Bags):
+        # A viewer could fill the recording with what is refused anyhow.
+        if client.role == OPERATOR and not isinstance(order, Bags):
             self.graph.log(in_words(order), client.id, client.address, ok, why)
         return {'op': 'answer', 'id': order.id, 'ok': ok, 'why': why, **answer}
 
@@ -203,16 +214,17 @@ class Operations:
             case Release():
                 return self._release(client)
             case State():
-                return await self._state(client, order.command)
+                return await self._state(order.command)
             case Calibrate():
-                return await self._moving(client, 'calibration', self._calibrate)
+                return await self._moving('calibration', self._calibrate)
             case Set():
                 return await self._set(order)
             case Record():
                 service = RECORDER_START if order.on else RECORDER_STOP
                 return await self._ask(partial(self.graph.client.trigger, service, _PATIENCE_S))
             case Acknowledge():
-                return self.alarms.acknowledge(order.alarm)
+                self.alarms.acknowledge(order.alarm)
+                return ''
             case Bags():
                 return await self._ask(self.explanations.listing)
             case Explain():
@@ -222,7 +234,7 @@ class Operations:
             case Cancel():
                 return await self.explanations.cancel(order.explanation)
             case Play():
-                return await self._play(order.explanation)
+                return await self._play(client, order.explanation)
 
     async def _ask[T](self, ask: Callable[[], T]) -> T:
         """Wait for the graph in a thread of the pool: the sockets go on meanwhile."""
@@ -238,6 +250,8 @@ class Operations:
         GraphRefusedError
             The console node does not follow a handle.
         """
+        if self._closing:
+            raise OrderRefusedError('the server of the page ends')
         claim = self.lease.claim(client.id, take, time.monotonic_ns())
         if not claim.granted:
             raise OrderRefusedError(claim.why)
@@ -250,7 +264,7 @@ class Operations:
             try:
                 if not self._speaks:
                     await self._take_the_place(take)
-            except EndoscopeError:
+            except BaseException:
                 if self.lease.holder == client.id:
                     self.lease.release(client.id)
                     self._holder = _Holder()
@@ -265,7 +279,7 @@ class Operations:
     def _lost(self, holder: str, to: Client) -> None:
         """Tell an operator that another took the lease."""
         self._taken_ns = time.monotonic_ns()
-        self._end_what_moves()
+        self._end_what_moves(holder)
         lost = self.clients.by_id(holder)
         if lost is not None:
             lost.tell({'op': 'lost', 'by': to.label, 'why': f'{to.label} took the controls'})
@@ -278,15 +292,18 @@ class Operations:
         return ''
 
     def _lease_ended(self, client: Client, why: str) -> None:
-        self._end_what_moves()
+        self._end_what_moves(client.id)
         self._holder = _Holder()
         self._tell_beat()
         self.graph.log('lease', client.id, client.address, True, f'ended: {why}')
         self.soon(self._give_back())
 
-    def _end_what_moves(self) -> None:
-        """Let nothing that an operator has begun go on without him."""
-        if self._holder.moves and self.graph.client.state == 'ENABLED':
+    def _end_what_moves(self, holder: str) -> None:
+        """Let nothing that an operator has begun or asked for go on without him."""
+        self._halts += 1
+        # He may hold the lease again before the next beat looks.
+        self.beat.refuse(holder, Reason.LOST, time.monotonic_ns())
+        if self._holder.moves:
             self.graph.client.order('pause')
         if self._played is not None:
             # The next operator's hand is no hand for what this one had played.
@@ -321,7 +338,7 @@ class Operations:
                 await asyncio.sleep(_LOOK_S)
             others = graph.others_at_the_handle()
             if others:
-                await self._ask(partial(self._set_console, source=settings.source))
+                await self._set_source_back(settings.source)
                 raise OrderRefusedError(f'{" and ".join(others)} goes on speaking for the handle')
             # A session that begins while a node still knows of the old sender ends as a fault.
             await asyncio.sleep(_SETTLED_S)
@@ -330,12 +347,13 @@ class Operations:
         self._speaks = True
 
     def _read_settings(self) -> Settings:
+        return Settings(**self._read_console('source', 'scale'))
+
+    def _read_console(self, *names: str) -> dict[str, Any]:
         client = self.graph.client
-        source, scale = (
-            read_parameter(client, f'console.{name}', _PATIENCE_S).value
-            for name in ('source', 'scale')
-        )
-        return Settings(source, scale)
+        return {
+            name: read_parameter(client, f'console.{name}', _PATIENCE_S).value for name in names
+        }
 
     def _set_console(self, **values: Any) -> None:
         set_parameters(self.graph.client, 'console', values, _PATIENCE_S)
@@ -353,36 +371,54 @@ class Operations:
             await asyncio.sleep(_SETTLED_S)
             source, self._given_back = self._given_back or FOLLOW_THE_HANDLE, None
             try:
-                if source in PLAYS and self.graph.client.state == 'ENABLED':
-                    # It would begin anew with nobody looking.
-                    await self._ask(partial(self.graph.client.ask, 'pause', _PATIENCE_S))
-                if source != FOLLOW_THE_HANDLE:
-                    await self._ask(partial(self._set_console, source=source))
+                await self._set_source_back(source)
             except GraphRefusedError as error:
                 self.graph.log(f'console.source {source}', '', '', False, str(error))
             self.graph.ask_for_settings(time.monotonic_ns())
 
-    async def _state(self, client: Client, command: str) -> str:
-        graph = self.graph.client
-        if command == 'home':
-            return await self._moving(client, 'home', partial(graph.home, _PATIENCE_S))
-        return await self._ask(partial(graph.ask_and_see, command, _PATIENCE_S))
+    async def _set_source_back(self, source: str) -> None:
+        """Have the console follow what it did before, which begins no motion by itself."""
+        if source in PLAYS and self.graph.client.state == 'ENABLED':
+            await self._ask(partial(self.graph.client.ask, 'pause', _PATIENCE_S))
+        if source != FOLLOW_THE_HANDLE:
+            await self._ask(partial(self._set_console, source=source))
 
-    async def _moving(self, client: Client, what: str, move: Callable[[], str]) -> str:
+    async def _state(self, command: str) -> str:
+        graph = self.graph.client
+        if command in HALTS:
+            # At once: no thread has to be free for it, and what was asked for before is over.
+            self._halts += 1
+            graph.order(command)
+            return await self._ask(partial(graph.ask, command, _PATIENCE_S))
+        halts = self._halts
+
+        def withdrawn() -> bool:
+            return self._halts != halts
+
+        if command == 'home':
+            return await self._moving(command, partial(graph.home, _PATIENCE_S, withdrawn))
+        return await self._ask(partial(graph.ask_and_see, command, _PATIENCE_S, withdrawn))
+
+    async def _moving(self, what: str, move: Callable[[], str]) -> str:
         """Have the slave moved, for as long as the client operates."""
         holder = self._holder
         if holder.moves:
             raise OrderRefusedError(f'{holder.moves} is under way')
-        holder.moves = what
+        if self.beat.said.state is DeadManState.ENGAGED:
+            raise OrderRefusedError('let go first: it moves the slave by itself')
+        holder.moves, holder.waits = what, True
         try:
-            return await self._ask(move)
-        finally:
+            told = await self._ask(move)
             holder.moves = ''
+        finally:
+            # Who waited in vain has not ended it.
+            holder.waits = False
+        return told
 
     def _calibrate(self) -> str:
         return self.graph.client.calibrate(patience_s=_PATIENCE_S).message
 
-    async def _play(self, explanation: str) -> str:
+    async def _play(self, client: Client, explanation: str) -> str:
         """Have the console play an experiment for as long as the operator holds on."""
         file = self.explanations.experiment_of(explanation)
         if self._holder.moves:
@@ -390,24 +426,33 @@ class Operations:
         if self.graph.client.state != 'ENABLED':
             raise OrderRefusedError(f'the slave is {self.graph.client.state}: enable it first')
         values = {'command_file': str(file), 'hold_to_play': True, 'source': 'file'}
-        await self._ask(partial(self._set_console, **values))
-        self._holder.moves = _EXPERIMENT
-        self.graph.settings = Settings('file', self.graph.settings.scale)
-        self._played = _Played(time.monotonic_ns())
-        return 'hold on: it plays while the dead-man is held'
+        async with self._place:
+            before = await self._ask(partial(self._read_console, 'command_file', 'hold_to_play'))
+            if self.lease.holder != client.id or self._holder.moves:
+                raise OrderRefusedError('the controls were lost or taken to something else')
+            # Said before it is so: whoever loses the controls meanwhile leaves nothing behind.
+            holder = self._holder
+            holder.moves, holder.waits = _EXPERIMENT, True
+            played = self._played = _Played(time.monotonic_ns(), before)
+            try:
+                await self._ask(partial(self._set_console, **values))
+            except BaseException:
+                self._played, holder.moves = None, ''
+                raise
+            self.graph.settings = Settings('file', self.graph.settings.scale)
+            played.begun_ns = time.monotonic_ns()
+        return 'it plays while the dead-man is held; give the controls back to leave it'
 
     async def _end_of_play(self) -> None:
         """Have the console follow the handle again."""
         async with self._place:
             if self._played is None:
                 return
-            self._played = None
+            before, self._played = self._played.before, None
             if self._holder.moves == _EXPERIMENT:
                 self._holder.moves = ''
             try:
-                await self._ask(
-                    partial(self._set_console, source=FOLLOW_THE_HANDLE, hold_to_play=False)
-                )
+                await self._ask(partial(self._set_console, source=FOLLOW_THE_HANDLE, **before))
             except GraphRefusedError as error:
                 self.graph.log(f'console.source {FOLLOW_THE_HANDLE}', '', '', False, str(error))
             self.graph.ask_for_settings(time.monotonic_ns())
@@ -427,6 +472,7 @@ class Operations:
 
     async def close(self) -> None:
         """End the lease and give everything back."""
+        self._closing = True
         holder = self.holder
         if holder is not None:
             self.lease.release(holder.id)

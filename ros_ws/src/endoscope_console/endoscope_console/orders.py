@@ -9,7 +9,8 @@ from endoscope_core.errors import EndoscopeError
 
 LARGEST_BYTES = 4096
 """Of any frame that a client sends."""
-PAD_MODES = ('speed', 'position')
+HALTS = ('pause', 'disable')
+"""Commands that end motion: they wait for nothing."""
 
 _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 _Number = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
@@ -50,15 +51,14 @@ class Calibrate(_Order, tag='calibrate', frozen=True):
 
 
 class Set(_Order, tag='set', frozen=True):
-    """Set one thing: `scale` of the motion, `mode` of the pad, or `compensator` mode."""
+    """Set one thing: `scale` of the motion, or `compensator` mode."""
 
     scale: Annotated[float, msgspec.Meta(ge=0.01, le=10.0)] | None = None
-    mode: Literal[PAD_MODES] | None = None  # type: ignore[valid-type]
     compensator: Literal[MODES] | None = None  # type: ignore[valid-type]
 
     def __post_init__(self) -> None:
-        if sum(value is not None for value in (self.scale, self.mode, self.compensator)) != 1:
-            raise ValueError('set one of scale, mode and compensator')
+        if (self.scale is None) == (self.compensator is None):
+            raise ValueError('set one of scale and compensator')
 
 
 class Record(_Order, tag='record', frozen=True):

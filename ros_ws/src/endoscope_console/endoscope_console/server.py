@@ -4,6 +4,7 @@ import asyncio
 import json
 import mimetypes
 import time
+import traceback
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
@@ -24,7 +25,7 @@ from endoscope_console.explanations import REPORT_FILE
 from endoscope_console.graph_side import GraphSide
 from endoscope_console.joy import JoyHand
 from endoscope_console.operations import Operations
-from endoscope_console.orders import MalformedOrderError, read_hello, read_order
+from endoscope_console.orders import HALTS, MalformedOrderError, State, read_hello, read_order
 from endoscope_console.pictures import RATE_HZ, SIGNALS
 from endoscope_console.view import View
 from endoscope_core.choices import MODES
@@ -129,7 +130,7 @@ class Console:
 
     async def _turn_away(self, socket: WebSocket, check: str, why: str) -> None:
         self.counts[f'refused: {check}'] += 1
-        await socket.close(_MALFORMED, why[:120])
+        await socket.close(_MALFORMED, _short(why))
 
     def _note_end(self, message: Mapping[str, Any]) -> None:
         if message.get('code') == _TOO_LARGE:
@@ -183,7 +184,12 @@ class Console:
         def start(work: Callable[..., Awaitable[None]], *words: Any) -> None:
             task = asyncio.ensure_future(work(*words))
             tasks.add(task)
-            task.add_done_callback(tasks.discard)
+            task.add_done_callback(ended)
+
+        def ended(task: asyncio.Task[None]) -> None:
+            tasks.discard(task)
+            if not task.cancelled() and (error := task.exception()) is not None:
+                traceback.print_exception(error)
 
         client.tell = lambda message: start(_tell, socket, message)
         try:
@@ -206,7 +212,7 @@ class Console:
                         start(self._obey, socket, client, order)
                 except (MalformedFrameError, MalformedOrderError) as error:
                     self.operations.refuse(client, Reason.MALFORMED, arrived_ns)
-                    await socket.close(_MALFORMED, str(error)[:120])
+                    await socket.close(_MALFORMED, _short(str(error)))
                     return
         finally:
             client.tell = _nobody
@@ -214,13 +220,19 @@ class Console:
             self.operations.closed(client)
 
     async def _obey(self, socket: WebSocket, client: Client, order: Any) -> None:
-        if client.orders >= ORDERS_AT_ONCE:
+        halts = isinstance(order, State) and order.command in HALTS
+        if client.orders >= ORDERS_AT_ONCE and not halts:
             why = f'{ORDERS_AT_ONCE} orders are not done yet'
             answer: dict[str, Any] = {'op': 'answer', 'id': order.id, 'ok': False, 'why': why}
         else:
             client.orders += 1
             try:
                 answer = await self.operations.obey(client, order)
+            except Exception:
+                # Its page waits for an answer, whatever has gone wrong here.
+                why = 'the server failed in it; its terminal says how'
+                await _tell(socket, {'op': 'answer', 'id': order.id, 'ok': False, 'why': why})
+                raise
             finally:
                 client.orders -= 1
         await _tell(socket, answer)
@@ -277,6 +289,11 @@ def _file(path: Path) -> Callable[[Request], Awaitable[Response]]:
         return Response(path.read_bytes(), media_type=kind)
 
     return answer
+
+
+def _short(why: str) -> str:
+    """As much of a reason as a socket's last frame has room for."""
+    return why.encode()[:120].decode(errors='ignore')
 
 
 def _nobody(message: dict[str, object]) -> None:

@@ -109,7 +109,6 @@ class View:
             'causes': self._causes(),
             'lease': {
                 'holder': operations.lease.holder,
-                'since': operations.lease.since_ns * 1e-9,
                 'operators': [
                     {'name': c.id, 'label': c.label, 'role': c.role}
                     for c in operations.clients.of('command')
@@ -132,7 +131,7 @@ class View:
             'recorder': _recorder(client.health.get(_RECORDER)),
             'console': {'source': settings.source, 'scale': settings.scale},
             'playing': self._playing(),
-            'alarms': [_alarm(a) for a in alarms],
+            'alarms': alarms,
             'explanations': operations.explanations.as_list(),
         }
 
@@ -164,9 +163,9 @@ class View:
             node = nodes.setdefault(
                 name, {'name': name, 'level': _LEVELS[0], 'message': 'ok', 'age': 0.0}
             )
-            if said.level > _LEVELS.index(node['level']):
-                node |= {'level': _LEVELS[said.level], 'message': told}
-            node['age'] = (now_ns - self._client.heard_ns[name]) * 1e-9
+            if _level(said) > _LEVELS.index(node['level']):
+                node |= {'level': _LEVELS[_level(said)], 'message': told}
+            node['age'] = (now_ns - said.received_ns) * 1e-9
         return list(nodes.values())
 
     def _alarms(self, now_ns: int) -> list[Alarm]:
@@ -215,15 +214,6 @@ class View:
         return [alarm for is_so, alarm in found if is_so]
 
 
-def _alarm(alarm: Alarm) -> dict[str, Any]:
-    return {
-        'id': alarm.id,
-        'level': alarm.level,
-        'text': alarm.text,
-        'latched': alarm.latched,
-    }
-
-
 def _number(said: Health, key: str) -> float | None:
     try:
         value = float(said.values[key])
@@ -246,9 +236,13 @@ def _result(said: Health | None) -> dict[str, Any] | None:
         'size_deg': _number(said, 'backlash_size_deg') if size is None else size,
         'low_deg': low,
         'high_deg': high,
-        'level': _LEVELS[said.level],
+        'level': _LEVELS[_level(said)],
         'message': said.message,
     }
+
+
+def _level(said: Health) -> int:
+    return min(said.level, len(_LEVELS) - 1)
 
 
 def _compensator(said: Health | None) -> dict[str, Any]:

@@ -34,7 +34,7 @@ def beat_of(situation):
 
 def test_a_picture_that_was_made_and_seen_while_the_beat_was_held_up_is_known():
     made = ((1, 0),)
-    beat = beat_of(Situation(holder='c1', enabled=True, heard_ns=0, source='master', pictures=made))
+    beat = beat_of(Situation('c1', True, source='master', pictures=made))
     beat._turn(MS)
     beat.hear('c1', NEUTRAL, 2 * MS)
     beat._turn(2 * MS)

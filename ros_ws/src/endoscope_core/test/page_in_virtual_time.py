@@ -35,7 +35,8 @@ class Page:
         self.draws = True
         self.pictures = ((1, self.now),)
         self.seen = 1
-        self.conditions = Conditions('c1', True, 0, False, 'master', self.pictures)
+        self.state_age_ns = 0
+        self.conditions = Conditions('c1', True, source='master')
         self.turn()
 
     def turn(self, times=1):
@@ -46,8 +47,15 @@ class Page:
                 self.pictures = (*self.pictures[-14:], (seq + 1, self.now))
             if self.draws:
                 self.seen = self.pictures[-1][0]
-            self.conditions = replace(self.conditions, pictures=self.pictures)
+            self.conditions = replace(
+                self.conditions, state_ns=self.now - self.state_age_ns, pictures=self.pictures
+            )
             self.dead_man.turn(self.now, self.conditions)
+
+    def learns(self, state_age_ns=None, **changes):
+        """Have the server know something else of lease and graph."""
+        self.state_age_ns = self.state_age_ns if state_age_ns is None else state_age_ns
+        self.conditions = replace(self.conditions, **changes)
 
     def frame(self, late_ns=0, **changes):
         seq = self.hand.seq + 1

@@ -1,5 +1,4 @@
 import math
-from dataclasses import replace
 
 import pytest
 from page_in_virtual_time import MS, Page
@@ -115,6 +114,6 @@ def test_the_rules_of_a_page_hold_for_it():
     page.turn(90)
     assert page.dead_man.reason is Reason.SILENT
     says(NOTHING)
-    page.conditions = replace(page.conditions, state_age_ns=4000 * MS)
+    page.learns(state_age_ns=4000 * MS)
     says(pressed(5))
     assert not page.dead_man.engaged

@@ -29,7 +29,7 @@ def test_another_is_refused_by_name_unless_he_takes_it():
     assert lease.holder == 'c1'
     assert lease.claim('c2', True, 2) == Claim(True, lost_by='c1')
     assert (lease.holder, lease.since_ns) == ('c2', 2)
-    lease.closed('c1')
+    lease.release('c1')
     assert lease.holder == 'c2'
 
 
@@ -82,9 +82,9 @@ class OneOperator(RuleBasedStateMachine):
             self.since = self.since if self.holder == client else self.now
             self.holder, self.heard = client, self.now
 
-    @rule(client=CLIENTS, closed=st.booleans())
-    def go(self, client, closed):
-        (self.lease.closed if closed else self.lease.release)(client)
+    @rule(client=CLIENTS)
+    def go(self, client):
+        self.lease.release(client)
         if client == self.holder:
             self.holder, self.since = '', 0
 

@@ -10,7 +10,7 @@ OPEN, READY, ENGAGED = DeadManState
 
 def of_conditions(**changes):
     def change(page):
-        page.conditions = replace(page.conditions, **changes)
+        page.learns(**changes)
 
     return change
 
@@ -65,7 +65,7 @@ def test_each_ends_the_grip_with_its_reason_and_only_a_new_grip_holds(reason, ha
     assert page.dead_man.counts == {reason: 1}
 
     # What is still on its way from that grip means nothing, however fine all else is.
-    page.conditions = replace(page.conditions, **vars(Page().conditions))
+    page.learns(state_age_ns=0, **vars(Page().conditions))
     page.draws = True
     page.hand = replace(held, seq=page.hand.seq + 1)
     page.go_on(200)
@@ -217,7 +217,7 @@ def test_a_page_that_takes_over_counts_its_own_grips():
     page = Page()
     for _ in range(5):
         page.engage()
-    page.conditions = replace(page.conditions, holder='c2')
+    page.learns(holder='c2')
     page.turn()
     assert page.dead_man.grips == 5
     page.client, page.hand = 'c2', replace(page.hand, grip=0, seq=0)
@@ -226,7 +226,7 @@ def test_a_page_that_takes_over_counts_its_own_grips():
 
     # And the first one, which has not let go of its fifth grip, counts on.
     page.client, page.hand = 'c1', replace(page.hand, grip=5, seq=100, pressed=True)
-    page.conditions = replace(page.conditions, holder='c1')
+    page.learns(holder='c1')
     page.turn()
     page.send()
     page.let_go()
@@ -238,10 +238,10 @@ def test_a_page_that_takes_over_counts_its_own_grips():
 
 def test_the_clutch_may_be_held_for_a_motion_that_waits_for_it():
     page = Page()
-    page.conditions = replace(page.conditions, source='file', playing=True)
+    page.learns(source='file', playing=True)
     page.turn()
     page.engage()
-    page.conditions = replace(page.conditions, source='master', playing=False)
+    page.learns(source='master', playing=False)
     page.turn()
     assert page.dead_man.reason is Reason.SOURCE
 
@@ -257,5 +257,5 @@ def test_whoever_holds_a_device_need_not_look_at_a_page():
 
 def test_nothing_is_engaged_before_anything_was_heard():
     dead_man = OperatorDeadMan()
-    dead_man.turn(0, Conditions('c1', True, 0, False, 'master', ((0, 0),)))
+    dead_man.turn(0, Conditions('c1', True, source='master', pictures=((0, 0),)))
     assert (dead_man.state, dead_man.reason, dead_man.missing) == (OPEN, None, Reason.SILENT)

@@ -73,7 +73,7 @@ class AnOperator(RuleBasedStateMachine):
             for reason, holds in (
                 (Reason.HIDDEN, not frame.visible),
                 (Reason.UNFOCUSED, not frame.focused),
-                (Reason.STATE, not said.state_enabled or said.state_age_ns > 3500 * MS),
+                (Reason.STATE, not said.state_enabled or page.state_age_ns > 3500 * MS),
                 (Reason.CALIBRATION, said.calibrating),
                 (Reason.SOURCE, said.source != 'master' and not said.playing),
                 (Reason.BLIND, frame.source != Source.JOY and not sees),
@@ -163,6 +163,7 @@ class AnOperator(RuleBasedStateMachine):
         ends = set()
         if said.holder != self.holder:
             self.holder, self.newest, self.hands_off = said.holder, None, False
+            self.quickest.pop(said.holder, None)
             ends.add(Reason.LOST)
         forbidden = self.forbidden()
         of_console = said.source, said.playing
@@ -234,7 +235,7 @@ class AnOperator(RuleBasedStateMachine):
             page.draws = False
             self.the_hand_goes_on(17)
         else:
-            page.conditions = replace(page.conditions, **change)
+            page.learns(**change)
         self.turn()
 
     @rule(
@@ -260,14 +261,14 @@ class AnOperator(RuleBasedStateMachine):
 
     @rule(change=st.sampled_from(CHANGES))
     def something_changes(self, change):
-        self.page.conditions = replace(self.page.conditions, **change)
+        self.page.learns(**change)
 
     @rule()
     def all_is_well(self):
         page = self.page
         page.draws = True
         changes = vars(Page().conditions) | {'holder': page.client}
-        page.conditions = replace(page.conditions, **changes)
+        page.learns(**changes)
         self.turn()
 
     @rule()
@@ -300,7 +301,7 @@ class AnOperator(RuleBasedStateMachine):
     @rule()
     def another_page_takes_over(self):
         self.page.client = 'c2' if self.page.client == 'c1' else 'c1'
-        self.page.conditions = replace(self.page.conditions, holder=self.page.client)
+        self.page.learns(holder=self.page.client)
         self.turn()
 
     @rule(hand=HANDS, pressed=st.booleans())

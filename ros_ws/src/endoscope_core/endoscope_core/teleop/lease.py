@@ -71,10 +71,6 @@ class Lease:
         if client == self.holder:
             self.holder, self.since_ns = '', 0
 
-    def closed(self, client: str) -> None:
-        """Take note that a client is gone: it holds nothing any more."""
-        self.release(client)
-
     def heard(self, client: str, now_ns: int) -> None:
         """Take a sign of a client at `now_ns`."""
         if client == self.holder:

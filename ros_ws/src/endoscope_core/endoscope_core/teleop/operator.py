@@ -63,7 +63,7 @@ _OF_THE_RULE = {
 
 @dataclass(frozen=True)
 class Conditions:
-    """What motion depends on besides the hand, as it is now.
+    """What motion depends on besides the hand; times are steady.
 
     Attributes
     ----------
@@ -71,8 +71,8 @@ class Conditions:
         Client that holds the lease; empty for nobody.
     state_enabled
         Whether the operating state last heard is ``ENABLED``.
-    state_age_ns
-        How long ago it was heard.
+    state_ns
+        When it was heard.
     calibrating
         Whether a calibration or a way home has the slave.
     source
@@ -84,12 +84,12 @@ class Conditions:
         Whether the console plays a motion that goes on only while the clutch is held.
     """
 
-    holder: str
-    state_enabled: bool
-    state_age_ns: int
-    calibrating: bool
-    source: str
-    pictures: tuple[tuple[int, int], ...]
+    holder: str = ''
+    state_enabled: bool = False
+    state_ns: int = 0
+    calibrating: bool = False
+    source: str = ''
+    pictures: tuple[tuple[int, int], ...] = ()
     playing: bool = False
 
 
@@ -102,6 +102,10 @@ class _Sender:
         self._at_ns = 0
         self.grip = 0
         self.number = 0
+
+    def begin(self) -> None:
+        """Judge by the next frame: while nothing was heard, a page's clock may have slept."""
+        self._quickest_ns = None
 
     def fault(self, frame: InputFrame, now_ns: int) -> Reason | None:
         if frame.seq <= self._seq:
@@ -233,6 +237,8 @@ class OperatorDeadMan:
         if conditions.holder != self._holder:
             self._open(Reason.LOST)
             self._holder, self.frame = conditions.holder, None
+            if self._holder in self._senders:
+                self._senders[self._holder].begin()
         hindrance = self._hindrance(now_ns, conditions)
         if self.state is DeadManState.OPEN:
             self._dead_man.turn(now_ns, Reason.HANDS_ON)
@@ -297,7 +303,7 @@ class OperatorDeadMan:
             return Reason.HIDDEN
         if not frame.focused:
             return Reason.UNFOCUSED
-        if not conditions.state_enabled or conditions.state_age_ns > STATE_NS:
+        if not conditions.state_enabled or now_ns - conditions.state_ns > STATE_NS:
             return Reason.STATE
         if conditions.calibrating:
             return Reason.CALIBRATION
