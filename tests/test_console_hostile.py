@@ -105,6 +105,27 @@ def test_a_flood_ends_its_sender(rig, operator):
     counted(rig, operator, 'flood')
 
 
+def test_a_flood_of_frames_that_carry_nothing_ends_its_sender(rig, operator):
+    with ExitStack() as stack:
+        other = greeted(rig, stack)
+        with suppress(ConnectionClosed):
+            for _ in range(3 * FRAMES_A_SECOND):
+                other.ping()
+        assert closed(other) == 1006
+    counted(rig, operator, 'too many frames')
+
+
+def test_a_connection_is_for_one_request(place):
+    host, port = place
+    with socket.create_connection(place, _PATIENCE_S) as asking:
+        asking.sendall(f'GET /nothing HTTP/1.1\r\nHost: {host}:{port}\r\n\r\nG'.encode())
+        answer = b''
+        with suppress(ConnectionResetError):
+            while data := asking.recv(4096):
+                answer += data
+    assert b'connection: close' in answer
+
+
 def test_frames_of_somebody_else_move_nothing(rig, operator):
     with ExitStack() as stack:
         other = greeted(rig, stack)

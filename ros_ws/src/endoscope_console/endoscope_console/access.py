@@ -45,6 +45,8 @@ _HEADERS = (
     (b'cross-origin-opener-policy', b'same-origin'),
     (b'cross-origin-resource-policy', b'same-origin'),
     (b'cache-control', b'no-store'),
+    # Between two requests of one connection nobody's patience runs out.
+    (b'connection', b'close'),
 )
 
 
@@ -176,7 +178,7 @@ def _with_headers(scope: Scope, send: Send) -> Send:
 
 
 async def _answer(refusal: Refusal, send: Send) -> None:
-    headers = [(b'content-type', b'text/plain; charset=utf-8'), (b'connection', b'close')]
+    headers = [(b'content-type', b'text/plain; charset=utf-8')]
     await send({'type': 'http.response.start', 'status': refusal.status, 'headers': headers})
     await send({'type': 'http.response.body', 'body': f'{refusal.why}\n'.encode()})
 

@@ -2,13 +2,20 @@
 
 import asyncio
 import socket
+import time
 from collections import Counter
 from typing import Any
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from endoscope_console.clients import HELLO_S, OF_A_KIND, UNANSWERED
+from endoscope_console.clients import (
+    FRAMES_A_SECOND,
+    HELLO_S,
+    OF_A_KIND,
+    UNANSWERED,
+    FrameRate,
+)
 
 AT_ONCE = 3 * OF_A_KIND + 2 * UNANSWERED
 """Connections of any kind: both sockets of each page, and requests for files."""
@@ -55,5 +62,28 @@ def limited(counts: Counter[str]) -> tuple[type[asyncio.Protocol], type[asyncio.
             transport.set_write_buffer_limits(high=_WRITE_BUFFER)
             plain = transport.get_extra_info('socket')
             plain.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+            self._rate = FrameRate(FRAMES_A_SECOND)
+
+        def handle_ping(self) -> None:
+            """Answer one of those that no message counts."""
+            if self._passes():
+                super().handle_ping()
+
+        def handle_cont(self, event: Any) -> None:
+            """Take a piece of a message."""
+            if self._passes():
+                super().handle_cont(event)
+
+        def _passes(self) -> bool:
+            if self.transport.is_closing() or not self._rate.exceeded(time.monotonic_ns()):
+                return True
+            counts['refused: too many frames'] += 1
+            self.transport.abort()
+            return False
+
+        def keepalive_timeout(self) -> None:
+            """Let go of who does not answer, and of what waits to be sent to him."""
+            super().keepalive_timeout()
+            self.transport.abort()
 
     return Requests, Sockets

@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ REPORT_FILE = 'report.html'
 _RESULT_FILE = 'report.json'
 EXPERIMENT_FILE = 'next_experiment.csv'
 _STEPS = 7
+_TOLD = 20
 """That `endoscope explain` names on the way, for two joints."""
 _REMARKS = ('note:', 'audit:')
 _NICE = 10
@@ -86,7 +88,7 @@ class Explanation:
             result = json.loads((self.folder / _RESULT_FILE).read_text('utf-8'))
             self.sentence = sentence or _in_short(result)
             planned = result['next_experiment'] is not None
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             self.error = f'{self.folder / _RESULT_FILE} is no result of an explanation: {error}'
             return
         self.experiment = planned and (self.folder / EXPERIMENT_FILE).is_file()
@@ -127,8 +129,8 @@ class Explanations:
         self._task: asyncio.Task[None] | None = None
 
     def as_list(self) -> list[dict[str, Any]]:
-        """What a page is told of all, newest first."""
-        return [one.as_mapping() for one in reversed(self._all.values())]
+        """What a page is told of the last twenty, newest first."""
+        return [one.as_mapping() for one in list(self._all.values())[: -_TOLD - 1 : -1]]
 
     def listing(self) -> dict[str, Any]:
         """Recordings with duration in s and size in bytes, newest first, and plants."""
@@ -148,7 +150,8 @@ class Explanations:
 
     def _plants(self) -> dict[str, Path]:
         found = {path.name: path for path in self._folder.glob('*.yaml')}
-        for one in self._all.values():
+        # Others are added while a thread of the pool lists these.
+        for one in tuple(self._all.values()):
             improved = one.folder / 'plant.yaml'
             if not one.running and improved.is_file():
                 found[f'{one.folder.name}/plant.yaml'] = improved
@@ -209,6 +212,20 @@ class Explanations:
         return one
 
     async def _explain(self, one: Explanation, words: list[str], plant: Path | None) -> None:
+        try:
+            status, said = await self._run(one, words, plant)
+        except (OSError, ValueError) as error:
+            one.running, one.error = False, f'it could not be followed: {error}'
+            return
+        if status:
+            one.running, one.error = False, one.error or one.step
+        else:
+            one.ended(said.decode(errors='replace').partition('\n')[0])
+
+    async def _run(
+        self, one: Explanation, words: list[str], plant: Path | None
+    ) -> tuple[int, bytes]:
+        """Run the program to its end, which comes at once where it cannot be followed."""
         with tempfile.TemporaryDirectory() as scratch:
             if plant is None:
                 plant = Path(scratch) / 'nominal.yaml'
@@ -221,16 +238,18 @@ class Explanations:
                 stderr=asyncio.subprocess.PIPE,
                 start_new_session=True,
             )
-            os.setpriority(os.PRIO_PROCESS, self._process.pid, _NICE)
-            said, _ = await asyncio.gather(
-                self._process.stdout.read(),  # type: ignore[union-attr]
-                self._follow(one, self._process.stderr),  # type: ignore[arg-type]
-            )
-            status = await self._process.wait()
-        if status:
-            one.running, one.error = False, one.error or one.step
-        else:
-            one.ended(said.decode(errors='replace').partition('\n')[0])
+            with suppress(ProcessLookupError):
+                os.setpriority(os.PRIO_PROCESS, self._process.pid, _NICE)
+            try:
+                said, _ = await asyncio.gather(
+                    self._process.stdout.read(),  # type: ignore[union-attr]
+                    self._follow(one, self._process.stderr),  # type: ignore[arg-type]
+                )
+            except BaseException:
+                with suppress(ProcessLookupError):
+                    os.killpg(self._process.pid, signal.SIGKILL)
+                raise
+            return await self._process.wait(), said
 
     async def _follow(self, one: Explanation, lines: asyncio.StreamReader) -> None:
         """Take the steps that it names; the last line of one that fails says why."""

@@ -10,11 +10,15 @@ import socket
 import ssl
 import subprocess
 import sys
+import tempfile
+import time
 import webbrowser
 from collections import Counter
 from collections.abc import Iterable
-from contextlib import ExitStack, nullcontext, suppress
+from contextlib import ExitStack, nullcontext
+from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import uvicorn
 import yaml
@@ -51,6 +55,8 @@ _ANSWERS_S = 1.5
 _LOOK_S = 0.1
 _ENDS_S = 20.0
 _DROPPED_S = 2
+# A browser that is started anew has read its file by then.
+_READ_S = 5.0
 _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -203,8 +209,6 @@ async def _announce(
     page = f'{address}/#token={tokens.operator}'
     print(f'operate at    {page}')
     print(f'look on at    {address}/#token={tokens.viewer}', flush=True)
-    if args.open:
-        await asyncio.to_thread(webbrowser.open, page)
     if not args.no_graph:
         await started.start_unless_one_answers(graph)
     while not graph.client.state:
@@ -212,10 +216,21 @@ async def _announce(
             raise ServingError(f'the graph has ended with status {started.ended}, as it says above')
         await asyncio.sleep(_LOOK_S)
     print(f'ready         slave {graph.client.state}; Ctrl-C ends', flush=True)
+    if args.open:
+        await asyncio.to_thread(_open, page)
     while started.ended is None:
         await asyncio.sleep(_LOOK_S)
     print(f'console: the graph has ended with status {started.ended}', flush=True)
     await asyncio.Event().wait()
+
+
+def _open(page: str) -> None:
+    """Open the page by way of a file: what a program is started with, every user can read."""
+    with tempfile.NamedTemporaryFile('w', suffix='.html') as file:
+        file.write(f'<meta http-equiv="refresh" content="0; url={page}">')
+        file.flush()
+        webbrowser.open(Path(file.name).as_uri())
+        time.sleep(_READ_S)
 
 
 def _configuration(
@@ -242,7 +257,11 @@ def _configuration(
 
 
 def _check_privacy(args: argparse.Namespace) -> None:
-    """Refuse to send tokens in the clear to other machines."""
+    """Refuse to send tokens in the clear to other machines, and origins that no browser names."""
+    for origin in args.origin:
+        parts = urlsplit(origin)
+        if parts.scheme not in ('http', 'https') or origin != f'{parts.scheme}://{parts.netloc}':
+            raise ServingError(f'--origin {origin}: give SCHEME://HOST:PORT, and nothing after it')
     if (args.certificate is None) != (args.key is None):
         raise ServingError('--certificate and --key belong together')
     for file in (args.certificate, args.key):
@@ -310,6 +329,8 @@ def _joy_parameters(given: Iterable[str]) -> dict[str, Any]:
         name, found, value = text.partition('=')
         if not found:
             raise JoyMappingError(f'--joy {text}: give NAME=VALUE')
-        with suppress(yaml.YAMLError):
+        try:
             parameters[name] = yaml.safe_load(value)
+        except yaml.YAMLError as error:
+            raise JoyMappingError(f'--joy {text}: {value!r} is no value') from error
     return parameters
