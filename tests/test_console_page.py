@@ -16,6 +16,8 @@ from browsed_console import (
 from chromium import chromium
 from playwright.sync_api import expect
 
+# Longer than a button has to be held.
+HELD_MS = 1500
 FAR = 0.03
 """rad at a motor's shaft that no noise makes."""
 FOLLOWING = "document.getElementById('lamp').textContent === 'FOLLOWING'"
@@ -198,9 +200,16 @@ def test_fingers_hold_by_both_areas_together(console, browser):
 def test_a_gamepad_holds_and_lets_go_when_unplugged(console, browser):
     with console.page(browser, script=GAMEPAD) as page:
         take(page)
+        expect(page.locator('#enable')).to_be_enabled()
         page.evaluate('pad.buttons[9].pressed = true')
         shows(page, 'state', 'ENABLED')
+        page.keyboard.press('Escape')
+        shows(page, 'state', 'PAUSED')
+        page.wait_for_timeout(HELD_MS)
+        shows(page, 'state', 'PAUSED')
         page.evaluate('pad.buttons[9].pressed = false')
+        hold(page, 'enable')
+        shows(page, 'state', 'ENABLED')
         begin = console.now_ns
         press, release = (
             lambda on=on: page.evaluate(f'pad.buttons[5].pressed = {on} === 1; pad.axes[0] = {on}')
@@ -237,7 +246,8 @@ def test_what_takes_the_page_away_lets_go_at_once(console, page, script, reason)
     press, release = press_keys(page, 'Space', 'ArrowLeft')
     grip(page, press, release, follows(console, page, begin))
     page.evaluate(script)
-    shows(page, 'lamp', 'OPEN')
+    # A page that was left has no connection any more.
+    shows(page, 'lamp', 'OPEN' if reason else 'UNKNOWN')
     if reason is not None:
         shows(page, 'lamp-why', reason)
     page.evaluate("dispatchEvent(new Event('focus'))")
@@ -414,6 +424,29 @@ def test_every_node_is_seen_with_its_health(console, page):
     expect(page.locator('#clients')).to_contain_text('this page')
 
 
+def test_pause_ends_what_is_held_to_resume(console, page):
+    enable(page)
+    page.keyboard.press('Escape')
+    shows(page, 'state', 'PAUSED')
+    page.keyboard.down('KeyE')
+    page.keyboard.press('Escape')
+    page.wait_for_timeout(HELD_MS)
+    shows(page, 'state', 'PAUSED')
+    page.keyboard.up('KeyE')
+
+
+@pytest.mark.parametrize('covers', ['?', 'Meta'])
+def test_what_covers_the_view_or_the_keys_lets_go(console, page, covers):
+    enable(page)
+    begin = console.now_ns
+    press, release = press_keys(page, 'Space', 'ArrowLeft')
+    grip(page, press, release, follows(console, page, begin))
+    page.keyboard.press(covers)
+    shows(page, 'lamp', 'OPEN')
+    assert console.stands(page)
+    release()
+
+
 def test_help_tells_the_keys(console, page):
     page.keyboard.press('?')
     expect(page.locator('#help')).to_be_visible()
@@ -430,7 +463,7 @@ def test_a_page_whose_server_ends_says_so_and_comes_back_without_the_controls(co
         enable(page)
         console.end()
         expect(page.locator('#alarms')).to_contain_text('No connection', timeout=PATIENCE_MS)
-        shows(page, 'lamp', 'OPEN')
+        shows(page, 'lamp', 'UNKNOWN')
         expect(page.locator('#pause')).to_be_disabled()
         console.start()
         expect(page.locator('#alarms')).not_to_contain_text('No connection', timeout=PATIENCE_MS)

@@ -5,13 +5,15 @@ export const SILENT_STATE_S = 3.5;
 const ORDER = { high: 0, medium: 1, low: 2 };
 export const SIGN = { high: 'Danger', medium: 'Warning', low: 'Note' };
 
+/** Without a state for so long, in s, what was said last does not count: it comes once a second. */
+export const SILENT_CONSOLE_S = 2;
 /** Age of the picture in s: of its newest sample when it was sent, and since it came. */
 export const pictureAge = (picture, now) => (Number.isFinite(picture?.age) ? picture.age + (now - picture.arrived) : Infinity);
 
 /**
  * @param server the alarms `{id, level, text, latched}` of the last state, or none
- * @param own `{connected, everConnected, pictureAge, gamepadLost, ended}`: whether both sockets are open, and were;
- *   age of the picture in s; a gamepad that does not answer any more; why the last grip was ended other than by hand
+ * @param own `{connected, everConnected, pictureAge, gamepadLost}`: whether both sockets are open, and were;
+ *   age of the picture in s; a gamepad that does not answer any more
  */
 export function standing(server, own) {
   const alarms = [...(server ?? [])];
@@ -21,10 +23,10 @@ export function standing(server, own) {
   if (own.everConnected && !own.connected) {
     // What was heard before says nothing of now.
     alarms.length = 0;
-    add('connection', 'medium', 'No connection to the console. The slave is held; it is being tried anew.');
+    add('connection', 'medium', 'No connection to the console: nothing shown here is current. Reconnecting …');
   } else if (own.connected && own.pictureAge > BLIND_S) {
     const age = Number.isFinite(own.pictureAge) ? ` is ${own.pictureAge.toFixed(1)} s old` : ' has not come yet';
-    add('picture', 'medium', `The picture${age}. Nothing follows a hand that cannot see.`);
+    add('picture', 'medium', `The picture${age}. Motion is blocked until the view is current.`);
   }
   if (own.gamepadLost) add('gamepad', 'low', 'The gamepad is gone.');
   return alarms.sort((a, b) => (ORDER[a.level] ?? 3) - (ORDER[b.level] ?? 3));

@@ -8,6 +8,8 @@ import { isMotionKey } from './hands.js';
 const PERIOD_MS = 20;
 /** A drag is told at most this often, so that no mouse is fast enough to be taken for a flood. */
 const MOVE_MS = 10;
+/** After the page has come to the front, no key that goes down is taken for a press. */
+const SETTLED_MS = 500;
 
 const writes = (element) =>
   element instanceof HTMLInputElement ? element.type !== 'range' && element.type !== 'checkbox'
@@ -27,6 +29,7 @@ export class DeadMan {
     this._hands = hands;
     this._page = page;
     this._focused = document.hasFocus();
+    this._focusedAt = -Infinity;
     this._sent = 0;
     this._pad = null;
     this.gamepadLost = false;
@@ -93,11 +96,15 @@ export class DeadMan {
 
   _keys() {
     window.addEventListener('keydown', (event) => {
+      // On a Mac the release of another key is not told while this one is down.
+      if (event.metaKey) this.letGo('the Command key is down');
       if (keysAreTaken() || event.ctrlKey || event.metaKey || event.altKey) return;
       if (!this._page.mine() || !this._page.shown()) return;
       // Space must press no button, arrows must move no slider, and neither may scroll.
       if (event.code === 'Space' || (isMotionKey(event.code) && (this._hands.held || !onSlider()))) event.preventDefault();
-      if (this._hands.keyDown(event.code, event.repeat)) this.send();
+      // What was held in another window goes on repeating here, and not all browsers call that a repeat.
+      const repeats = event.repeat || performance.now() - this._focusedAt < SETTLED_MS;
+      if (this._hands.keyDown(event.code, repeats)) this.send();
     });
     window.addEventListener('keyup', (event) => {
       if (event.code === 'Space' && this._page.mine() && this._page.shown() && !keysAreTaken()) event.preventDefault();
@@ -133,6 +140,7 @@ export class DeadMan {
   _ends() {
     window.addEventListener('focus', () => {
       this._focused = true;
+      this._focusedAt = performance.now();
       this.send();
     });
     window.addEventListener('blur', () => {

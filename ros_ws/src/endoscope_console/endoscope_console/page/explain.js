@@ -6,7 +6,6 @@ export class Explain {
   constructor(app) {
     this._app = app;
     this._report = null;
-    this._asked = false;
     $('ask').addEventListener('submit', (event) => {
       event.preventDefault();
       this._ask();
@@ -16,7 +15,7 @@ export class Explain {
 
   /** The page comes into view. */
   shown() {
-    if (!this._asked) this._look();
+    this._look();
   }
 
   render() {
@@ -44,7 +43,6 @@ export class Explain {
 
   async _look() {
     const answer = await this._app.orders.give({ op: 'bags' });
-    this._asked = answer.ok;
     if (!answer.ok) {
       write($('ask-answer'), `No recordings: ${answer.why}`);
       return;
@@ -54,7 +52,7 @@ export class Explain {
     const fill = (id, items) =>
       each($(id), items, (item) => item.value, (item) => make('option', { value: item.value }), (option, item) => write(option, item.text));
     fill('bag', options([]));
-    fill('baseline', options([{ value: '', text: 'no such recording' }]));
+    fill('baseline', options([{ value: '', text: 'none' }]));
     fill('validate', options([{ value: '', text: 'the end of the recording itself' }]));
     fill('plants', (answer.plants ?? []).map((plant) => ({ value: plant, text: plant })));
     write($('ask-answer'), bags.length ? '' : 'There is no recording yet. Press Record on the page Operate, and move.');

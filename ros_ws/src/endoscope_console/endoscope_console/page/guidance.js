@@ -41,9 +41,10 @@ export const stateIsFresh = (state, stateAge) => Boolean(state?.operating_state)
  * The step that comes next, 0 to 4, and what to say:
  * 0 cannot, 1 take the controls, 2 enable, 3 let go first, 4 hold and move.
  */
-export function nextStep({ connected, role, mine, state, stateAge, busy, half, held, touch, why }) {
+export function nextStep({ connected, current, role, mine, state, stateAge, busy, half, held, touch, why }) {
   if (!connected) return { step: 0, text: `Connecting to the console …${why ? ` It said: ${why}.` : ''}` };
   if (!state) return { step: 0, text: 'Waiting for the graph …' };
+  if (!current) return { step: 0, text: 'Nothing is heard of the console. Let go: what is shown is not current.' };
   if (role !== 'operator') return { step: 0, text: 'You are looking on. To operate, open the operator’s address.' };
   const { lease, calibration, playing, dead_man: deadMan } = state;
   if (!mine && lease?.holder) return { step: 1, text: `${nameOf(lease.holder, state)} has the controls. Watch, or take over.` };
@@ -52,7 +53,7 @@ export function nextStep({ connected, role, mine, state, stateAge, busy, half, h
   if (calibration?.running) return { step: 0, text: 'Calibrating: the instrument moves by itself. Esc pauses it.' };
   if (state.operating_state === 'FAULT') {
     const causes = state.causes ?? [];
-    if (causes.length) return { step: 0, text: 'Held. Mend the cause of the fault, then enable.' };
+    if (causes.length) return { step: 0, text: 'Held. Clear the cause of the fault, then enable.' };
     return { step: 2, text: 'The cause of the fault is gone. Hold Enable for 1 s.' };
   }
   const orKey = touch ? '.' : ', or key E.';

@@ -106,7 +106,7 @@ export class Hands {
 
   /**
    * Look at the gamepad, `{axes, buttons: [bool]}` or null for none; return what its other buttons ask
-   * for now: 'pause', 'mode', 'slower', 'faster', and 'enable' for as long as that one is down.
+   * for now: 'pause', 'mode', 'slower', 'faster', 'enable', and 'enable down' for as long as that one is.
    */
   gamepad(pad) {
     if (pad === null) {
@@ -134,7 +134,8 @@ export class Hands {
     if (fresh(BUTTON.mode)) asked.push('mode');
     if (fresh(BUTTON.down)) asked.push('slower');
     if (fresh(BUTTON.up)) asked.push('faster');
-    if (down.has(BUTTON.enable)) asked.push('enable');
+    if (fresh(BUTTON.enable)) asked.push('enable');
+    if (down.has(BUTTON.enable)) asked.push('enable down');
     return asked;
   }
 

@@ -11,8 +11,10 @@ export class HoldButton {
   /**
    * @param button element of the class `hold`
    * @param act called once, when it has been held long enough
+   * @param may whether it may be held now
    */
-  constructor(button, act) {
+  constructor(button, act, may = () => true) {
+    this._may = may;
     this._button = button;
     this._act = act;
     this._by = null;
@@ -48,11 +50,15 @@ export class HoldButton {
 
   /** Begin to hold, by whatever names itself so. */
   press(by) {
-    if (!this.enabled || this._by !== null) return;
+    if (!this.enabled || this._by !== null || !this._may()) return;
     this._by = by;
     this._share = 0;
     let last = performance.now();
     this._timer = setInterval(() => {
+      if (!this._may()) {
+        this.cancel();
+        return;
+      }
       const now = performance.now();
       this._share += Math.min((now - last) / 1000, LONGEST_TICK_S) / HELD_S;
       last = now;

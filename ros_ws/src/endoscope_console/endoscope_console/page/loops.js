@@ -11,6 +11,8 @@ export class Loops {
     const style = getComputedStyle(document.documentElement);
     this._colour = (name) => style.getPropertyValue(`--${name}`).trim();
     this._boxes = boxes;
+    /** Compensation that the loops called after are of. */
+    this._mode = '';
     this.paths = boxes.map(() => ({ before: new Loop(), after: new Loop() }));
     for (const box of boxes) new ResizeObserver(() => this.draw()).observe(box.querySelector('canvas'));
   }
@@ -18,6 +20,10 @@ export class Loops {
   /** Take the newest angles of a joint in deg, under the compensator's mode; nothing where it is not known. */
   take(joint, mode, wanted, actual) {
     if (!mode) return;
+    if (mode !== UNCOMPENSATED && mode !== this._mode) {
+      this._mode = mode;
+      for (const path of this.paths) path.after = new Loop();
+    }
     const path = this.paths[joint][mode === UNCOMPENSATED ? 'before' : 'after'];
     path.take(wanted, actual);
   }

@@ -1,12 +1,12 @@
 /** The page as a whole: sockets, hands and what is shown of both. */
 
-import { pictureAge } from './alarms.js';
+import { BLIND_S, SILENT_CONSOLE_S, pictureAge } from './alarms.js';
 import { DeadMan } from './dead_man.js';
 import { $, set, toggle, write } from './elements.js';
 import { Explain } from './explain.js';
 import { decodeTelemetry, encodeInput } from './frames.js';
 import { Hands } from './hands.js';
-import { DEG, History } from './history.js';
+import { History } from './history.js';
 import { Loops } from './loops.js';
 import { Operate } from './operate.js';
 import { Plots, places, scalesOf } from './plots.js';
@@ -44,7 +44,8 @@ const app = {
   sinceState: () => now() - app.stateArrived,
   stateAge: () => (app.state?.state_age ?? Infinity) + app.sinceState(),
   pictureAge: () => pictureAge(app.picture, now()),
-  shown: () => app.tab === 'operate',
+  current: () => app.connected && app.state !== null && app.sinceState() < SILENT_CONSOLE_S,
+  shown: () => app.tab === 'operate' && document.querySelector('dialog[open]') === null,
   show,
   claimed() {
     app.mine = true;
@@ -91,6 +92,9 @@ app.deadMan = new DeadMan(app.hands, { pad: $('pad'), thumb: $('thumb') }, {
 
 function render() {
   operate.render();
+  const stale = !app.connected || !(app.pictureAge() < BLIND_S);
+  set(document.body, 'data-stale', String(stale));
+  if (stale) readings(tensionsNow().fill(NaN));
   if (app.tab === 'see') see.render();
   if (app.tab === 'explain') explain.render();
 }
@@ -120,6 +124,7 @@ telemetry.addEventListener('hello', ({ detail }) => {
   app.signals = detail.signals;
   app.ceiling = detail.limits?.tension_ceiling ?? 60;
   $('highest-bar').max = app.ceiling;
+  loops.clear();
   past = new History(detail.signals.length, { scales: scalesOf(detail.signals) });
   at = places(detail.signals);
   plots?.destroy();
@@ -168,7 +173,7 @@ $('token').addEventListener('close', () => {
 });
 
 function tensionsNow() {
-  return at.tensions.map((s) => past.last(s) ?? NaN);
+  return (at?.tensions ?? []).map((s) => past.last(s) ?? NaN);
 }
 
 /** Draw what is new, in the browser's own rhythm: pictures that came in between are passed over. */
@@ -203,13 +208,13 @@ function spot() {
 }
 
 function readings(tensions) {
-  const [wx, wy] = at.wanted.map((s) => past.last(s));
-  const [x, y] = at.actual.map((s) => past.last(s));
-  const off = [wx, wy, x, y].includes(null) ? null : Math.hypot(wx - x, wy - y);
+  const known = app.connected && app.pictureAge() < BLIND_S;
+  const [wx, wy, x, y] = known ? [...at.wanted, ...at.actual].map((s) => past.last(s)) : [null];
+  const off = !known || [wx, wy, x, y].includes(null) ? null : Math.hypot(wx - x, wy - y);
   write($('off'), off === null ? '–' : `${off.toFixed(1)}°`);
   const highest = Math.max(...tensions);
   write($('highest'), Number.isFinite(highest) ? `${highest.toFixed(1)} N` : '–');
-  if (Number.isFinite(highest)) $('highest-bar').value = highest;
+  $('highest-bar').value = Number.isFinite(highest) ? highest : 0;
 }
 
 const TABS = ['operate', 'plots', 'see', 'explain'];
@@ -232,7 +237,11 @@ function show(tab) {
 }
 
 for (const name of TABS) {
-  $(`tab-${name}`).addEventListener('click', () => show(name));
+  $(`tab-${name}`).addEventListener('click', ({ detail, target }) => {
+    show(name);
+    // Arrows bend, unless somebody goes by keys from page to page.
+    if (detail) target.blur();
+  });
   $(`tab-${name}`).addEventListener('keydown', (event) => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!step || app.hands.held) return;
@@ -248,6 +257,8 @@ matchMedia('(min-width: 1280px)').addEventListener('change', ({ matches }) => {
   if (matches && app.tab === 'plots') show('operate');
 });
 
+// A key that is put into the address of a page that is open.
+window.addEventListener('hashchange', () => location.reload());
 window.addEventListener('pagehide', () => {
   telemetry.close();
   command.close();

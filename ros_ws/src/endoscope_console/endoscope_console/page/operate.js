@@ -9,7 +9,6 @@ import { HoldButton } from './hold_button.js';
 const SCALES = [0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3];
 const ALARMS_SHOWN = 4;
 const ANSWER_S = 8;
-const SLIDING_MS = 1000;
 /** Within so long the state tells of a scale that was asked for. */
 const SCALE_TOLD_MS = 1500;
 /** A protective stop is not unlocked by the hand that is still pressing. */
@@ -24,16 +23,17 @@ export const nearestScale = (value) =>
 export class Operate {
   /** @param app state of the page, see main.js */
   constructor(app) {
-    this._app = app;
+    this.app = app;
     this._faultSince = null;
     this._answered = 0;
-    this._sliding = 0;
     this._scaleAsked = NaN;
     this._scaleAskedAt = -Infinity;
+    // Nothing moves by itself under a hand that holds.
+    const free = () => !app.hands.held;
     this._holds = {
       KeyE: new HoldButton($('enable'), () => this._enable()),
-      KeyH: new HoldButton($('home'), () => this._order({ op: 'state', command: 'home' }, 'Home')),
-      KeyC: new HoldButton($('calibrate'), () => this._order({ op: 'calibrate' }, 'Calibrate')),
+      KeyH: new HoldButton($('home'), () => this._order({ op: 'state', command: 'home' }, 'Home'), free),
+      KeyC: new HoldButton($('calibrate'), () => this._order({ op: 'calibrate' }, 'Calibrate'), free),
     };
     this._buttons();
     this._keys();
@@ -43,23 +43,26 @@ export class Operate {
   pause() {
     const { app } = this;
     app.deadMan.letGo('paused');
+    for (const hold of Object.values(this._holds)) hold.cancel();
     if (app.mine) this._order({ op: 'state', command: 'pause' }, 'Pause');
   }
 
   /** What a gamepad's other buttons ask for. */
   gamepadAsked(asked) {
+    const { app } = this;
     const enable = this._holds.KeyE;
-    if (asked.includes('enable') && this._app.mine) enable.press('gamepad');
-    else enable.release('gamepad');
-    if (!this._app.mine) return;
+    if (!asked.includes('enable down')) enable.release('gamepad');
+    if (!app.mine) return;
     if (asked.includes('pause')) this.pause();
+    if (!app.shown() || !document.hasFocus()) return;
+    if (asked.includes('enable')) enable.press('gamepad');
     if (asked.includes('mode')) this.toggleMode('gamepad');
     if (asked.includes('faster')) this._stepScale(1);
     if (asked.includes('slower')) this._stepScale(-1);
   }
 
   toggleMode(device) {
-    if (this._app.hands.toggleMode(device)) this.render();
+    if (this.app.hands.toggleMode(device)) this.render();
     else this.say('Let go first: the mode changes only while nothing is held.');
   }
 
@@ -84,7 +87,7 @@ export class Operate {
     this._renderSigns();
     this._renderAlarms();
     const next = nextStep({
-      connected, role, mine, state, stateAge: age, busy: app.hands.busy, half: app.hands.half, held: app.hands.held,
+      connected, current: app.current(), role, mine, state, stateAge: age, busy: app.hands.busy, half: app.hands.half, held: app.hands.held,
       touch: app.touch, why: app.whyClosed,
     });
     write($('next'), next.text);
@@ -95,26 +98,23 @@ export class Operate {
     }
     this._renderOrders(fresh);
     this._renderHand();
-    if (state) this._renderTube(state);
+    this._renderTube(state ?? {});
     if (this._answered && performance.now() - this._answered > 1000 * ANSWER_S) {
       this._answered = 0;
       write($('answer'), '');
     }
   }
 
-  get app() {
-    return this._app;
-  }
-
   _renderLamp() {
     const { app } = this;
-    const shown = app.connected ? lamp(app.state) : 'OPEN';
+    const shown = app.current() ? lamp(app.state) : 'UNKNOWN';
     write($('lamp'), shown);
     set($('lamp'), 'class', `lamp ${shown.toLowerCase()}`);
     set($('view'), 'data-lamp', shown);
     const deadMan = app.state?.dead_man;
     let why = '';
-    if (shown === 'HELD') why = 'the hand holds; nothing follows yet';
+    if (shown === 'UNKNOWN') why = app.endedHere || 'nothing is heard of it';
+    else if (shown === 'HELD') why = 'the hand holds; nothing follows yet';
     else if (shown === 'FOLLOWING') why = app.state.playing ? 'as long as you hold on' : 'the hand';
     else if (app.endedHere) why = app.endedHere;
     else if (deadMan?.state === 'READY') why = 'ready';
@@ -140,7 +140,7 @@ export class Operate {
       connected: app.connected, everConnected: app.everConnected, pictureAge: app.pictureAge(),
       gamepadLost: app.deadMan?.gamepadLost,
     });
-    const shown = alarms.slice(0, ALARMS_SHOWN);
+    const shown = app.tab === 'see' ? alarms : alarms.slice(0, ALARMS_SHOWN);
     if (alarms.length > shown.length) {
       shown.push({ id: ' more', level: 'low', text: `and ${alarms.length - shown.length} more, see the tab See` });
     }
@@ -162,7 +162,9 @@ export class Operate {
 
   _renderOrders(fresh) {
     const { app } = this;
-    const { state, mine } = app;
+    const { state } = app;
+    const mine = app.mine && app.connected;
+    const may = mine && app.shown();
     const now = fresh ? state.operating_state : null;
     const busy = Boolean(state?.calibration?.running);
     this._faultSince = now === 'FAULT' ? (this._faultSince ?? performance.now()) : null;
@@ -171,23 +173,23 @@ export class Operate {
     toggle($('pause'), 'disabled', !mine);
     const claim = $('claim');
     const holder = state?.lease?.holder;
-    write(claim, mine ? 'Give back' : holder ? 'Take over …' : 'Take the controls');
+    write(claim, mine ? 'Give back' : holder && holder !== app.you ? 'Take over …' : 'Take the controls');
     set(claim, 'class', mine ? '' : 'main');
-    toggle(claim, 'disabled', !app.connected || app.role !== 'operator');
-    this._holds.KeyE.enabled = mine && now !== null && now !== 'ENABLED' && faultOver;
+    toggle(claim, 'disabled', app.claiming || !app.connected || app.role !== 'operator');
+    this._holds.KeyE.enabled = may && now !== null && now !== 'ENABLED' && faultOver;
     write($('enable').querySelector('span'), now === 'PAUSED' ? 'Resume' : 'Enable');
-    this._holds.KeyH.enabled = mine && now === 'ENABLED' && !busy;
-    this._holds.KeyC.enabled = mine && now === 'ENABLED' && !busy;
+    this._holds.KeyH.enabled = may && now === 'ENABLED' && !busy;
+    this._holds.KeyC.enabled = may && now === 'ENABLED' && !busy;
     toggle($('disable'), 'disabled', !mine || now === 'DISABLED');
   }
 
   _renderHand() {
     const { hands, mine, state, deadMan } = this.app;
     const free = mine && !hands.held;
-    set($('hand'), 'data-held', String(Boolean(hands.held && state?.dead_man?.state === 'ENGAGED')));
+    const engaged = Boolean(hands.held && state?.dead_man?.state === 'ENGAGED');
+    set($('hand'), 'data-held', String(engaged));
     set($('hand'), 'data-live', String(mine));
     // A grip that was ended looks ended, however long it is still pressed.
-    const engaged = hands.held && state?.dead_man?.state === 'ENGAGED';
     const looks = hands.held ? (engaged ? 'following' : 'spent') : 'off';
     set($('pad'), 'data-on', hands.source === 'pad' ? looks : 'off');
     set($('thumb'), 'data-on', looks);
@@ -197,9 +199,9 @@ export class Operate {
     for (const id of ['mode-position', 'mode-speed', 'scale']) toggle($(id), 'disabled', !free);
     const scale = state?.console?.scale;
     write($('scale-value'), Number.isFinite(scale) ? String(Number(scale.toPrecision(2))) : '–');
-    if (Number.isFinite(scale) && performance.now() > this._sliding) $('scale').value = String(nearestScale(scale));
+    if (Number.isFinite(scale) && document.activeElement !== $('scale')) $('scale').value = String(nearestScale(scale));
     let device = this.app.touch ? '' : 'keys: arrows, or W A S D';
-    if (deadMan?.gamepadUnknown) device = 'this gamepad is none of the standard kind: use the topic joy';
+    if (deadMan?.gamepadUnknown) device = 'unsupported gamepad mapping: use the topic joy';
     else if (deadMan?.hasGamepad) device = `gamepad: hold RB; stick asks for ${hands.modes.gamepad}`;
     write($('device'), device);
   }
@@ -249,8 +251,13 @@ export class Operate {
     }
     const from = nameOf(app.state?.lease?.holder, app.state) || played(app.state);
     if (from && !(await this._mayTake(from))) return;
+    if (from !== (nameOf(app.state?.lease?.holder, app.state) || played(app.state))) {
+      this.say(`${from} has given the controls back meanwhile: ask again.`);
+      return;
+    }
     // Frames have to come from the start: who is silent for 2 s loses the controls, before he is told that he has them.
     app.claiming = true;
+    this.render();
     const answer = await this._order({ op: 'claim', take: Boolean(from) }, 'Take the controls');
     app.claiming = false;
     if (answer.ok) app.claimed();
@@ -304,28 +311,30 @@ export class Operate {
       target.blur();
       this._set('compensator', target.value);
     });
-    // What comes from the graph meanwhile must not pull the slider from under the hand.
-    $('scale').addEventListener('input', () => {
-      this._sliding = performance.now() + SLIDING_MS;
-    });
     $('scale').addEventListener('change', ({ target }) => {
       target.blur();
       this._set('scale', SCALES[Number(target.value)]);
     });
-    click('help-open', () => $('help').showModal());
+    click('help-open', () => this._help());
   }
 
   _mode(mode) {
     if (this.app.hands.modes.pad !== mode) this.toggleMode('pad');
   }
 
+  /** What is held is let go of first: the view is covered. */
+  _help() {
+    this.app.deadMan.letGo('the help is open');
+    $('help').showModal();
+    this.render();
+  }
+
   _keys() {
     window.addEventListener('keydown', (event) => {
-      if (event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
-      // Pausing is never wrong, wherever the cursor stands.
-      if (event.code === 'Escape') this.pause();
-      if (keysAreTaken()) return;
-      if (event.key === '?') $('help').showModal();
+      // Pausing is never wrong, wherever the cursor stands and whatever else is down.
+      if (event.code === 'Escape' && !event.repeat) this.pause();
+      if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || keysAreTaken()) return;
+      if (event.key === '?') this._help();
       if (!this.app.mine || !this.app.shown()) return;
       this._holds[event.code]?.press(event.code);
       if (event.code === 'KeyM') this.toggleMode('pad');

@@ -60,5 +60,5 @@ function flat(counters, before = '') {
 
 function facts(list, pairs) {
   each(list, pairs.flatMap(([name, value]) => [{ key: `${name} t`, tag: 'dt', text: name }, { key: `${name} d`, tag: 'dd', text: String(value) }]),
-    (item) => item.key, (item) => make(item.tag), (element, item) => write(element, item.text.replaceAll('_', ' ')));
+    (item) => item.key, (item) => make(item.tag), (element, item) => write(element, item.tag === 'dt' ? item.text.replaceAll('_', ' ') : item.text));
 }

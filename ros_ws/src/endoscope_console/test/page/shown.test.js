@@ -34,7 +34,7 @@ test('age of a picture counts from its newest sample', () => {
   assert.equal(pictureAge({ age: NaN, arrived: 5 }, 5), Infinity);
 });
 
-const base = { connected: true, role: 'operator', mine: true, stateAge: 0.1, busy: false, half: false, held: false, touch: false };
+const base = { connected: true, current: true, role: 'operator', mine: true, stateAge: 0.1, busy: false, half: false, held: false, touch: false };
 const state = (more = {}) => ({ operating_state: 'ENABLED', lease: { holder: '' }, dead_man: { state: 'OPEN', reason: '' }, causes: [], ...more });
 
 test('a stranger is led to the first motion step by step', () => {
@@ -60,7 +60,7 @@ test('a stranger is led to the first motion step by step', () => {
 
 test('nothing is promised where nothing can move', () => {
   const cannot = [
-    [{ connected: false }, state()], [{ role: 'viewer' }, state()], [{ stateAge: 4 }, state()], [{}, null],
+    [{ connected: false }, state()], [{ current: false }, state()], [{ role: 'viewer' }, state()], [{ stateAge: 4 }, state()], [{}, null],
     [{}, state({ calibration: { running: true } })], [{}, state({ operating_state: 'FAULT', causes: ['no tracker'] })],
   ];
   for (const [more, said] of cannot) assert.equal(nextStep({ ...base, ...more, state: said }).step, 0);
