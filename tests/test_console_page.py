@@ -16,6 +16,7 @@ from browsed_console import (
 from chromium import chromium
 from playwright.sync_api import expect
 
+SHARE = "(button) => Number(button.style.getPropertyValue('--share'))"
 # Longer than a button has to be held.
 HELD_MS = 1500
 FAR = 0.03
@@ -429,7 +430,9 @@ def test_pause_ends_what_is_held_to_resume(console, page):
     page.keyboard.press('Escape')
     shows(page, 'state', 'PAUSED')
     page.keyboard.down('KeyE')
+    until(page, lambda: page.locator('#enable').evaluate(SHARE) > 0.0)
     page.keyboard.press('Escape')
+    assert page.locator('#enable').evaluate(SHARE) == 0.0
     page.wait_for_timeout(HELD_MS)
     shows(page, 'state', 'PAUSED')
     page.keyboard.up('KeyE')
@@ -445,6 +448,16 @@ def test_what_covers_the_view_or_the_keys_lets_go(console, page, covers):
     shows(page, 'lamp', 'OPEN')
     assert console.stands(page)
     release()
+
+
+def test_a_view_that_is_turned_says_so_and_is_turned_back(console, page):
+    box = page.locator('#space').bounding_box()
+    page.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
+    page.mouse.down()
+    page.mouse.move(box['x'] + box['width'] / 4, box['y'] + box['height'] / 2)
+    page.mouse.up()
+    page.get_by_role('button', name='View turned: reset').click()
+    expect(page.locator('#view-reset')).to_be_hidden()
 
 
 def test_help_tells_the_keys(console, page):
@@ -483,7 +496,9 @@ def test_a_page_without_its_key_says_what_to_do(console, browser):
         expect(page.locator('#token')).to_contain_text('refused this page', timeout=PATIENCE_MS)
 
 
-@pytest.mark.parametrize(('width', 'height', 'touch'), [(1440, 900, False), (1024, 768, True)])
+@pytest.mark.parametrize(
+    ('width', 'height', 'touch'), [(1440, 900, False), (1024, 768, True), (768, 1024, True)]
+)
 def test_all_of_it_fits_on_the_screen(console, browser, width, height, touch):
     how = {'viewport': {'width': width, 'height': height}, 'has_touch': touch}
     with console.page(browser, **how) as page:

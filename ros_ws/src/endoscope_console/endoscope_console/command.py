@@ -103,7 +103,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         metavar='PORT',
         help='0 for any that is free (default: %(default)d)',
     )
-    parser.add_argument('--open', action='store_true', help='open the page in a browser')
 
 
 def _port(text: str) -> int:

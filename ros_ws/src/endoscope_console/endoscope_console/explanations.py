@@ -27,8 +27,8 @@ REPORT_FILE = 'report.html'
 _RESULT_FILE = 'report.json'
 EXPERIMENT_FILE = 'next_experiment.csv'
 _STEPS = 7
-_TOLD = 20
 """That `endoscope explain` names on the way, for two joints."""
+_TOLD = 20
 _REMARKS = ('note:', 'audit:')
 _NICE = 10
 _ENDED_S = 5.0

@@ -71,6 +71,7 @@ class JoyHand:
                     self._claim()
             holds = self._operations.lease.holder == self._client.id
             if holds:
+                self._claimed = frame.grip
                 self._operations.hear(self._client, frame, arrived_ns)
             if holds and self._mapping.pause:
                 self._graph.client.order('pause')

@@ -174,6 +174,7 @@ class Operations:
             source=graph.settings.source if self._speaks else '',
             pictures=pictures.made,
             playing=self._played is not None,
+            session=graph.client.session,
             wanted=pictures.wanted,
             wanted_ns=pictures.wanted_ns,
             scale=graph.settings.scale,
@@ -216,7 +217,7 @@ class Operations:
             case State():
                 return await self._state(order.command)
             case Calibrate():
-                return await self._moving('calibration', self._calibrate)
+                return await self._moving('calibration', self._calibrate(self._withdrawn()))
             case Set():
                 return await self._set(order)
             case Record():
@@ -390,14 +391,15 @@ class Operations:
             self._halts += 1
             graph.order(command)
             return await self._ask(partial(graph.ask, command, _PATIENCE_S))
-        halts = self._halts
-
-        def withdrawn() -> bool:
-            return self._halts != halts
-
+        withdrawn = self._withdrawn()
         if command == 'home':
             return await self._moving(command, partial(graph.home, _PATIENCE_S, withdrawn))
         return await self._ask(partial(graph.ask_and_see, command, _PATIENCE_S, withdrawn))
+
+    def _withdrawn(self) -> Callable[[], bool]:
+        """Whether something has ended motion since now."""
+        halts = self._halts
+        return lambda: self._halts != halts
 
     async def _moving(self, what: str, move: Callable[[], str]) -> str:
         """Have the slave moved, for as long as the client operates."""
@@ -415,8 +417,13 @@ class Operations:
             holder.waits = False
         return told
 
-    def _calibrate(self) -> str:
-        return self.graph.client.calibrate(patience_s=_PATIENCE_S).message
+    def _calibrate(self, withdrawn: Callable[[], bool]) -> Callable[[], str]:
+        def calibrate() -> str:
+            if withdrawn():
+                raise OrderRefusedError('calibration was withdrawn before it began')
+            return self.graph.client.calibrate(patience_s=_PATIENCE_S).message
+
+        return calibrate
 
     async def _play(self, client: Client, explanation: str) -> str:
         """Have the console play an experiment for as long as the operator holds on."""
@@ -437,7 +444,8 @@ class Operations:
             try:
                 await self._ask(partial(self._set_console, **values))
             except BaseException:
-                self._played, holder.moves = None, ''
+                # It may have been set all the same, and only not answered.
+                self.soon(self._end_of_play())
                 raise
             self.graph.settings = Settings('file', self.graph.settings.scale)
             played.begun_ns = time.monotonic_ns()

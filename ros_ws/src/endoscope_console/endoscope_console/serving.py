@@ -10,13 +10,9 @@ import socket
 import ssl
 import subprocess
 import sys
-import tempfile
-import time
-import webbrowser
 from collections import Counter
 from collections.abc import Iterable
 from contextlib import ExitStack, nullcontext
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -55,8 +51,6 @@ _ANSWERS_S = 1.5
 _LOOK_S = 0.1
 _ENDS_S = 20.0
 _DROPPED_S = 2
-# A browser that is started anew has read its file by then.
-_READ_S = 5.0
 _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -216,21 +210,10 @@ async def _announce(
             raise ServingError(f'the graph has ended with status {started.ended}, as it says above')
         await asyncio.sleep(_LOOK_S)
     print(f'ready         slave {graph.client.state}; Ctrl-C ends', flush=True)
-    if args.open:
-        await asyncio.to_thread(_open, page)
     while started.ended is None:
         await asyncio.sleep(_LOOK_S)
     print(f'console: the graph has ended with status {started.ended}', flush=True)
     await asyncio.Event().wait()
-
-
-def _open(page: str) -> None:
-    """Open the page by way of a file: what a program is started with, every user can read."""
-    with tempfile.NamedTemporaryFile('w', suffix='.html') as file:
-        file.write(f'<meta http-equiv="refresh" content="0; url={page}">')
-        file.flush()
-        webbrowser.open(Path(file.name).as_uri())
-        time.sleep(_READ_S)
 
 
 def _configuration(

@@ -161,11 +161,11 @@ class View:
             name, _, subcomponent = part.partition(': ')
             told = f'{subcomponent}: {said.message}' if said.level else 'ok'
             node = nodes.setdefault(
-                name, {'name': name, 'level': _LEVELS[0], 'message': 'ok', 'age': 0.0}
+                name, {'name': name, 'level': _LEVELS[0], 'message': 'ok', 'age': math.inf}
             )
             if _level(said) > _LEVELS.index(node['level']):
                 node |= {'level': _LEVELS[_level(said)], 'message': told}
-            node['age'] = (now_ns - said.received_ns) * 1e-9
+            node['age'] = min(node['age'], (now_ns - said.received_ns) * 1e-9)
         return list(nodes.values())
 
     def _alarms(self, now_ns: int) -> list[Alarm]:

@@ -42,7 +42,7 @@ def test_orders_are_read():
         '{"op":"hello","token":"x"}',
         '{"op":"state","id":1,"command":"fly"}',
         '{"op":"set","id":1}',
-        '{"op":"set","id":1,"scale":0.5,"mode":"speed"}',
+        '{"op":"set","id":1,"scale":0.5,"compensator":"none"}',
         '{"op":"set","id":1,"scale":NaN}',
         '{"op":"set","id":1,"scale":1e9}',
         '{"op":"set","id":1,"scale":"0.5"}',

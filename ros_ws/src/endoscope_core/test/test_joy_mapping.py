@@ -88,6 +88,7 @@ def test_a_message_of_another_device_is_refused(axes, buttons, said):
         ({'axis_angular.bend_x': -1}, 'axis_angular.bend_x = -1'),
         ({'scale_angular.bend_y': 0.0}, 'scale_angular.bend_y = 0.0'),
         ({'scale_angular.bend_y': math.nan}, 'scale_angular.bend_y = nan'),
+        ({'scale_angular.bend_y': '1e-1'}, 'scale_angular.bend_y = 1e-1'),
         ({'require_enable_button': 1}, 'require_enable_button = 1'),
     ],
 )

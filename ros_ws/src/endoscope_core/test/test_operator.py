@@ -44,6 +44,7 @@ ENDS = {
     'the lease taken': (Reason.LOST, of_conditions(holder='c2')),
     'not enabled': (Reason.STATE, of_conditions(state_enabled=False)),
     'no supervisor': (Reason.STATE, of_conditions(state_age_ns=3501 * MS)),
+    'another session': (Reason.STATE, of_conditions(session='session-2')),
     'calibration': (Reason.CALIBRATION, of_conditions(calibrating=True)),
     'another source of the console': (Reason.SOURCE, of_conditions(source='none')),
     'a played motion': (Reason.SOURCE, of_conditions(source='file', playing=True)),

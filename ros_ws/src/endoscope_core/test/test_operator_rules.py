@@ -34,6 +34,7 @@ CHANGES = (
     {'state_enabled': False},
     {'state_age_ns': 3499 * MS},
     {'state_age_ns': 3501 * MS},
+    {'session': 'another'},
     {'calibrating': True},
     {'source': 'none'},
     {'source': 'file'},
@@ -59,6 +60,7 @@ class AnOperator(RuleBasedStateMachine):
         self.hands_off = False
         self.new_grip = 0
         self.of_grip = self.of_console = ()
+        self.of_session = ''
         self.ended = Counter()
 
     def forbidden(self):
@@ -172,6 +174,7 @@ class AnOperator(RuleBasedStateMachine):
             ends |= forbidden | ({Reason.STALLED} if stalled else set())
             ends |= {Reason.SILENT} if silent else set()
             ends |= {Reason.SOURCE} if of_console != self.of_console else set()
+            ends |= {Reason.STATE} if said.session != self.of_session else set()
             self.has_ended(ends)
         elif before is OPEN:
             assert after is (READY if self.hands_off and not forbidden else OPEN)
@@ -180,7 +183,7 @@ class AnOperator(RuleBasedStateMachine):
             assert after is ENGAGED
             frame = self.newest
             self.of_grip = frame.grip, frame.source, frame.position_mode
-            self.of_console = of_console
+            self.of_console, self.of_session = of_console, said.session
             EVER[ENGAGED] += 1
         else:
             assert after is (OPEN if forbidden or self.newest.pressed else READY)

@@ -314,8 +314,8 @@ class GraphClient(ClosedOnExit):
         """
         state = self.ask(command, patience_s, withdrawn)
         if state == 'ENABLED' and self.wait_until(lambda: self.state != state, _STEADY_S):
-            self.wait_until(lambda: bool(self.why), patience_s)
-            raise GraphRefusedError(f'{self.state}: {self.why}')
+            self.wait_until(lambda: bool(self.why) or withdrawn(), patience_s)
+            raise GraphRefusedError(f'{self.state}: {self.why or "asked for meanwhile"}')
         return state
 
     def _ask(

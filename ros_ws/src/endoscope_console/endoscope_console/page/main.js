@@ -66,7 +66,7 @@ const app = {
 const operate = new Operate(app);
 const see = new See(app);
 const explain = new Explain(app);
-const view = new View3d($('space'));
+const view = new View3d($('space'), $('view-reset'));
 const loops = new Loops([...document.querySelectorAll('#loops figure')]);
 let plots = null;
 let past = null;
@@ -94,6 +94,7 @@ function render() {
   operate.render();
   const stale = !app.connected || !(app.pictureAge() < BLIND_S);
   set(document.body, 'data-stale', String(stale));
+  set(document.body, 'data-connected', String(app.connected));
   if (stale) readings(tensionsNow().fill(NaN));
   if (app.tab === 'see') see.render();
   if (app.tab === 'explain') explain.render();

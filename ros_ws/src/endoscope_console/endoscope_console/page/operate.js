@@ -9,6 +9,7 @@ import { HoldButton } from './hold_button.js';
 const SCALES = [0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3];
 const ALARMS_SHOWN = 4;
 const ANSWER_S = 8;
+const SLIDING_MS = 1000;
 /** Within so long the state tells of a scale that was asked for. */
 const SCALE_TOLD_MS = 1500;
 /** A protective stop is not unlocked by the hand that is still pressing. */
@@ -26,6 +27,7 @@ export class Operate {
     this.app = app;
     this._faultSince = null;
     this._answered = 0;
+    this._sliding = 0;
     this._scaleAsked = NaN;
     this._scaleAskedAt = -Infinity;
     // Nothing moves by itself under a hand that holds.
@@ -162,9 +164,8 @@ export class Operate {
 
   _renderOrders(fresh) {
     const { app } = this;
-    const { state } = app;
-    const mine = app.mine && app.connected;
-    const may = mine && app.shown();
+    const { state, mine } = app;
+    const may = mine && app.connected && app.shown();
     const now = fresh ? state.operating_state : null;
     const busy = Boolean(state?.calibration?.running);
     this._faultSince = now === 'FAULT' ? (this._faultSince ?? performance.now()) : null;
@@ -199,7 +200,7 @@ export class Operate {
     for (const id of ['mode-position', 'mode-speed', 'scale']) toggle($(id), 'disabled', !free);
     const scale = state?.console?.scale;
     write($('scale-value'), Number.isFinite(scale) ? String(Number(scale.toPrecision(2))) : '–');
-    if (Number.isFinite(scale) && document.activeElement !== $('scale')) $('scale').value = String(nearestScale(scale));
+    if (Number.isFinite(scale) && performance.now() > this._sliding) $('scale').value = String(nearestScale(scale));
     let device = this.app.touch ? '' : 'keys: arrows, or W A S D';
     if (deadMan?.gamepadUnknown) device = 'unsupported gamepad mapping: use the topic joy';
     else if (deadMan?.hasGamepad) device = `gamepad: hold RB; stick asks for ${hands.modes.gamepad}`;
@@ -252,7 +253,7 @@ export class Operate {
     const from = nameOf(app.state?.lease?.holder, app.state) || played(app.state);
     if (from && !(await this._mayTake(from))) return;
     if (from !== (nameOf(app.state?.lease?.holder, app.state) || played(app.state))) {
-      this.say(`${from} has given the controls back meanwhile: ask again.`);
+      this.say(`${from} has lost the controls meanwhile: ask again.`);
       return;
     }
     // Frames have to come from the start: who is silent for 2 s loses the controls, before he is told that he has them.
@@ -310,6 +311,10 @@ export class Operate {
     $('compensator').addEventListener('change', ({ target }) => {
       target.blur();
       this._set('compensator', target.value);
+    });
+    // What comes from the graph meanwhile must not pull the slider from under the hand.
+    $('scale').addEventListener('input', () => {
+      this._sliding = performance.now() + SLIDING_MS;
     });
     $('scale').addEventListener('change', ({ target }) => {
       target.blur();

@@ -35,7 +35,8 @@ export class See {
       set(row, 'data-health', kind);
       [word, node.name, node.message, seconds(age)].forEach((text, k) => write(row.children[k], text));
     });
-    facts($('counters'), Object.entries(flat(state.counters ?? {})));
+    const ended = Object.entries(state.dead_man?.counts ?? {}).map(([reason, count]) => [`grips ended: ${reason}`, count]);
+    facts($('counters'), [...Object.entries(state.counters ?? {}), ...ended]);
     each($('states'), this._states, (entry) => entry.key, (entry) =>
       make('li', {}, make('time', { class: 'number' }, entry.at.toLocaleTimeString()), ` ${entry.text}`), () => {});
     const { lease = {}, recorder = {} } = state;
@@ -50,12 +51,6 @@ export class See {
       ['pictures', `${this._app.picturesLost} lost on the way of ${this._app.pictures}`],
     ]);
   }
-}
-
-/** Counters of counters in one level: `name kind`. */
-function flat(counters, before = '') {
-  return Object.assign({}, ...Object.entries(counters).map(([name, value]) =>
-    (value !== null && typeof value === 'object' ? flat(value, `${before}${name} `) : { [before + name]: value })));
 }
 
 function facts(list, pairs) {

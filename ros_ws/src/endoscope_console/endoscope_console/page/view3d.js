@@ -77,9 +77,13 @@ export function tensionColour(tension, ceiling, scale) {
 }
 
 export class View3d {
-  /** @param canvas fills its box; turning it by dragging, nearer and farther by the wheel */
-  constructor(canvas) {
+  /**
+   * @param canvas fills its box; turning it by dragging, nearer and farther by the wheel
+   * @param reset button that is shown while it is turned
+   */
+  constructor(canvas, reset) {
     this._canvas = canvas;
+    this._reset = reset;
     this._ctx = canvas.getContext('2d');
     this._ground = document.createElement('canvas');
     this._angles = { ...HOME };
@@ -127,6 +131,8 @@ export class View3d {
 
   _look() {
     if (!this._width) return;
+    // Seen from elsewhere, the tip does not go where the hand goes.
+    this._reset.hidden = this._angles.azimuth === HOME.azimuth && this._angles.elevation === HOME.elevation;
     this._camera = new Camera(this._width, this._height, this._angles);
     this._drawGround();
     if (this._last) this.draw(this._last);
@@ -376,9 +382,12 @@ export class View3d {
       angles.zoom = Math.max(0.5, Math.min(3, angles.zoom * Math.exp(-event.deltaY / 600)));
       this._look();
     }, { passive: false });
-    canvas.addEventListener('dblclick', () => {
+    const reset = () => {
       Object.assign(angles, HOME);
       this._look();
-    });
+      this._reset.blur();
+    };
+    canvas.addEventListener('dblclick', reset);
+    this._reset.addEventListener('click', reset);
   }
 }

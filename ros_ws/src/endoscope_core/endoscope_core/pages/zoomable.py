@@ -151,10 +151,7 @@ def head() -> str:
 
 def scripts() -> str:
     """Return what stands at the end of a page with plots: `<script>` elements."""
-    return ''.join(
-        f'<script>{_text(name)}</script>\n'
-        for name in ('uPlot.iife.min.js', 'drawing.js', 'zoomable.js')
-    )
+    return ''.join(f'<script>{_text(name)}</script>\n' for name in _SCRIPTS)
 
 
 def figure_html(plots: Sequence[Plot], caption: str = '') -> str:

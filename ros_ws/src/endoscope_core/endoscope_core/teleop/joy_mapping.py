@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_core.teleop.frames import InputFrame, MalformedFrameError, Source
@@ -123,7 +124,7 @@ class JoyMapping:
         )
 
 
-def _checked(name: str, value: float) -> float:
+def _checked(name: str, value: Any) -> Any:
     """Check one parameter."""
     if name not in DEFAULTS:
         raise JoyMappingError(f"there is no parameter '{name}' of joy: {nearest(name, DEFAULTS)}")
@@ -135,7 +136,8 @@ def _checked(name: str, value: float) -> float:
         least = -1 if name in _MAY_BE_NONE else 0
         fits, wanted = isinstance(value, int) and value >= least, f'a number from {least}'
     else:
-        fits, wanted = math.isfinite(value) and value != 0.0, 'a finite speed in rad/s, not 0'
+        fits = isinstance(value, int | float) and math.isfinite(value) and value != 0.0
+        wanted = 'a finite speed in rad/s, not 0'
     if not fits:
         raise JoyMappingError(f'{name} = {value} must be {wanted}')
     return value

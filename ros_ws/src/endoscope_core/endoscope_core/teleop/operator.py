@@ -16,7 +16,7 @@ LATE_NS = 100_000_000
 BLIND_NS = 300_000_000
 """Who was drawn no newer picture is blind."""
 STATE_NS = 3_500_000_000
-"""The operating state counts as unknown after three repetitions that did not come."""
+"""Without a word of the supervisor for so long its state is unknown; motors hold long before."""
 
 # What a hand that rests on a stick may leave.
 _REST = 0.1
@@ -82,6 +82,8 @@ class Conditions:
         picture stands here before it is sent.
     playing
         Whether the console plays a motion that goes on only while the clutch is held.
+    session
+        Motion session; another one may have begun unseen between two words on the state.
     """
 
     holder: str = ''
@@ -91,6 +93,7 @@ class Conditions:
     source: str = ''
     pictures: tuple[tuple[int, int], ...] = ()
     playing: bool = False
+    session: str = ''
 
 
 class _Sender:
@@ -171,6 +174,7 @@ class OperatorDeadMan:
         self._hands_off = False
         self._of_grip = (0, 0, False)
         self._of_console = ('', False)
+        self._of_session = ''
 
     @property
     def engaged(self) -> bool:
@@ -212,7 +216,7 @@ class OperatorDeadMan:
         Parameters
         ----------
         reason
-            `Reason.MALFORMED`, or `Reason.FLOOD` for too many of them.
+            `Reason.MALFORMED`, `Reason.FLOOD` for too many of them, or `Reason.LOST` for a lease.
         client
             Who sent it.
         """
@@ -270,6 +274,7 @@ class OperatorDeadMan:
         self.state, self.reason = DeadManState.ENGAGED, None
         self._of_grip = frame.grip, frame.source, frame.position_mode
         self._of_console = conditions.source, conditions.playing
+        self._of_session = conditions.session
 
     def _open(self, reason: Reason) -> None:
         self._dead_man.let_go(reason)
@@ -304,6 +309,8 @@ class OperatorDeadMan:
         if not frame.focused:
             return Reason.UNFOCUSED
         if not conditions.state_enabled or now_ns - conditions.state_ns > STATE_NS:
+            return Reason.STATE
+        if self.engaged and conditions.session != self._of_session:
             return Reason.STATE
         if conditions.calibrating:
             return Reason.CALIBRATION
