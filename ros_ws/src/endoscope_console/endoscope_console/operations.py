@@ -217,7 +217,9 @@ class Operations:
             case State():
                 return await self._state(order.command)
             case Calibrate():
-                return await self._moving('calibration', self._calibrate(self._withdrawn()))
+                return await self._moving(
+                    'calibration', partial(self._calibrate, self._withdrawn())
+                )
             case Set():
                 return await self._set(order)
             case Record():
@@ -417,13 +419,10 @@ class Operations:
             holder.waits = False
         return told
 
-    def _calibrate(self, withdrawn: Callable[[], bool]) -> Callable[[], str]:
-        def calibrate() -> str:
-            if withdrawn():
-                raise OrderRefusedError('calibration was withdrawn before it began')
-            return self.graph.client.calibrate(patience_s=_PATIENCE_S).message
-
-        return calibrate
+    def _calibrate(self, withdrawn: Callable[[], bool]) -> str:
+        if withdrawn():
+            raise OrderRefusedError('calibration was withdrawn before it began')
+        return self.graph.client.calibrate(patience_s=_PATIENCE_S).message
 
     async def _play(self, client: Client, explanation: str) -> str:
         """Have the console play an experiment for as long as the operator holds on."""

@@ -53,6 +53,10 @@ _HEARD = profile(Qos(200))
 _HEARD_LATCHED = profile(Qos(200, latched=True))
 
 
+def _never() -> bool:
+    return False
+
+
 class GraphRefusedError(EndoscopeError):
     """The graph refused what was asked of it, or did not do it in time."""
 
@@ -268,7 +272,7 @@ class GraphClient(ClosedOnExit):
         self,
         command: str,
         patience_s: float = PATIENCE_S,
-        withdrawn: Callable[[], bool] = lambda: False,
+        withdrawn: Callable[[], bool] = _never,
     ) -> str:
         """Give a state command and wait for the state that it leads to; that state.
 
@@ -294,7 +298,7 @@ class GraphClient(ClosedOnExit):
         self,
         command: str,
         patience_s: float = PATIENCE_S,
-        withdrawn: Callable[[], bool] = lambda: False,
+        withdrawn: Callable[[], bool] = _never,
     ) -> str:
         """Give a state command, and see whether the state lasts; that state.
 
@@ -358,9 +362,7 @@ class GraphClient(ClosedOnExit):
                 return words
         return ''
 
-    def home(
-        self, patience_s: float = PATIENCE_S, withdrawn: Callable[[], bool] = lambda: False
-    ) -> str:
+    def home(self, patience_s: float = PATIENCE_S, withdrawn: Callable[[], bool] = _never) -> str:
         """Go home, and wait until the slave is there; what calibration says of it.
 
         Parameters are those of :meth:`ask_and_see`.
@@ -393,7 +395,7 @@ class GraphClient(ClosedOnExit):
         patience_s: float,
         begun_ns: int = -1,
         progress: Callable[[str, float], None] = lambda step, share: None,
-        is_told: Callable[[], bool] = lambda: False,
+        is_told: Callable[[], bool] = _never,
     ) -> str:
         """Wait while calibration moves the slave, or until its end is told; what it said last."""
         while not is_told():

@@ -125,9 +125,9 @@ def undergo(event: Event, hand: Hand, settled_s: float, watched_s: float) -> Out
     hand
         Of the operator.
     settled_s
-        After the word on the clutch: what moves within it still counts to the motion.
+        After the word on the clutch, s: what moves within it still counts to the motion.
     watched_s
-        For how long the motors are watched after that.
+        For how long the motors are watched after that, s.
 
     Raises
     ------

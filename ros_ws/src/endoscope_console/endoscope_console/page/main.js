@@ -45,6 +45,7 @@ const app = {
   stateAge: () => (app.state?.state_age ?? Infinity) + app.sinceState(),
   pictureAge: () => pictureAge(app.picture, now()),
   current: () => app.connected && app.state !== null && app.sinceState() < SILENT_CONSOLE_S,
+  sees: () => app.connected && app.pictureAge() < BLIND_S,
   shown: () => app.tab === 'operate' && document.querySelector('dialog[open]') === null,
   show,
   claimed() {
@@ -92,10 +93,9 @@ app.deadMan = new DeadMan(app.hands, { pad: $('pad'), thumb: $('thumb') }, {
 
 function render() {
   operate.render();
-  const stale = !app.connected || !(app.pictureAge() < BLIND_S);
-  set(document.body, 'data-stale', String(stale));
+  set(document.body, 'data-stale', String(!app.sees()));
   set(document.body, 'data-connected', String(app.connected));
-  if (stale) readings(tensionsNow().fill(NaN));
+  if (!app.sees()) readings([]);
   if (app.tab === 'see') see.render();
   if (app.tab === 'explain') explain.render();
 }
@@ -174,7 +174,7 @@ $('token').addEventListener('close', () => {
 });
 
 function tensionsNow() {
-  return (at?.tensions ?? []).map((s) => past.last(s) ?? NaN);
+  return at.tensions.map((s) => past.last(s) ?? NaN);
 }
 
 /** Draw what is new, in the browser's own rhythm: pictures that came in between are passed over. */
@@ -209,9 +209,8 @@ function spot() {
 }
 
 function readings(tensions) {
-  const known = app.connected && app.pictureAge() < BLIND_S;
-  const [wx, wy, x, y] = known ? [...at.wanted, ...at.actual].map((s) => past.last(s)) : [null];
-  const off = !known || [wx, wy, x, y].includes(null) ? null : Math.hypot(wx - x, wy - y);
+  const [wx, wy, x, y] = app.sees() ? [...at.wanted, ...at.actual].map((s) => past.last(s)) : [null];
+  const off = [wx, wy, x, y].includes(null) ? null : Math.hypot(wx - x, wy - y);
   write($('off'), off === null ? '–' : `${off.toFixed(1)}°`);
   const highest = Math.max(...tensions);
   write($('highest'), Number.isFinite(highest) ? `${highest.toFixed(1)} N` : '–');
