@@ -1,5 +1,7 @@
 """`endoscope_explain.read`, `simulate` and `explain`: as the commands, with results in memory."""
 
+import inspect
+import pydoc
 import subprocess
 import sys
 
@@ -11,7 +13,7 @@ from short_bags import PLANT, one_joint, write_short_bag
 import endoscope_explain
 from endoscope_bringup.cli import main
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.physics import PlantDescription, load_plant, save_plant
+from endoscope_core.physics import EffectSpec, PlantDescription, load_plant, save_plant
 
 TIME = np.arange(0.0, 1.0, 1e-3)
 
@@ -31,6 +33,131 @@ def test_the_import_is_quick_and_knows_no_other_name():
         [sys.executable, '-c', program], capture_output=True, text=True, check=True
     )
     assert done.stdout.splitlines() == ['', 'False True']
+
+
+def test_help_shows_what_can_be_called_and_what_it_returns():
+    calls = ['explain', 'from_arrays', 'read', 'simulate']
+    assert dir(endoscope_explain) == sorted(['EndoscopeError', *calls])
+    shown = pydoc.plain(pydoc.render_doc(endoscope_explain))
+    assert '__getattr__' not in shown
+    for name in calls:
+        assert f'    {name}(' in shown
+        assert 'Returns\n-------\n' in inspect.getdoc(getattr(endoscope_explain, name))
+    assert endoscope_explain.EndoscopeError is EndoscopeError
+
+
+def test_a_signal_is_an_array(bag):
+    angle = endoscope_explain.read(bag)['slave/measured_js:bend_x']
+    assert np.array_equal(np.asarray(angle), angle.values)
+    assert np.asarray(angle, dtype=np.float32).dtype == np.float32
+    assert np.degrees(angle).shape == (80,)
+    copied = np.array(angle)
+    copied[0] = 7.0
+    assert angle.values[0] != 7.0
+
+
+def test_signals_become_a_table_where_there_is_pandas(bag):
+    signals = endoscope_explain.read(bag)
+    pandas = pytest.importorskip('pandas', reason='a table is a frame of pandas')
+    frame = signals.to_frame()
+    assert isinstance(frame, pandas.DataFrame)
+    assert list(frame) == list(signals)
+    assert frame.index.name == 'time'
+    for name, signal in signals.items():
+        column = frame[name].dropna()
+        assert np.array_equal(column.index, signal.time)
+        assert np.array_equal(column, signal.values)
+
+
+def test_without_pandas_a_table_is_refused_in_one_line(bag):
+    program = (
+        'import sys; sys.modules["pandas"] = None\n'
+        'import endoscope_explain\n'
+        f'signals = endoscope_explain.read({str(bag)!r})\n'
+        'try:\n    signals.to_frame()\n'
+        'except endoscope_explain.EndoscopeError as error:\n    print(error)'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == 'to_frame needs pandas: pip install pandas\n'
+
+
+def test_ones_own_arrays_are_a_recording(bag, tmp_path):
+    measured = endoscope_explain.read(bag)
+    given = {name: (signal.time, signal.values) for name, signal in measured.items()}
+    given['slave/measured_js:bend_x'] = measured['slave/measured_js:bend_x']
+    for made in (
+        endoscope_explain.from_arrays(given),
+        endoscope_explain.from_arrays(given, out=tmp_path / 'kept'),
+        endoscope_explain.read(tmp_path / 'kept'),
+    ):
+        assert set(made) == set(measured)
+        for name, signal in measured.items():
+            assert np.array_equal(made[name].values, signal.values)
+            assert made[name].time == pytest.approx(signal.time, abs=1e-9)
+    with pytest.raises(EndoscopeError, match='exists'):
+        endoscope_explain.from_arrays(given, out=tmp_path / 'kept')
+    again, before = (endoscope_explain.simulate(PLANT, one) for one in (made, bag))
+    name = 'wires/measured_js:wire_x_pos'
+    assert again[name].values == pytest.approx(before[name].values)
+
+
+WIRE, OTHER = 'wires/measured_js:wire_x_pos', 'wires/measured_js:wire_x_neg'
+
+
+@pytest.mark.parametrize(
+    ('signals', 'message'),
+    [
+        ({}, 'no signals: give some of motor/servo_jp:motor_x'),
+        ({'wires/measured_js:wire_x_po': (TIME, TIME)}, f'did you mean {WIRE}'),
+        ({'motor/servo_jq:motor_x': (TIME, TIME)}, 'did you mean motor/servo_jp:motor_x'),
+        ({WIRE: (TIME, TIME), OTHER: (TIME + 1.0, TIME)}, f'{OTHER}: give it the times of {WIRE}'),
+        ({WIRE: (TIME[::-1], TIME)}, 'increase'),
+        ({WIRE: (1e12 * TIME, TIME)}, 'times are in s'),
+        ({WIRE: (TIME, TIME[1:])}, 'give 1000 values, one for each time'),
+        ({WIRE: TIME}, 'an array of times and one of values'),
+        ({WIRE: (TIME, np.where(TIME < 0.5, 1.0, np.nan))}, '500 of 1000 values are not finite'),
+    ],
+)
+def test_arrays_that_are_no_recording_are_refused(signals, message):
+    with pytest.raises(EndoscopeError, match=message):
+        endoscope_explain.from_arrays(signals)
+
+
+@pytest.mark.parametrize(
+    ('effect', 'message'),
+    [
+        (EffectSpec('gravty', 'bend_x'), 'the plant: unknown effect gravty: did you mean gravity'),
+        (EffectSpec('gravity', 'bend_z'), 'is on joint bend_z: did you mean bend_x'),
+        (EffectSpec('gravity', 'bend_x', {'moment': 1.0}), 'did you mean moment_nm'),
+        (EffectSpec('gravity', 'bend_x', {'moment_nm': np.nan}), 'moment_nm is nan'),
+    ],
+)
+def test_a_wrong_effect_is_found_before_a_recording_is_read(effect, message):
+    for call in (
+        endoscope_explain.explain,
+        lambda bag, plant: endoscope_explain.simulate(plant, bag),
+    ):
+        with pytest.raises(EndoscopeError, match=message):
+            call('there is no such recording', one_joint(effect))
+
+
+@pytest.mark.parametrize(
+    ('given', 'options', 'message'),
+    [
+        ({'time': TIME, 'bend_x': TIME}, {}, 'dict is no bag: .* from_arrays'),
+        ([], {}, '0 recordings'),
+        (['a', 'b'], {'validate': ['c']}, '2 recordings with 1 in validate'),
+        ('a', {'without': 'motor/measured_js'}, "without 'm': "),
+        ('a', {'without': ['motor/measured_j']}, 'did you mean motor/measured_js'),
+        ('a', {'effects': 0}, 'effects is 0'),
+        ('a', {'band': -1.0}, 'band is -1.0'),
+    ],
+)
+def test_options_that_cannot_be_used_are_refused_early(given, options, message):
+    with pytest.raises(EndoscopeError, match=message):
+        endoscope_explain.explain(given, PLANT, **options)
 
 
 def test_signals_are_arrays_in_si_by_name(bag):
@@ -97,12 +224,12 @@ def test_arrays_command_joints_or_shafts(tmp_path):
 @pytest.mark.parametrize(
     ('commands', 'message'),
     [
-        ({'bend_x': TIME}, 'time: give two or more times'),
-        ({'time': TIME[::-1], 'bend_x': TIME}, 'time: give two or more times'),
-        ({'time': TIME}, 'command joints'),
-        ({'time': TIME, 'bend_x': TIME, 'motor_y': TIME}, 'command joints'),
-        ({'time': TIME, 'bend_x': TIME[1:]}, 'bend_x: give 1000 finite angles'),
-        ({'time': TIME, 'bend_x': TIME * np.nan}, 'bend_x: give 1000 finite angles'),
+        ({'bend_x': TIME}, 'bend_x: give time, and angles of joints'),
+        ({'time': TIME[::-1], 'bend_x': TIME}, 'bend_x: give two or more times'),
+        ({'time': TIME}, 'time: give time, and angles of joints'),
+        ({'time': TIME, 'bend_x': TIME, 'motor_y': TIME}, 'angles of joints'),
+        ({'time': TIME, 'bend_x': TIME[1:]}, 'bend_x: give 1000 values'),
+        ({'time': TIME, 'bend_x': TIME * np.nan}, 'bend_x: 1000 of 1000 values are not finite'),
         ({'time': TIME, 'bend_z': TIME}, 'commands bend_z'),
     ],
 )
@@ -129,3 +256,16 @@ def test_an_explanation_is_looked_at_saved_and_gone_on_with(bag, tmp_path):
     assert found.report['verdict'] == 'consistent'
     again = endoscope_explain.simulate(found.plant, bag)
     assert len(again['slave/measured_js:bend_x']) == 80
+
+
+@pytest.mark.timeout(900)
+def test_several_recordings_are_explained_in_one_call(bag, tmp_path):
+    other = write_short_bag(tmp_path / 'other', duration=2.0, seed=5)
+    both = [bag, endoscope_explain.read(other)]
+    found = endoscope_explain.explain(both, one_joint(), quick=True)
+    assert [one.case.recording.name for one in found] == ['short', 'other']
+    assert [one.verdict for one in found] == ['consistent', 'consistent']
+    alone = endoscope_explain.explain(bag, one_joint(), quick=True)
+    assert found[0].report | {'runtime_s': 0} == alone.report | {'runtime_s': 0}
+    with pytest.raises(EndoscopeError, match='exclude each other'):
+        endoscope_explain.explain(both, one_joint(), same_physics=True, baseline=bag)

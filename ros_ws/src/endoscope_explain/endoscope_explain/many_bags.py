@@ -83,6 +83,31 @@ def explained_case(
     return replace(case, provenance=made_from)
 
 
+def explained_cases(
+    sources: Sequence[Sources],
+    jobs: int = 2,
+    *,
+    same_physics: bool = False,
+    progress: Progress | None = None,
+) -> list[ExplainedCase]:
+    """Explain bags side by side, of one rig where they have the `same_physics`.
+
+    Raises
+    ------
+    EndoscopeError
+        If a recording cannot be used, or what was asked for does not go together.
+    """
+    sources = _prepared(sources, jobs, same_physics, progress)
+    if len(sources) == 1:
+        return [explained_case(sources[0], jobs, progress)]
+    cases: dict[int, ExplainedCase] = {}
+    for index, case in _here(explained_case, sources, jobs):
+        cases[index] = case
+        if progress is not None:
+            progress(f'{len(cases)}/{len(sources)} {case.recording.name}')
+    return [case for _, case in sorted(cases.items())]
+
+
 def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = None) -> Reported:
     """Explain one bag.
 
@@ -138,26 +163,20 @@ def explain_bags(
         If a recording, the folder or the cluster cannot be used; nothing is written then.
     """
     require_free_directory(out)
-    if same_physics:
-        if any(one.baseline is not None for one in sources):
-            raise TogetherError(
-                '--same-physics cannot be had with --baseline: leave one of them out'
-            )
-        all_given = physics_of_all(sources, jobs, progress or say)
-        sources = [replace(o, given=g) for o, g in zip(sources, all_given, strict=True)]
+    if same_physics or dask_address is None:
+        sources = _prepared(sources, jobs, same_physics, progress or say)
     if len(sources) == 1 and dask_address is None:
         reported = explain_one(sources[0], jobs, progress)
         with atomic_directory(out) as folder:
             _write(reported, folder)
         say(f'{reported.told}\nReport: {out / REPORT_HTML}')
         return {unique_names([sources[0].bag])[0]: reported}
-    if dask_address is None and not same_physics:
-        for one in sources:
-            read_inputs(one)
     names = unique_names([one.bag for one in sources])
     rows: dict[str, Reported] = {}
     with atomic_directory(out) as folder:
-        finished = _on_dask(sources, dask_address) if dask_address else _here(sources, jobs)
+        finished = (
+            _on_dask(sources, dask_address) if dask_address else _here(explain_one, sources, jobs)
+        )
         for index, reported in finished:
             name = names[index]
             (folder / name).mkdir()
@@ -250,9 +269,26 @@ def _write(reported: Reported, folder: Path) -> None:
         (folder / name).write_bytes(content)
 
 
-def _here(sources: Sequence[Sources], jobs: int) -> Iterator[tuple[int, Reported]]:
+def _prepared(
+    sources: Sequence[Sources], jobs: int, same_physics: bool, tell: Progress | None
+) -> Sequence[Sources]:
+    """Sources of which each can be explained for itself, after all of several were read."""
+    if same_physics:
+        if any(one.baseline is not None for one in sources):
+            raise TogetherError('same physics and a baseline exclude each other: leave one out')
+        all_given = physics_of_all(sources, jobs, tell or (lambda _: None))
+        return [replace(o, given=g) for o, g in zip(sources, all_given, strict=True)]
+    if len(sources) > 1:
+        for one in sources:
+            read_inputs(one)
+    return sources
+
+
+def _here[Found](
+    explain: Callable[[Sources], Found], sources: Sequence[Sources], jobs: int
+) -> Iterator[tuple[int, Found]]:
     with worker_pool(min(jobs, len(sources))) as pool:
-        futures = {pool.submit(explain_one, one): i for i, one in enumerate(sources)}
+        futures = {pool.submit(explain, one): i for i, one in enumerate(sources)}
         for future in as_completed(futures):
             yield futures[future], future.result()
 

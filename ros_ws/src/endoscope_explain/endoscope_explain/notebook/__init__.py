@@ -1,7 +1,18 @@
 """What a notebook or a script calls; the commands of the same names do the same."""
 
+from endoscope_core.errors import EndoscopeError
+from endoscope_explain.notebook.arrays import from_arrays
 from endoscope_explain.notebook.calls import explain, simulate
 from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.notebook.signals import Signal, Signals, read
 
-__all__ = ['Explained', 'Signal', 'Signals', 'explain', 'read', 'simulate']
+__all__ = [
+    'EndoscopeError',
+    'Explained',
+    'Signal',
+    'Signals',
+    'explain',
+    'from_arrays',
+    'read',
+    'simulate',
+]

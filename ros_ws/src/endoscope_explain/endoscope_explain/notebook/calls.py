@@ -1,34 +1,35 @@
 """`simulate` and `explain`: the commands of these names, with results in memory."""
 
 import tempfile
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, overload
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from endoscope_bags import BagWriter, MessageStream, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_states
-from endoscope_bags.message_types import JOINT_STATE
-from endoscope_core.errors import EndoscopeError
-from endoscope_core.physics import PlantDescription, load_plant
+from endoscope_bags import open_bag
+from endoscope_core.errors import EndoscopeError, nearest
+from endoscope_core.physics import PlantDescription, PlantFileError, load_plant, recording_faults
+from endoscope_core.physics.packing import pack
 from endoscope_explain.fit.free_parameters import BAND
-from endoscope_explain.many_bags import explained_case
+from endoscope_explain.many_bags import explained_cases
+from endoscope_explain.notebook.arrays import commands_from
 from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.notebook.signals import Signals, read
 from endoscope_explain.pipeline import Progress, Sources
-from endoscope_explain.recording.series import COMMAND, DESIRED
+from endoscope_explain.recording.bag_source import WAIVABLE
 from endoscope_explain.search.levels import MOST_EFFECTS
 from endoscope_explain.simulation.answer_bag import write_answer
 
 Plant = str | Path | PlantDescription
 Bag = str | Path | Signals
-TIME = 'time'
+ONE = (str, Path, Mapping)
+"""Is no sequence of bags; a mapping other than `Signals` is refused with a word about it."""
 
 
-class CommandsError(EndoscopeError, ValueError):
-    """Arrays that are no commands."""
+class CallError(EndoscopeError, ValueError):
+    """An argument that a call cannot use."""
 
 
 def simulate(
@@ -52,6 +53,11 @@ def simulate(
     out : str or Path, optional
         Where to write the answer as a bag; without it, it is kept as long as the result is.
 
+    Returns
+    -------
+    Signals
+        What the sensors would read, as `read` gives it.
+
     Raises
     ------
     EndoscopeError
@@ -59,40 +65,46 @@ def simulate(
     """
     scratch = tempfile.TemporaryDirectory(prefix='endoscope-')
     if isinstance(commands, Mapping) and not isinstance(commands, Signals):
-        source = _written(commands, Path(scratch.name) / 'commands.mcap')
-    else:
-        source = _path(commands)
+        commands = commands_from(commands)
     target = Path(scratch.name) / 'simulated.mcap' if out is None else Path(out)
-    write_answer(_plant(plant), open_bag(source), target, noise)
+    write_answer(_plant(plant), open_bag(_path(commands)), target, noise)
     return replace(read(target), _kept=scratch)
 
 
-def explain(
-    bag: Bag,
+@overload
+def explain(bag: Bag, plant: Plant, **options: Any) -> Explained: ...
+@overload
+def explain(bag: Sequence[Bag], plant: Plant, **options: Any) -> list[Explained]: ...
+
+
+# The overloads tell one result from several, and leave the options to the signature below.
+def explain(  # type: ignore[misc]
+    bag: Bag | Sequence[Bag],
     plant: Plant,
     *,
     baseline: Bag | None = None,
-    validate: Bag | None = None,
+    validate: Bag | Sequence[Bag | None] | None = None,
     without: Collection[str] = (),
     namespace: str | None = None,
     band: float = BAND,
     effects: int = MOST_EFFECTS,
+    same_physics: bool = False,
     quick: bool = False,
     jobs: int = 2,
     progress: Progress | None = None,
-) -> Explained:
-    """Explain where a recording and its simulation differ, and what was left out.
+) -> Explained | list[Explained]:
+    """Explain where recordings and their simulation differ, and what was left out.
 
     Parameters
     ----------
-    bag : str, Path or Signals
-        The recording.
+    bag : str, Path or Signals, or a sequence of them
+        The recording; or several, which are explained side by side.
     plant : str, Path or PlantDescription
         The simulation that is to be compared.
     baseline : str, Path or Signals, optional
-        The same rig when it was well: only what is new is explained.
-    validate : str, Path or Signals, optional
-        A second recording of the same rig to judge the fit on.
+        A healthy recording of the same rig: only what is new since is explained.
+    validate : str, Path or Signals, or a sequence of them, optional
+        A second recording of the same rig to judge the fit on; one for all, or one for each.
     without : collection of str
         Topics that may be missing: `motor/measured_js`.
     namespace : str, optional
@@ -101,6 +113,8 @@ def explain(
         By which share the plant's parameters may differ from the rig's.
     effects : int
         How many effects to look for on a joint at most.
+    same_physics : bool
+        Whether all recordings show one rig, so that one choice of effects has to explain all.
     quick : bool
         Whether to leave out the black boxes and the next experiment.
     jobs : int
@@ -108,60 +122,69 @@ def explain(
     progress : callable, optional
         Told in a few words what is being done, such as `print`.
 
+    Returns
+    -------
+    Explained, or a list of them
+        Of each recording in its order where several were given.
+
     Raises
     ------
     EndoscopeError
-        A recording or the plant cannot be used.
+        A recording, the plant or an option cannot be used.
     """
-    sources = Sources(
-        _path(bag),
-        _plant(plant),
-        None if baseline is None else _path(baseline),
-        None if validate is None else _path(validate),
-        tuple(without),
-        quick,
-        band,
-        effects,
-        namespace=namespace,
-        plant_file=None if isinstance(plant, PlantDescription) else Path(plant),
+    for name, number in (('band', band), ('effects', effects), ('jobs', jobs)):
+        if not number > 0:
+            raise CallError(f'{name} is {number!r}: give a number above 0')
+    for topic in without:
+        if topic not in WAIVABLE:
+            raise CallError(f'without {topic!r}: {nearest(topic, WAIVABLE)}')
+    bags = [bag] if isinstance(bag, ONE) else list(bag)
+    seconds = (
+        [validate] * len(bags) if validate is None or isinstance(validate, ONE) else list(validate)
     )
-    return Explained(explained_case(sources, jobs, progress))
+    if not bags or len(seconds) != len(bags):
+        raise CallError(
+            f'{len(bags)} recordings with {len(seconds)} in validate: give one or more, and as '
+            'many in validate'
+        )
+    described = _plant(plant)
+    sources = [
+        Sources(
+            _path(one),
+            described,
+            None if baseline is None else _path(baseline),
+            None if second is None else _path(second),
+            tuple(without),
+            quick,
+            band,
+            effects,
+            namespace=namespace,
+            plant_file=None if isinstance(plant, PlantDescription) else Path(plant),
+        )
+        for one, second in zip(bags, seconds, strict=True)
+    ]
+    cases = explained_cases(sources, jobs, same_physics=same_physics, progress=progress)
+    found = [Explained(case) for case in cases]
+    return found[0] if isinstance(bag, ONE) else found
 
 
 def _plant(plant: Plant) -> PlantDescription:
-    return plant if isinstance(plant, PlantDescription) else load_plant(plant)
+    if not isinstance(plant, PlantDescription):
+        return load_plant(plant)
+    try:
+        # What a plant.yaml could not say is refused before a recording is read.
+        pack(plant)
+        recording_faults(plant)
+    except ValueError as error:
+        raise PlantFileError(f'the plant: {error}') from error
+    return plant
 
 
-def _path(bag: Bag | Mapping[str, ArrayLike]) -> Path:
+def _path(bag: Bag) -> Path:
     if isinstance(bag, Signals):
         return bag.path
     if isinstance(bag, str | Path):
         return Path(bag)
-    raise CommandsError(f'{type(bag).__name__} is no bag: give a path, or what was read')
-
-
-def _written(commands: Mapping[str, ArrayLike], path: Path) -> Path:
-    """Write arrays as a bag of commands."""
-    arrays = {name: np.asarray(values, dtype=np.float64) for name, values in commands.items()}
-    time = arrays.pop(TIME, np.empty(0))
-    joints = list(arrays)
-    motors = [name for name in joints if name.startswith('motor_')]
-    if time.ndim != 1 or len(time) < 2 or not (np.diff(time) > 0.0).all() or time[0] < 0.0:
-        raise CommandsError(f'{TIME}: give two or more times in s that increase from 0 or later')
-    if not joints or (motors and len(motors) < len(joints)):
-        raise CommandsError(
-            f'{", ".join(joints) or "no joint"}: command joints (bend_x, bend_y) or motor shafts '
-            '(motor_x, motor_y)'
-        )
-    for name, values in arrays.items():
-        if values.shape != time.shape or not np.isfinite(values).all():
-            raise CommandsError(
-                f'{name}: give {len(time)} finite angles, one for each time, not {values.shape}'
-            )
-    stamps = np.round(time * 1e9).astype(np.int64)
-    position = np.stack(list(arrays.values()), axis=1)
-    payloads = encode_joint_states(joints, stamps, position=position)
-    topic = f'/endoscope/{COMMAND if motors else DESIRED}'
-    with BagWriter(path) as bag:
-        bag.write_streams([MessageStream(topic, JOINT_STATE, payloads, stamps)])
-    return path
+    raise CallError(
+        f'{type(bag).__name__} is no bag: give a path, or what read or from_arrays gave'
+    )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from endoscope_bags import open_bag
 from endoscope_bags.errors import MissingTopicError
@@ -19,15 +19,20 @@ from endoscope_explain.report.columns import table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 Array = NDArray[np.float64]
 
-_UNITS = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
+UNITS = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
 _COLOURS = ('#2f6fb7', '#b3261e', '#136b4f', '#a15c00', '#52606d', '#7b3fa0')
 
 
 class UnknownSignalError(EndoscopeError, KeyError):
     """A name that no signal of the recording has."""
+
+
+class NoPandasError(EndoscopeError, ImportError):
+    """A table was asked for where pandas is not installed."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,9 @@ class Signal:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self.values, dtype=dtype, copy=copy)
 
     def __repr__(self) -> str:
         return f'{self.name}: {", ".join(_cells(self)[1:])}'
@@ -95,6 +103,35 @@ class Signals(Mapping[str, Signal]):
     def duration(self) -> float:
         """Seconds from the first stamp to the last."""
         return max(float(signal.time[-1]) for signal in self.values())
+
+    def to_frame(self, names: Sequence[str] | None = None) -> 'DataFrame':
+        """Return signals as the columns of a table, a row for each stamp that one of them has.
+
+        Parameters
+        ----------
+        names : sequence of str, optional
+            Which; all if not given.
+
+        Returns
+        -------
+        pandas.DataFrame
+            By `time` in s; NaN where a signal has no sample. Of samples with one stamp the last.
+
+        Raises
+        ------
+        NoPandasError
+            This environment has no pandas.
+        """
+        try:
+            from pandas import DataFrame, Index
+        except ImportError as error:
+            raise NoPandasError('to_frame needs pandas: pip install pandas') from error
+        signals = [self[name] for name in (self if names is None else names)]
+        time = np.unique(np.concatenate([signal.time for signal in signals]))
+        columns = {signal.name: np.full(len(time), np.nan) for signal in signals}
+        for signal in signals:
+            columns[signal.name][np.searchsorted(time, signal.time)] = signal.values
+        return DataFrame(columns, Index(time, name='time'))
 
     def _rows(self) -> list[tuple[str, ...]]:
         return [_cells(signal) for signal in self.values()]
@@ -161,6 +198,11 @@ def read(bag: str | Path, *, namespace: str | None = None) -> Signals:
     namespace : str, optional
         Of the rig's topics, where a bag has several rigs.
 
+    Returns
+    -------
+    Signals
+        By names such as `wires/measured_js:wire_x_pos`.
+
     Raises
     ------
     BagError
@@ -181,11 +223,11 @@ def read(bag: str | Path, *, namespace: str | None = None) -> Signals:
     origin_ns = min(int(one.stamp_ns[0]) for one in series.values())
     found = {}
     for topic, one in series.items():
-        for quantity, unit in _UNITS.items():
+        for quantity, unit in UNITS.items():
             values = getattr(one, quantity)
             for column, name in enumerate(one.names if values is not None else ()):
                 signal = Signal(
-                    _name(topic, name, quantity),
+                    name_of(topic, name, quantity),
                     'N' if (topic, quantity) == (WIRES, 'effort') else unit,
                     one.seconds(origin_ns),
                     np.ascontiguousarray(values[:, column]),
@@ -194,8 +236,8 @@ def read(bag: str | Path, *, namespace: str | None = None) -> Signals:
     return Signals(path, origin_ns * 1e-9, found)
 
 
-def _name(topic: str, name: str, quantity: str) -> str:
-    """Name as in `endoscope_explain.recording.signals`, for topics of all kinds."""
+def name_of(topic: str, name: str, quantity: str) -> str:
+    """Name of a signal as in `endoscope_explain.recording.signals`, for topics of all kinds."""
     usual = {WIRES: 'effort', MOTOR: ''}.get(topic, 'position')
     return f'{topic}:{name}' + ('' if quantity == usual else f'.{quantity}')
 
