@@ -22,6 +22,9 @@ def _public_definitions(
     """Yield public functions and classes of a module with the class around them."""
     for node in tree.body:
         if isinstance(node, Documented) and not node.name.startswith('_'):
+            # What several signatures share is said at the function itself.
+            if 'overload' in map(ast.unparse, node.decorator_list):
+                continue
             yield node, None
             if isinstance(node, ast.ClassDef):
                 for member in node.body:
