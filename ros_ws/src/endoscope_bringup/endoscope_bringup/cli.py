@@ -14,10 +14,8 @@ from endoscope_bringup.commands import COMMANDS
 from endoscope_bringup.other_packages import COMES_WITH, commands_of_other_packages
 from endoscope_bringup.subcommands import OneLineParser, add_subcommands, run_chosen
 from endoscope_core.choices import LOG_LEVEL_VARIABLE, LOG_LEVELS
-from endoscope_core.errors import EndoscopeError, printable
+from endoscope_core.exit_status import exit_status
 
-EXIT_UNUSABLE_INPUT = 2
-EXIT_INTERRUPTED = 130
 EXIT_TERMINATED = 143
 
 
@@ -68,29 +66,18 @@ def build_parser() -> OneLineParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `endoscope` with `argv` (default: the command line) and return its exit status.
 
-    0 on success, 2 on wrong usage or unusable input with one line on stderr, 130 when interrupted,
-    143 when terminated. An exception that is not the user's to act on keeps its traceback.
+    As `exit_status` says, and 143 when terminated.
     """
+    return exit_status('endoscope', lambda: _run(sys.argv[1:] if argv is None else argv))
+
+
+def _run(argv: Sequence[str]) -> int:
     args = build_parser().parse_args(argv)
-    args.command_line = shlex.join(['endoscope', *(sys.argv[1:] if argv is None else argv)])
+    args.command_line = shlex.join(['endoscope', *argv])
     if args.log_level is not None:
         _log_from(args.log_level)
-    try:
-        with _cleanup_on_sigterm():
-            return run_chosen(args, dest='command')
-    except EndoscopeError as error:
-        return _refuse(str(error))
-    except BrokenPipeError:
-        # The reader of a pipe has seen enough; python's own flush at exit must not complain.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    except OSError as error:
-        if error.filename is None:
-            raise
-        return _refuse(f'{error.filename}: {error.strerror}')
-    except KeyboardInterrupt:
-        print('endoscope: interrupted', file=sys.stderr)
-        return EXIT_INTERRUPTED
+    with _cleanup_on_sigterm():
+        return run_chosen(args, dest='command')
 
 
 def _log_from(level: str) -> None:
@@ -100,11 +87,6 @@ def _log_from(level: str) -> None:
     # ROS takes it from the environment; python has the same levels by the same names.
     os.environ[LOG_LEVEL_VARIABLE] = level
     logging.basicConfig(level=getattr(logging, level.upper()))
-
-
-def _refuse(message: str) -> int:
-    print(f'endoscope: {printable(" ".join(message.split()))}', file=sys.stderr)
-    return EXIT_UNUSABLE_INPUT
 
 
 @contextmanager

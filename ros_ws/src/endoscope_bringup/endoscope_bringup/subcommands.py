@@ -2,18 +2,52 @@
 
 import argparse
 import importlib
+import itertools
 import json
 import math
-from collections.abc import Iterable, Mapping
-from typing import NoReturn
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NoReturn
+
+from endoscope_core.errors import nearest, printable
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """An `ArgumentParser` whose errors are one line instead of a usage text and a line."""
+    """An `ArgumentParser` whose errors are one line, with the nearest of what there is."""
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """Parse, and refuse what is unknown where it is known what else there is."""
+        words = sys.argv[1:] if args is None else list(args)
+        # Before a missing argument is said to be missing, which is often the misspelt one.
+        for word in itertools.takewhile(lambda word: word != '--', words):
+            if not word.startswith('-') and self._subparsers is not None:
+                break  # a subcommand: the rest is for its parser
+            if word.startswith('--'):
+                self._refuse_unknown(word.partition('=')[0])
+        parsed, extras = super().parse_known_args(words, namespace)
+        for word in extras:
+            self._refuse_unknown(word)
+        return parsed, extras
+
+    def _refuse_unknown(self, word: str) -> None:
+        if not word.startswith('-') or word in self._option_string_actions:
+            return
+        if not self._get_option_tuples(word):
+            options = [option for option in self._option_string_actions if option[:2] == '--']
+            self.error(f'unknown option {word}: {nearest(word, options)}')
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            choices = [str(choice) for choice in action.choices]
+            raise argparse.ArgumentError(
+                action, f'unknown {value!r}: {nearest(str(value), choices)}'
+            )
 
     def error(self, message: str) -> NoReturn:
         """Exit 2 with `message` and where to find the usage, in one line on stderr."""
-        one_line = ' '.join(message.split())
+        one_line = printable(' '.join(message.split()))
         self.exit(2, f'{self.prog}: {one_line} (see {self.prog} --help)\n')
 
 

@@ -74,10 +74,59 @@ def test_missing_file_is_named(
     assert capsys.readouterr().err == f'endoscope: {missing}: No such file or directory\n'
 
 
-def test_defect_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cli, 'build_parser', _parser_running(lambda _args: 1 // 0))
-    with pytest.raises(ZeroDivisionError):
-        cli.main([])
+@pytest.mark.parametrize('level', [(), ('--log-level', 'debug')])
+def test_a_defect_is_one_line_that_says_where_and_keeps_its_traceback_for_debug(
+    level: tuple[str, ...], tmp_path: Path
+) -> None:
+    # As another package brings a command of its own.
+    write_text(
+        tmp_path / 'endoscope_other' / 'other.py',
+        'def add_parser(subparsers):\n'
+        "    subparsers.add_parser('break')\n"
+        'def run(args):\n'
+        "    {}['alpha']\n",
+    )
+    (tmp_path / 'other.dist-info').mkdir()
+    write_text(
+        tmp_path / 'other.dist-info' / 'entry_points.txt',
+        '[endoscope.commands]\nbreak = endoscope_other.other\n',
+    )
+    done = subprocess.run(
+        [sys.executable, '-m', 'endoscope_bringup.cli', *level, 'break'],
+        env=os.environ | {'PYTHONPATH': str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    *above, line = done.stderr.splitlines()
+    assert done.returncode == 2
+    assert line == (
+        "endoscope: a defect of this program in other.py:4: KeyError: 'alpha'; please report it; "
+        '--log-level debug shows the traceback'
+    )
+    assert ('Traceback (most recent call last):' in above) == bool(level)
+
+
+@pytest.mark.parametrize(
+    ('argv', 'words'),
+    [
+        ('expain', "unknown 'expain': did you mean explain?"),
+        ('operate statu', "unknown 'statu': did you mean status?"),
+        ('train --model sise', "unknown 'sise': did you mean size?"),
+        ('explain bag --plnat p.yaml', 'unknown option --plnat: did you mean --plant?'),
+        ('record --topcs a', 'unknown option --topcs: did you mean --topics?'),
+        ('--log-levle debug demo', 'unknown option --log-levle: did you mean --log-level?'),
+        ('demo -q', 'unknown option -q: valid are --help, --out'),
+    ],
+)
+def test_a_misspelt_command_or_option_is_told_the_nearest(
+    argv: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(argv.split())
+    assert stop.value.code == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert words in line
 
 
 @pytest.mark.parametrize(('signum', 'status'), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
@@ -117,23 +166,28 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.stdout.strip() == ''
 
 
-def test_closed_pipe_is_no_traceback(tmp_path: Path) -> None:
-    script = tmp_path / 'print_a_lot.py'
-    write_text(
-        script,
-        'import sys\n'
-        'from endoscope_bringup import cli\n'
-        'from endoscope_bringup.subcommands import OneLineParser\n'
-        'def run(args):\n'
-        '    for _ in range(100000):\n'
-        "        print('line')\n"
-        '    return 0\n'
-        "parser = OneLineParser(prog='endoscope')\n"
-        'parser.set_defaults(run_command=run, log_level=None)\n'
-        'cli.build_parser = lambda: parser\n'
-        'sys.exit(cli.main([]))\n',
-    )
-    pipeline = f'{sys.executable} {script} | head -n 1'
-    done = subprocess.run(['bash', '-c', pipeline], capture_output=True, text=True, check=False)
-    assert done.stdout == 'line\n'
-    assert done.stderr == ''
+@pytest.mark.parametrize(
+    'program',
+    [
+        'from endoscope_bringup.cli import main; main(["--help"])',
+        'from endoscope_bringup.cli import main; main(["effects"])',
+        'from endoscope_nodes.program import conductor; conductor(["--help"])',
+        'from endoscope_nodes.healthcheck import main; main(["--help"])',
+    ],
+)
+def test_a_reader_that_goes_away_or_has_no_room_gets_no_traceback(
+    program: str, tmp_path: Path
+) -> None:
+    write_text(tmp_path / 'program.py', f'import sys\ntry:\n    {program}\nfinally:\n    pass\n')
+    run = f'{sys.executable} {tmp_path / "program.py"}'
+    for line, said in (
+        # True ends at once, so that the pipe is closed when something is written.
+        (f'{{ sleep 0.1; {run}; }} | true', ''),
+        (f'{run} >&-', ''),
+        (f'{run} 2>&- >&-', ''),
+        # What argparse prints, it writes without asking whether there was room.
+        *([(f'{run} >/dev/full', 'No space left on device')] if 'effects' in program else []),
+    ):
+        done = subprocess.run(['bash', '-c', line], capture_output=True, text=True, check=False)
+        assert said in done.stderr
+        assert len(done.stderr.splitlines()) == bool(said), done.stderr

@@ -10,10 +10,10 @@ class EndoscopeError(Exception):
     """An input, a file or a request that cannot be used as it is.
 
     The message is one line that names the thing and says what to do. The command line prints it
-    on stderr and exits 2; anything that is not an `EndoscopeError` is a defect and keeps its
-    traceback. Names that come out of files or off the network go into it as they are: wherever it
-    is shown, it is `printable` and of 2000 characters at most. Derive from a built-in as well where
-    callers expect one: ``class X(EndoscopeError, ValueError)``.
+    on stderr and exits 2; anything that is not an `EndoscopeError` is a defect, and is called one
+    by `endoscope_core.exit_status`. Names that come out of files or off the network go into it as
+    they are: wherever it is shown, it is `printable` and of 2000 characters at most. Derive from a
+    built-in as well where callers expect one: ``class X(EndoscopeError, ValueError)``.
     """
 
     def __str__(self) -> str:

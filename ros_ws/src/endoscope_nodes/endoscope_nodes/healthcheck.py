@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Sequence
 
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.exit_status import exit_status
 from endoscope_nodes.program import NODES
 
 _LONGEST_S = 5.0
@@ -66,6 +66,10 @@ def is_heard(node: str, namespace: str, longest_s: float) -> bool:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Return 0 if the node speaks, 1 if it is silent, 2 for wrong usage."""
+    return exit_status('healthcheck', lambda: _run(argv))
+
+
+def _run(argv: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser(
         prog='healthcheck',
         description='Exits 0 if a node speaks on /diagnostics, 1 if it is silent.',
@@ -75,11 +79,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         '--namespace', default='endoscope', help='of the node (default: %(default)s)'
     )
     args = parser.parse_args(argv)
-    try:
-        if is_heard(args.node, args.namespace, _LONGEST_S):
-            return 0
-    except EndoscopeError as error:
-        print(f'healthcheck: {error}', file=sys.stderr)
-        return 2
+    if is_heard(args.node, args.namespace, _LONGEST_S):
+        return 0
     print(f'healthcheck: {args.node} has been silent for {_LONGEST_S:g} s', file=sys.stderr)
     return 1

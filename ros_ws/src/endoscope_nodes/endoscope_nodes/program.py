@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from endoscope_core.exit_status import exit_status
 from endoscope_nodes.stop_signals import end_when_asked
 
 _ROS_ARGS = '--ros-args'
@@ -52,7 +53,9 @@ class Program:
             Exit status; see the help.
         """
         end_when_asked(self.name)
-        argv = sys.argv[1:] if argv is None else argv
+        return exit_status(self.name, lambda: self._run(sys.argv[1:] if argv is None else argv))
+
+    def _run(self, argv: Sequence[str]) -> int:
         # Wherever it stands: nobody who asks for help wants to see motors start.
         if set(_HELP) & set(argv):
             from endoscope_nodes.node_help import help_of
