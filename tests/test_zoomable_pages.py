@@ -41,6 +41,35 @@ def page_of_plots() -> str:
     )
 
 
+WRITTEN = """<script>
+const written = [], write = CanvasRenderingContext2D.prototype.fillText;
+CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
+  written.push(text);
+  return write.call(this, text, ...rest);
+};
+</script>"""
+
+
+@pytest.mark.parametrize(
+    ('size', 'log', 'ticks'),
+    [
+        (1e-4, False, {'-0.0001', '-0.00005', '0', '0.00005', '0.0001'}),
+        (0.5, False, {'-0.4', '-0.2', '0', '0.2', '0.4'}),
+        (300.0, False, {'-200', '0', '200'}),
+        (300.0, True, {'1', '10', '100'}),
+    ],
+)
+def test_places_on_an_axis_are_told_apart(size: float, log: bool, ticks: set[str]) -> None:
+    values = np.geomspace(0.5, size, 200) if log else np.linspace(-size, size, 200)
+    plot = Plot('value', 'time (s)', (Curve('one', TIME[:200], values),), log=log)
+    content = f'<html><head>{head()}{WRITTEN}</head><body>{figure_html([plot])}{scripts()}'
+    with drawn(content) as (page, _):
+        expect(page.locator('.plots.is-drawn')).to_be_visible()
+        seen = page.evaluate('written.map((text) => text.replace("\u2212", "-"))')
+    assert ticks <= set(seen)
+    assert '-0' not in seen
+
+
 @pytest.fixture
 def page() -> Iterator[Page]:
     with drawn(page_of_plots()) as (page, complaints):

@@ -1,5 +1,6 @@
 import dataclasses
 import html
+import json
 import re
 import xml.etree.ElementTree as ET
 
@@ -159,10 +160,10 @@ def stages(page):
 def test_only_the_guilty_stage_is_marked(page, consistent):
     blocks = stages(page)
     assert [text for text, red in blocks if red] == [
-        'Wires, sheath wires/measured_js stribeck_friction (bend_x)'
+        'transmission wires and sheath, wires/measured_js stribeck_friction (bend_x)'
     ]
     assert [text.split()[0] for text, _ in blocks] == [
-        *('Command', 'Servo', 'Wires,', 'Bending', 'Sensors', 'Recording')
+        *('command', 'actuator', 'transmission', 'joint', 'sensing', 'recording')
     ]
     assert not any(red for _, red in stages(html_page(consistent)))
 
@@ -240,6 +241,49 @@ def test_a_formula_that_explains_little_is_not_offered(
     )
 
 
+def test_a_formula_lies_on_its_function_in_a_unit_that_can_be_read(stribeck_case, missing_function):
+    small = 1e-4 * np.sin(3.0 * missing_function.nodes)
+    term = dataclasses.replace(
+        missing_function, values=small, formula=small + 2e-4, deviation=np.full(41, 1e-6)
+    )
+    page = html_page(with_explanation(stribeck_case, unknown=term, verdict=Verdict.UNKNOWN_PHYSICS))
+    data = json.loads(re.search(r'class="plot-data">(.*?)</script>', page, re.DOTALL)[1])
+    function, formula = (curve['y'] for curve in data['plots'][0]['curves'])
+    assert max(function) == pytest.approx(100.0, rel=0.01)
+    assert formula == pytest.approx(function, abs=0.01)
+    assert 'load_of_angle of bend_x (µN m)' in page
+
+
+@pytest.mark.parametrize('width', [1000, 1040, 1440, 1920])
+def test_nothing_is_cut_on_a_screen_of_this_width(stribeck_case, width):
+    three = stribeck_case.ladder
+    # Names of black boxes are the longest; what they leave does not matter here.
+    five = {**three, 'gaussian_process': three['nominal'], 'neural_network': three['nominal']}
+    with drawn(html_page(dataclasses.replace(stribeck_case, ladder=five))) as (seen, complaints):
+        seen.set_viewport_size({'width': width, 'height': 900})
+        # By how many px what is drawn or written is wider than the room that it has.
+        cut = seen.evaluate(
+            """() => [
+              ...[...document.querySelectorAll('svg[role=img]')].map((svg) => {
+                const {right} = svg.getBoundingClientRect();
+                return Math.max(...[...svg.querySelectorAll('text')].map(
+                  (text) => text.getBoundingClientRect().right - right));
+              }),
+              ...[...document.querySelectorAll('.scroll, body, html')].map(
+                (e) => e.scrollWidth - e.clientWidth)]"""
+        )
+        assert max(cut) <= 0.0
+        next_step = seen.get_by_text('Next:').bounding_box()
+        assert next_step['y'] < 250.0
+    assert complaints == []
+
+
+def test_the_next_step_is_said_once_and_at_the_top(page, stribeck_case):
+    text = text_of(page)
+    assert text.count(next_step(stribeck_case)) == 1
+    assert text.index(next_step(stribeck_case)) < text.index('What was left out')
+
+
 def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case, missing_function):
     time = np.linspace(0.0, 10.0, 200)
     experiment = NextExperiment(
@@ -307,7 +351,7 @@ def test_what_did_not_move_is_left_out(consistent):
 
 def test_angles_are_in_degrees(page):
     assert re.search(r'slave:bend_x deg [\d.]+ \(', text_of(page))
-    assert ' rad ' not in text_of(page[page.index('The ladder of fits') :].split('Next step')[0])
+    assert ' rad ' not in text_of(page[page.index('The ladder of fits') :].split('<footer>')[0])
     assert in_degrees('angle_rad', 'rad')[:2] == ('angle_deg', 'deg')
     assert in_degrees('rate_rad_per_s', 'rad/s')[:2] == ('rate_deg_per_s', 'deg/s')
     assert in_degrees('motor_bandwidth', 'rad/s') == ('motor_bandwidth', 'rad/s', 1.0)
@@ -388,7 +432,7 @@ def test_the_block_that_was_touched_is_marked(stribeck_case):
         stribeck_case, verdict=Verdict.RECORDING_FAULT, effects=(), audit=audit, places=(place,)
     )
     (red,) = [text for text, marked in stages(html_page(case)) if marked]
-    assert red == 'Sensors load cells, tracker recording fault (bend_x)'
+    assert red == 'sensing load cells, tracker recording fault (bend_x)'
     assert next_step(case) == 'Exchange their names, or the plugs.'
 
 

@@ -247,6 +247,14 @@
 
   /* Making a plot */
 
+  /* Places on an axis with as many digits as their step has: 1e-4 is not 0. */
+  function ticks(u, places) {
+    const known = places.filter((v) => v != null);
+    const step = Math.min(...known.slice(1).map((v, k) => Math.abs(v - known[k])));
+    const digits = Number.isFinite(step) && step > 0 ? clamp(1 + Math.ceil(-Math.log10(step)), 0, 9) : 3;
+    return places.map((v) => v == null ? v : v.toLocaleString('en', {maximumFractionDigits: digits, useGrouping: false, signDisplay: 'negative'}));
+  }
+
   const powers = (u, places) => places.map((v) => v > 0 && Math.abs(Math.log10(v) % 1) < 1e-9 ? v : null);
 
   function axis(label, size, gap) {
@@ -273,8 +281,8 @@
       },
       series: [{}, ...plot.curves.map((curve) => ({facets, paths: () => { drawCurve(plot, curve); return null; }, points: {show: false}}))],
       axes: [
-        spec.labelled ? {...axis(spec.x_label, 24, 4), space: 60} : {...axis('', 4, 0), space: 60, values: (u, places) => places.map(() => '')},
-        {...axis('', 46, 4), space: 22, ...(spec.log ? {filter: powers, grid: {stroke: () => colour('line'), width: 1, filter: powers}} : {})},
+        spec.labelled ? {...axis(spec.x_label, 24, 4), space: 60, values: ticks} : {...axis('', 4, 0), space: 60, values: (u, places) => places.map(() => '')},
+        {...axis('', 46, 4), space: 22, values: ticks, ...(spec.log ? {filter: powers, grid: {stroke: () => colour('line'), width: 1, filter: powers}} : {})},
       ],
       cursor: {
         x: false, y: false, points: {show: false}, drag: {x: true, y: spec.loop, setScale: false, dist: 4, uni: spec.loop ? 12 : null},

@@ -63,14 +63,14 @@ EFFECTS_TITLE = {
     Verdict.RECORDING_FAULT: 'What is at fault',
 }
 CHAIN = {
-    'command': ('Command', 'motor/servo_jp'),
-    'actuator': ('Servo', 'motor/measured_js'),
-    'transmission': ('Wires, sheath', 'wires/measured_js'),
-    'joint': ('Bending joint', 'the tip'),
-    'sensing': ('Sensors', 'load cells, tracker'),
-    'recording': ('Recording', 'clocks, samples'),
+    'command': 'motor/servo_jp',
+    'actuator': 'servo, motor/measured_js',
+    'transmission': 'wires and sheath, wires/measured_js',
+    'joint': 'bending section, the tip',
+    'sensing': 'load cells, tracker',
+    'recording': 'clocks, samples',
 }
-"""From command to recording: what each stage is called, and what is read of it."""
+"""From command to recording: each stage by its one name, and what it is or is read of it."""
 
 DRAWINGS = ('unknown', 'timeline', 'loops', 'ladder', 'experiment')
 

@@ -13,6 +13,11 @@ from endoscope_explain.report.sentences import LEAST_SHARE
 
 Array = NDArray[np.float64]
 
+PREFIXED = ('N', 'm', 's')
+"""What a unit that takes a prefix begins with: a force, a length or a time."""
+LEAST_READABLE = 0.1
+"""Of the largest value of an axis."""
+
 
 def experiment_figure(experiment: NextExperiment) -> str:
     """Plot the proposed motion."""
@@ -36,8 +41,9 @@ def unknown_figure(term: UnknownTerm) -> str:
 
 def _function(term: UnknownTerm, columns: int) -> Plot:
     argument = term.there.argument
-    _, unit, across = in_degrees('_rad', argument.unit)
-    _, of, up = in_degrees('_rad', term.there.unit)
+    whole = term.multiplies or term.there.is_factor
+    unit, across = _readable(argument.unit, term.nodes)
+    of, up = ('', 1.0) if whole else _readable(term.there.unit, term.values)
 
     def drawn(values: Array) -> Array:
         if term.multiplies:
@@ -58,12 +64,24 @@ def _function(term: UnknownTerm, columns: int) -> Plot:
     ]
     if term.formula_share >= LEAST_SHARE:
         colour = COLOUR['augmented']
-        curves.append(Curve('formula', nodes, drawn(term.formula), colour, dash=(6.0, 4.0)))
+        # A constant is the plant's numbers as well, and no recording says how much of it is where.
+        level = np.median(term.values - term.formula)
+        curves.append(Curve('formula', nodes, drawn(term.formula + level), colour, dash=(6.0, 4.0)))
     times = 'factor on it' if term.multiplies else 'factor'
-    value = times if term.multiplies or term.there.is_factor else of
+    value = times if whole else of
     return Plot(
         f'{term.place} of {term.joint} ({value})',
         f'{argument.words} ({unit})' if unit else argument.words,
         tuple(curves),
         columns=columns,
     )
+
+
+def _readable(unit: str, values: Array) -> tuple[str, float]:
+    """A unit in which values (N,) can be read without a power of ten, and the factor to it."""
+    _, unit, factor = in_degrees('_rad', unit)
+    largest = factor * float(np.abs(values).max())
+    if unit[:1] not in PREFIXED or largest >= LEAST_READABLE:
+        return unit, factor
+    prefix, more = ('m', 1e3) if largest >= 1e-3 * LEAST_READABLE else ('µ', 1e6)
+    return prefix + unit, factor * more

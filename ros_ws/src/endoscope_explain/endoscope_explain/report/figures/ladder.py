@@ -72,14 +72,15 @@ def ladder_figure(ladder: Ladder) -> str:
 
 
 def _keys(rungs: list[str]) -> str:
-    """The legend, in one line above the rows."""
-    drawn, x = [], LEFT
-    for name in rungs:
+    """The legend, in one line above the rows, further left where it is long."""
+    widths = [44.0 + 8.2 * len(LABEL[name]) for name in rungs]
+    drawn, x = [], min(LEFT, WIDTH - sum(widths))
+    for name, width in zip(rungs, widths, strict=True):
         drawn.append(
             f'{_marker(name, x + 6, 14, LABEL[name])}<text x="{x + 18:g}" y="19">'
             f'{escape(LABEL[name])}</text>'
         )
-        x += 44.0 + 8.2 * len(LABEL[name])
+        x += width
     return ''.join(drawn)
 
 
