@@ -1,16 +1,20 @@
 """The compose files are valid and run the nodes that there are, each once."""
 
+import argparse
 import ast
 import os
 import re
+import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
-from endoscope_nodes.node_parameters import OF_NODE
+from endoscope_console import command as console_command
+from endoscope_nodes.node_parameters import OF_NODE, BeatParameters
 from endoscope_nodes.parameters import described
 
 ROOT = Path(__file__).parents[1]
@@ -19,6 +23,7 @@ HARDWARE_FILE = ROOT / 'docker' / 'hardware.yaml'
 
 # All nodes in one process, the clock of simulated time, the player of bags; what services run too.
 STARTED_BY_HAND = {'graph', 'conductor', 'replay', 'healthcheck'}
+PAGE = 'web_console'
 
 
 def _entry_points_of_nodes() -> set[str]:
@@ -36,11 +41,94 @@ def _compose_command() -> list[str]:
     pytest.skip('no container engine on this machine: install docker with its compose command')
 
 
+def _interpolated(path: Path, **given: str) -> dict[str, dict]:
+    """Services as compose sees them with an environment of these variables alone."""
+
+    def value(match: re.Match[str]) -> str:
+        name, how, other = match.groups()
+        if how == ':+':
+            return other if given.get(name) else ''
+        return given.get(name) or (other if how == ':-' else '')
+
+    text = re.sub(r'\$\{(\w+)(?:(:[-+?])([^}]*))?\}', value, path.read_text())
+    return yaml.safe_load(text)['services']
+
+
 def test_every_node_is_a_service() -> None:
-    services = yaml.safe_load(COMPOSE_FILE.read_text())['services']
-    commands = {service['command'] for service in services.values()}
-    assert commands == _entry_points_of_nodes() - STARTED_BY_HAND
-    assert all(name == service['command'] for name, service in services.items())
+    services = _interpolated(COMPOSE_FILE)
+    commands = {name: shlex.split(service['command']) for name, service in services.items()}
+    assert commands.pop(PAGE)[:2] == ['endoscope', 'console']
+    assert set(commands) == _entry_points_of_nodes() - STARTED_BY_HAND
+    assert all(words == [name, '--ros-args'] for name, words in commands.items())
+
+
+def test_the_page_is_served_with_options_that_it_has_and_starts_no_second_graph() -> None:
+    words = shlex.split(_interpolated(COMPOSE_FILE, RIG_FILE='/srv/rig.yaml')[PAGE]['command'])
+    program = argparse.ArgumentParser()
+    console_command.add_parser(program.add_subparsers())
+    given = program.parse_args(words[1:])
+    assert given.no_graph
+    assert str(given.rig) == '/given/rig.yaml'
+    assert f'127.0.0.1:{given.port}/' in _interpolated(COMPOSE_FILE)[PAGE]['healthcheck']['test'][3]
+
+
+def test_the_image_is_built_once_and_pulled_never() -> None:
+    services = _interpolated(COMPOSE_FILE).values()
+    assert len([service for service in services if 'build' in service]) == 1
+    assert {service['pull_policy'] for service in services} == {'never'}
+
+
+@pytest.mark.parametrize('files', [(COMPOSE_FILE,), (COMPOSE_FILE, HARDWARE_FILE)])
+def test_rig_and_plant_files_are_named_by_the_environment(files) -> None:
+    given = {'RIG_FILE': '/srv/my rig.yaml', 'PLANT_FILE': '/srv/plant.yaml'}
+    mounts = {
+        '/srv/my rig.yaml:/given/rig.yaml:ro': '/given/rig.yaml',
+        '/srv/plant.yaml:/given/plant.yaml:ro': '/given/plant.yaml',
+    }
+    first = _interpolated(COMPOSE_FILE, **given)
+    for path in files:
+        for name, service in _interpolated(path, **given).items():
+            words = shlex.split(service['command'])
+            there = {mounts[v] for v in first[name]['volumes'] if v in mounts}
+            used = {word.partition(':=')[2] or word for word in words if '/given/' in word}
+            assert '/given/rig.yaml' in used
+            assert used <= there
+            simulated = path == COMPOSE_FILE and name in (
+                'motor_driver',
+                'load_cells',
+                'em_tracker',
+            )
+            assert ('/given/plant.yaml' in used) == simulated, name
+            parameters = re.findall(r'-p (\w+):=', service['command'])
+            declared = {
+                one.name
+                for kind in (BeatParameters, *OF_NODE.get(name, ()))
+                for one in described(kind)
+            }
+            assert set(parameters) <= declared
+    assert '/given/' not in str([s['command'] for s in _interpolated(COMPOSE_FILE).values()])
+
+
+def test_a_container_finds_what_the_image_has_compiled(tmp_path) -> None:
+    program = [
+        sys.executable,
+        '-c',
+        'from endoscope_core.hysteresis.dahl_kernel import dahl_step as d; d(0.1, 0.1, 0.2, 1.0)',
+    ]
+    environment = os.environ | {'NUMBA_DEBUG_CACHE': '1'}
+    environment.pop('NUMBA_CACHE_DIR', None)
+    compiled = environment | {'XDG_CACHE_HOME': str(tmp_path / 'compiled')}
+    said = subprocess.run(program, env=compiled, capture_output=True, text=True, check=True)
+    assert 'data saved' in said.stdout
+    # The entrypoint with the folders of this test, and without the ROS of the image.
+    lines = (ROOT / 'docker' / 'entrypoint').read_text().replace('/endoscope/', f'{tmp_path}/')
+    entrypoint = tmp_path / 'entrypoint'
+    entrypoint.write_text(re.sub('(?m)^source .*$', '', lines))
+    later = environment | {'XDG_CACHE_HOME': str(tmp_path / 'memory')}
+    command = ['bash', str(entrypoint), *program]
+    said = subprocess.run(command, env=later, capture_output=True, text=True, check=True)
+    assert 'data loaded' in said.stdout
+    assert 'data saved' not in said.stdout
 
 
 def test_nodes_share_one_network_domain_and_user() -> None:
@@ -58,11 +146,12 @@ def test_no_service_may_do_more_than_it_has_to() -> None:
         assert 'privileged' not in service
         assert service['security_opt'] == ['no-new-privileges:true']
         assert service['ulimits'] == {'rtprio': 99, 'memlock': -1}
-        assert service['healthcheck']['test'][-2:] == ['healthcheck', name]
+        if name != PAGE:
+            assert service['healthcheck']['test'][-2:] == ['healthcheck', name]
 
 
 def test_hardware_takes_nothing_of_that_back() -> None:
-    hardened = set(yaml.safe_load(COMPOSE_FILE.read_text())['x-node']) - {'command'}
+    hardened = set(yaml.safe_load(COMPOSE_FILE.read_text())['x-node']) - {'command', 'volumes'}
     for service in yaml.safe_load(HARDWARE_FILE.read_text())['services'].values():
         assert not hardened & set(service)
         assert not {'cap_add', 'privileged', 'healthcheck'} & set(service)
@@ -97,7 +186,9 @@ def test_hardware_changes_how_nodes_are_started_and_only_by_parameters_that_they
         assert node == name
         given = re.findall(r'-p (\w+):=', ' '.join(arguments))
         assert 'device' in given
-        declared = {one.name for kind in OF_NODE[name] for one in described(kind)}
+        declared = {
+            one.name for kind in (BeatParameters, *OF_NODE[name]) for one in described(kind)
+        }
         assert set(given) <= declared
 
 
