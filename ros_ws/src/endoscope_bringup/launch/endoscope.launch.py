@@ -1,8 +1,8 @@
 """Starts the endoscope: all nodes in one process, or each in its own.
 
     ros2 launch endoscope_bringup endoscope.launch.py
+    ros2 launch endoscope_bringup endoscope.launch.py rig_file:=rig.yaml namespace:=left
     ros2 launch endoscope_bringup endoscope.launch.py processes:=many plant_file:=plant.yaml
-    ros2 launch endoscope_bringup endoscope.launch.py use_sim_time:=true
 
 One process is the default because two cores carry the graph at 1 kHz that way only.
 """
@@ -10,41 +10,44 @@ One process is the default because two cores carry the graph at 1 kHz that way o
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, GroupAction
 from launch.conditions import IfCondition
-from launch.substitutions import EqualsSubstitution, LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import (
+    AndSubstitution,
+    EqualsSubstitution,
+    LaunchConfiguration,
+    NotSubstitution,
+    PathJoinSubstitution,
+)
 from launch_ros.actions import Node, SetParameter
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-SIMULATED_DEVICES = ('motor_driver', 'load_cells', 'em_tracker')
-OTHERS = (
+NODES = (
+    *('motor_driver', 'load_cells', 'em_tracker'),
     *('supervisor', 'compensator', 'controller', 'calibration', 'console'),
     *('instrument_model', 'recorder'),
 )
 
 
-def _if(name: str, value: str) -> IfCondition:
-    return IfCondition(EqualsSubstitution(LaunchConfiguration(name), value))
-
-
 def generate_launch_description() -> LaunchDescription:
     """Describe the arguments and the nodes."""
-    config = LaunchConfiguration('config')
-    plant = {'plant_file': LaunchConfiguration('plant_file')}
-    composed = Node(
-        package='endoscope_nodes', executable='graph', parameters=[config, plant], output='screen'
-    )
-    processes = [
-        *(
-            Node(package='endoscope_nodes', executable=name, parameters=[config, plant])
-            for name in SIMULATED_DEVICES
-        ),
-        *(Node(package='endoscope_nodes', executable=name, parameters=[config]) for name in OTHERS),
-    ]
-    conductor = Node(
-        package='endoscope_nodes',
-        executable='conductor',
-        parameters=[config],
-        condition=_if('use_sim_time', 'true'),
-    )
+    real_time = LaunchConfiguration('real_time')
+    many = EqualsSubstitution(LaunchConfiguration('processes'), 'many')
+    in_lock_step = IfCondition(AndSubstitution(many, NotSubstitution(real_time)))
+
+    def node(executable: str, **others: object) -> Node:
+        files = {
+            name: ParameterValue(LaunchConfiguration(name), value_type=str)
+            for name in ('rig_file', 'plant_file')
+        }
+        return Node(
+            package='endoscope_nodes',
+            executable=executable,
+            namespace=LaunchConfiguration('namespace'),
+            parameters=[LaunchConfiguration('config'), files],
+            output='screen',
+            **others,
+        )
+
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -55,9 +58,17 @@ def generate_launch_description() -> LaunchDescription:
                 description='parameters of the nodes',
             ),
             DeclareLaunchArgument(
+                'namespace', default_value='endoscope', description='of all nodes and topics'
+            ),
+            DeclareLaunchArgument(
+                'rig_file',
+                default_value='',
+                description='rig.yaml with devices and limits; empty for the shipped one',
+            ),
+            DeclareLaunchArgument(
                 'plant_file',
                 default_value='',
-                description='plant.yaml of the simulated slave; empty for the nominal plant',
+                description='plant.yaml of the simulated slave; empty for that of the rig',
             ),
             DeclareLaunchArgument(
                 'processes',
@@ -66,13 +77,18 @@ def generate_launch_description() -> LaunchDescription:
                 description='all nodes in one process, or each in its own',
             ),
             DeclareLaunchArgument(
-                'use_sim_time',
+                'real_time',
                 default_value='false',
                 choices=['true', 'false'],
-                description='lock-step simulated time instead of real time',
+                description='true for the wall clock: a rig with a real device needs it where each '
+                'node has a process, and one process takes it there by itself',
             ),
-            SetParameter('use_sim_time', LaunchConfiguration('use_sim_time')),
-            GroupAction([composed], condition=_if('processes', 'one')),
-            GroupAction([*processes, conductor], condition=_if('processes', 'many')),
+            # In one process the graph decides for itself unless it is told.
+            SetParameter('use_sim_time', False, condition=IfCondition(real_time)),
+            SetParameter('use_sim_time', True, condition=in_lock_step),
+            GroupAction([node('graph')], condition=IfCondition(NotSubstitution(many))),
+            GroupAction([node(name) for name in NODES], condition=IfCondition(many)),
+            # The conductor says the simulated time, no faster than the wall clock.
+            GroupAction([SetParameter('speed', 1.0), node('conductor')], condition=in_lock_step),
         ]
     )
