@@ -42,13 +42,13 @@ _DELAY_S, _PERIOD_S, _LONGEST_HOLD_S = 0.4, 1.0 / 30.0, 6.0
 class OperatedGraph(SimulatedGraph):
     """The whole graph, recorder included, no faster than real time while a program is at it."""
 
-    def __init__(self, folder, **values) -> None:
+    def __init__(self, folder, extra=(), **values) -> None:
         overrides = {'recorder': {'bag': str(folder / 'bag'), 'autostart': False}}
         overrides |= {
             'calibration': {'motion': 'brief'},
             'conductor': {'wait_for': ['motor/measured_js']},
         }
-        super().__init__(extra=(RecorderNode,), overrides=overrides | values)
+        super().__init__(extra=(*extra, RecorderNode), overrides=overrides | values)
         self.goals = self.listen(MOTOR_COMMAND, MOTORS)
         self.wanted = self.listen(SLAVE_COMMAND, JOINTS)
         self.advance(0.1)

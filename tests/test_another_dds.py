@@ -12,12 +12,17 @@ import pytest
 from doc_pages import WORKSPACE, blocks
 from operated_graph import OperatedGraph
 
+from endoscope_bags.message_types import TF_MESSAGE, message_type
+from endoscope_core.rig import shipped_rig
+from endoscope_nodes.graph import SHOWING_NODES
+from endoscope_nodes.joint_transforms import section_of
 from endoscope_nodes.names import (
     JOINTS,
     MOTOR_MEASURED,
     MOTORS,
     OPERATING_STATE,
     SLAVE_MEASURED,
+    TRANSFORMS,
     WIRES,
     WIRES_MEASURED,
 )
@@ -64,7 +69,7 @@ class ForeignParticipant:
 
 @pytest.fixture(scope='module')
 def graph(tmp_path_factory):
-    with OperatedGraph(tmp_path_factory.mktemp('operated')) as graph:
+    with OperatedGraph(tmp_path_factory.mktemp('operated'), extra=SHOWING_NODES) as graph:
         graph.said = {topic: graph.listen(topic, names) for topic, names in STREAMS.items()}
         graph.set('console', source='master')
         graph.enable()
@@ -106,6 +111,27 @@ def test_it_reads_what_was_published_to_the_last_bit(graph, foreigner):
             assert tuple(name) == names
             sent = published[stamp]
             assert [tuple(v) for v in values] == [sent.position, sent.velocity, sent.effort]
+
+
+def test_it_reads_where_the_links_are_though_nobody_here_has_the_package_of_the_type(
+    graph, foreigner
+):
+    section = section_of(shipped_rig().instrument)
+    graph.until(lambda: len(foreigner.heard[TRANSFORMS]) > 10)
+    bent = {s.stamp_ns: s.position for s in graph.said[SLAVE_MEASURED]}
+    compared = 0
+    for links in list(foreigner.heard[TRANSFORMS]):
+        [stamp] = {stamp for stamp, *_ in links}
+        frames = [(parent, child) for _, parent, child, _ in links]
+        assert frames == [(h.parent, h.child) for h in section.hinges]
+        if stamp in bent:
+            due = section.transforms(section.joint_angles(bent[stamp]))
+            assert [pose for *_, pose in links] == [[*p.translation, *p.rotation] for p in due]
+            compared += 1
+    assert compared > 5
+    [sender] = graph.nodes['instrument_model'].get_publishers_info_by_topic(TRANSFORMS)
+    assert sender.topic_type == TF_MESSAGE
+    assert str(sender.topic_type_hash) == message_type(TF_MESSAGE).type_hash
 
 
 def test_the_slave_follows_its_handle_while_the_clutch_is_held(graph, foreigner):

@@ -82,7 +82,7 @@ def graph():
 @pytest.fixture
 def address(graph, monkeypatch):
     monkeypatch.setenv('ROS_DOMAIN_ID', str(graph.domain))
-    with viewers('endoscope', INSTRUMENT, 0) as address:
+    with viewers('endoscope', 0) as address:
         yield address
 
 
@@ -166,6 +166,6 @@ def test_a_port_that_is_taken_is_said(address):
     port = int(address.rpartition(':')[2])
     with (
         pytest.raises(EndoscopeError, match=f'{port}.*--viewers-port'),
-        viewers('endoscope', INSTRUMENT, port),
+        viewers('endoscope', port),
     ):
         pass

@@ -131,7 +131,7 @@ def serve(args: argparse.Namespace) -> int:
             # Its SDK is large, and few ask for it.
             from endoscope_console.viewers import viewers
 
-            seen = stack.enter_context(viewers(args.namespace, rig.instrument, args.viewers_port))
+            seen = stack.enter_context(viewers(args.namespace, args.viewers_port))
             print(f'viewers read  {seen}')
         stack.callback(started.end)
         asyncio.run(_serve(args, listening, graph, started, rig, mapping, tokens))

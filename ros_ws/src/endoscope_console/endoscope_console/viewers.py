@@ -15,17 +15,13 @@ from foxglove import Channel, Context, Schema
 from foxglove.websocket import ChannelView, Client, ServerListener
 from rclpy.node import Node
 
-from endoscope_bags.errors import MalformedMessageError
-from endoscope_bags.message_types import JOINT_STATE, TF_MESSAGE, message_type
+from endoscope_bags.message_types import JOINT_STATE, message_type
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.rig import InstrumentFacts
 from endoscope_nodes.joined_graph import joined_node
-from endoscope_nodes.joint_transforms import JointTransforms, section_of
-from endoscope_nodes.names import JOINT_STATES, TRANSFORMS
 from endoscope_nodes.qos import profile
 from endoscope_nodes.raw_subscription import RawSubscription
-from endoscope_nodes.recorded_topics import is_installed, message_class
-from endoscope_nodes.topics import BY_NAME, TOPICS, Qos, Topic
+from endoscope_nodes.recorded_topics import message_class
+from endoscope_nodes.topics import TOPICS, Qos, Topic
 
 NODE = 'console_viewers'
 HOST = '127.0.0.1'
@@ -46,25 +42,13 @@ class ViewedTopic:
         By which it is heard.
     topic
         What is shown.
-    heard
-        What is heard: the same, or what it is made of.
-    transforms
-        How it is made of that; None where it is passed on as it is.
     context
         Of the server.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        topic: Topic,
-        heard: Topic,
-        transforms: JointTransforms | None,
-        context: Context,
-    ) -> None:
+    def __init__(self, node: Node, topic: Topic, context: Context) -> None:
         self._node = node
-        self._heard = heard
-        self._transforms = transforms
+        self._topic = topic
         self._subscription: RawSubscription | None = None
         self._last: bytes | None = None
         self._asked = threading.Event()
@@ -92,24 +76,18 @@ class ViewedTopic:
         elif asked and self._last is not None:
             self.channel.log(self._last)
         for data, info in self._subscription.take():
-            if self._transforms is not None:
-                try:
-                    data = self._transforms.of_message(data)
-                except MalformedMessageError as error:
-                    self._node.get_logger().error(f'{self._heard.name} {error}', once=True)
-                    continue
             self._show(data, info)
 
     def _subscribe(self) -> RawSubscription:
-        latched = self._heard.asked.latched
-        stream = self._heard.type == JOINT_STATE and not latched
+        latched = self._topic.asked.latched
+        stream = self._topic.type == JOINT_STATE and not latched
         qos = _STREAM if stream else Qos(_EVENTS.depth, latched=latched)
         return RawSubscription(
-            self._node, message_class(self._heard.type), self._heard.name, profile(qos)
+            self._node, message_class(self._topic.type), self._topic.name, profile(qos)
         )
 
     def _show(self, data: bytes, info: dict[str, int]) -> None:
-        if self._heard.asked.latched:
+        if self._topic.asked.latched:
             self._last = data
         self.channel.log(data, log_time=info['received_timestamp'])
 
@@ -130,15 +108,13 @@ class _Listener(ServerListener):
 
 
 @contextmanager
-def viewers(namespace: str, instrument: InstrumentFacts, port: int) -> Iterator[str]:
+def viewers(namespace: str, port: int) -> Iterator[str]:
     """Let viewers read the topics of a graph, a hundred times a second at most.
 
     Parameters
     ----------
     namespace
         Of the graph.
-    instrument
-        What `/tf` is made by where no package of its type is installed.
     port
         At 127.0.0.1; 0 for any that is free.
 
@@ -154,7 +130,7 @@ def viewers(namespace: str, instrument: InstrumentFacts, port: int) -> Iterator[
     """
     context = Context()
     with joined_node(NODE, namespace) as node:
-        topics = [_viewed(node, topic, instrument, context) for topic in TOPICS if topic.recorded]
+        topics = [ViewedTopic(node, topic, context) for topic in TOPICS if topic.recorded]
         listener = _Listener({topic.channel.id(): topic for topic in topics})
         try:
             server = foxglove.start_server(
@@ -183,13 +159,6 @@ def viewers(namespace: str, instrument: InstrumentFacts, port: int) -> Iterator[
             for topic in topics:
                 topic.close()
                 topic.channel.close()
-
-
-def _viewed(node: Node, topic: Topic, instrument: InstrumentFacts, context: Context) -> ViewedTopic:
-    if topic.name == TRANSFORMS and not is_installed(TF_MESSAGE):
-        transforms = JointTransforms(section_of(instrument))
-        return ViewedTopic(node, topic, BY_NAME[JOINT_STATES], transforms, context)
-    return ViewedTopic(node, topic, topic, None, context)
 
 
 def _pass_on(topics: list[ViewedTopic], ended: threading.Event) -> None:

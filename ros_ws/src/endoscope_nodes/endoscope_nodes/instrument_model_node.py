@@ -17,7 +17,7 @@ from endoscope_nodes.names import (
     TRANSFORMS,
 )
 from endoscope_nodes.qos import RESULT, SENSOR_ASKED, SENSOR_OFFERED
-from endoscope_nodes.recorded_topics import is_installed, message_class
+from endoscope_nodes.recorded_topics import message_class
 from endoscope_nodes.runtime import Runtime, run_nodes
 
 # Every other sample of a tracker of 40 Hz, whatever its clock does.
@@ -25,10 +25,7 @@ _PERIOD_NS = 45_000_000
 
 
 class InstrumentModelNode(EndoscopeNode):
-    """Publishes ``robot_description`` once, and how the instrument is bent twenty times a second.
-
-    ``/tf`` is published where `tf2_msgs` is installed, which comes with a sourced ROS alone.
-    """
+    """Publishes ``robot_description`` once, and how the instrument is bent 20 times a second."""
 
     def __init__(self, runtime: Runtime) -> None:
         super().__init__('instrument_model', runtime)
@@ -42,10 +39,8 @@ class InstrumentModelNode(EndoscopeNode):
             self, JOINT_STATES, self._section.joint_names, ('position',), SENSOR_OFFERED
         )
         self._transforms = JointTransforms(self._section)
-        self._transforms_out = (
-            self.create_publisher(message_class(TF_MESSAGE), TRANSFORMS, SENSOR_OFFERED)
-            if is_installed(TF_MESSAGE)
-            else None
+        self._transforms_out = self.create_publisher(
+            message_class(TF_MESSAGE), TRANSFORMS, SENSOR_OFFERED
         )
         JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_bending, SENSOR_ASKED)
         self.diagnostics.add('model', self._report)
@@ -60,9 +55,7 @@ class InstrumentModelNode(EndoscopeNode):
             self._out_of_reach += 1
             return
         self._joints.publish(sample.stamp_ns, *angles)
-        if self._transforms_out is not None:
-            sample = JointSample(sample.stamp_ns, angles, (), ())
-            self._transforms_out.publish(self._transforms.of_sample(sample))
+        self._transforms_out.publish(self._transforms.encode(sample.stamp_ns, angles))
 
     def _report(self) -> Report:
         values = {'published': self._joints.count, 'out of reach': self._out_of_reach}

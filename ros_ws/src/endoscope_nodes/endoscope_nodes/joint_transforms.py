@@ -1,9 +1,10 @@
 """Where the links of the instrument are, as messages, from the angles of its joints."""
 
+from collections.abc import Sequence
+
 from endoscope_bags.cdr_encoding import TransformEncoder
 from endoscope_core.kinematics import Vertebrae
 from endoscope_core.rig import InstrumentFacts
-from endoscope_nodes.joint_stream import JointReader, JointSample
 
 
 def section_of(instrument: InstrumentFacts) -> Vertebrae:
@@ -12,7 +13,7 @@ def section_of(instrument: InstrumentFacts) -> Vertebrae:
 
 
 class JointTransforms:
-    """Turns `joint_states` into `/tf`, which few have the message class of.
+    """Writes `/tf`, which few have the message class of.
 
     Parameters
     ----------
@@ -22,20 +23,9 @@ class JointTransforms:
 
     def __init__(self, section: Vertebrae) -> None:
         self._section = section
-        self._reader = JointReader(section.joint_names)
         self._encoder = TransformEncoder([(h.parent, h.child) for h in section.hinges])
 
-    def of_sample(self, sample: JointSample) -> bytes:
-        """Encode the transforms of one sample."""
-        poses = self._section.transforms(sample.position)
-        return self._encoder.encode(sample.stamp_ns, [(p.translation, p.rotation) for p in poses])
-
-    def of_message(self, data: bytes) -> bytes:
-        """Encode the transforms of one `JointState` in CDR.
-
-        Raises
-        ------
-        MalformedMessageError
-            It is no JointState of the section's joints.
-        """
-        return self.of_sample(self._reader.read(data))
+    def encode(self, stamp_ns: int, angles: Sequence[float]) -> bytes:
+        """Encode the transforms at these angles of all joints, in rad."""
+        poses = self._section.transforms(angles)
+        return self._encoder.encode(stamp_ns, [(p.translation, p.rotation) for p in poses])

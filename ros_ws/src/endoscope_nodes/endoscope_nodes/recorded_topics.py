@@ -7,13 +7,17 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from endoscope_bags.errors import UnknownTypeError
+from endoscope_bags.message_types import TF_MESSAGE
 from endoscope_bags.qos_profile import QosProfile
 from endoscope_nodes import topics
 from endoscope_nodes.qos import profile
+from endoscope_nodes.transform_type import transform_class
 
 
 def message_class(type_name: str) -> type:
-    """Import the class of a message type, for example of ``'std_msgs/msg/String'``.
+    """Return the class of a message type, for example of ``'std_msgs/msg/String'``.
+
+    That of ``'tf2_msgs/msg/TFMessage'`` is for bytes alone where its package is not installed.
 
     Raises
     ------
@@ -24,17 +28,10 @@ def message_class(type_name: str) -> type:
     try:
         kind: type = getattr(importlib.import_module(f'{package}.msg'), name)
     except (ImportError, AttributeError) as error:
+        if type_name == TF_MESSAGE:
+            return transform_class()
         raise UnknownTypeError(f'message type {type_name}: not installed') from error
     return kind
-
-
-def is_installed(type_name: str) -> bool:
-    """Tell whether this process can send and hear a message type."""
-    try:
-        message_class(type_name)
-    except UnknownTypeError:
-        return False
-    return True
 
 
 def suitable_qos(latched: bool, publishers: Sequence[TopicEndpointInfo]) -> QoSProfile:

@@ -2,15 +2,14 @@
 
 import struct
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from rclpy.clock import Clock, ClockType
 from std_srvs.srv import Trigger
 
-from endoscope_bags.errors import BagError, MalformedMessageError, UnknownTypeError
-from endoscope_bags.message_types import TF_MESSAGE, begins_with_header, message_type
+from endoscope_bags.errors import BagError, UnknownTypeError
+from endoscope_bags.message_types import begins_with_header, message_type
 from endoscope_bags.recording_session import (
     Arrival,
     RecordingSession,
@@ -20,13 +19,11 @@ from endoscope_bags.recording_session import (
 from endoscope_core.atomic_output import with_final_names
 from endoscope_nodes.diagnostics import ERROR, OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.joint_transforms import JointTransforms, section_of
-from endoscope_nodes.names import JOINT_STATES, RECORDER_START, RECORDER_STOP, TRANSFORMS
+from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
 from endoscope_nodes.node_parameters import RecorderParameters
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.raw_subscription import RawSubscription
 from endoscope_nodes.recorded_topics import (
-    is_installed,
     message_class,
     offered_profiles,
     suitable_qos,
@@ -48,7 +45,6 @@ class _Source:
     subscription: RawSubscription
     number: int
     publishers_seen: int = -1
-    made_of: Callable[[bytes], bytes] | None = None
 
     def count_publishers(self) -> int:
         # The subscription may be replaced by another one.
@@ -186,15 +182,6 @@ class RecorderNode(EndoscopeNode):
     def _subscribe(self, topic: str) -> None:
         namespace = self.get_namespace().rstrip('/') + '/'
         known = BY_NAME.get(topic) or BY_NAME.get(topic.removeprefix(namespace))
-        if topic == TRANSFORMS and not is_installed(TF_MESSAGE):
-            self._add_source(
-                JOINT_STATES,
-                BY_NAME[JOINT_STATES].type,
-                latched=False,
-                recorded=(TRANSFORMS, TF_MESSAGE),
-                made_of=JointTransforms(section_of(self.rig.instrument)).of_message,
-            )
-            return
         if known is not None:
             self._add_source(topic, known.type, known.asked.latched)
             return
@@ -204,25 +191,17 @@ class RecorderNode(EndoscopeNode):
         else:
             self._untyped.append(topic)
 
-    def _add_source(
-        self,
-        topic: str,
-        type_name: str,
-        latched: bool,
-        *,
-        recorded: tuple[str, str] | None = None,
-        made_of: Callable[[bytes], bytes] | None = None,
-    ) -> None:
-        """Take a topic, and record it or, as a topic and type of its own, what is made of it."""
+    def _add_source(self, topic: str, type_name: str, latched: bool) -> None:
         assert self._session is not None
         full = self.resolve_topic_name(topic)
         kind = message_class(type_name)
         has_stamp = begins_with_header(message_type(type_name).definition)
         qos = suitable_qos(latched, self.get_publishers_info_by_topic(full))
         subscription = RawSubscription(self, kind, topic, qos)
-        source = _Source(full, kind, latched, has_stamp, subscription, 0, made_of=made_of)
+        source = _Source(full, kind, latched, has_stamp, subscription, 0)
         source.number = self._session.add_topic(
-            *(recorded or (full, type_name)),
+            full,
+            type_name,
             lambda: offered_profiles(self.get_publishers_info_by_topic(full)),
             source.count_publishers,
         )
@@ -286,12 +265,6 @@ class RecorderNode(EndoscopeNode):
                 else:
                     received = info['received_timestamp']
                     published = info['source_timestamp']
-                if source.made_of is not None:
-                    try:
-                        data = source.made_of(data)
-                    except MalformedMessageError as error:
-                        self.get_logger().error(f'{source.name} {error}', once=True)
-                        continue
                 arrivals.append(
                     Arrival(received, number, info['publication_sequence_number'], published, data)
                 )

@@ -10,14 +10,13 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from endoscope_bags import RawMessage, Recording, Topic, open_bag
 from endoscope_bags.cdr_encoding import encode_clock
 from endoscope_bags.errors import BagError
-from endoscope_bags.message_types import TF_MESSAGE
 from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.names import CLOCK, DIAGNOSTICS, MOTOR_COMMAND, MOTOR_MEASURED, TRANSFORMS
+from endoscope_nodes.names import CLOCK, DIAGNOSTICS, MOTOR_COMMAND, MOTOR_MEASURED
 from endoscope_nodes.node_parameters import ReplayParameters
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import LOCK_STEP, SENSOR_OFFERED
-from endoscope_nodes.recorded_topics import is_installed, message_class
+from endoscope_nodes.recorded_topics import message_class
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_NS
 
@@ -83,10 +82,7 @@ class ReplayNode(EndoscopeNode):
                 f'has {", ".join(sorted(recording.topics))}'
             )
         chosen = [recording.topics[name] for name in wanted or sorted(recording.topics)]
-        # Recordings have transforms that were made without the package of their type.
         silent = {CLOCK} if self._parameters_.clock else set()
-        if not wanted and not is_installed(TF_MESSAGE):
-            silent.add(TRANSFORMS)
         return [topic for topic in chosen if topic.message_count and topic.name not in silent]
 
     def _publisher(self, topic: Topic) -> Publisher:

@@ -367,8 +367,7 @@ TOPICS = (
         names.TRANSFORMS,
         'tf2_msgs/msg/TFMessage',
         '20 Hz',
-        'where every link of `robot_description` is, from the base to the tip of the instrument; '
-        'without an installed `tf2_msgs` only in recordings and by `endoscope console --viewers`',
+        'where every link of `robot_description` is, from the base to the tip of the instrument',
         offered=SENSOR_OFFERED,
         asked=SENSOR_OFFERED,
         said_by=('instrument_model',),

@@ -10,6 +10,7 @@ from typing import Any
 
 from rclpy.serialization import deserialize_message
 
+from endoscope_bags.message_types import TF_MESSAGE, typestore
 from endoscope_bringup.operating.message_text import fields_of, lines_of
 from endoscope_core.errors import nearest, printable
 from endoscope_nodes.graph_client import GraphClient, NoGraphError
@@ -214,7 +215,13 @@ def echo(
     """
     say: Callable[[Any], None] = _print_json if as_json else _print_lines
     for data, _, kind in _messages(client, name, count, seconds, patience_s):
-        say(deserialize_message(data, kind))
+        say(_decoded(data, kind))
+
+
+def _decoded(data: bytes, kind: type) -> Any:
+    if hasattr(kind, 'get_fields_and_field_types'):
+        return deserialize_message(data, kind)
+    return typestore().deserialize_cdr(data, TF_MESSAGE)
 
 
 def _print_json(message: Any) -> None:

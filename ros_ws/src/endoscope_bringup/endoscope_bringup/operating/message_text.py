@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -29,6 +30,8 @@ def fields_of(value: Any) -> Any:
         return {
             name: fields_of(getattr(value, name)) for name in value.get_fields_and_field_types()
         }
+    if is_dataclass(value):
+        return {field.name: fields_of(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, bytes):
         return list(value) if len(value) != 1 else value[0]
     if isinstance(value, float) and not math.isfinite(value):
