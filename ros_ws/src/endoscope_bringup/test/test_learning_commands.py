@@ -1,6 +1,7 @@
 """`endoscope dataset`, `train` and `identify`, one after the other as a person uses them."""
 
 import json
+import subprocess
 import sys
 
 import numpy as np
@@ -79,6 +80,44 @@ def test_training_leaves_weights_that_tell_sizes(data, tmp_path):
     dataset = load_dataset(data)
     result = load_classifier(out).classify(dataset.tension[0])
     assert result.size == pytest.approx(dataset.backlash_size[0], abs=np.deg2rad(5.0))
+
+
+@pytest.mark.parametrize(
+    ('folds', 'words'),
+    [
+        ('1', '1 folds cannot be made of 2 recorded tubes a class: give 2 to 2 folds'),
+        ('5', 'give 2 to 2 folds, or make more of them with `endoscope dataset --per-class`'),
+        ('-3', 'give 2 to 2 folds'),
+    ],
+)
+def test_folds_that_cannot_be_made_are_one_line(data, tmp_path, capsys, folds, words):
+    out = tmp_path / 'weights.safetensors'
+    assert main(['train', '--data', str(data), '--out', str(out), '--folds', folds]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert words in line
+    assert not out.exists()
+
+
+def test_one_recording_a_class_trains_nothing(tmp_path, capsys):
+    folder, out = tmp_path / 'data', tmp_path / 'weights.safetensors'
+    assert main(['dataset', '--out', str(folder), '--per-class', '1']) == 0
+    assert main(['train', '--data', str(folder), '--out', str(out)]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert 'of 1 recorded tubes a class: at least 2 a class are needed' in line
+
+
+def test_a_data_set_without_room_on_the_disk_is_named(tmp_path):
+    program = f'{sys.executable} -m endoscope_bringup.cli dataset --per-class 1 --out data'
+    done = subprocess.run(
+        ['bash', '-c', f'ulimit -f 20; {program}'],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr == f'endoscope: {tmp_path / "data"}: File too large\n'
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_training_the_papers_network_leaves_weights_that_classify(data, tmp_path):

@@ -1,5 +1,6 @@
 """Output files and folders that appear whole or not at all."""
 
+import errno
 import os
 import re
 import secrets
@@ -11,6 +12,7 @@ from pathlib import Path
 
 from endoscope_core.errors import EndoscopeError
 
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _PARTIAL = re.compile(r'(?<![\w.-])\.partial-[0-9a-f]{8}-')
 
 
@@ -50,8 +52,9 @@ def atomic_file(path: str | Path, *, overwrite: bool = True) -> Iterator[Path]:
         raise OutputExistsError(f'{target} exists already: remove it or name another file')
     partial = _partial_sibling(target)
     try:
-        yield partial
-        _flush_to_disk(partial)
+        with _named(target):
+            yield partial
+            _flush_to_disk(partial)
         partial.replace(target)
     finally:
         partial.unlink(missing_ok=True)
@@ -81,7 +84,8 @@ def atomic_directory(path: str | Path) -> Iterator[Path]:
     partial = _partial_sibling(target)
     partial.mkdir()
     try:
-        yield partial
+        with _named(target):
+            yield partial
         partial.replace(target)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
@@ -136,6 +140,17 @@ def write_bytes(path: str | Path, content: bytes, *, overwrite: bool = True) -> 
     """Write `content` to `path`, whole or not at all; errors as in `atomic_file`."""
     with atomic_file(path, overwrite=overwrite) as partial:
         partial.write_bytes(content)
+
+
+@contextmanager
+def _named(target: Path) -> Iterator[None]:
+    """Name the output in errors of writing, such as that of a full disk, that name no file."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None and error.errno in _NO_ROOM:
+            error.filename = str(target)
+        raise
 
 
 def _partial_sibling(target: Path) -> Path:

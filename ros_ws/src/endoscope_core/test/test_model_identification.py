@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,11 @@ from endoscope_core.hysteresis import (
     prandtl_ishlinskii_forward,
 )
 from endoscope_core.hysteresis.inverse import MODELS
-from endoscope_core.hysteresis.inverse_safety import GREATEST_INVERSE_SLOPE
+from endoscope_core.hysteresis.inverse_safety import (
+    GREATEST_ALPHA,
+    GREATEST_INVERSE_SLOPE,
+    SMALLEST_ALPHA,
+)
 from endoscope_core.identification import (
     IdentificationError,
     Recording,
@@ -19,6 +25,7 @@ from endoscope_core.identification import (
     fit_feedforward,
     fit_model,
 )
+from endoscope_core.identification.feedforward_candidates import candidates_for
 
 TIME = np.arange(0.0, 9.0, 0.02)
 DRIVER = 1.5 * np.sin(TIME)
@@ -51,6 +58,16 @@ def test_an_asymmetric_loop_is_fitted_better_by_the_asymmetric_model():
     recordings = [Recording(DRIVER, forward(truth, DRIVER))]
     plain, skewed = (fit_model(recordings, 0, m) for m in ('bouc_wen', 'asymmetric_bouc_wen'))
     assert skewed.rmse < 0.3 * plain.rmse
+
+
+@pytest.mark.parametrize('gain', [SMALLEST_ALPHA, 0.25, 1.0, GREATEST_ALPHA])
+@pytest.mark.parametrize('model', MODELS)
+def test_every_candidate_for_the_inverse_is_safe_whatever_the_gain_of_the_rig(model, gain):
+    fit = fit_model([Recording(DRIVER, gain * answer(TRUTHS['dahl'], DRIVER))], 0, model)
+    candidates = candidates_for(fit.parameters)
+    for corner in itertools.product(*candidates.bounds):
+        parameters = candidates.make(corner)
+        assert parameters.inverse_slope <= GREATEST_INVERSE_SLOPE * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize('model', MODELS)

@@ -84,13 +84,7 @@ def load_command_file(path: Path, tick: float) -> SampledMotion:
     CommandFileError
         The file cannot be played.
     """
-    table = read_command_file(path, JOINTS)
-    first, last = table.time[0], table.time[-1]
-    time = np.arange(math.floor((last - first) / tick + 1e-6) + 1) * tick + first
-    angle = np.stack([np.interp(time, table.time, column) for column in table.angle.T], axis=1)
-    velocity = np.gradient(angle, tick, axis=0) if len(time) > 1 else np.zeros_like(angle)
-    velocity[-1] = 0.0
-    return SampledMotion(angle, velocity)
+    return SampledMotion(*read_command_file(path, JOINTS).sampled(tick))
 
 
 def approach(

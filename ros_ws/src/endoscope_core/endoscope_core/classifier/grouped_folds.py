@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
+from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset, DatasetError
 
 Rows = NDArray[np.intp]
 
@@ -55,9 +55,17 @@ def grouped_folds(
 
     Raises
     ------
-    ValueError
-        If a class has fewer configurations than there are folds.
+    DatasetError
+        If there are fewer than two folds, or a class has fewer configurations than there are folds.
     """
+    classes = np.unique(dataset.class_deg)
+    least = min(len(set(dataset.configuration[dataset.class_deg == c])) for c in classes)
+    if not 2 <= folds <= least:
+        may = f'give 2 to {least} folds' if least >= 2 else 'at least 2 a class are needed'
+        raise DatasetError(
+            f'{folds} folds cannot be made of {least} recorded tubes a class: {may}, or make more '
+            'of them with `endoscope dataset --per-class`'
+        )
     # Only training divides rows: a node that classifies would load it for nothing, and for seconds.
     from sklearn.model_selection import StratifiedGroupKFold
 

@@ -61,8 +61,8 @@ def train_size_classifier(dataset: CalibrationDataset, seed: int, folds: int = 5
 
     Raises
     ------
-    ValueError
-        If a class has fewer configurations than there are folds.
+    DatasetError
+        If there are fewer than two folds, or a class has fewer configurations than there are folds.
     """
     return _train(dataset, seed, folds)[0]
 

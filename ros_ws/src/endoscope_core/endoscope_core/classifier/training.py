@@ -119,8 +119,8 @@ def cross_validate(
 
     Raises
     ------
-    ValueError
-        If a class has fewer configurations than there are folds.
+    DatasetError
+        If there are fewer than two folds, or a class has fewer configurations than there are folds.
     """
     named = np.zeros_like(dataset.class_deg)
     split = grouped_folds(dataset, seed, folds)

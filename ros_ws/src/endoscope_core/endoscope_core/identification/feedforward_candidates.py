@@ -17,6 +17,7 @@ from endoscope_core.hysteresis.inverse_safety import (
     GREATEST_ALPHA,
     GREATEST_INVERSE_SLOPE,
     GREATEST_LAG,
+    SMALLEST_ALPHA,
 )
 from endoscope_core.hysteresis.prandtl_ishlinskii import LONGEST_THRESHOLD, SMALLEST_FIRST_WEIGHT
 
@@ -54,7 +55,7 @@ def candidates_for(model: HysteresisParameters) -> Candidates:
     if isinstance(model, PrandtlIshlinskiiParameters):
         return _play_stack(model)
     gain_and_lag = [
-        (0.7 * model.alpha, min(1.4 * model.alpha, GREATEST_ALPHA)),
+        (max(0.7 * model.alpha, SMALLEST_ALPHA), min(1.4 * model.alpha, GREATEST_ALPHA)),
         (0.01, min(2.5 * model.lag + 0.2, GREATEST_LAG)),
     ]
     if isinstance(model, BoucWenParameters):

@@ -217,6 +217,8 @@ def _fit_play_stack(recordings: Sequence[Recording]) -> ModelFit:
     weights = np.clip(found.x, low, GREATEST_ALPHA)
     weights *= min(1.0, GREATEST_ALPHA / float(np.sum(weights)))
     weights[0] = max(weights[0], SMALLEST_FIRST_WEIGHT, SMALLEST_ALPHA - float(np.sum(weights[1:])))
+    # The floor of the first may have lifted the sum again.
+    weights[1:] *= min(1.0, (GREATEST_ALPHA - weights[0]) / max(float(np.sum(weights[1:])), 1e-9))
     rmse = float(np.sqrt(np.mean((target - matrix @ weights) ** 2)))
     left = [r.actual - c @ weights for r, c in zip(recordings, columns, strict=True)]
     offset = float(np.clip(_mean_offset(recordings, left), -GREATEST_OFFSET, GREATEST_OFFSET))

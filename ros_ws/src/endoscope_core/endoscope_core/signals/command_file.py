@@ -44,6 +44,15 @@ class CommandTable:
     time: FloatArray
     angle: FloatArray
 
+    def sampled(self, tick: float) -> tuple[FloatArray, FloatArray]:
+        """Angles and velocities at every `tick` in s, in rad and rad/s, both of shape (M, J)."""
+        first, last = self.time[0], self.time[-1]
+        time = np.arange(math.floor((last - first) / tick + 1e-6) + 1) * tick + first
+        angle = np.stack([np.interp(time, self.time, column) for column in self.angle.T], axis=1)
+        velocity = np.gradient(angle, tick, axis=0) if len(time) > 1 else np.zeros_like(angle)
+        velocity[-1] = 0.0
+        return angle, velocity
+
 
 def write_command_file(
     path: str | Path, time: ArrayLike, angle: ArrayLike, joints: Sequence[str] = JOINTS
