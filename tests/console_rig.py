@@ -21,9 +21,7 @@ from endoscope_nodes.qos import EVENT, profile
 from endoscope_nodes.topics import Qos
 
 CONSOLE = [sys.executable, '-m', 'endoscope_bringup.cli', 'console']
-# In real time, a busy machine would end the motion session.
-IN_SIMULATED_TIME = ['--ros-args', '-p', 'use_sim_time:=true', '-p', 'speed:=1.0']
-IN_SIMULATED_TIME += ['-p', 'source:=master', '-p', 'tick_rate:=500']
+OF_THE_GRAPH = ['--ros-args', '-p', 'source:=master', '-p', 'tick_rate:=500']
 _GRAPH = 'import sys; from endoscope_nodes.program import graph; sys.exit(graph())'
 PATIENCE_S = 240.0
 _QUEUE = profile(Qos(2000, reliable=False))
@@ -101,7 +99,7 @@ class ConsoleRig:
         self._stack = ExitStack()
         self.goals, self.wanted, self.clutches = [], [], []
         self._graph = subprocess.Popen(
-            [sys.executable, '-c', _GRAPH, *IN_SIMULATED_TIME],
+            [sys.executable, '-c', _GRAPH, *OF_THE_GRAPH],
             cwd=folder,
             env=self.environment,
             stdin=subprocess.DEVNULL,

@@ -34,9 +34,6 @@ NOT_RUN = {
 }
 """Words after the language with which a block is not run, and why."""
 
-IN_SIMULATED_TIME = '--ros-args -p use_sim_time:=true -p speed:=1.0'
-"""What `graph` is started with: in real time, a busy machine would end the motion session."""
-
 _FENCE = re.compile(r'^(`{3,})([^`\n]*)\n(.*?)^\1$', re.MULTILINE | re.DOTALL)
 
 
@@ -145,9 +142,8 @@ def _run(words: list[str], folder: Path, environment: dict[str, str], where: str
 
 def _start(command: Command, folder: Path, environment: dict[str, str]) -> subprocess.Popen:
     """Start a command, and wait until it has said what the page shows."""
-    text = f'graph {IN_SIMULATED_TIME}' if command.text == 'graph' else command.text
     process = subprocess.Popen(
-        ['bash', '-c', f'exec {text}'],
+        ['bash', '-c', f'exec {command.text}'],
         cwd=folder,
         env=environment,
         stdin=subprocess.DEVNULL,

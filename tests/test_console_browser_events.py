@@ -10,8 +10,6 @@ from endoscope_benchmarks.console_trials.hand import Hand
 from endoscope_benchmarks.console_trials.relay import Relay
 from endoscope_benchmarks.console_trials.served_console import SAME_RAD, ServedConsole
 
-# In real time, a busy machine would end the motion session.
-IN_SIMULATED_TIME = '-p use_sim_time:=true -p speed:=1.0'
 SETTLED_S, WATCHED_S = 1.0, 0.5
 
 
@@ -20,7 +18,7 @@ def hand(tmp_path_factory):
     folder = tmp_path_factory.mktemp('console')
     with (
         Relay() as network,
-        ServedConsole(folder, private_domain(), IN_SIMULATED_TIME, (network.address,)) as console,
+        ServedConsole(folder, private_domain(), (network.address,)) as console,
     ):
         network.target = console.port
         with Hand(console, network) as hand:

@@ -107,11 +107,16 @@ def test_a_recording_is_called_what_it_will_be_called(tmp_path):
     assert f'{tmp_path / "demo" / "bag"}: 0 messages, 0 lost' in errors
 
 
-def test_the_graph_says_what_it_was_given_when_it_is_ready_and_what_to_do(tmp_path):
+@pytest.mark.parametrize(
+    ('words', 'pace'),
+    [([], 'in simulated time, no faster than real time'), (['--real-time'], 'at 200 Hz')],
+)
+def test_the_graph_says_what_it_was_given_when_it_is_ready_and_what_to_do(tmp_path, words, pace):
     parameters = tmp_path / 'rig.yaml'
     parameters.write_text('/**/console: {ros__parameters: {source: none, scale: 0.5}}\n')
     process = start(
         'graph',
+        *words,
         *('--ros-args', '--params-file', str(parameters), '-p', 'tick_rate:=200'),
         *('-p', 'autostart:=false', '-r', '__ns:=/left'),
     )
@@ -128,7 +133,7 @@ def test_the_graph_says_what_it_was_given_when_it_is_ready_and_what_to_do(tmp_pa
         'left.recorder]: with autostart:=false',
     ]
     assert told[-1] == (
-        'graph]: ready in /left at 200 Hz: motors simulated; load cells simulated; '
+        f'graph]: ready in /left {pace}: motors simulated; load cells simulated; '
         'tracker simulated; slave DISABLED; next: endoscope operate enable --namespace left; '
         'not recording: endoscope operate record start --namespace left'
     )

@@ -65,6 +65,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         '--no-graph', action='store_true', help='start no graph, wait for one to answer'
     )
     parser.add_argument(
+        '--real-time',
+        action='store_true',
+        help='run that graph by the wall clock also where all devices are simulated',
+    )
+    parser.add_argument(
         '--graph',
         default='',
         metavar='ARGUMENTS',

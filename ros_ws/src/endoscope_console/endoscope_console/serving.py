@@ -36,7 +36,7 @@ from endoscope_core.rig import Rig, load_rig
 from endoscope_core.teleop.joy_mapping import JoyMapping, JoyMappingError
 from endoscope_core.teleop.pad import PadHandle
 from endoscope_nodes.names import JOINTS
-from endoscope_nodes.program import NODES
+from endoscope_nodes.program import NODES, REAL_TIME
 from endoscope_nodes.runtime import GC_THRESHOLDS, SWITCH_INTERVAL_S
 
 # Where this process is killed, the graph ends as it does by Ctrl-C.
@@ -70,7 +70,8 @@ class _Graph:
     """The graph that this command starts, where none answers."""
 
     def __init__(self, args: argparse.Namespace) -> None:
-        self._words = ['--ros-args', '-p', 'source:=master']
+        self._words = [REAL_TIME] if args.real_time else []
+        self._words += ['--ros-args', '-p', 'source:=master']
         if args.namespace.strip('/') != 'endoscope':
             self._words += ['-r', f'__ns:=/{args.namespace.strip("/")}']
         if args.rig is not None:

@@ -12,13 +12,14 @@ from endoscope_console.graph_side import GraphSide
 from endoscope_console.operations import Operations
 from endoscope_core.rig import Rig
 from endoscope_core.teleop.operator import STATE_NS, DeadManState, Reason
-from endoscope_nodes.graph_client import CONSOLE, PROCEDURE, GraphClient, Health
+from endoscope_nodes.graph_client import CONSOLE, LOCK_STEP, PROCEDURE, GraphClient, Health
 from endoscope_nodes.names import WIRES
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')
 _RECORDER = 'recorder: recording'
 _TENSE = 0.9
 _LOST_S = 0.5
+_SLOW = 0.9
 _REPEATED_NS = 1_000_000_000
 _NOT_RECORDING = 'not recording'
 _encode = msgspec.json.Encoder().encode
@@ -67,6 +68,7 @@ class View:
                 **steady,
                 'stamp': time.time(),
                 'state_age': self._state_age_s(now_ns),
+                'time': self._time(),
                 'recorder': {
                     **steady['recorder'],
                     'messages': None if recorder is None else _number(recorder, 'messages'),
@@ -135,6 +137,10 @@ class View:
             'explanations': operations.explanations.as_list(),
         }
 
+    def _time(self) -> str:
+        said = self._client.health.get(LOCK_STEP)
+        return 'real' if said is None else f'simulated, {said.message}'
+
     def _causes(self) -> list[str]:
         said = self._client.health.get('supervisor: operating state')
         text = '' if said is None else said.values.get('present causes', '')
@@ -178,6 +184,7 @@ class View:
         recorder = client.health.get(_RECORDER)
         compensator = client.compensator
         reason = operations.beat.said.reason
+        factor = client.factor
         found = [
             (
                 client.state == 'FAULT',
@@ -209,6 +216,9 @@ class View:
         if tension is not None and tension[0] > _TENSE * self._rig.tension.ceiling:
             text = f'{tension[1]} is above {_TENSE * self._rig.tension.ceiling:.0f} N'
             found.append((True, Alarm('tension', Level.HIGH, text)))
+        if factor is not None and factor < _SLOW:
+            text = f'a busy machine: simulated at {factor:.1f} of real time'
+            found.append((True, Alarm('pace', Level.LOW, text)))
         if recorder is not None and recorder.level:
             found.append((True, Alarm('recorder', Level.MEDIUM, recorder.message)))
         return [alarm for is_so, alarm in found if is_so]

@@ -63,5 +63,6 @@ class Announcement:
     def _ready(self) -> str:
         nodes, ticker = self._runtime.nodes, self._runtime.ticker
         pace = 'in simulated time' if ticker.simulated else f'at {ticker.rate} Hz'
+        pace += ', no faster than real time' * ticker.paced
         said = '; '.join(filter(None, (node.announcement for node in nodes)))
         return f'ready in {nodes[0].get_namespace()} {pace}' + (f': {said}' if said else '')

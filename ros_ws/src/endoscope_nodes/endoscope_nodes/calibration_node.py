@@ -79,7 +79,7 @@ class CalibrationNode(EndoscopeNode):
         self._timeout_ns = self.rig.timeouts.stream_ns
         self._motion = calibration_motion(p.motion)
         self._classifier = self._load_classifier(p.weights)
-        self._thread = None if self.ticker.simulated else ThreadPoolExecutor(1)
+        self._thread = ThreadPoolExecutor(1)
         self._run: CalibrationRun | None = None
         self._homing = False
         self._began_ns = 0
@@ -214,7 +214,7 @@ class CalibrationNode(EndoscopeNode):
         except TensionGapError as error:
             self._abort(str(error))
             return
-        if self._thread is not None:
+        if self.ticker.paced or not self.ticker.simulated:
             self._judging = self._thread.submit(self._judgement, self._classifier, tension, cells)
             return
         self._judging = Future()
@@ -306,8 +306,7 @@ class CalibrationNode(EndoscopeNode):
 
     def close(self) -> None:
         """Let the classifier's thread end."""
-        if self._thread is not None:
-            self._thread.shutdown()
+        self._thread.shutdown()
 
 
 def main() -> int:

@@ -1,7 +1,9 @@
-"""Beats simulated time for the whole graph, a tick at a time, as fast as the graph can follow."""
+"""Beats simulated time for the whole graph, a tick at a time, as fast as it can or is to follow."""
 
+import math
 import struct
 import time
+from collections import deque
 from collections.abc import Callable
 
 from rclpy.clock import Clock, ClockType
@@ -13,16 +15,17 @@ from endoscope_bags.cdr_encoding import encode_clock
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.names import (
-    CLOCK,
-    SLAVE_MEASURED,
-)
+from endoscope_nodes.names import FACTOR, SLAVE_MEASURED
 from endoscope_nodes.node_parameters import FOLLOWED, ConductorParameters
 from endoscope_nodes.qos import LOCK_STEP
 from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.sampling import SampleClock
 
 _STAMP = struct.Struct('<iI')
+# What a late beat may be made up for: more would be seen as a leap.
+_DEBT_NS = 20_000_000
+_FACTOR_OVER_S = 1.0
+_AS_ASKED = 0.95
 
 
 class BarrierTimeout(EndoscopeError, TimeoutError):
@@ -35,6 +38,8 @@ class ConductorNode(EndoscopeNode):
     The next tick comes once every topic of ``wait_for``, and every other stream that answered the
     tick before, has published a message with this tick's stamp.  In one process this makes the
     content of every message a function of parameters and seeds alone.
+
+    With a ``speed`` time goes on at that pace where the machine can, and slower where it cannot.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -43,23 +48,29 @@ class ConductorNode(EndoscopeNode):
         self._runtime = runtime
         self._settings = p
         self._tick_ns = 1_000_000_000 // self.ticker.rate
+        self._period_ns = round(self._tick_ns / p.speed) if p.speed > 0.0 else 0
+        self._due_ns = 0
         self._now_ns = round(p.start * 1e9) - self._tick_ns
         self._until_ns = self._now_ns
         self._answered: dict[str, int] = dict.fromkeys(FOLLOWED, 0)
         self._pending: set[str] = set()
         self._tracker = SampleClock(p.tracker_rate)
-        self._asked_at = time.monotonic()
-        self._repeated = False
+        self._looked = 0
+        self._look_s = min(p.grace, p.timeout) / 2
+        self._course: deque[tuple[int, int]] = deque(
+            maxlen=round(_FACTOR_OVER_S / self._look_s) + 1
+        )
         self._future: Future | None = None
         self.ticks = 0
         self.failure: BarrierTimeout | None = None
-        self._clock_out = self.create_publisher(ClockMessage, CLOCK, LOCK_STEP)
+        self._clock_out = self.create_publisher(ClockMessage, runtime.clock, LOCK_STEP)
         for topic in FOLLOWED:
             self.create_subscription(JointState, topic, self._answer_to(topic), LOCK_STEP, raw=True)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(min(p.grace, p.timeout) / 2, self._look, clock=steady)
-        if p.speed > 0.0:
-            self.create_timer(self._tick_ns * 1e-9 / p.speed, self._go_on, clock=steady)
+        self.create_timer(self._look_s, self._look, clock=steady)
+        if self._period_ns:
+            self.ticker.paced = True
+            self.create_timer(self._period_ns * 1e-9, self._go_on, clock=steady)
         self.diagnostics.add('lock-step', self._report)
 
     def advance(self, seconds: float) -> Future:
@@ -69,7 +80,8 @@ class ConductorNode(EndoscopeNode):
         """
         self._until_ns = self._now_ns + round(seconds * 1e9)
         self._future = Future()
-        self._asked_at = time.monotonic()
+        self._looked = 0
+        self._due_ns = time.monotonic_ns()
         if not self._pending:
             self._step()
         return self._future
@@ -87,14 +99,21 @@ class ConductorNode(EndoscopeNode):
             answered[topic] = seconds * 1_000_000_000 + nanoseconds
             if answered[topic] >= self._now_ns and topic in pending:
                 pending.discard(topic)
-                if not pending and self._settings.speed == 0.0:
-                    self._step()
+                self._go_on()
 
         return answer
 
     def _go_on(self) -> None:
-        if not self._pending:
-            self._step()
+        """Give the next tick if the last one is answered and, where there is a pace, it is due."""
+        if self._pending:
+            return
+        if self._period_ns:
+            now = time.monotonic_ns()
+            if now < self._due_ns:
+                return
+            self._due_ns = max(self._due_ns + self._period_ns, now - _DEBT_NS)
+            self.ticker.turn_hand()
+        self._step()
 
     def _step(self) -> None:
         if self._now_ns >= self._until_ns:
@@ -113,19 +132,21 @@ class ConductorNode(EndoscopeNode):
                     self._pending.add(topic)
             elif stamp == before:
                 self._pending.add(topic)
-        self._asked_at = time.monotonic()
+        self._looked = 0
         self._clock_out.publish(encode_clock(now))
 
     def _look(self) -> None:
         """Repeat a tick that may have been lost, give streams up that have ended."""
+        self._course.append((time.monotonic_ns(), self._now_ns))
         if not self._pending or self._future is None:
             return
-        waited = time.monotonic() - self._asked_at
+        # Time in which this process was not run itself has kept nobody from being heard.
+        self._looked += 1
+        waited = self._looked * self._look_s
         if waited > self._settings.grace:
             self._clock_out.publish(encode_clock(self._now_ns))
             self._pending.intersection_update(self._settings.wait_for)
-            if not self._pending:
-                self._step()
+            self._go_on()
         if self._pending and waited > self._settings.timeout:
             self._fail()
 
@@ -141,8 +162,21 @@ class ConductorNode(EndoscopeNode):
         if future is not None:
             future.set_exception(self.failure)
 
+    @property
+    def factor(self) -> float:
+        """Simulated seconds in a real one, over the last second or so; NaN before."""
+        if len(self._course) < 2:
+            return math.nan
+        (wall, simulated), (wall_now, simulated_now) = self._course[0], self._course[-1]
+        return (simulated_now - simulated) / (wall_now - wall)
+
     def _report(self) -> Report:
-        return OK, 'running', {'ticks': self.ticks}
+        factor, speed = self.factor, self._settings.speed
+        said = 'as fast as this machine can'
+        if speed:
+            slow = factor < _AS_ASKED * speed
+            said = f'at {factor:.2f} of real time, {said}' if slow else f'at {speed:g} of real time'
+        return OK, said, {'ticks': self.ticks, FACTOR: factor, 'speed': speed}
 
 
 class SelfStartingConductor(ConductorNode):

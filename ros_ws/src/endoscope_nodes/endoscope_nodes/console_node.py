@@ -29,6 +29,7 @@ from endoscope_nodes.console_motion import (
 )
 from endoscope_nodes.diagnostics import OK, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.handle_sender import CLUTCH_PERIOD_NS
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
@@ -78,6 +79,7 @@ class ConsoleNode(EndoscopeNode):
         self._sent_ns: int | None = None
         self._clutch_said = False
         self._refused_before = 0
+        self._handle_ns = self._clutch_said_ns = 0
         self._handle_from: tuple[float, ...] = ()
         self._handle_moves = False
         self._told_of_handle = False
@@ -123,7 +125,6 @@ class ConsoleNode(EndoscopeNode):
         self._results = self._session.senders_of(results)
         self._on_parameters(self._settings)
         self.diagnostics.add('commands', self._report)
-        self.ticker.every(0.1, self._repeat_clutch)
         self.ticker.add(self._on_tick)
 
     @property
@@ -171,6 +172,7 @@ class ConsoleNode(EndoscopeNode):
         if crowd:
             self._session.leave(crowd)
             return
+        self._handle_ns = self.ticker.hand_ns()
         refused = self._handle.take(sample.stamp_ns, sample.position, self.ticker.monotonic_ns())
         if refused is None and self._settings.source != FOLLOW_THE_HANDLE:
             self._notice_motion(sample.position)
@@ -221,14 +223,10 @@ class ConsoleNode(EndoscopeNode):
         if self._clutch_said:
             self._publish_clutch(self.ticker.now_ns())
 
-    def _repeat_clutch(self) -> None:
-        if self.ticker.now_ns():
-            self._publish_clutch(self.ticker.now_ns())
-
     def _publish_clutch(self, stamp_ns: int) -> None:
         if self._clutch_out is None:
             return
-        self._clutch_said = self._moving
+        self._clutch_said, self._clutch_said_ns = self._moving, self.ticker.hand_ns()
         message = Joy(buttons=[int(self._clutch_said)])
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
         self._clutch_out.publish(message)
@@ -258,6 +256,11 @@ class ConsoleNode(EndoscopeNode):
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         self._session.turn()
+        now = self.ticker.hand_ns()
+        if now - self._clutch_said_ns >= CLUTCH_PERIOD_NS:
+            self._publish_clutch(stamp_ns)
+        if now - self._handle_ns > self.rig.timeouts.handle_ns:
+            self._handle.lose()
         followed = self._handle.follow(self.ticker.monotonic_of(stamp_ns))
         if self._commands is None:
             return

@@ -54,6 +54,7 @@ class EndoscopeNode(Node):
         )
         self.exit_code = 0
         self.given: dict[str, object] = {}
+        self._by_default = runtime.chosen if name == 'conductor' else {}
         self._matched: list[rclpy_implementation.EventHandle] = []
         self.ticker = runtime.ticker_of(self)
         self.rig = runtime.rig
@@ -67,7 +68,9 @@ class EndoscopeNode(Node):
     ) -> P:
         """Declare the parameters of the dataclass ``kind``; see :func:`declare_parameters`."""
         values = declare_parameters(self, kind, on_change, check)
-        self.given |= changed(values)
+        self.given |= {
+            name: value for name, value in changed(values).items() if name not in self._by_default
+        }
         return values
 
     def matched_event(self, subscription: Subscription) -> rclpy_implementation.EventHandle:

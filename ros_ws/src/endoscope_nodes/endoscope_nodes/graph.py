@@ -1,5 +1,10 @@
-"""All nodes of the endoscope composed in one process."""
+"""All nodes of the endoscope composed in one process, in lock-step where all is simulated."""
 
+import sys
+import time
+from functools import partial
+
+from endoscope_core.rig import RigFileError, load_rig
 from endoscope_nodes.calibration_node import CalibrationNode
 from endoscope_nodes.compensator_node import CompensatorNode
 from endoscope_nodes.conductor_node import SelfStartingConductor
@@ -9,6 +14,8 @@ from endoscope_nodes.em_tracker_node import EmTrackerNode
 from endoscope_nodes.instrument_model_node import InstrumentModelNode
 from endoscope_nodes.load_cells_node import LoadCellsNode
 from endoscope_nodes.motor_driver_node import MotorDriverNode
+from endoscope_nodes.names import MOTOR_MEASURED
+from endoscope_nodes.program import REAL_TIME, words_for_nobody
 from endoscope_nodes.recorder_node import RecorderNode
 from endoscope_nodes.runtime import Runtime, run
 from endoscope_nodes.supervisor_node import SupervisorNode
@@ -20,14 +27,54 @@ SHOWING_NODES = (InstrumentModelNode,)
 ALL_NODES = (*SLAVE_NODES, *CONTROL_NODES, *SHOWING_NODES, RecorderNode)
 
 
-def compose(runtime: Runtime) -> None:
-    """Add all nodes, and in simulated time the conductor."""
+_DEVICES = {'motor_driver': 'motors', 'load_cells': 'load_cells', 'em_tracker': 'tracker'}
+
+
+def compose(runtime: Runtime, real_time: bool = False) -> None:
+    """Add all nodes, and in simulated time the conductor.
+
+    Time is simulated where all devices are and the command line does not say otherwise: in
+    lock-step a busy machine makes the simulated slave slower, and nothing else.
+
+    Parameters
+    ----------
+    runtime
+        Without nodes.
+    real_time
+        Whether to run in real time all the same.
+    """
+    if not real_time and _is_simulated(runtime):
+        runtime.keep_lock_step(
+            {
+                # Two runs never have the same stamps, nor sessions the same name.
+                'start': float(int(time.time())),
+                'speed': 1.0,
+                # Load cells may fall silent.
+                'wait_for': [MOTOR_MEASURED],
+            }
+        )
     for factory in ALL_NODES:
         runtime.add(factory)
     if runtime.ticker.simulated:
         runtime.add(SelfStartingConductor)
 
 
+def _is_simulated(runtime: Runtime) -> bool:
+    """Whether all devices are simulated and the command line leaves it open what time is."""
+    given = {name: runtime.given(name) for name in _DEVICES}
+    if any('use_sim_time' in values for values in given.values()):
+        return False
+    try:
+        devices = load_rig(str(given['motor_driver'].get('rig_file') or '') or None).devices
+    except RigFileError:
+        # The first node says what is wrong with it.
+        return False
+    return all(
+        (given[name].get('device') or getattr(devices, kind)) == 'simulated'
+        for name, kind in _DEVICES.items()
+    )
+
+
 def main() -> int:
     """Run the whole graph in one process."""
-    return run(compose)
+    return run(partial(compose, real_time=REAL_TIME in words_for_nobody(sys.argv[1:])))

@@ -1,5 +1,6 @@
 """The operator's side of a running graph: asks it for something, and hears what it answers."""
 
+import math
 import re
 import time
 from collections.abc import Callable
@@ -24,6 +25,7 @@ from endoscope_nodes.names import (
     CALIBRATION_RUN,
     COMPENSATOR_STATE,
     DIAGNOSTICS,
+    FACTOR,
     HOME_REACHED,
     MOTION_SESSION,
     OPERATING_STATE,
@@ -39,6 +41,7 @@ POLL_S = 0.05
 SUPERVISOR = 'supervisor: operating state'
 PROCEDURE = 'calibration: procedure'
 CONSOLE = 'console: commands'
+LOCK_STEP = 'conductor: lock-step'
 _OPENS = {'enable': 'ENABLED', 'resume': 'ENABLED', 'disable': 'DISABLED', 'pause': 'PAUSED'}
 _TO_MOTION = ('enable', 'resume', 'home')
 # What was refused is told at once; the same words a second later are an old story.
@@ -206,6 +209,13 @@ class GraphClient(ClosedOnExit):
         if said is None:
             return ''
         return said.values.get('cause') or said.values.get('present causes', '')
+
+    @property
+    def factor(self) -> float | None:
+        """Simulated seconds in a real one, as last told; None where time is real, or before."""
+        said = self.health.get(LOCK_STEP)
+        factor = math.nan if said is None else float(said.values[FACTOR])
+        return factor if math.isfinite(factor) else None
 
     @property
     def where(self) -> str:

@@ -40,5 +40,7 @@ MOTOR_REBOOT = 'motor/reboot'
 # What `calibration: procedure` says on /diagnostics where nothing is being done, and of a way home.
 PROCEDURE_WAITING = 'waiting'
 HOME_REACHED = 'home reached'
+# What `conductor: lock-step` says on /diagnostics: simulated seconds in a real one.
+FACTOR = 'real-time factor'
 # What `calibration/run` answers; the stamp tells this calibration's result from one before it.
 CALIBRATION_BEGUN = f'begun at {{}} ns; {CALIBRATION_RESULT} will say how it went'

@@ -9,7 +9,7 @@ from endoscope_nodes.topics import SERVICES, TOPICS
 
 _WIDTH = 100
 _USAGE = """\
-usage: {name} [--ros-args [-p PARAMETER:=VALUE ...] [--params-file FILE ...]
+usage: {name} {options}[--ros-args [-p PARAMETER:=VALUE ...] [--params-file FILE ...]
        {blank} [-r __ns:=/NAMESPACE] [-r OLD:=NEW ...] [--log-level LEVEL]]
 
 {purpose}
@@ -30,7 +30,9 @@ was refused, 2 for arguments or parameters that it does not start with, 128 + th
 where it was stopped before it had started."""
 
 
-def help_of(name: str, purpose: str, nodes: Sequence[str]) -> str:
+def help_of(
+    name: str, purpose: str, nodes: Sequence[str], options: Sequence[tuple[str, str]] = ()
+) -> str:
     """Return the help of a program.
 
     Parameters
@@ -41,8 +43,17 @@ def help_of(name: str, purpose: str, nodes: Sequence[str]) -> str:
         What it does, a sentence.
     nodes
         Those that it runs, in their order.
+    options
+        Its own words, and what each does.
     """
-    parts = [_USAGE.format(name=name, blank=' ' * len(name), purpose=purpose)]
+    words = ''.join(f'[{word}] ' for word, _ in options)
+    blank = ' ' * len(f'{name} {words}')
+    said = textwrap.fill(purpose, _WIDTH)
+    parts = [_USAGE.format(name=name, options=words, blank=blank[:-1], purpose=said)]
+    if options:
+        parts.append(
+            ''.join(_wrapped(does, f'{word:<14}', ' ' * 14) + '\n' for word, does in options)
+        )
     if len(nodes) > 1:
         parts += [_wrapped(f'{", ".join(nodes)}.', 'Nodes: ', ' ' * 7) + '\n', _TO_ONE_OF_MANY]
     else:

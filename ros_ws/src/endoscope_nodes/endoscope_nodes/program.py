@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from endoscope_core.exit_status import exit_status
 from endoscope_nodes.stop_signals import end_when_asked
 
+REAL_TIME = '--real-time'
 _ROS_ARGS = '--ros-args'
 _END_OF_ROS_ARGS = '--'
 _HELP = ('-h', '--help')
@@ -27,12 +28,15 @@ class Program:
         What it does, a sentence or two.
     composed
         Nodes that it runs; empty for the one of its name.
+    options
+        Words of its own that it understands, and what each does.
     """
 
     name: str
     module: str
     purpose: str
     composed: tuple[str, ...] = ()
+    options: tuple[tuple[str, str], ...] = ()
 
     @property
     def nodes(self) -> tuple[str, ...]:
@@ -60,9 +64,9 @@ class Program:
         if set(_HELP) & set(argv):
             from endoscope_nodes.node_help import help_of
 
-            print(help_of(self.name, self.purpose, self.nodes))
+            print(help_of(self.name, self.purpose, self.nodes, self.options))
             return 0
-        words = words_for_nobody(argv)
+        words = [word for word in words_for_nobody(argv) if word not in dict(self.options)]
         if words:
             print(
                 f"{self.name}: unknown argument '{words[0]}'; parameters go behind {_ROS_ARGS} "
@@ -169,7 +173,9 @@ NODES = tuple(program.name for program in (*_COMPOSED, replay, conductor))
 graph = Program(
     'graph',
     'graph',
-    'Runs all nodes in one process; with -p use_sim_time:=true the conductor too, in simulated '
-    'time.',
+    'Runs all nodes in one process. Where all devices are simulated, it runs in lock-step with a '
+    'conductor, at real time where the machine can and slower where it cannot; -p speed:=0.0 lets '
+    'it go as fast as it can.',
     tuple(program.name for program in (*_COMPOSED, conductor)),
+    ((REAL_TIME, 'by the wall clock, as with a real device: a machine that is busy ends motion'),),
 )

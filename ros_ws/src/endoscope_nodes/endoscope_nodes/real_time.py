@@ -53,7 +53,9 @@ def enter_real_time(
         return
     where = f"{node}: parameter 'realtime_priority' is {priority}"
     if simulated:
-        raise ParameterError(f'{where}, which is not for simulated time; give 0')
+        raise ParameterError(
+            f'{where}, which is not for simulated time; give 0, or to `graph` --real-time'
+        )
     _lock_memory(where)
     try:
         for thread in (0, *urgent):

@@ -2,7 +2,8 @@
 
 import gc
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TypeVar
 
 import rclpy
@@ -17,6 +18,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import LoggingSeverity, set_logger_level
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -27,9 +29,10 @@ from endoscope_core.rig import Rig, RigFileError, load_rig
 from endoscope_nodes.announcement import Announcement
 from endoscope_nodes.declared_parameters import check_overrides, declare_parameters
 from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
-from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.endoscope_node import NAMESPACE, EndoscopeNode
 from endoscope_nodes.log_level import LogLevelError, log_as_asked
 from endoscope_nodes.matching import all_matched
+from endoscope_nodes.names import CLOCK
 from endoscope_nodes.node_parameters import BeatParameters, RealTimeParameters
 from endoscope_nodes.parameter_sections import check_sections
 from endoscope_nodes.parameters import ParameterError, changed
@@ -80,6 +83,10 @@ class Runtime(ClosedOnExit):
     ----------
     process_parameters
         Values of the parameters of the whole process that are not the defaults.
+    chosen
+        Values of the conductor's parameters, in a lock-step that nobody has asked for.
+    clock
+        Topic of the simulated time.
 
     Examples
     --------
@@ -130,6 +137,8 @@ class Runtime(ClosedOnExit):
         self.process_parameters: dict[str, object] = {}
         self._real_time = RealTimeParameters()
         self._overrides = overrides or {}
+        self.chosen: dict[str, object] = {}
+        self.clock = CLOCK
         self._exit_codes: list[int] = []
         self._stop = Future()
         self._closed = False
@@ -162,9 +171,47 @@ class Runtime(ClosedOnExit):
             else:
                 self._pose = None
 
+    def given(self, name: str) -> dict[str, object]:
+        """Parameter values that the command line has for a node of this name."""
+        with self._asked(name) as node:
+            return {key: value.value for key, value in node._parameter_overrides.items()}
+
+    @contextmanager
+    def _asked(self, name: str) -> Iterator[Node]:
+        node = Node(
+            name,
+            context=self.context,
+            namespace=NAMESPACE,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        try:
+            yield node
+        finally:
+            node.destroy_node()
+
+    def keep_lock_step(self, conductor: Mapping[str, object]) -> None:
+        """Simulate time though nobody has asked for it; call it before the first node is added.
+
+        A graph in another namespace than the usual has a clock of its own there: two rigs of a
+        domain do not share one.
+
+        Parameters
+        ----------
+        conductor
+            Values of its parameters, where the command line has none.
+        """
+        self.chosen = {**conductor, **self.given('conductor')}
+        with self._asked('conductor') as node:
+            if node.get_namespace() != f'/{NAMESPACE}':
+                self.clock = CLOCK.strip('/')
+
     def overrides_of(self, name: str) -> list[Parameter]:
         """Parameter values that this process was told to give the node called ``name``."""
-        return [Parameter(key, value=value) for key, value in self._overrides.get(name, {}).items()]
+        values: dict[str, object] = {'use_sim_time': True} if self.chosen else {}
+        values |= self.chosen if name == 'conductor' else {}
+        values |= self._overrides.get(name, {})
+        return [Parameter(key, value=value) for key, value in values.items()]
 
     def ticker_of(self, node: EndoscopeNode) -> Ticker:
         """Give the process's ticker; the first node to ask decides whether time is simulated.
@@ -179,7 +226,7 @@ class Runtime(ClosedOnExit):
         if self._ticker is None:
             for line in check_sections(self._args, node.get_namespace()):
                 node.get_logger().warning(line)
-            self._ticker = Ticker(node, simulated, self._stride_and_rig(node))
+            self._ticker = Ticker(node, simulated, self._stride_and_rig(node), self.clock)
         if self._ticker.simulated != simulated:
             raise ParameterError(
                 f"{node.get_name()}: parameter 'use_sim_time' differs from that "

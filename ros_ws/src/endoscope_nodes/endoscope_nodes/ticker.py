@@ -19,6 +19,8 @@ TickCallback = Callable[[int, int], None]
 _STAMP = struct.Struct('<iI')
 _SLOW_NS = 20_000_000
 _USUAL_DELAY_NS = 5_000_000
+# What a hand says meanwhile waits to be heard, and is no silence of it.
+_LONGEST_WAIT_NS = 50_000_000
 
 
 class Ticker:
@@ -37,6 +39,8 @@ class Ticker:
         Whether ``/clock`` gives the time.
     stride
         Milliseconds from beat to beat; simulated time beats as ``/clock`` does, whoever gives it.
+    clock
+        Topic of the simulated time.
 
     Attributes
     ----------
@@ -45,15 +49,19 @@ class Ticker:
     late_ns
         Time that this process was not run though a beat was due, so far, in ns; delays of up to
         5 ms, which every desktop kernel makes, do not count.
+    paced
+        Whether simulated time goes no faster than a person's: set by who gives it in this process.
     """
 
-    def __init__(self, node: Node, simulated: bool, stride: int = 1) -> None:
+    def __init__(self, node: Node, simulated: bool, stride: int = 1, clock: str = CLOCK) -> None:
         self._node = node
         self.simulated = simulated
         self._stride = stride
         self.ticks = 0
         self.missed = 0
         self.late_ns = 0
+        self.paced = False
+        self._hand_ns = self._hand_at_ns = 0
         self._slow_ns = 0
         self._listeners: tuple[TickCallback, ...] = ()
         self._periodic: list[_Periodic] = []
@@ -66,7 +74,7 @@ class Ticker:
         # system clock must not look like a step of the motion.
         self._offset_ns = time.time_ns() - time.monotonic_ns()
         if simulated:
-            node.create_subscription(ClockMessage, CLOCK, self._on_clock, SENSOR_ASKED, raw=True)
+            node.create_subscription(ClockMessage, clock, self._on_clock, SENSOR_ASKED, raw=True)
 
     @property
     def rate(self) -> int:
@@ -80,6 +88,16 @@ class Ticker:
     def monotonic_ns(self) -> int:
         """Time for ages and watchdogs: the steady clock, or simulated time."""
         return self._sim_ns if self.simulated else time.monotonic_ns()
+
+    def hand_ns(self) -> int:
+        """Time by which a person's hand is judged: the steady clock, also where time is paced."""
+        return self._hand_ns if self.paced else self.monotonic_ns()
+
+    def turn_hand(self) -> None:
+        """Let the time of hands go on, where time is paced; at each beat, before it is given."""
+        now = time.monotonic_ns()
+        self._hand_ns += min(now - self._hand_at_ns, _LONGEST_WAIT_NS)
+        self._hand_at_ns = now
 
     def monotonic_of(self, stamp_ns: int) -> int:
         """Time for ages at which a beat was due: beats come late, what they sample must not."""

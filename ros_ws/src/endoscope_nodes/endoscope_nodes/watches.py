@@ -223,12 +223,12 @@ class ClutchWatch:
         if before and not (pressed and self.held) and self._on_release is not None:
             self._on_release()
         self._pressed = pressed
-        self._heard_ns = self._ticker.monotonic_ns()
+        self._heard_ns = self._ticker.hand_ns()
 
     @property
     def held(self) -> bool:
         """Whether the clutch is held now, and was heard of lately."""
-        return self._pressed and self._ticker.monotonic_ns() - self._heard_ns <= CLUTCH_TIMEOUT_NS
+        return self._pressed and self._ticker.hand_ns() - self._heard_ns <= CLUTCH_TIMEOUT_NS
 
 
 class StreamWatch:

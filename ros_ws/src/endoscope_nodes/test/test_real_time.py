@@ -80,7 +80,11 @@ def test_what_carries_messages_is_urgent_and_what_starts_later_is_not():
     ('parameters', 'without', 'words'),
     [
         (['realtime_priority:=7'], ('sys_nice', 'ipc_lock'), "'realtime_priority' is 7, for which"),
-        (['realtime_priority:=7', 'use_sim_time:=true'], (), 'not for simulated time; give 0'),
+        (
+            ['realtime_priority:=7', 'use_sim_time:=true'],
+            (),
+            'not for simulated time; give 0, or to `graph` --real-time',
+        ),
         (['realtime_priority:=100'], (), 'give a whole number, from 0 to 99'),
         (['cores:=[4095]'], (), "'cores' is [4095]; this process may use [0"),
         (['cores:=all'], (), "'cores' is 'all'; give a list"),

@@ -23,7 +23,6 @@ _HEADING = (
 _AIM_MS = 150.0
 # Without a load the last word of a motion comes within 0.05 s of the one that ends it.
 _SETTLED_S, _WATCHED_S = 0.3, 0.3
-_SIMULATED = '-p use_sim_time:=true -p speed:=1.0'
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -50,9 +49,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         '--seconds', type=float, default=20.0, help='of each figure of cost (default: %(default)g)'
     )
     parser.add_argument(
-        '--simulated-time',
+        '--real-time',
         action='store_true',
-        help='no faster than real time, but without its deadlines: for a machine that is busy',
+        help='run the graph by the wall clock, with its deadlines',
     )
 
 
@@ -75,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
         if name not in EVENTS:
             raise EndoscopeError(f"no event '{name}'; known are {', '.join(EVENTS)}")
     print(
-        f'{"simulated" if args.simulated_time else "real"} time, {time.strftime("%Y-%m-%d")}, '
+        f'{"real" if args.real_time else "simulated"} time, {time.strftime("%Y-%m-%d")}, '
         f'{os.cpu_count()} cores, {platform.processor() or platform.machine()}',
         flush=True,
     )
@@ -87,8 +86,8 @@ def run(args: argparse.Namespace) -> int:
         ServedConsole(
             Path(folder),
             100 + os.getpid() % 130,
-            _SIMULATED if args.simulated_time else '',
             (network.address,),
+            real_time=args.real_time,
         ) as console,
     ):
         network.target = console.port

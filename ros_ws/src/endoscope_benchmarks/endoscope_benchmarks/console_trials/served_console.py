@@ -101,10 +101,10 @@ class ServedConsole(ClosedOnExit):
         Where it is started, and writes its bag.
     domain
         ROS domain.
-    graph
-        Further arguments of the graph.
     origins
         Addresses of relays under which the page is reached, too.
+    real_time
+        Whether the graph goes by the wall clock.
 
     Attributes
     ----------
@@ -119,13 +119,19 @@ class ServedConsole(ClosedOnExit):
     """
 
     def __init__(
-        self, folder: Path, domain: int, graph: str = '', origins: tuple[str, ...] = ()
+        self,
+        folder: Path,
+        domain: int,
+        origins: tuple[str, ...] = (),
+        *,
+        real_time: bool = False,
     ) -> None:
         words = [f'--origin={origin}' for origin in origins]
+        words += ['--real-time'] if real_time else []
         self.log = folder / 'console.log'
         with self.log.open('w') as log:
             self._process = subprocess.Popen(
-                [*_COMMAND, *words, f'--graph={graph}'],
+                [*_COMMAND, *words],
                 cwd=folder,
                 env=os.environ | {'ROS_DOMAIN_ID': str(domain)},
                 stdin=subprocess.DEVNULL,

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
-from endoscope_nodes.graph_client import CONSOLE, GraphClient, Health
-from endoscope_nodes.names import JOINTS
+from endoscope_nodes.graph_client import CONSOLE, LOCK_STEP, GraphClient, Health
+from endoscope_nodes.names import FACTOR, JOINTS
 from endoscope_nodes.program import NODES
 
 RECORDER = 'recorder: recording'
@@ -29,6 +29,7 @@ def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], 
         'state': client.state,
         'why': client.why,
         'session': client.session,
+        'time': {'simulated': LOCK_STEP in health, FACTOR: client.factor},
         'nodes': {
             name: {'level': _LEVELS[said.level], 'message': said.message, 'values': said.values}
             for name, said in sorted(health.items())
@@ -42,6 +43,7 @@ def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], 
     lines = (
         *_entry('state', [_state(client)]),
         *_entry('session', [client.session or 'none']),
+        *_entry('time', [_time(health.get(LOCK_STEP))]),
         *_entry('console', [_console(source, console)]),
         *_entry('compensator', [client.compensator.message if client.compensator else 'silent']),
         *_entry('calibration', calibration_in_words(client.calibration)),
@@ -73,6 +75,10 @@ def _state(client: GraphClient) -> str:
         return f'{client.state}: {forbidden}{client.why}'
     todo = {'DISABLED': 'enable', 'PAUSED': 'resume', 'FAULT': 'enable'}.get(client.state)
     return client.state + (f'; `endoscope operate {todo}` lets it move' if todo else '')
+
+
+def _time(said: Health | None) -> str:
+    return 'real' if said is None else f'simulated, {said.message}'
 
 
 def _console(source: str, said: Health | None) -> str:

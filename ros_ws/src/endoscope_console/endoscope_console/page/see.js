@@ -47,6 +47,7 @@ export class See {
       ...operators,
       ['role here', this._app.role ?? '–'],
       ['session', state.session || 'none'],
+      ['time', state.time || '–'],
       ['recorder', recorder.message || (recorder.recording ? `${recorder.bag}: ${recorder.messages} messages` : 'off')],
       ['pictures', `${this._app.picturesLost} lost on the way of ${this._app.pictures}`],
     ]);

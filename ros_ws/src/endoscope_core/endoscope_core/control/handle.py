@@ -209,6 +209,11 @@ class Handle:
         self.last_reason = f'{refusal}: {words}'
         return refusal
 
+    def lose(self) -> None:
+        """Take the handle for gone, whatever its time-out says, until it is heard again."""
+        self._received_ns = None
+        self.release()
+
     def engage(self, slave: Sequence[float]) -> None:
         """Begin to follow from where the slave is and the handle, as far as it was followed, was.
 

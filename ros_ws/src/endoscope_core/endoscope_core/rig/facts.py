@@ -142,6 +142,11 @@ class Timeouts:
         return round(self.command * 1e9)
 
     @cached_property
+    def handle_ns(self) -> int:
+        """`handle` in ns."""
+        return round(self.handle * 1e9)
+
+    @cached_property
     def stream_ns(self) -> int:
         """`stream` in ns."""
         return round(self.stream * 1e9)
