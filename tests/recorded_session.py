@@ -13,9 +13,11 @@ from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Header, String
 
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_poses
+from endoscope_bags.message_types import TF_MESSAGE
 from endoscope_core.rig import shipped_rig
-from endoscope_nodes.joint_transforms import section_of
+from endoscope_nodes.joint_transforms import JointTransforms, section_of
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
+from endoscope_nodes.recorded_topics import message_class
 from endoscope_nodes.recorder_node import RecorderNode
 from endoscope_nodes.runtime import Runtime
 
@@ -85,11 +87,12 @@ N = 400
 def record_all_types(path: Path):
     """Record one of each kind of topic; return what was sent by topic, and the report.
 
-    The state is published before the recorder starts, as latched states are.  The recorder makes
-    the transforms of the joints' angles by itself.
+    The state is published before the recorder starts, as latched states are.
     """
-    joints = section_of(shipped_rig().instrument).joint_names
-    sent = {topic: [] for topic in (SERVO, WIRES, TRACKER, CLUTCH, STATE, SESSION, JOINT_STATES)}
+    section = section_of(shipped_rig().instrument)
+    joints, encoder = section.joint_names, JointTransforms(section)
+    topics = (SERVO, WIRES, TRACKER, CLUTCH, STATE, SESSION, JOINT_STATES, TRANSFORMS)
+    sent = {topic: [] for topic in topics}
     with RecordedSession(bag=str(path), autostart=False) as session:
         state = session.probe.create_publisher(String, STATE, RESULT)
         state.publish(String(data='ENABLED'))
@@ -103,6 +106,7 @@ def record_all_types(path: Path):
         clutch = session.publisher(Joy, CLUTCH, EVENT)
         motion = session.publisher(Header, SESSION, EVENT)
         angles = session.publisher(JointState, JOINT_STATES, SENSOR_OFFERED)
+        links = session.publisher(message_class(TF_MESSAGE), TRANSFORMS, SENSOR_OFFERED)
         diagnostics = session.publisher(DiagnosticArray, DIAGNOSTICS, EVENT)
         diagnostics.publish(DiagnosticArray())
 
@@ -120,8 +124,11 @@ def record_all_types(path: Path):
                 sent[TRACKER].append((now, [k, 0.1, 0.2]))
                 pose = encode_poses([now], [[k, 0.1, 0.2]], [[0, 0, 0, 1]], frame_id='base')
                 tracker.publish(pose[0])
-                sent[JOINT_STATES].append((now, [1e-4 * k] * len(joints)))
-                angles.publish(encode_joint_state(joints, now, position=[1e-4 * k] * len(joints)))
+                bent = [1e-4 * k] * len(joints)
+                sent[JOINT_STATES].append((now, bent))
+                angles.publish(encode_joint_state(joints, now, position=bent))
+                sent[TRANSFORMS].append((now, bent))
+                links.publish(encoder.encode(now, bent))
             if k % 100 == 0:
                 sent[CLUTCH].append(k // 100 % 2)
                 clutch.publish(Joy(buttons=[k // 100 % 2]))

@@ -158,3 +158,17 @@ def test_every_number_of_an_effects_evidence_is_explained() -> None:
     }
     assert len(given) > 5
     assert given <= EVIDENCE.keys()
+
+
+def test_what_other_programs_have_is_said_to_be_here_by_names_that_there_are() -> None:
+    page = (WORKSPACE / 'doc/coming_from.md').read_text()
+    rows = [line.split(' | ') for line in page.splitlines() if line.startswith('| ')]
+    here = ' '.join(row[1] for row in rows)
+    topics = re.findall(r'`(\w+/\w+)`', here)
+    assert len(topics) > 10
+    types = {one.type.replace('/msg/', '/') for one in TOPICS}
+    assert set(topics) <= {one.name for one in TOPICS} | types
+    rig = yaml.safe_load((WORKSPACE / 'src/endoscope_core/endoscope_core/rig/rig.yaml').read_text())
+    keys = re.findall(r'`(joints|timeouts)\.(\w+)`', here)
+    assert keys
+    assert all(key in rig[room] for room, key in keys)

@@ -1,12 +1,14 @@
 """What the recorder wrote, read by programs that are not ours: rosbags, and Foxglove's decoders."""
 
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from doc_pages import WORKSPACE
 from recorded_session import (
     CLUTCH,
     SERVO,
@@ -22,8 +24,15 @@ from rosbags.highlevel import AnyReader
 
 from endoscope_bags import open_bag
 from endoscope_bags.message_types import message_type
-from endoscope_nodes.topics import TOPICS
+from endoscope_nodes.topics import BY_NAME, TOPICS
 
+LAYOUT = WORKSPACE / 'src/endoscope_bringup/layouts/foxglove.json'
+PATHS = [
+    (BY_NAME[topic if topic in BY_NAME else topic.removeprefix('/endoscope/')].type, fields)
+    for value in re.findall(r'"value": "(/[^"]+)"', LAYOUT.read_text())
+    for topic, _, fields in [value.partition('.')]
+]
+"""Type and fields of every path that the layout plots."""
 READERS = Path(__file__).parent / 'independent_readers'
 
 
@@ -58,7 +67,7 @@ def foxglove(recorded, tmp_path_factory):
         pytest.skip("Foxglove's readers are fetched from the npm registry, which cannot be reached")
     assert installed.returncode == 0, installed.stderr
     done = subprocess.run(
-        ['node', 'read.mjs', str(recorded[1] / 'bag_0.mcap')],
+        ['node', 'read.mjs', str(recorded[1] / 'bag_0.mcap'), json.dumps(PATHS)],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -140,3 +149,9 @@ def test_foxglove_finds_index_and_checksums_right(recorded, foxglove):
     assert stream['counts']['Message'] == bag.message_count >= 2 * N
     assert stream['counts']['Footer'] == 1
     assert stream['counts']['Statistics'] == 1
+
+
+def test_foxglove_finds_what_the_layout_plots(foxglove):
+    led = foxglove['index']['led']
+    assert set(led) == {f'{kind}.{fields}' for kind, fields in PATHS}
+    assert set(led.values()) <= {'float64', 'string'}

@@ -14,7 +14,20 @@ const plain = (key, value) => {
   return value;
 };
 
-async function throughIndex(path, decompressHandlers) {
+// The type of what a path of a layout leads to, by the definitions of a message; null for nowhere.
+function typeAt(definitions, path) {
+  let fields = definitions[0].definitions;
+  let found = null;
+  for (const step of path.split('.')) {
+    const [, name, index] = /^(\w+)(?:\[(\d+)\])?$/.exec(step) ?? [];
+    found = fields?.find((field) => field.name === name && !field.isConstant);
+    if (!found || Boolean(found.isArray) !== (index !== undefined)) return null;
+    fields = definitions.find((other) => other.name === found.type)?.definitions;
+  }
+  return found.isComplex ? null : found.type;
+}
+
+async function throughIndex(path, decompressHandlers, paths) {
   const file = await open(path, 'r');
   const reader = await McapIndexedReader.Initialize({
     readable: new FileHandleReadable(file),
@@ -22,12 +35,17 @@ async function throughIndex(path, decompressHandlers) {
   });
   const decoders = new Map();
   const topics = {};
+  const led = {};
   for await (const message of reader.readMessages({ validateCrcs: true })) {
     const channel = reader.channelsById.get(message.channelId);
     const schema = reader.schemasById.get(channel.schemaId);
     if (!decoders.has(channel.id)) {
       const text = new TextDecoder().decode(schema.data);
-      decoders.set(channel.id, new MessageReader(parse(text, { ros2: true })));
+      const definitions = parse(text, { ros2: true });
+      decoders.set(channel.id, new MessageReader(definitions));
+      for (const [type, value] of paths) {
+        if (type === schema.name) led[`${type}.${value}`] = typeAt(definitions, value);
+      }
     }
     const decoded = decoders.get(channel.id).readMessage(message.data);
     topics[channel.topic] ??= {
@@ -50,7 +68,7 @@ async function throughIndex(path, decompressHandlers) {
   }
   await file.close();
   const compressions = [...new Set(reader.chunkIndexes.map((chunk) => chunk.compression))];
-  return { header: reader.header, statistics: reader.statistics, compressions, topics };
+  return { header: reader.header, statistics: reader.statistics, compressions, topics, led };
 }
 
 async function asStream(path, decompressHandlers) {
@@ -66,10 +84,10 @@ async function asStream(path, decompressHandlers) {
   return { counts, done: reader.done() };
 }
 
-const [path] = process.argv.slice(2);
+const [path, paths] = process.argv.slice(2);
 const handlers = await loadDecompressHandlers();
 const result = {
-  index: await throughIndex(path, handlers),
+  index: await throughIndex(path, handlers, JSON.parse(paths)),
   stream: await asStream(path, handlers),
 };
 process.stdout.write(JSON.stringify(result, plain));
