@@ -1,6 +1,8 @@
 """`endoscope convert`, and a recording of a real machine that comes with the project."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -89,3 +91,39 @@ def test_a_real_servo_shows_its_backlash(servo):
     assert seconds[jump + int(np.argmax(moved > 1))] - seconds[jump] == pytest.approx(0.2, abs=0.03)
     arrived = seconds[jump + int(np.argmax(moved >= moved.max()))] - seconds[jump]
     assert arrived == pytest.approx(0.6, abs=0.03)
+
+
+def test_a_long_table_takes_little_memory_and_shows_how_far_it_is(tmp_path):
+    row = ','.join(['0.12345678901'] * 9)
+    with (tmp_path / 'long.csv').open('w') as file:
+        file.writelines(f'{k}e-3,{row}\n' for k in range(150_000))
+    (tmp_path / 'mapping.yaml').write_text(
+        'time: {column: 1, unit: s}\ntopics:\n'
+        '  motor/servo_jp: {position: {motor_x: {column: 2}, motor_y: {column: 3}}}\n'
+        '  slave/measured_js: {position: {bend_x: {column: 4}, bend_y: {column: 5}}}\n'
+    )
+    code = (
+        'import resource, sys\n'
+        'from endoscope_bringup.cli import main\n'
+        "status = main('convert long.csv --mapping mapping.yaml --out bag'.split())\n"
+        'print(status, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    told, (status, peak_kb) = done.stdout.splitlines()[0], done.stdout.split()[-2:]
+    assert (told, status) == (
+        'bag: 300000 messages of 150000 rows, 0 repeated rows dropped',
+        '0',
+    )
+    assert done.stderr.splitlines()[0] == 'reading the table'
+    # 20 MB of text took 750 MB when its cells were held as lists of texts.
+    assert int(peak_kb) < 300_000
+
+
+def test_a_table_is_to_be_converted_before_it_is_explained(tmp_path, capsys):
+    (tmp_path / 'table.csv').write_text('time,angle\n0,1\n1,2\n')
+    table = str(tmp_path / 'table.csv')
+    assert main(['bag', 'info', table]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert f'is converted first: endoscope convert {table} --propose mapping.yaml' in line

@@ -156,10 +156,10 @@ def test_parameters_are_set_by_their_own_type_and_can_be_read_again(graph, name,
 @pytest.mark.parametrize(
     ('words', 'status', 'said'),
     [
-        (['get', 'compensator.mod'], 2, 'endoscope: no parameter compensator.mod; mode?'),
-        (['set', 'compensator.mod', 'x'], 2, 'endoscope: no parameter compensator.mod; mode?'),
+        (['get', 'compensator.mod'], 2, 'no parameter compensator.mod; did you mean mode?'),
+        (['set', 'compensator.mod', 'x'], 2, 'no parameter compensator.mod; did you mean mode?'),
         (
-            ['get', 'mode'],
+            ['set', 'mode', 'none'],
             2,
             "endoscope: 'mode': give NODE.PARAMETER, for example compensator.mode",
         ),
@@ -177,11 +177,24 @@ def test_wrong_names_and_values_are_told_from_refused_ones(graph, words, status,
     assert len(text.splitlines()) == 1
 
 
+def test_the_parameters_of_a_node_are_listed_with_their_values_and_ranges(graph):
+    status, out, _ = graph.run('operate', 'get', 'compensator')
+    assert status == 0
+    [mode] = [line for line in out.splitlines() if line.startswith('compensator.mode ')]
+    assert '= bouc_wen' in mode
+    assert 'physical' in mode
+    status, out, _ = graph.run('operate', 'get', 'console', '--json')
+    told = json.loads(out)['parameters']
+    assert told['scale']['value'] == 1.0
+    assert 'from 0.01' in told['scale']['description']
+    assert not [name for name in told if name.startswith('qos_overrides')]
+
+
 def test_an_unknown_node_is_named_with_the_nearest(graph):
     process = graph.start('operate', 'get', 'compensater.mode', '--timeout', '2')
     status, _, errors = graph.finish(process)
     assert status == 2
-    assert errors.strip().endswith('; compensator?')
+    assert errors.strip().endswith('; did you mean compensator?')
 
 
 def test_what_only_a_device_can_do_is_refused_by_the_simulated_slave(graph):

@@ -1,6 +1,7 @@
 """`endoscope record` as a process: signals, a kill, a full disk, losses."""
 
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -16,7 +17,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 
-from endoscope_bags import open_bag
+from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state
 from endoscope_bags.errors import TruncatedBagError
 from endoscope_bags.information import bag_information
@@ -206,3 +207,60 @@ def test_an_existing_bag_is_one_line_and_exit_2(tmp_path):
     [line] = done.stderr.splitlines()
     assert 'exists already' in line
     assert [p.name for p in (tmp_path / 'bag').iterdir()] == ['precious']
+
+
+def _ended_after_a_while(argv, words):
+    """Run a program until it has said something, interrupt it, and return all that it said."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'endoscope_bringup.cli', *argv],
+        env=os.environ | {'ROS_DOMAIN_ID': str(private_domain())},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    said = ''
+    try:
+        for line in process.stderr:
+            said += line
+            if words in line:
+                break
+        process.send_signal(signal.SIGTERM)
+        said += process.communicate(timeout=60)[1]
+    finally:
+        process.kill()
+        process.communicate()
+    return process.returncode, said
+
+
+def test_topics_on_which_nothing_comes_are_said_at_once_and_at_the_end(tmp_path):
+    argv = ['record', '--out', str(tmp_path / 'bag'), '--topics', 'foo', 'wires/measured_js']
+    code, said = _ended_after_a_while(argv, 'nobody publishes /endoscope/foo')
+    assert code == 0
+    assert 'no message came on /endoscope/wires/measured_js, foo' in said
+
+
+def test_a_topic_that_cannot_be_is_one_line(tmp_path, capsys):
+    argv = ['record', '--out', str(tmp_path / 'bag'), '--topics', '3 x']
+    done = subprocess.run(
+        [sys.executable, '-m', 'endoscope_bringup.cli', *argv],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr == "recorder: parameter 'topics': '3 x' is no name of a topic\n"
+    assert not (tmp_path / 'bag').exists()
+
+
+def test_a_replay_says_how_far_it_came(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        for k in range(2000):
+            stamp = 10**18 + k * 10**7
+            cdr = encode_joint_state(['motor_x'], stamp, position=[0.0])
+            writer.write_raw(TOPIC, 'sensor_msgs/msg/JointState', cdr, stamp)
+    bag = str(tmp_path / 'bag')
+    code, said = _ended_after_a_while(['replay', bag, '--delay', '0'], 'times its pace')
+    assert code == 0
+    assert re.search(rf'stopped: {bag}: \d+ messages, \d+\.\d s of 2000 replayed', said)
+    code, said = _ended_after_a_while(['replay', bag, '--speed', '100'], 'replayed')
+    assert code == 0
+    assert f'{bag}: 2000 messages, 20.0 s replayed' in said.splitlines()[-1]

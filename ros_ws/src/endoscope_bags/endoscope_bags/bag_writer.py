@@ -205,7 +205,7 @@ class BagWriter:
     def write_streams(self, streams: Sequence[MessageStream]) -> None:
         """Add whole topics, merged by receipt (equal ones in the order of `streams`).
 
-        The sequence counts from 1 in each topic, as a publisher does.
+        The sequence counts from 1 in each topic, as a publisher does, on from call to call.
 
         Raises
         ------
@@ -216,6 +216,7 @@ class BagWriter:
             return
         for stream in streams:
             self.add_topic(stream.topic, stream.type)
+        before = [self._counts[stream.topic] for stream in streams]
         which = np.repeat(np.arange(len(streams)), [len(s.payloads) for s in streams])
         row = np.concatenate([np.arange(len(s.payloads)) for s in streams])
         log_ns = np.concatenate([s.log_ns for s in streams])
@@ -225,7 +226,12 @@ class BagWriter:
         for k, index, log, publish in zip(*(c.tolist() for c in columns), strict=True):
             stream = streams[k]
             self.write_raw(
-                stream.topic, stream.type, stream.payloads[index], log, publish, index + 1
+                stream.topic,
+                stream.type,
+                stream.payloads[index],
+                log,
+                publish,
+                before[k] + index + 1,
             )
 
     def flush(self) -> None:

@@ -7,12 +7,14 @@ lines above the numbers, and among them the names and units of the columns.
 import csv
 import math
 import re
+from array import array
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +73,8 @@ class DelimitedText:
     decimal_comma : bool
     headings : tuple of Heading
         One for each column.
-    rows : list of list of str
+    rows : sequence of list of str
+        Cut when they are asked for: held as lists of texts, a table takes thirty times its size.
         Without the lines above the numbers, without empty lines and comments.
     lines : list of int
         Number of each row's line in the file, from 1.
@@ -131,7 +134,7 @@ class DelimitedText:
             A row is too short; names the line.
         """
         try:
-            return [row[index] for row in self.rows]
+            return [row[index] for row in self.rows]  # one column at a time
         except IndexError:
             short, line = next(
                 (row, line)
@@ -310,17 +313,20 @@ def read_table(
     path = Path(path)
     lines = _lines(path)
     above = lines[:header_lines] if header_lines is not None else []
-    body = [
-        (number, line)
-        for number, line in enumerate(lines[len(above) :], len(above) + 1)
-        if line.strip() and not line.lstrip().startswith(_COMMENTS)
-    ]
-    if not body:
+    numbers = array(
+        'q',
+        (
+            number
+            for number, line in enumerate(lines[len(above) :], len(above) + 1)
+            if line.strip() and not line.lstrip().startswith(_COMMENTS)
+        ),
+    )
+    if not numbers:
         raise TableError(f'{path}: fewer than two rows')
-    sample = [line for _, line in body[:_SAMPLE]]
     if separator is None:
+        sample = [lines[number - 1] for number in numbers[:_SAMPLE]]
         separator = min(SEPARATORS, key=lambda each: _badness(sample, each))
-    cells = _split(path, body, separator)
+    cells = _Rows(path, lines, numbers, separator)
     if decimal_comma is None:
         decimal_comma = separator != ',' and any(
             _DECIMAL_COMMA.fullmatch(cell) for row in cells[:_SAMPLE] for cell in row
@@ -328,7 +334,6 @@ def read_table(
     first = 0 if header_lines is not None else _first_row(cells, decimal_comma)
     if len(cells) - first < 2:
         raise TableError(f'{path}: fewer than two rows')
-    numbers = [number for number, _ in body]
     begin = numbers[first]
     width = len(cells[first])
     titles = _title_rows(path, lines[: begin - 1], separator, width)
@@ -337,7 +342,7 @@ def read_table(
         separator,
         decimal_comma,
         _headings(titles, width),
-        cells[first:],
+        _Rows(path, lines, numbers[first:], separator),
         numbers[first:],
     )
 
@@ -379,14 +384,37 @@ def _cut(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in row]
 
 
-def _split(path: Path, body: Sequence[tuple[int, str]], separator: str) -> list[list[str]]:
-    rows = []
-    for number, line in body:
+@dataclass(frozen=True)
+class _Rows(Sequence[list[str]]):
+    """Some lines of a file as rows of cells."""
+
+    path: Path
+    lines: Sequence[str]
+    numbers: Sequence[int]
+    separator: str
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __iter__(self) -> Iterator[list[str]]:
+        return map(self._row, self.numbers)
+
+    @overload
+    def __getitem__(self, which: int) -> list[str]: ...
+
+    @overload
+    def __getitem__(self, which: slice) -> list[list[str]]: ...
+
+    def __getitem__(self, which: int | slice) -> list[str] | list[list[str]]:
+        if isinstance(which, slice):
+            return [self._row(number) for number in self.numbers[which]]
+        return self._row(self.numbers[which])
+
+    def _row(self, number: int) -> list[str]:
         try:
-            rows.append(_cut(line, separator))
+            return _cut(self.lines[number - 1], self.separator)
         except (csv.Error, ValueError) as error:
-            raise TableError(f'{path}: line {number}: {error}') from error
-    return rows
+            raise TableError(f'{self.path}: line {number}: {error}') from error
 
 
 def _first_row(cells: Sequence[Sequence[str]], decimal_comma: bool) -> int:
@@ -411,7 +439,7 @@ def _title_rows(path: Path, above: Sequence[str], separator: str, width: int) ->
     for line in reversed(above[-_SAMPLE:]):
         bare = line.strip().lstrip(''.join(_COMMENTS)).strip() if line.strip() else ''
         for cut in dict.fromkeys((separator, *SEPARATORS)) if bare else ():
-            row = _split(path, [(0, bare)], cut)[0]
+            row = _Rows(path, [bare], [1], cut)[0]
             if len(row) == width and not all(is_number(cell) for cell in row if cell):
                 rows.append(row)
                 break

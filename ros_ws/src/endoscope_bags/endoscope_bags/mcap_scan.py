@@ -39,6 +39,7 @@ UNSURE_NAMES = 'the names of topics agree with no checksum'
 _CUT = 'ends in the middle'
 _CRC_STEP = 1 << 24
 _MOST_DAMAGE = 100
+_LOOKED_AT = 512
 # How many records must follow each other, end to head, to be taken for records in a damaged file.
 _CHAIN = 3
 # Where a record may begin: an opcode, and a length below 4 GiB.
@@ -150,10 +151,28 @@ def scan_mcap(path: str | Path, *, salvage: bool = False) -> McapScan:
         if size == 0:
             raise NotABagError(f'{path}: empty file, not an MCAP recording')
         # Damage may hit the first bytes, too; what is no recording shows by having no records.
-        if file.read(len(MAGIC)) != MAGIC and not salvage:
+        first = file.read(_LOOKED_AT)
+        if not first.startswith(MAGIC) and not salvage:
+            if _is_text(first):
+                raise NotABagError(
+                    f'{path}: text, no recording; a table of measurements is converted first: '
+                    f'endoscope convert {path} --propose mapping.yaml'
+                )
             raise NotABagError(f'{path}: not an MCAP recording (wrong first bytes)')
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             return _Pass(path, data, salvage).run()
+
+
+def _is_text(first: bytes) -> bool:
+    """Whether a file begins as text does."""
+    try:
+        # A letter may be cut at the end.
+        text = first.decode('utf-16' if first[:2] in (b'\xff\xfe', b'\xfe\xff') else 'utf-8-sig')
+    except UnicodeDecodeError as error:
+        if error.start < len(first) - 3:
+            return False
+        text = first[: error.start].decode('utf-8', errors='replace')
+    return all(c.isprintable() or c.isspace() for c in text)
 
 
 class _Pass:

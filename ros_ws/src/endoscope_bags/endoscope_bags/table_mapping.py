@@ -3,8 +3,9 @@
 `EXAMPLE` shows a whole one and names every key.
 """
 
+import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,18 @@ from endoscope_core.strict_yaml import YamlError, load_yaml
 
 _TYPES = {str: 'a text', int: 'a whole number', bool: 'true or false'}
 QUANTITIES = ('position', 'velocity', 'effort')
+ANGLES = ('bend_x', 'bend_y', 'motor_x', 'motor_y')
+NAMES = {
+    'slave/servo_jp': ANGLES[:2],
+    'motor/servo_jp': ANGLES,
+    'motor/measured_js': ANGLES,
+    'slave/measured_js': ANGLES[:2],
+    'wires/measured_js': ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg'),
+    'master/measured_js': ANGLES[:2],
+}
+"""Topics that the analysis knows, with the names of their joints and wires."""
+# One letter left out of six, or another one among eleven.
+_NEAR_MISS = 0.9
 KEYS = (
     'time',
     'topics',
@@ -26,7 +39,9 @@ KEYS = (
     'start_s',
     'drop_repeats',
     'sample_and_hold',
+    'incomplete_rows',
 )
+REFUSE, DROP = 'refuse', 'drop'
 EXAMPLE = """\
 time: {column: time, unit: ms}          # a column by its name or by its number, from 1
 topics:                                 # what each topic takes from the table
@@ -45,6 +60,7 @@ header_lines: 2         # lines above the numbers; found if left out
 namespace: /endoscope   # of the topics
 start_s: 0.0            # added to every time
 drop_repeats: true      # drop rows whose time is that of the row before
+incomplete_rows: refuse # or drop: where a topic lacks a part of its numbers, or one is NaN
 """
 """A mapping with every key but `sample_and_hold`, which excludes `drop_repeats`."""
 WHITESPACE = 'whitespace'
@@ -108,6 +124,9 @@ class TableMapping:
     sample_and_hold : bool
         Rows of one time lie evenly between it and the next one, and a topic has a message where one
         of its columns changes.
+    drop_incomplete : bool
+        Whether a topic has no message, instead of an error, where some of its cells are empty or
+        not finite.
     """
 
     time: Column
@@ -119,6 +138,7 @@ class TableMapping:
     start_s: float = 0.0
     drop_repeats: bool = True
     sample_and_hold: bool = False
+    drop_incomplete: bool = False
 
 
 def load_table_mapping(path: str | Path) -> TableMapping:
@@ -166,6 +186,9 @@ def _mapping(content: Any) -> TableMapping:
     header_lines = _of_type(int, given, 'header_lines', None)
     if header_lines is not None and header_lines < 0:
         raise ValueError(f'header_lines is {header_lines}: give how many lines to skip')
+    incomplete = given.get('incomplete_rows', REFUSE)
+    if incomplete not in (REFUSE, DROP):
+        raise ValueError(f'incomplete_rows is {incomplete!r}: give {REFUSE} or {DROP}')
     time = _column(given['time'], 'time')
     if time.unit is not None and time.unit not in TIME_UNITS:
         raise ValueError(f'time.unit is {time.unit!r}: valid are {", ".join(TIME_UNITS)}')
@@ -179,6 +202,7 @@ def _mapping(content: Any) -> TableMapping:
         _number(given.get('start_s', 0.0), 'start_s'),
         _of_type(bool, given, 'drop_repeats', True),
         _of_type(bool, given, 'sample_and_hold', False),
+        incomplete == DROP,
     )
 
 
@@ -195,6 +219,7 @@ def _of_type[Kind, Default](
 
 def _topic(topic: str, content: Any) -> dict[str, dict[str, Column]]:
     where = f'topics.{topic}'
+    _refuse_near_miss(topic, 'topics', NAMES)
     quantities = _section(content, where, QUANTITIES)
     read = {
         quantity: {
@@ -203,10 +228,20 @@ def _topic(topic: str, content: Any) -> dict[str, dict[str, Column]]:
         }
         for quantity, columns in quantities.items()
     }
+    for columns in read.values():
+        for name in columns:
+            _refuse_near_miss(name, where, NAMES.get(topic, ()))
     names = {tuple(columns) for columns in read.values()}
     if len(names) != 1 or not next(iter(names)):
         raise ValueError(f'{where}: every quantity must have the same joints in the same order')
     return read
+
+
+def _refuse_near_miss(name: str, where: str, known: Collection[str]) -> None:
+    """Other names than those that the analysis knows are kept, but not one that is misspelt."""
+    near = difflib.get_close_matches(name, known, n=1, cutoff=_NEAR_MISS)
+    if near and name not in known:
+        raise ValueError(f'unknown {name} in {where}: did you mean {near[0]}?')
 
 
 def _column(content: Any, where: str) -> Column:

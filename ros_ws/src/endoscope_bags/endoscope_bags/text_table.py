@@ -1,7 +1,7 @@
 """From a text table of measurements to a bag."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from endoscope_bags.delimited_text import DelimitedText, TableError, is_date, is
 from endoscope_bags.errors import NonFiniteError
 from endoscope_bags.message_stream import MessageStream
 from endoscope_bags.message_types import JOINT_STATE
-from endoscope_bags.table_mapping import Column, TableMapping
+from endoscope_bags.table_mapping import DROP, Column, TableMapping
 from endoscope_bags.units import DATE, TIME_UNITS, UNITS
 
 Array = NDArray[np.float64]
@@ -23,6 +23,8 @@ Mask = NDArray[np.bool_]
 
 # Rows between times may lie as far behind the last one as it lies behind the epoch.
 _LATEST = 1 << 62
+# Encoded messages are ten times the size of the numbers in them.
+_ROWS_AT_ONCE = 20_000
 
 
 @dataclass(frozen=True)
@@ -37,14 +39,25 @@ class Converted:
         Those of them that were dropped because their time is that of the row before or, where the
         table samples and holds, because no topic has a new number in them.
     messages : int
+    incomplete : dict of str to int
+        Rows by topic that were dropped because a part of its cells is empty or not finite.
+    gaps : dict of str to int
+        Cells that are empty or not finite, by the name of the column.
     """
 
     rows: int
     repeated: int
     messages: int
+    incomplete: dict[str, int] = field(default_factory=dict)
+    gaps: dict[str, int] = field(default_factory=dict)
 
 
-def convert_table(table: str | Path, mapping: TableMapping, out: str | Path) -> Converted:
+def convert_table(
+    table: str | Path,
+    mapping: TableMapping,
+    out: str | Path,
+    progress: Callable[[str, float], None] = lambda step, share: None,
+) -> Converted:
     """Convert a text table to a bag.
 
     Parameters
@@ -54,6 +67,8 @@ def convert_table(table: str | Path, mapping: TableMapping, out: str | Path) -> 
         What its columns are.
     out : str or Path
         rosbag2 folder, or `.mcap`; must not exist.
+    progress : callable
+        Called with what is done and the share that is done already.
 
     Returns
     -------
@@ -64,11 +79,12 @@ def convert_table(table: str | Path, mapping: TableMapping, out: str | Path) -> 
     TableError
         If the table cannot be read, lacks a column, or its time runs backwards; names the line.
     NonFiniteError
-        If a number is NaN or infinite.
+        If a number is NaN or infinite, unless the mapping drops such rows.
     BagExistsError
         If `out` exists.
     """
     table = Path(table)
+    progress('reading the table', 0.0)
     text = read_table(
         table,
         separator=mapping.delimiter,
@@ -76,40 +92,58 @@ def convert_table(table: str | Path, mapping: TableMapping, out: str | Path) -> 
         decimal_comma=mapping.decimal_comma,
     )
     time = _times(text, mapping.time, mapping.start_s)
-    _check(table, time)
+    _check(text, time)
     kept = np.ones(len(time), bool)
     if mapping.sample_and_hold:
         time = _between_times(table, time)
     elif mapping.drop_repeats:
         kept[1:] = np.diff(time) != 0
-    used = np.zeros(len(time), bool)
-    streams = []
-    for topic, quantities in mapping.topics.items():
-        names = list(next(iter(quantities.values())))
-        values, fresh = _values(text, topic, quantities)
+    rows, used = len(time), np.zeros(len(time), bool)
+    incomplete: dict[str, int] = {}
+    gaps: dict[str, int] = {}
+    streams: list[tuple[str, list[str], dict[str, Array], Mask]] = []
+    for k, (topic, quantities) in enumerate(mapping.topics.items()):
+        progress(topic, 0.1 + 0.5 * k / len(mapping.topics))
+        values, fresh = _values(text, topic, quantities, mapping.drop_incomplete, incomplete, gaps)
         fresh &= kept
         if mapping.sample_and_hold:
             fresh[1:] &= np.any([np.diff(v, axis=0).any(axis=1) for v in values.values()], axis=0)
         used |= fresh
-        stamps = time[fresh]
-        streams.append(
-            MessageStream(
-                f'{mapping.namespace}/{topic}',
-                JOINT_STATE,
-                encode_joint_states(
-                    names,
-                    stamps,
-                    position=values['position'][fresh] if 'position' in values else None,
-                    velocity=values['velocity'][fresh] if 'velocity' in values else None,
-                    effort=values['effort'][fresh] if 'effort' in values else None,
-                ),
-                stamps,
-            )
-        )
+        streams.append((topic, list(next(iter(quantities.values()))), values, fresh))
+    del text
     with BagWriter(out) as bag:
-        bag.write_streams(streams)
-    rows = len(time)
-    return Converted(rows, rows - int(used.sum()), sum(len(stream.payloads) for stream in streams))
+        for first in range(0, rows, _ROWS_AT_ONCE):
+            progress('writing the bag', 0.6 + 0.4 * first / rows)
+            block = slice(first, first + _ROWS_AT_ONCE)
+            bag.write_streams([_stream(mapping, time, block, *each) for each in streams])
+        messages = bag.message_count
+    return Converted(rows, rows - int(used.sum()), messages, incomplete, gaps)
+
+
+def _stream(
+    mapping: TableMapping,
+    time: Stamps,
+    block: slice,
+    topic: str,
+    names: list[str],
+    values: Mapping[str, Array],
+    fresh: Mask,
+) -> MessageStream:
+    """Messages of a topic in some of the rows."""
+    stamps = time[block][fresh[block]]
+    numbers = {quantity: array[block][fresh[block]] for quantity, array in values.items()}
+    return MessageStream(
+        f'{mapping.namespace}/{topic}',
+        JOINT_STATE,
+        encode_joint_states(
+            names,
+            stamps,
+            position=numbers.get('position'),
+            velocity=numbers.get('velocity'),
+            effort=numbers.get('effort'),
+        ),
+        stamps,
+    )
 
 
 def _times(text: DelimitedText, column: Column, start_s: float) -> Stamps:
@@ -132,24 +166,49 @@ def _times(text: DelimitedText, column: Column, start_s: float) -> Stamps:
 
 
 def _values(
-    text: DelimitedText, topic: str, quantities: Mapping[str, Mapping[str, Column]]
+    text: DelimitedText,
+    topic: str,
+    quantities: Mapping[str, Mapping[str, Column]],
+    drop: bool,
+    incomplete: dict[str, int],
+    gaps: dict[str, int],
 ) -> tuple[dict[str, Array], Mask]:
-    """Values of a topic by quantity, each (N, J) in SI, and the rows that have a sample, (N,)."""
-    values, absent = {}, []
+    """Values of a topic by quantity, each (N, J) in SI, and the rows that have a sample, (N,).
+
+    Counts rows that are dropped into `incomplete`, and cells without a number into `gaps`.
+    """
+    values, absent, unusable = {}, [], []
     for quantity, columns in quantities.items():
-        read = [_si(text, column) for column in columns.values()]
-        values[quantity] = np.stack([numbers for numbers, _ in read], axis=1)
-        absent += [empty for _, empty in read]
+        read = []
+        for column in columns.values():
+            numbers, empty = _si(text, column)
+            read.append(numbers)
+            absent.append(empty)
+            unusable.append(~np.isfinite(numbers))
+            if unusable[-1].any():
+                gaps[text.label(text.column(column.source))] = int(unusable[-1].sum())
+        values[quantity] = np.stack(read, axis=1)
     sampled: Mask = ~np.all(absent, axis=0)
-    partly = np.any(absent, axis=0) & sampled
-    if partly.any():
-        line = text.lines[int(np.argmax(partly))]
-        raise TableError(f'{text.path}: line {line}: only a part of {topic} has a number there')
     if not sampled.any():
         raise TableError(f'{text.path}: {topic} has no number in any row')
-    for quantity, array in values.items():
-        _check_finite(text, topic, quantity, array, sampled)
-    return values, sampled
+    bad = np.any(unusable, axis=0) & sampled
+    if not bad.any():
+        return values, sampled
+    if drop:
+        incomplete[topic] = int(bad.sum())
+        if not (sampled & ~bad).any():
+            raise TableError(f'{text.path}: {topic} has no row with all its numbers')
+        return values, sampled & ~bad
+    row = int(np.argmax(bad))
+    hint = (
+        f'{int(bad.sum())} of {len(bad)} rows are so; `incomplete_rows: {DROP}` in the mapping '
+        'leaves them out'
+    )
+    where = f'{text.path}: line {text.lines[row]}'
+    if np.any(absent, axis=0)[row]:
+        raise TableError(f'{where}: only a part of {topic} has a number there; {hint}')
+    quantity = next(q for q, array in values.items() if not np.isfinite(array[row]).all())
+    raise NonFiniteError(f'{where}: {quantity} of {topic} is not finite; {hint}')
 
 
 def _si(text: DelimitedText, column: Column) -> tuple[Array, Mask]:
@@ -173,25 +232,17 @@ def _between_times(table: Path, time: Stamps) -> Stamps:
     return time + np.round(since).astype(np.int64)
 
 
-def _check(table: Path, time: Stamps) -> None:
+def _check(text: DelimitedText, time: Stamps) -> None:
     if np.abs(time).max() >= _LATEST:
-        raise TableError(f'{table}: time reaches {np.abs(time).max() * 1e-9:g} s: no stamp can')
+        raise TableError(f'{text.path}: time reaches {np.abs(time).max() * 1e-9:g} s: no stamp can')
     if time[0] < 0:
         raise TableError(
-            f'{table}: time begins at {time[0] * 1e-9:g} s: set start_s in the mapping'
+            f'{text.path}: time begins at {time[0] * 1e-9:g} s: set start_s in the mapping'
         )
     backward = np.flatnonzero(np.diff(time) < 0)
     if len(backward):
-        raise TableError(f'{table}: time runs backwards after {time[backward[0]] * 1e-9:g} s')
-
-
-def _check_finite(
-    text: DelimitedText, topic: str, quantity: str, values: Array, sampled: Mask
-) -> None:
-    bad = ~np.isfinite(values).all(axis=1) & sampled
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise NonFiniteError(
-            f'{text.path}: {quantity} of {topic} is not finite in line {text.lines[row]} and '
-            f'{int(bad.sum()) - 1} more'
+        row = int(backward[0])
+        raise TableError(
+            f'{text.path}: line {text.lines[row + 1]}: time runs backwards, from '
+            f'{time[row] * 1e-9:g} to {time[row + 1] * 1e-9:g} s'
         )

@@ -154,7 +154,7 @@ topics: {a/q: {position: {q: {column: q}}}, a/f: {effort: {f: {column: f}}}}
         ('t,q\n0,1\nsoon,2\n', TableError, "line 3, column 1 (t): 'soon' is no number"),
         ('t,q\n0,1\nnan,2\n', TableError, "line 3, column 1 (t): the time 'nan' is not finite"),
         ('t,q\n0,1\n1e30,2\n', TableError, 'no stamp reaches it'),
-        ('t,q\n0,1\n1,inf\n', NonFiniteError, 'position of a/b is not finite in line 3'),
+        ('t,q\n0,1\n1,inf\n', NonFiniteError, 'line 3: position of a/b is not finite'),
         ('t,angle\n0,1\n1,2\n', TableError, "no column is named 'q': "),
         ('t,q,q\n0,1,1\n1,2,2\n', TableError, "2 columns are named 'q': give the number"),
         ('0,1\n1,2\n', TableError, 'the table names no columns: give the number'),

@@ -105,6 +105,9 @@ def test_what_samples_and_holds_needs_more_than_one_time(tmp_path):
         ('column: 3', 'column: 0', 'from 1'),
         ('position: {bend_x: {column: 2', 'angle: {bend_x: {column: 2', 'unknown key angle'),
         ('start_s: 100.0', 'start_s: soon', "start_s is 'soon'"),
+        ('slave/servo_jp', 'slave/servo_jq', 'did you mean slave/servo_jp?'),
+        ('bend_x: {column: 2', 'bnd_x: {column: 2', 'did you mean bend_x?'),
+        ('start_s: 100.0', 'incomplete_rows: skip', "incomplete_rows is 'skip': give refuse or"),
         (
             'start_s: 100.0',
             'drop_repeats: true\nsample_and_hold: true',
@@ -125,11 +128,11 @@ def test_a_wrong_mapping_is_refused_by_its_key(tmp_path, old, new, message):
         ('0,1,1,5,5\n1,1,1,5\n', TableError, 'line 2 has 4 columns, 5 are needed'),
         ('0,1,1,5,5\n1,one,1,5,5\n', TableError, "line 2, column 2: 'one' is no number"),
         ('0,1,1,5,5\n', TableError, 'fewer than two rows'),
-        ('1,1,1,5,5\n0,1,1,5,5\n', TableError, 'time runs backwards after 101 s'),
+        ('1,1,1,5,5\n0,1,1,5,5\n', TableError, 'line 2: time runs backwards, from 101 to 100 s'),
         (
             '0,1,1,5,5\n1,1,nan,5,5\n',
             BagError,
-            'position of slave/measured_js is not finite in line 2',
+            'line 2: position of slave/measured_js is not finite; 1 of 2 rows are so; `incomplete_',
         ),
     ],
 )
@@ -139,6 +142,23 @@ def test_a_wrong_table_is_refused_and_nothing_is_written(tmp_path, mapping, text
     with pytest.raises(error, match=re.escape(message)):
         convert_table(path, mapping, tmp_path / 'bag')
     assert not (tmp_path / 'bag').exists()
+
+
+def test_incomplete_rows_are_counted_and_dropped_where_the_mapping_says_so(tmp_path):
+    path = tmp_path / 'mapping.yaml'
+    path.write_text(MAPPING + 'incomplete_rows: drop\n')
+    table = tmp_path / 'table.txt'
+    table.write_text('t,u,q,a,b\n0,1,nan,5,5\n1,1,1,5,\n2,1,1,,\n3,1,1,5,5\n')
+    done = convert_table(table, load_table_mapping(path), tmp_path / 'bag')
+    assert done.incomplete == {'slave/measured_js': 1, 'wires/measured_js': 1}
+    assert done.gaps == {'column 3 (q)': 1, 'column 4 (a)': 1, 'column 5 (b)': 2}
+    bag = open_bag(tmp_path / 'bag')
+    stamps = {topic: bag.joint_state(topic).stamp_ns * 1e-9 - 100.0 for topic in bag.topics}
+    assert {topic: at.tolist() for topic, at in stamps.items()} == {
+        '/endoscope/slave/servo_jp': [0.0, 1.0, 2.0, 3.0],
+        '/endoscope/slave/measured_js': [1.0, 2.0, 3.0],
+        '/endoscope/wires/measured_js': [0.0, 3.0],
+    }
 
 
 def test_lines_of_text_may_stand_above(tmp_path, mapping):

@@ -89,3 +89,30 @@ class ProgressLine:
     def _write(self, text: str) -> None:
         self._stream.write(text)
         self._stream.flush()
+
+
+class ShareBar:
+    """Shows how far something is: one line that changes, or where nobody looks on, one a step.
+
+    It goes to stderr: stdout is for the result.
+    """
+
+    def __init__(self) -> None:
+        self._shows = sys.stderr.isatty()
+        self._step = ''
+
+    def __call__(self, step: str, share: float) -> None:
+        """Say which step it is at, and the share that is done."""
+        if self._shows:
+            done = round(20 * share)
+            bar = '#' * done + '.' * (20 - done)
+            print(f'\r[{bar}] {100 * share:3.0f} %  {step:<18}', end='', file=sys.stderr)
+        elif step != self._step:
+            print(step, file=sys.stderr)
+        sys.stderr.flush()
+        self._step = step
+
+    def end(self) -> None:
+        """Leave the line."""
+        if self._shows and self._step:
+            print(file=sys.stderr)

@@ -1,7 +1,6 @@
 """Parameters of the nodes of a running graph, by name and as text."""
 
-import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +16,7 @@ from rcl_interfaces.srv import (
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.task import Future
 
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_nodes.graph_client import PATIENCE_S, GraphClient, GraphRefusedError, NoGraphError
 
 _ROS_OWN = ('qos_overrides.', 'start_type_description_service')
@@ -125,6 +124,29 @@ def read_parameter(
         The node does not answer.
     """
     node, parameter = node_and_parameter(name)
+    own = _names(client, node, patience_s)
+    if parameter not in own:
+        raise UnknownParameterError(f'no parameter {name}; {nearest(parameter, sorted(own))}')
+    return _read(client, node, [parameter], patience_s)[0]
+
+
+def read_parameters(
+    client: GraphClient, node: str, patience_s: float = PATIENCE_S
+) -> list[GraphParameter]:
+    """Ask a node for all of its parameters, in the order of their names.
+
+    Raises
+    ------
+    UnknownParameterError
+        There is no such node; with the nearest that there is.
+    NoGraphError
+        The node does not answer.
+    """
+    return _read(client, node, sorted(_names(client, node, patience_s)), patience_s)
+
+
+def _names(client: GraphClient, node: str, patience_s: float) -> list[str]:
+    """Names of the parameters of a node, without those that ROS gives every one."""
     # A node whose parameters can be asked for is known by that service.
     service = f'{node}/describe_parameters'
     if not client.wait_until(
@@ -135,25 +157,33 @@ def read_parameter(
             raise NoGraphError(f'no graph answers in {client.where}: start one with `graph`')
         if node in others:
             raise NoGraphError(f'{node} does not answer in {client.where}')
-        raise UnknownParameterError(f'no node {node} in {client.where}; {_nearest(node, others)}')
+        raise UnknownParameterError(
+            f'no node {node} in {client.where}; {nearest(node, sorted(others))}'
+        )
     known = client.call(
         ListParameters, f'{node}/list_parameters', ListParameters.Request(), patience_s
     ).result.names
-    if parameter not in known:
-        own = [name for name in known if not name.startswith(_ROS_OWN)]
-        raise UnknownParameterError(f'no parameter {name}; {_nearest(parameter, own)}')
-    descriptor = client.call(
-        DescribeParameters, service, DescribeParameters.Request(names=[parameter]), patience_s
-    ).descriptors[0]
-    value = client.call(
-        GetParameters,
-        f'{node}/get_parameters',
-        GetParameters.Request(names=[parameter]),
+    return [name for name in known if not name.startswith(_ROS_OWN)]
+
+
+def _read(
+    client: GraphClient, node: str, names: list[str], patience_s: float
+) -> list[GraphParameter]:
+    descriptors = client.call(
+        DescribeParameters,
+        f'{node}/describe_parameters',
+        DescribeParameters.Request(names=names),
         patience_s,
-    ).values[0]
-    return GraphParameter(
-        node, parameter, _plain(parameter_value_to_python(value)), _words(descriptor), value.type
-    )
+    ).descriptors
+    values = client.call(
+        GetParameters, f'{node}/get_parameters', GetParameters.Request(names=names), patience_s
+    ).values
+    return [
+        GraphParameter(
+            node, name, _plain(parameter_value_to_python(value)), _words(descriptor), value.type
+        )
+        for name, descriptor, value in zip(names, descriptors, values, strict=True)
+    ]
 
 
 def request_parameters(client: GraphClient, node: str, values: Mapping[str, Any]) -> Future:
@@ -197,9 +227,3 @@ def _plain(value: Any) -> Any:
 def _words(descriptor: ParameterDescriptor) -> str:
     bounds = descriptor.additional_constraints
     return descriptor.description + (f'; {bounds}' if bounds else '')
-
-
-def _nearest(name: str, known: Iterable[str]) -> str:
-    known = sorted(known)
-    close = difflib.get_close_matches(name, known, 1, 0.5)
-    return f'{close[0]}?' if close else 'there are ' + ', '.join(known)

@@ -1,11 +1,14 @@
 """Records topics into a bag: every message as it came, counted, with what was lost."""
 
+import math
 import struct
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.validate_topic_name import validate_topic_name
 from std_srvs.srv import Trigger
 
 from endoscope_bags.errors import BagError, UnknownTypeError
@@ -17,6 +20,7 @@ from endoscope_bags.recording_session import (
     simulated_receipt_ns,
 )
 from endoscope_core.atomic_output import with_final_names
+from endoscope_core.errors import nearest
 from endoscope_nodes.diagnostics import ERROR, OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
@@ -34,6 +38,7 @@ from endoscope_nodes.topics import BY_NAME
 _STAMP = struct.Struct('<iI')
 _SECOND = 1_000_000_000
 _LOOK_PERIOD_S = 0.1
+_UNTYPED_S = 2.0
 
 
 @dataclass
@@ -70,7 +75,9 @@ class RecorderNode(EndoscopeNode):
         self._bag = ''
         p = self.parameters(RecorderParameters, self._on_parameters)
         self._bag = p.bag
-        self._topics = p.topics
+        self._topics = checked_names(p.topics)
+        self._asked_for = p.topics != RecorderParameters().topics
+        self._said_untyped_s = 0.0
         self._session: RecordingSession | None = None
         self._sources: list[_Source] = []
         self._to_look_at: list[_Source] = []
@@ -118,6 +125,7 @@ class RecorderNode(EndoscopeNode):
         self._session = RecordingSession(path)
         self._said_loss = 0
         self._untyped = list(self._topics)
+        self._said_untyped_s = time.monotonic() + _UNTYPED_S
         self._subscribe_untyped()
         self.get_logger().info(f'recording to {with_final_names(str(path))}')
         return path
@@ -138,6 +146,9 @@ class RecorderNode(EndoscopeNode):
         for source in sources:
             source.subscription.close()
         report = self.last_report = session.close()
+        silent = [topic for topic, count in report.counts.items() if not count] + self._untyped
+        if silent and (self._asked_for or not report.message_count):
+            self.get_logger().warning(f'no message came on {", ".join(silent)}')
         if report.complete:
             self.get_logger().info(str(report))
         else:
@@ -219,6 +230,12 @@ class RecorderNode(EndoscopeNode):
             self._adapt(self._to_look_at.pop())
             return
         self._subscribe_untyped()
+        if self._untyped and time.monotonic() > self._said_untyped_s:
+            self._said_untyped_s = math.inf
+            there = [name for name, _ in self.get_topic_names_and_types()]
+            for topic in self._untyped:
+                full = self.resolve_topic_name(topic)
+                self.get_logger().warning(f'nobody publishes {full}: {nearest(full, there)}')
         self._to_look_at = list(self._sources)
         report = session.report()
         if report.lost_count > self._said_loss:
@@ -289,6 +306,24 @@ class RecorderNode(EndoscopeNode):
         if report.lost_count:
             return ERROR, f'{report.lost_count} messages lost', values
         return OK, 'recording', values
+
+
+def checked_names(topics: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names of topics, if all of them can be some.
+
+    Raises
+    ------
+    ParameterError
+        One cannot.
+    """
+    for topic in topics:
+        try:
+            validate_topic_name(topic)
+        except InvalidTopicNameException as error:
+            raise ParameterError(
+                f"recorder: parameter 'topics': {topic!r} is no name of a topic"
+            ) from error
+    return topics
 
 
 def _stamp_ns(data: bytes) -> int:

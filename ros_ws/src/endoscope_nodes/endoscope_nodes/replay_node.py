@@ -51,6 +51,7 @@ class ReplayNode(EndoscopeNode):
         self._next = next(self._messages, None)
         if self._next is None:
             raise ParameterError(f'replay: {p.bag}: nothing to publish in the chosen topics')
+        self._total = sum(recording.topics[name].message_count for name in self._outputs)
         self._start_ns = self._next.log_ns // TICK_NS * TICK_NS
         self._clock_ns = self._start_ns - TICK_NS
         self._clock_out = self.create_publisher(ClockMessage, CLOCK, LOCK_STEP) if p.clock else None
@@ -116,7 +117,7 @@ class ReplayNode(EndoscopeNode):
                 self._clock_out.publish(encode_clock(self._clock_ns))
             more = self._publish_until(self._clock_ns + TICK_NS)
         if not more:
-            self._end(f'{self._parameters_.bag}: {self.published} messages replayed', failed=False)
+            self._end(f'{self._played} replayed', failed=False)
 
     def _publish_until(self, end_ns: int) -> bool:
         """Publish what was received before `end_ns`; tell whether there is more."""
@@ -158,9 +159,21 @@ class ReplayNode(EndoscopeNode):
         # Readers forget what a process sent that is gone before they looked.
         self.ticker.every(_LINGER_S, self._runtime.stop)
 
+    def close(self) -> None:
+        """Say how far it came, if it was stopped on the way."""
+        if self._next is not None:
+            self.get_logger().info(f'stopped: {self._played} of {self._total} replayed')
+
+    @property
+    def _played(self) -> str:
+        return f'{self._parameters_.bag}: {self.published} messages, {self._seconds:.1f} s'
+
+    @property
+    def _seconds(self) -> float:
+        return max(0, self._clock_ns - self._start_ns) * 1e-9
+
     def _report(self) -> Report:
-        done = max(0, self._clock_ns - self._start_ns) * 1e-9
-        return OK, 'replaying', {'messages': self.published, 'seconds': done}
+        return OK, 'replaying', {'messages': self.published, 'seconds': self._seconds}
 
 
 def _offered(topic: Topic) -> QoSProfile:

@@ -60,12 +60,17 @@ def run(args: argparse.Namespace) -> int:
     """Convert and write, or say what is in the table; return 0."""
     from endoscope_bags.table_mapping import load_table_mapping
     from endoscope_bags.text_table import convert_table
+    from endoscope_bringup.progress_line import ShareBar
 
     if args.mapping is None:
         return _propose(args)
     if args.out is None or args.propose is not None:
         raise NoMappingError('--mapping takes --out BAG, and no --propose')
-    done = convert_table(args.table, load_table_mapping(args.mapping), args.out)
+    bar = ShareBar()
+    try:
+        done = convert_table(args.table, load_table_mapping(args.mapping), args.out, bar)
+    finally:
+        bar.end()
     if args.json:
         print_json({'bag': args.out, **vars(done)})
         return 0
@@ -73,6 +78,10 @@ def run(args: argparse.Namespace) -> int:
         f'{args.out}: {done.messages} messages of {done.rows} rows, '
         f'{done.repeated} repeated rows dropped'
     )
+    for column, cells in done.gaps.items():
+        print(f'    {column}: {cells} cells are empty or no finite number')
+    for topic, rows in done.incomplete.items():
+        print(f'    {topic}: {rows} incomplete rows dropped')
     return 0
 
 

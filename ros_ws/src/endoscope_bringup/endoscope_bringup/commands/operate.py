@@ -19,7 +19,7 @@ _ACTIONS = {
     'register_straight': "take the tracker's pose of the last second for straight",
     'reboot': 'restart the servos without torque; not while the slave is ENABLED',
     'set': 'give a node a new value of a parameter',
-    'get': "print a parameter's value",
+    'get': "print a parameter's value, or all parameters of a node with values and ranges",
     'record': 'begin or end a recording',
 }
 _INTERRUPTED = (
@@ -58,7 +58,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         )
         if name in ('set', 'get'):
             action.add_argument(
-                'parameter', metavar='NODE.PARAMETER', help='for example compensator.mode'
+                'parameter',
+                metavar='NODE.PARAMETER' if name == 'set' else 'NODE[.PARAMETER]',
+                help='for example compensator.mode',
             )
         if name == 'set':
             action.add_argument(

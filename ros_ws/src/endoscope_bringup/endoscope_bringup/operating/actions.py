@@ -3,13 +3,13 @@
 import argparse
 import json
 import math
-import sys
 from dataclasses import dataclass, field
 from typing import Any
 
 from endoscope_bringup.operating.status import calibration_in_words, status_of
+from endoscope_bringup.progress_line import ShareBar
 from endoscope_nodes.graph_client import GraphClient, GraphRefusedError
-from endoscope_nodes.graph_parameters import read_parameter, set_parameters
+from endoscope_nodes.graph_parameters import read_parameter, read_parameters, set_parameters
 from endoscope_nodes.names import (
     LOAD_CELLS_TARE,
     MOTOR_REBOOT,
@@ -79,7 +79,7 @@ def act(client: GraphClient, args: argparse.Namespace) -> Reply:
 
 
 def _calibrate(client: GraphClient, patience_s: float) -> Reply:
-    progress = _Progress()
+    progress = ShareBar()
     try:
         result = client.calibrate(progress, patience_s)
     except GraphRefusedError as error:
@@ -92,32 +92,9 @@ def _calibrate(client: GraphClient, patience_s: float) -> Reply:
     return Reply(calibration_in_words(result), {'result': result.values})
 
 
-class _Progress:
-    """Shows how far a calibration is: one line that changes, or where nobody looks on, one a step.
-
-    It goes to stderr: stdout is for the result.
-    """
-
-    def __init__(self) -> None:
-        self._shows = sys.stderr.isatty()
-        self._step = ''
-
-    def __call__(self, step: str, share: float) -> None:
-        if self._shows:
-            done = round(20 * share)
-            bar = '#' * done + '.' * (20 - done)
-            print(f'\r[{bar}] {100 * share:3.0f} %  {step:<18}', end='', file=sys.stderr)
-        elif step != self._step:
-            print(step, file=sys.stderr)
-        sys.stderr.flush()
-        self._step = step
-
-    def end(self) -> None:
-        if self._shows and self._step:
-            print(file=sys.stderr)
-
-
 def _get(client: GraphClient, name: str, patience_s: float) -> Reply:
+    if '.' not in name.strip('/'):
+        return _list(client, name.strip('/'), patience_s)
     parameter = read_parameter(client, name, patience_s)
     return Reply(
         (f'{name} = {_in_words(parameter.value)}', f'    {parameter.description}'),
@@ -126,6 +103,24 @@ def _get(client: GraphClient, name: str, patience_s: float) -> Reply:
             'parameter': parameter.name,
             'value': _of_json(parameter.value),
             'description': parameter.description,
+        },
+    )
+
+
+def _list(client: GraphClient, node: str, patience_s: float) -> Reply:
+    parameters = read_parameters(client, node, patience_s)
+    width = max(len(parameter.name) for parameter in parameters)
+    return Reply(
+        tuple(
+            f'{node}.{p.name:<{width}} = {_in_words(p.value)}    {p.description}'
+            for p in parameters
+        ),
+        {
+            'node': node,
+            'parameters': {
+                p.name: {'value': _of_json(p.value), 'description': p.description}
+                for p in parameters
+            },
         },
     )
 
