@@ -127,3 +127,26 @@ def test_a_domain_that_cannot_be_is_refused(monkeypatch, given):
         joined_graph('asks', ''),
     ):
         pass
+
+
+def test_an_enable_waits_until_the_graph_is_whole_and_says_for_what():
+    overrides = {
+        'load_cells': {'connected': False},
+        'conductor': {'wait_for': ['motor/measured_js']},
+    }
+    with (
+        SimulatedGraph(overrides=overrides) as graph,
+        GraphClient(graph.probe, graph.advance) as client,
+    ):
+        told = []
+
+        def plug_in(what):
+            told.append(what)
+            graph.set('load_cells', connected=True)
+
+        client.told = plug_in
+        client.find(5.0)
+        assert client.ask_and_see('enable', 5.0) == 'ENABLED'
+        [line] = told
+        assert line.endswith('wires/measured_js has not been received')
+        assert client.awaited == ''

@@ -10,6 +10,7 @@ import socket
 import ssl
 import subprocess
 import sys
+import time
 from collections import Counter
 from collections.abc import Iterable
 from contextlib import ExitStack, nullcontext
@@ -35,6 +36,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.rig import Rig, load_rig
 from endoscope_core.teleop.joy_mapping import JoyMapping, JoyMappingError
 from endoscope_core.teleop.pad import PadHandle
+from endoscope_nodes.graph_client import SUPERVISOR, WHOLE_S
 from endoscope_nodes.names import JOINTS
 from endoscope_nodes.program import NODES, REAL_TIME
 from endoscope_nodes.runtime import GC_THRESHOLDS, SWITCH_INTERVAL_S
@@ -210,11 +212,24 @@ async def _announce(
         if started.ended is not None:
             raise ServingError(f'the graph has ended with status {started.ended}, as it says above')
         await asyncio.sleep(_LOOK_S)
+    await _until_whole(graph, started)
     print(f'ready         slave {graph.client.state}; Ctrl-C ends', flush=True)
     while started.ended is None:
         await asyncio.sleep(_LOOK_S)
     print(f'console: the graph has ended with status {started.ended}', flush=True)
     await asyncio.Event().wait()
+
+
+async def _until_whole(graph: GraphSide, started: _Graph) -> None:
+    """Wait for the streams without which nothing may move, and say for which."""
+    client, end, said = graph.client, time.monotonic() + WHOLE_S, ''
+    while (SUPERVISOR not in client.health or client.awaited) and started.ended is None:
+        if client.awaited and client.awaited != said:
+            said = client.awaited
+            print(f'waiting       {said}', flush=True)
+        if time.monotonic() > end:
+            return
+        await asyncio.sleep(_LOOK_S)
 
 
 def _configuration(

@@ -28,6 +28,7 @@ from endoscope_nodes.names import (
     FACTOR,
     HOME_REACHED,
     MOTION_SESSION,
+    NOT_RECEIVED,
     OPERATING_STATE,
     PROCEDURE_WAITING,
     STATE_COMMAND,
@@ -37,6 +38,8 @@ from endoscope_nodes.raw_subscription import RawSubscription
 from endoscope_nodes.topics import Qos
 
 PATIENCE_S = 20.0
+WHOLE_S = 10.0
+"""How long a graph that has just been started may take until all its streams are heard."""
 POLL_S = 0.05
 SUPERVISOR = 'supervisor: operating state'
 PROCEDURE = 'calibration: procedure'
@@ -118,6 +121,8 @@ class GraphClient(ClosedOnExit):
         When each node was last heard on ``/diagnostics``.
     calibration, compensator
         Last result of a calibration, and the model in force; None before the first.
+    told
+        Called with what is waited for, in words, before an order can be given.
     """
 
     def __init__(
@@ -135,6 +140,7 @@ class GraphClient(ClosedOnExit):
         self.heard_ns: dict[str, int] = {}
         self.calibration: Health | None = None
         self.compensator: Health | None = None
+        self.told: Callable[[str], object] = lambda what: None
         self._busy = False
         self._prefix = f'{node.get_namespace().rstrip("/")}/'
         self._orders = node.create_publisher(String, STATE_COMMAND, EVENT)
@@ -353,10 +359,26 @@ class GraphClient(ClosedOnExit):
             self.order(command)
             if self.wait_until(lambda: done() or bool(self._refused(asked_ns)), _REPEATED_AFTER_S):
                 refused = self._refused(asked_ns)
+                if self._becomes_whole(refused):
+                    return self._ask(command, done, what, patience_s, withdrawn)
                 if refused:
                     raise GraphRefusedError(refused)
-                return
+                return None
         raise GraphRefusedError(f'waited {patience_s:g} s in vain for {what}')
+
+    @property
+    def awaited(self) -> str:
+        """What the supervisor has never heard and has to hear; empty where the graph is whole."""
+        said = self.health.get(SUPERVISOR)
+        causes = '' if said is None else said.values.get('present causes', '')
+        return '; '.join(cause for cause in causes.split('; ') if cause.endswith(NOT_RECEIVED))
+
+    def _becomes_whole(self, refused: str) -> bool:
+        """Wait where that was the reason of a refusal; whether the streams have come since."""
+        if NOT_RECEIVED not in refused:
+            return False
+        self.told(f'waits until the graph is whole: {refused}')
+        return self.wait_until(lambda: not self.awaited, WHOLE_S)
 
     def _refused(self, asked_ns: int) -> str:
         """What was refused just now, by the supervisor or calibration; empty for nothing."""
@@ -443,7 +465,12 @@ class GraphClient(ClosedOnExit):
         GraphRefusedError
             It was refused or aborted, or the tube is of no known class; with the reason.
         """
-        answer = self.trigger(CALIBRATION_RUN, patience_s)
+        try:
+            answer = self.trigger(CALIBRATION_RUN, patience_s)
+        except GraphRefusedError as error:
+            if not self._becomes_whole(str(error)):
+                raise
+            answer = self.trigger(CALIBRATION_RUN, patience_s)
         begun = re.fullmatch(CALIBRATION_BEGUN.format(r'(\d+)'), answer)
         if begun is None:
             raise GraphRefusedError(f'{CALIBRATION_RUN} does not say when it has begun: {answer!r}')

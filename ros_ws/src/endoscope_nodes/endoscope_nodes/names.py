@@ -40,6 +40,8 @@ MOTOR_REBOOT = 'motor/reboot'
 # What `calibration: procedure` says on /diagnostics where nothing is being done, and of a way home.
 PROCEDURE_WAITING = 'waiting'
 HOME_REACHED = 'home reached'
+# What is said of a stream that has to be there before the slave may move, and was never heard.
+NOT_RECEIVED = 'has not been received'
 # What `conductor: lock-step` says on /diagnostics: simulated seconds in a real one.
 FACTOR = 'real-time factor'
 # What `calibration/run` answers; the stamp tells this calibration's result from one before it.

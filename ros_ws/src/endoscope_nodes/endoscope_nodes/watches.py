@@ -19,6 +19,7 @@ from endoscope_nodes.names import (
     MOTION_SESSION,
     MOTOR_MEASURED,
     MOTORS,
+    NOT_RECEIVED,
     SLAVE_MEASURED,
 )
 from endoscope_nodes.qos import EVENT, SENSOR_ASKED
@@ -268,7 +269,7 @@ class StreamWatch:
         if self.heard(timeout_ns):
             return ''
         if self._heard_ns is None:
-            return f'{self.topic} has not been received'
+            return f'{self.topic} {NOT_RECEIVED}'
         age = self._ticker.monotonic_ns() - self._heard_ns
         deaf = self._ticker.late_ns - self._late_ns
         late = f', {deaf * 1e-6:.0f} ms of which this process was not run itself' if deaf else ''

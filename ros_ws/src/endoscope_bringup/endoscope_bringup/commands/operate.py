@@ -82,6 +82,7 @@ def run(args: argparse.Namespace) -> int:
     """Ask; return 1 if it was refused or not reached in time."""
     import json
     import sys
+    from functools import partial
 
     from endoscope_bringup.operating.actions import act
     from endoscope_bringup.operating.interruption import paused_when_interrupted
@@ -95,6 +96,7 @@ def run(args: argparse.Namespace) -> int:
             joined_graph('operate', args.namespace) as client,
             paused_when_interrupted(client, args.action in MOVING),
         ):
+            client.told = partial(print, file=sys.stderr, flush=True)
             reply = act(client, args)
     except GraphRefusedError as error:
         if args.json:
