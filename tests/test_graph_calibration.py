@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import slave_of, tube_of_size
@@ -12,8 +13,9 @@ from tubes import slave_of, tube_of_size
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.rig import load_rig
-from endoscope_nodes.names import CALIBRATION_NUMBERS
-from endoscope_nodes.qos import RESULT
+from endoscope_nodes.names import CALIBRATION_FEEDBACK, CALIBRATION_NUMBERS
+from endoscope_nodes.qos import RESULT, profile
+from endoscope_nodes.topics import Qos
 
 
 def assert_same_figures(numbers, values):
@@ -155,6 +157,48 @@ def test_over_tension_aborts_and_is_a_fault():
         assert 'wire_' in abort_reason(graph)
         assert graph.states[-1] == 'FAULT'
         assert not graph.nodes['calibration'].active
+
+
+def test_feedback_says_by_codes_how_orders_fare():
+    with SimulatedGraph(overrides={'calibration': {'motion': 'brief'}}) as graph:
+        said = []
+        all_of_it = profile(Qos(1000, latched=True))
+        graph.probe.create_subscription(
+            DiagnosticArray, CALIBRATION_FEEDBACK, said.append, all_of_it
+        )
+        graph.connect()
+
+        def told_to_the_end():
+            graph.wait(lambda: said and orders()[-1]['state'] != 'executing')
+            found = orders()
+            said.clear()
+            return found
+
+        def orders():
+            assert {message.status[0].name for message in said} == {'calibration: order'}
+            return [{i.key: i.value for i in message.status[0].values} for message in said]
+
+        assert not graph.call_calibration().success
+        [rejected] = told_to_the_end()
+        assert (rejected['state'], rejected['code']) == ('rejected', 'no_session')
+        graph.enable()
+        graph.calibrate()
+        told = told_to_the_end()
+        assert {o['order'] for o in told} == {'calibrate'}
+        assert len({o['id'] for o in told}) == 1
+        assert [o['state'] for o in told] == ['executing'] * (len(told) - 1) + ['succeeded']
+        phases = list(dict.fromkeys(o['phase'] for o in told[:-1]))
+        assert phases[:3] == ['returning', 'resting', 'moving']
+        progress = [float(o['progress']) for o in told]
+        assert progress == sorted(progress)
+        assert progress[-1] == 1.0
+        assert len(told) > 20
+        graph.command('home')
+        graph.advance(0.2)
+        graph.command('pause')
+        graph.advance(0.2)
+        last = told_to_the_end()[-1]
+        assert (last['order'], last['state'], last['code']) == ('home', 'aborted', 'session_ended')
 
 
 def test_home_returns_to_zero():

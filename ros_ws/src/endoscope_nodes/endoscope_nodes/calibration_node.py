@@ -5,6 +5,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -34,21 +35,34 @@ from endoscope_nodes.calibration_result import (
     refused_result,
     successful_result,
 )
-from endoscope_nodes.diagnostics import OK, Report
+from endoscope_nodes.diagnostics import ERROR, OK, Report, status
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
+    ABORTED,
+    BUSY,
     CALIBRATION_BEGUN,
     CALIBRATION_COMMAND,
+    CALIBRATION_FEEDBACK,
     CALIBRATION_NUMBERS,
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
+    EXECUTING,
     HOME_REACHED,
     JOINTS,
     MOTOR_MEASURED,
+    NO_SESSION,
+    NOT_JUDGED,
     PROCEDURE_WAITING,
+    REJECTED,
+    SESSION_ENDED,
     SLAVE_MEASURED,
     STATE_COMMAND,
+    STREAM_SILENT,
+    SUCCEEDED,
+    TENSION_CEILING,
+    TENSION_GAP,
+    UNKNOWN_TUBE,
     WIRES,
     WIRES_MEASURED,
 )
@@ -59,17 +73,18 @@ from endoscope_nodes.runtime import Runtime, run_nodes
 from endoscope_nodes.ticker import TICK_NS
 from endoscope_nodes.watches import SessionWatch, StreamWatch
 
+_FED_NS = 100_000_000
 _Judgement = tuple[ClassificationResult, tuple[PhysicalParameters, ...]]
 
 
 class CalibrationNode(EndoscopeNode):
     """Serves ``calibration/run`` and the ``home`` command; publishes ``calibration/result``.
 
-    The service answers at once, with the reason if it refuses; the result follows on its topic, and
-    as numbers for programs that plot. Whatever makes the recording worthless or motion doubtful
-    aborts: the commands stop, the slave holds or goes back to the console by a ramp, and the result
-    says why. Tensions unlike any known are refused: the result names no class, and nothing is
-    compensated.
+    The service answers at once, with the reason if it refuses. How far an order is follows on
+    ``calibration/feedback``, the result on its topic, and as numbers for programs that plot.
+    Whatever makes the recording worthless or motion doubtful aborts: the commands stop, the
+    slave holds or goes back to the console by a ramp, and the result says why. Tensions unlike
+    any known are refused: the result names no class, and nothing is compensated.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -90,12 +105,14 @@ class CalibrationNode(EndoscopeNode):
         self._refused = 0
         self._last = ''
         self._last_ns = 0
+        self._fed = '', 0
         self._guard = TensionGuard(WIRES, self.rig.tension.calibration_ceiling)
         self._commands = JointPublisher(
             self, CALIBRATION_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
         )
         self._results = self.create_publisher(DiagnosticArray, CALIBRATION_RESULT, RESULT)
         self._numbers = self.create_publisher(JointState, CALIBRATION_NUMBERS, RESULT)
+        self._feedback = self.create_publisher(DiagnosticArray, CALIBRATION_FEEDBACK, RESULT)
         self._session = SessionWatch(self, None, self._on_leave)
         self._pose = runtime.pose_of(self)
         self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
@@ -135,21 +152,54 @@ class CalibrationNode(EndoscopeNode):
             trouble = self._start(homing=True)
             if trouble:
                 self.get_logger().warning(f'home: {trouble}')
-                self._tell(f'home: {trouble}')
+                self._last, self._last_ns = f'home: {trouble}', self.ticker.now_ns()
+                self.diagnostics.publish()
 
-    def _tell(self, last: str) -> None:
-        """Say at once what has come of a procedure: whoever asked for it waits for that."""
+    def _tell(self, last: str, code: str) -> None:
+        """Say at once what has come of a procedure, and why it was aborted, if it was."""
         self._last, self._last_ns = last, self.ticker.now_ns()
+        self._feed(ABORTED if code else SUCCEEDED, last, code)
         self.diagnostics.publish()
+
+    def _feed(self, state: str, words: str, code: str = '', progress: float = 1.0) -> None:
+        """Say how the order that is obeyed fares."""
+        self._say_of(
+            'home' if self._homing else 'calibrate', self._began_ns, state, words, code, progress
+        )
+
+    def _say_of(
+        self, order: str, begun_ns: int, state: str, words: str, code: str, progress: float
+    ) -> None:
+        now = self.ticker.now_ns()
+        values: dict[str, object] = {
+            'order': order,
+            'id': begun_ns,
+            'state': state,
+            'phase': self._phase,
+            'progress': progress,
+            'code': code,
+        }
+        message = DiagnosticArray()
+        message.header.stamp = Time(nanoseconds=now).to_msg()
+        level = OK if state in (EXECUTING, SUCCEEDED) else ERROR
+        message.status = [status('calibration: order', level, words, values)]
+        self._feedback.publish(message)
+        self._fed = self._phase, now
+
+    @property
+    def _phase(self) -> str:
+        if self._run is None:
+            return ''
+        step = self._run.step
+        return 'judging' if step is CalibrationStep.DONE else step.name.lower()
 
     def _start(self, homing: bool) -> str:
         """Begin, or say why not."""
-        if self._run is not None:
-            return f'busy: {self._run.step}'
-        if not self._session.name:
-            return 'no motion session is open: the slave has to be ENABLED'
-        trouble, shafts = self._trouble(), self._pose.shafts()
+        trouble, code = self._obstacle()
+        shafts = self._pose.shafts()
         if trouble or shafts is None:
+            order = 'home' if homing else 'calibrate'
+            self._say_of(order, self.ticker.now_ns(), REJECTED, trouble, code, 0.0)
             return trouble
         self._commands.session = self._session.name
         self._run = CalibrationRun(
@@ -165,8 +215,20 @@ class CalibrationNode(EndoscopeNode):
         self._began_ns = self.ticker.now_ns()
         self._bending = BendingRecord(len(JOINTS))
         self._judging = None
+        self._feed(EXECUTING, str(self._run.step), progress=0.0)
         self.diagnostics.publish()
         return ''
+
+    def _obstacle(self) -> tuple[str, str]:
+        """Why nothing can begin, in words and as a code; empty where it can."""
+        if self._run is not None:
+            return f'busy: {self._run.step}', BUSY
+        if not self._session.name:
+            return 'no motion session is open: the slave has to be ENABLED', NO_SESSION
+        return self._trouble(), self._code_of_trouble()
+
+    def _code_of_trouble(self) -> str:
+        return TENSION_CEILING if self._guard.trouble else STREAM_SILENT
 
     def _trouble(self) -> str:
         if self._guard.trouble:
@@ -176,7 +238,7 @@ class CalibrationNode(EndoscopeNode):
         return self._wires.trouble(self._timeout_ns)
 
     def _on_leave(self) -> None:
-        self._abort('the motion session has ended')
+        self._abort('the motion session has ended', SESSION_ENDED)
 
     def _on_wires(self, sample: JointSample) -> None:
         if len(sample.effort) != len(WIRES):
@@ -196,11 +258,13 @@ class CalibrationNode(EndoscopeNode):
             return
         trouble = self._trouble()
         if trouble:
-            self._abort(trouble)
+            self._abort(trouble, self._code_of_trouble())
             return
         command = run.command(stamp_ns, periods)
         if command is not None:
             self._commands.publish(stamp_ns, *command.position, *command.velocity)
+        if self._phase != self._fed[0] or stamp_ns - self._fed[1] >= _FED_NS:
+            self._feed(EXECUTING, str(run.step), progress=run.progress)
         if run.record is not None and run.record.complete and self._judging is None:
             self._judge(run)
         if self._run is not None and run.step is CalibrationStep.DONE:
@@ -212,7 +276,7 @@ class CalibrationNode(EndoscopeNode):
         try:
             tension, cells = run.record.resampled(), run.record.cells()
         except TensionGapError as error:
-            self._abort(str(error))
+            self._abort(str(error), TENSION_GAP)
             return
         if self.ticker.paced or not self.ticker.simulated:
             self._judging = self._thread.submit(self._judgement, self._classifier, tension, cells)
@@ -237,11 +301,11 @@ class CalibrationNode(EndoscopeNode):
     def _finish(self, run: CalibrationRun) -> None:
         if self._homing:
             self._run = None
-            self._tell(HOME_REACHED)
+            self._tell(HOME_REACHED, '')
             return
         if self._judging is None:
             if run.record is None or not run.record.complete:
-                self._abort('the tensions of the last samples did not come')
+                self._abort('the tensions of the last samples did not come', TENSION_GAP)
             return
         if not self._judging.done():
             return
@@ -250,7 +314,7 @@ class CalibrationNode(EndoscopeNode):
             self._refuse(str(trouble))
             return
         if isinstance(trouble, ClassifierError | PlantFitError):
-            self._abort(str(trouble))
+            self._abort(str(trouble), NOT_JUDGED)
             return
         verdict, plants = self._judging.result()
         backlash = None
@@ -263,13 +327,13 @@ class CalibrationNode(EndoscopeNode):
         )
         self._run = None
         self._runs += 1
-        self._tell(f'class {verdict.class_deg} deg')
+        self._tell(f'class {verdict.class_deg} deg', '')
         self.get_logger().info(f'{self._last}, probability {verdict.probability:.3f}')
 
     def _refuse(self, reason: str) -> None:
         self._run = None
         self._refused += 1
-        self._tell(reason)
+        self._tell(reason, UNKNOWN_TUBE)
         self.get_logger().error(f'{reason}; the motion is not compensated')
         now = self.ticker.now_ns()
         self._publish(refused_result(now, reason, (now - self._began_ns) * 1e-9))
@@ -279,12 +343,12 @@ class CalibrationNode(EndoscopeNode):
         self._results.publish(result)
         self._numbers.publish(numbers_of(result))
 
-    def _abort(self, reason: str) -> None:
+    def _abort(self, reason: str, code: str) -> None:
         run, self._run = self._run, None
         if run is None:
             return
         self._aborts += 1
-        self._tell(f'aborted while {run.step}: {reason}')
+        self._tell(f'aborted while {run.step}: {reason}', code)
         self.get_logger().error(self._last)
         if not self._homing:
             now = self.ticker.now_ns()

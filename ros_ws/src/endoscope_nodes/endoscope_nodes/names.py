@@ -10,6 +10,7 @@ SLAVE_COMMAND = 'slave/servo_jp'
 SLAVE_MEASURED = 'slave/measured_js'
 CALIBRATION_COMMAND = 'calibration/servo_jp'
 CALIBRATION_RESULT = 'calibration/result'
+CALIBRATION_FEEDBACK = 'calibration/feedback'
 CALIBRATION_NUMBERS = 'calibration/numbers'
 CORRECTION = 'controller/correction_js'
 COMPENSATOR_STATE = 'compensator/state'
@@ -44,5 +45,11 @@ HOME_REACHED = 'home reached'
 NOT_RECEIVED = 'has not been received'
 # What `conductor: lock-step` says on /diagnostics: simulated seconds in a real one.
 FACTOR = 'real-time factor'
+# What `calibration/feedback` says of an order, as the states of a ROS action's goal are called, and
+# why one was rejected or aborted.
+EXECUTING, SUCCEEDED, ABORTED, REJECTED = 'executing', 'succeeded', 'aborted', 'rejected'
+BUSY, NO_SESSION, SESSION_ENDED = 'busy', 'no_session', 'session_ended'
+TENSION_CEILING, STREAM_SILENT, TENSION_GAP = 'tension_ceiling', 'stream_silent', 'tension_gap'
+UNKNOWN_TUBE, NOT_JUDGED = 'unknown_tube', 'not_judged'
 # What `calibration/run` answers; the stamp tells this calibration's result from one before it.
 CALIBRATION_BEGUN = f'begun at {{}} ns; {CALIBRATION_RESULT} will say how it went'

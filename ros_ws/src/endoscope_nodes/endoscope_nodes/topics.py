@@ -239,6 +239,20 @@ TOPICS = (
         one_sender=True,
     ),
     Topic(
+        names.CALIBRATION_FEEDBACK,
+        _DIAGNOSTICS,
+        'on change and 10 Hz while it calibrates or goes home, latched',
+        'status `calibration: order`, for programs: `order` is `calibrate` or `home`, `id` '
+        'the time in ns at which it was given, `state` is `executing`, `succeeded`, `aborted` '
+        'or `rejected`, `phase` is `returning`, `resting`, `moving` or `judging`, `progress` '
+        'goes from 0 to 1, and `code` says why it was aborted or rejected: `busy`, '
+        '`no_session`, `session_ended`, `tension_ceiling`, `stream_silent`, `tension_gap`, '
+        '`unknown_tube` or `not_judged`; the message is the same in words',
+        offered=RESULT,
+        asked=RESULT,
+        said_by=('calibration',),
+    ),
+    Topic(
         names.CALIBRATION_NUMBERS,
         _JOINT_STATE,
         'once a calibration, latched',
