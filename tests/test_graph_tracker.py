@@ -17,6 +17,9 @@ def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
     with SimulatedGraph(overrides=CALIBRATION) as graph:
         drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         corrections = graph.listen('controller/correction_js')
+        graph.advance(2.0)
+        at_rest = graph.diagnostics['controller: feedback'][-1]
+        assert (at_rest.level, at_rest.message) == (b'\x00', 'waiting for slave/servo_jp')
         graph.enable()
         graph.calibrate()
         graph.set('console', source='motion', motion='non_periodic')

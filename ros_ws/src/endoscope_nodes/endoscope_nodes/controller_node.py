@@ -64,6 +64,7 @@ class ControllerNode(EndoscopeNode):
         self._used_ns = 0
         self._last_stamp_ns = 0
         self._forget = False
+        self._told = 0
         self._corrections = JointPublisher(self, CORRECTION, JOINTS, ('position',), COMMAND)
         self._session = SessionWatch(self, self._start_anew, self._start_anew)
         self._pose = runtime.pose_of(self)
@@ -170,8 +171,15 @@ class ControllerNode(EndoscopeNode):
             values |= {f'{joint}.gain': gain, f'{joint}.backlash': backlash}
         if not self._settings.active:
             return OK, 'not active', values
-        if not controller.tracker_fresh(self._last_stamp_ns * 1e-9):
+        if not self._pose.tracks:
             return WARN, f'{SLAVE_MEASURED} is silent: feed-forward alone', values
+        # Measurements are taken with commands: at rest none of them is fresh, however many come.
+        idle = self._corrections.count == self._told
+        self._told = self._corrections.count
+        if idle:
+            return OK, f'waiting for {SLAVE_COMMAND}', values
+        if not controller.tracker_fresh(self._last_stamp_ns * 1e-9):
+            return WARN, f'{SLAVE_MEASURED} is not believed: feed-forward alone', values
         return OK, 'in the loop', values
 
 

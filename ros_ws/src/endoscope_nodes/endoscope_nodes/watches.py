@@ -340,9 +340,14 @@ class MeasuredPose:
         sample = _read(self._shafts_reader, self._shafts)
         return None if sample is None else sample.position
 
+    @property
+    def tracks(self) -> bool:
+        """Whether the tracker was heard lately."""
+        return self.tracked is not None and not self._silent(self._tracked_ns, TRACKER_TIMEOUT_NS)
+
     def bending(self) -> tuple[float, ...] | None:
         """Bending angles in rad, shape (J,); None while neither tracker nor shafts are known."""
-        if self.tracked is not None and not self._silent(self._tracked_ns, TRACKER_TIMEOUT_NS):
+        if self.tracked is not None and self.tracks:
             return self.tracked.position
         shafts = self.shafts()
         return None if shafts is None else tuple(x / self._gear for x in shafts)
