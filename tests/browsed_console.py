@@ -167,13 +167,13 @@ def grip(page: Page, press: Callable[[], None], release: Callable[[], None], don
     """Take hold until something has come true; anew where a stall of the machine has ended it."""
     end = time.monotonic() + _LONGEST_S
     while time.monotonic() < end:
-        until(page, lambda: page.locator('body').get_attribute('data-step') == '4', 'readiness')
+        until(page, lambda: page.locator('body').get_attribute('data-ready') == 'true', 'readiness')
         press()
         slot = time.monotonic() + _GRIP_S
         while time.monotonic() < slot:
             if done():
                 return
-            if page.locator('body').get_attribute('data-step') == '3':
+            if page.locator('body').get_attribute('data-step') == '4':
                 break
             page.wait_for_timeout(20)
         release()

@@ -49,6 +49,23 @@ SIZES = """() => Object.fromEntries([...document.querySelectorAll('body *')]
   .map((element) => [element.id || element.tagName, getComputedStyle(element).fontSize])
   .map(([name, size]) => [name, parseFloat(size)]))
 """
+CUT = """() => {
+  const sought = 'button, input, select, h1, dd, canvas, .touch, #next, figcaption';
+  return [...document.querySelectorAll(sought)].filter((element) => {
+    if (!element.checkVisibility() || element.closest('dialog')) return false;
+    element.scrollIntoView({ block: element.closest('.bar, #view') ? 'nearest' : 'end' });
+    const box = element.getBoundingClientRect();
+    for (let outer = element.parentElement; outer; outer = outer.parentElement) {
+      if (getComputedStyle(outer).overflow === 'visible') continue;
+      const { left, top, right, bottom } = outer.getBoundingClientRect();
+      const across = box.left >= left - 1 && box.right <= right + 1;
+      if (!across || box.top < top - 1 || box.bottom > bottom + 1) return true;
+    }
+    const across = box.width > 0 && box.left >= 0 && box.right <= innerWidth + 1;
+    return !across || box.top < 0 || box.bottom > innerHeight + 1;
+  }).map((element) => element.id || element.className || element.outerHTML.slice(0, 80));
+}"""
+WHITE = 'rgb(242, 244, 248)'
 HIDE = """
 Object.defineProperty(document, 'visibilityState', { value: 'hidden' });
 document.dispatchEvent(new Event('visibilitychange'));
@@ -112,12 +129,12 @@ def test_a_stranger_is_led_to_the_first_motion(console, browser):
 def lead(console, page):
     shows(page, 'next', 'Take the controls. Nothing moves yet.')
     shows(page, 'operator', 'nobody')
-    for name in ('pause', 'enable', 'home', 'disable', 'calibrate', 'record', 'compensator'):
+    for name in ('pause', 'enable', 'home', 'disable', 'calibrate', 'compensator'):
         expect(page.locator(f'#{name}')).to_be_disabled()
     page.get_by_role('button', name='Take the controls').click()
     shows(page, 'next', re.compile('^Hold Enable for 1 s'))
     hold(page, 'enable')
-    shows(page, 'next', re.compile('^Hold Space and press an arrow key'))
+    shows(page, 'next', re.compile('^Hold Calibrate for 1 s.* hold Space and an arrow key'))
     begin = console.now_ns
     press, release = press_keys(page, 'Space', 'ArrowRight')
     grip(page, press, release, follows(console, page, begin))
@@ -293,6 +310,8 @@ def test_of_two_pages_the_one_that_takes_over_has_the_controls(console, browser,
         other.get_by_role('button', name='Take over', exact=True).click()
         shows(other, 'operator', 'you')
         expect(page.locator('#answer')).to_contain_text('The controls are lost')
+        expect(page.locator('#alarms')).to_contain_text('took the controls')
+        expect(other.locator('#alarms')).not_to_contain_text('took the controls')
         expect(page.locator('#operator')).not_to_have_text('you')
         assert console.stands(page), 'the one who lost them still presses'
         release()
@@ -305,6 +324,7 @@ def test_whoever_looks_on_can_do_nothing(console, browser, page):
         shows(viewer, 'next', 'You are looking on. To operate, open the operator’s address.')
         expect(viewer.locator('#age')).to_contain_text('ms')
         expect(viewer.locator('#claim')).to_be_disabled()
+        expect(viewer.locator('#claim')).not_to_have_css('background-color', WHITE)
         viewer.keyboard.press('Escape')
         viewer.click('#tab-explain')
         expect(viewer.locator('#ask-go')).to_be_disabled()
@@ -355,10 +375,19 @@ def test_home_calibration_and_compensation(console, page):
     shows(page, 'class', re.compile(r'^\d+° \(\d+ %\)$'))
     shows(page, 'size', re.compile(r'^\d+\.\d°$'))
     shows(page, 'interval', re.compile(r'^\d+\.\d° and \d+\.\d°$'))
-    page.select_option('#compensator', 'physical')
+    expect(page.locator('#answer')).to_contain_text('physical now, and was bouc_wen')
+    expect(page.locator('#compensator')).to_have_value('physical')
+    expect(page.locator('#compensator-in-force')).to_be_empty()
+    shows(page, 'next', re.compile('^Hold Space and press an arrow key'))
+
+    def compensation():
+        node = console.graph.nodes['compensator']
+        return [node.get_parameter(name).value for name in ('mode', 'selected_by')]
+
+    assert console.ask(lambda _: compensation()) == ['physical', 'plant']
+    page.select_option('#compensator', 'bouc_wen')
     expect(page.locator('#answer')).to_contain_text('compensator: done')
-    mode = console.ask(lambda graph: graph.nodes['compensator'].get_parameter('mode').value)
-    assert mode == 'physical'
+    assert console.ask(lambda _: compensation()) == ['bouc_wen', 'class']
     page.select_option('#compensator', 'none')
     expect(page.locator('#alarms')).to_contain_text('nothing is compensated')
 
@@ -397,12 +426,17 @@ def test_recordings_are_made_and_offered_for_explanation(console, page):
     shows(page, 'record', 'Stop recording')
     expect(page.locator('#recorder')).to_contain_text('bag')
     page.wait_for_timeout(500)
-    page.click('#record')
-    shows(page, 'record', 'Record')
     page.click('#tab-explain')
-    expect(page.locator('#bag option')).to_have_count(1, timeout=PATIENCE_MS)
-    page.click('#ask-go')
+    expect(page.locator('#being-recorded')).to_contain_text('is being recorded')
+    expect(page.locator('#asking')).not_to_contain_text('There is no recording yet')
+    expect(page.locator('#plant')).to_have_attribute(
+        'placeholder', "this graph's own: nominal_plant", timeout=PATIENCE_MS
+    )
+    page.click('#stop-and-explain')
     expect(page.locator('#explanations li')).to_have_count(1, timeout=PATIENCE_MS)
+    expect(page.locator('#explanations li')).to_contain_text('by nominal_plant')
+    expect(page.locator('#being-recorded')).to_be_hidden()
+    expect(page.locator('#bag option')).to_have_count(1)
     cancel = page.get_by_role('button', name='Cancel')
     cancel.click()
     expect(cancel).to_be_hidden(timeout=PATIENCE_MS)
@@ -494,6 +528,9 @@ def test_a_page_without_its_key_says_what_to_do(console, browser):
         expect(page.locator('#token')).to_contain_text('endoscope console', timeout=PATIENCE_MS)
         page.goto(f'{console.address}/?#token=wrong')
         expect(page.locator('#token')).to_contain_text('refused this page', timeout=PATIENCE_MS)
+        page.fill('#token-address', f'{console.address}/#token={console.viewer}')
+        page.get_by_role('button', name='Open', exact=True).click()
+        expect(page.locator('#next')).to_contain_text('You are looking on', timeout=PATIENCE_MS)
 
 
 @pytest.mark.parametrize(
@@ -508,6 +545,16 @@ def test_all_of_it_fits_on_the_screen(console, browser, width, height, touch):
         assert page.evaluate(f'[{root}.scrollWidth, {root}.scrollHeight]') == [width, height]
         sizes = page.evaluate(SIZES)
         assert sizes['state'] == max(sizes.values()), 'the state is the largest word'
+
+
+def test_nothing_is_cut_or_out_of_reach_in_a_small_window(console, browser):
+    with console.page(browser) as page:
+        for width, height in ((1440, 900), (1280, 600), (1100, 560), (800, 600), (390, 844)):
+            page.set_viewport_size({'width': width, 'height': height})
+            page.wait_for_timeout(200)
+            assert page.evaluate(CUT) == [], (width, height)
+        expect(page.locator('#tab-plots')).to_be_hidden()
+        expect(page.locator('#plots')).to_be_visible()
 
 
 def test_nothing_flashes_for_who_asked_for_less_motion(console, browser):

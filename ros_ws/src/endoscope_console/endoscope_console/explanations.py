@@ -6,7 +6,6 @@ import os
 import secrets
 import signal
 import sys
-import tempfile
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -24,6 +23,8 @@ from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.plant_file import save_plant
 
 REPORT_FILE = 'report.html'
+NOMINAL = 'nominal_plant'
+"""Name of the plant that a graph simulates where no file describes it."""
 _RESULT_FILE = 'report.json'
 EXPERIMENT_FILE = 'next_experiment.csv'
 _STEPS = 7
@@ -65,6 +66,8 @@ class Explanation:
         Why nothing was; empty where something was.
     experiment
         Whether there is a motion that would tell more.
+    plant
+        By which plant it is explained.
     report
         Path of its report's address; None where there is none.
     """
@@ -79,6 +82,7 @@ class Explanation:
     sentence: str = ''
     error: str = ''
     experiment: bool = False
+    plant: str = ''
     report: str | None = None
 
     def ended(self, sentence: str = '') -> None:
@@ -100,6 +104,7 @@ class Explanation:
         return {
             'id': self.id,
             'bag': self.bag,
+            'plant': self.plant,
             'running': self.running,
             'step': self.step,
             'progress': self.progress,
@@ -178,9 +183,14 @@ class Explanations:
         return (one.folder / EXPERIMENT_FILE).resolve()
 
     async def begin(
-        self, bag: str, plant: str | None, baseline: str | None, validate: str | None
+        self,
+        bag: str,
+        plant: str | None,
+        baseline: str | None,
+        validate: str | None,
+        own: str = '',
     ) -> Mapping[str, Any]:
-        """Begin to explain a recording by a plant, the nominal one where none is named.
+        """Begin to explain a recording by a plant, the graph's own where none is named.
 
         Raises
         ------
@@ -194,26 +204,38 @@ class Explanations:
         ):
             if name is not None and name not in known:
                 raise ExplanationRefusedError(f'there is no {kind} {name} in {self._folder}')
+        file = plants[plant] if plant is not None else self._own_plant(own)
         if self._task is not None and not self._task.done():
             raise ExplanationRefusedError('another recording is being explained')
         name = f'why-{bag.removesuffix(".mcap")}-{time.strftime("%Y%m%d-%H%M%S")}'
         one = self._new(bag, self._folder / name)
+        one.plant = plant or own
         words = [str(bags[bag]), '--out', str(one.folder), '--jobs', '1']
         for option, chosen in (('--baseline', baseline), ('--validate', validate)):
             words += [option, str(bags[chosen])] if chosen is not None else []
         self._task = asyncio.get_running_loop().create_task(
-            self._explain(one, words, None if plant is None else plants[plant])
+            self._explain(one, [*words, '--plant', str(file)])
         )
         return {'explanation': one.id}
+
+    def _own_plant(self, own: str) -> Path:
+        """File of the graph's own plant; the nominal one is written beside the recordings."""
+        file = self._folder / f'{NOMINAL}.yaml' if own == NOMINAL else Path(own)
+        if own == NOMINAL and not file.exists():
+            save_plant(PlantDescription(), file)
+        if not file.is_file():
+            why = f'{own} is not there' if own else 'the graph does not say which it simulates'
+            raise ExplanationRefusedError(f'name a plant: {why}')
+        return file
 
     def _new(self, bag: str, folder: Path) -> Explanation:
         one = Explanation(f'e{len(self._all) + 1}', bag, folder, secrets.token_urlsafe(16))
         self._all[one.id] = one
         return one
 
-    async def _explain(self, one: Explanation, words: list[str], plant: Path | None) -> None:
+    async def _explain(self, one: Explanation, words: list[str]) -> None:
         try:
-            status, said = await self._run(one, words, plant)
+            status, said = await self._run(one, words)
         except (OSError, ValueError) as error:
             one.running, one.error = False, f'it could not be followed: {error}'
             return
@@ -222,34 +244,27 @@ class Explanations:
         else:
             one.ended(said.decode(errors='replace').partition('\n')[0])
 
-    async def _run(
-        self, one: Explanation, words: list[str], plant: Path | None
-    ) -> tuple[int, bytes]:
+    async def _run(self, one: Explanation, words: list[str]) -> tuple[int, bytes]:
         """Run the program to its end, which comes at once where it cannot be followed."""
-        with tempfile.TemporaryDirectory() as scratch:
-            if plant is None:
-                plant = Path(scratch) / 'nominal.yaml'
-                save_plant(PlantDescription(), plant)
-            self._process = await asyncio.create_subprocess_exec(
-                *(sys.executable, '-m', 'endoscope_bringup.cli', 'explain', *words),
-                *('--plant', str(plant)),
-                stdin=asyncio.subprocess.DEVNULL,
-                stdout=asyncio.subprocess.PIPE,
-                stderr=asyncio.subprocess.PIPE,
-                start_new_session=True,
+        self._process = await asyncio.create_subprocess_exec(
+            *(sys.executable, '-m', 'endoscope_bringup.cli', 'explain', *words),
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+            start_new_session=True,
+        )
+        with suppress(ProcessLookupError):
+            os.setpriority(os.PRIO_PROCESS, self._process.pid, _NICE)
+        try:
+            said, _ = await asyncio.gather(
+                self._process.stdout.read(),  # type: ignore[union-attr]
+                self._follow(one, self._process.stderr),  # type: ignore[arg-type]
             )
+        except BaseException:
             with suppress(ProcessLookupError):
-                os.setpriority(os.PRIO_PROCESS, self._process.pid, _NICE)
-            try:
-                said, _ = await asyncio.gather(
-                    self._process.stdout.read(),  # type: ignore[union-attr]
-                    self._follow(one, self._process.stderr),  # type: ignore[arg-type]
-                )
-            except BaseException:
-                with suppress(ProcessLookupError):
-                    os.killpg(self._process.pid, signal.SIGKILL)
-                raise
-            return await self._process.wait(), said
+                os.killpg(self._process.pid, signal.SIGKILL)
+            raise
+        return await self._process.wait(), said
 
     async def _follow(self, one: Explanation, lines: asyncio.StreamReader) -> None:
         """Take the steps that it names; the last line of one that fails says why."""

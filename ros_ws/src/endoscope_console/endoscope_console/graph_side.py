@@ -91,6 +91,8 @@ class GraphSide:
         Of the console node; asked for once a second, and by whoever has changed them.
     heard_ns
         When the operating state was heard, by a steady clock.
+    ended
+        Status with which the graph of this program has ended; None while it runs, or is another's.
     """
 
     def __init__(self, client: _Client, pictures: Pictures, services: threading.Thread) -> None:
@@ -99,6 +101,7 @@ class GraphSide:
         self.pictures = pictures
         self.settings = Settings()
         self.heard_ns = 0
+        self.ended: int | None = None
         self._state_ns = 0
         self._calibrating_ns = 0
         self._asking: Future | None = None

@@ -13,7 +13,7 @@ from endoscope_console.access import OPERATOR
 from endoscope_console.alarms import Alarms
 from endoscope_console.beat import Beat, Situation
 from endoscope_console.clients import Client, Clients
-from endoscope_console.explanations import Explanations
+from endoscope_console.explanations import NOMINAL, Explanations
 from endoscope_console.graph_side import GraphSide, Settings
 from endoscope_console.orders import (
     HALTS,
@@ -31,23 +31,33 @@ from endoscope_console.orders import (
     State,
     in_words,
 )
-from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
+from endoscope_core.choices import (
+    ADAPTIVE_PHYSICAL,
+    BY_CLASS,
+    BY_PLANT,
+    FOLLOW_THE_HANDLE,
+    PHYSICAL,
+    PLAYS,
+)
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.rig import load_rig
 from endoscope_core.teleop.frames import InputFrame
 from endoscope_core.teleop.lease import Lease
 from endoscope_core.teleop.operator import DeadManState, Reason
-from endoscope_nodes.graph_client import CONSOLE, GraphRefusedError
+from endoscope_nodes.calibration_result import REACH
+from endoscope_nodes.graph_client import CONSOLE, GraphRefusedError, Health
 from endoscope_nodes.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
+from endoscope_nodes.node_parameters import CompensatorParameters
 
 _PATIENCE_S = 10.0
 _PLACE_S = 5.0
+_LISTED_S = 2.0
 _LOOK_S = 0.05
 # Until all nodes know that a sender of the handle has gone.
 _SETTLED_S = 0.2
 _SILENCED_S = 2.0
 _WAITING_ORDERS = 16
-_TAKEN_NS = 10_000_000_000
 # The console tells once a second how far it is; a word from before it was asked means nothing.
 _NEXT_WORD_NS = 1_500_000_000
 _EXPERIMENT = 'an experiment'
@@ -56,6 +66,11 @@ _NO_LEASE = (Claim, Release, Bags, Explain, Cancel, Acknowledge)
 
 class OrderRefusedError(EndoscopeError):
     """What was asked for is not done; the message says why."""
+
+
+def _identified(calibration: Health | None) -> bool:
+    """Whether a calibration has found the plant of each joint, and so how far it can be bent."""
+    return calibration is not None and any(key.startswith(REACH) for key in calibration.values)
 
 
 @dataclass
@@ -108,14 +123,9 @@ class Operations:
         self._given_back: str | None = None
         self._played: _Played | None = None
         self._holder = _Holder()
-        self._taken_ns = -_TAKEN_NS
         self._halts = 0
         self._closing = False
         self._tasks: set[asyncio.Task[None]] = set()
-
-    def lease_was_taken(self, now_ns: int) -> bool:
-        """Whether an operator took it from another just before now, a steady time in ns."""
-        return now_ns - self._taken_ns < _TAKEN_NS
 
     @property
     def holder(self) -> Client | None:
@@ -205,6 +215,8 @@ class Operations:
         if isinstance(order, _NO_LEASE) or client.id == self.lease.holder:
             return
         holder = self.holder
+        if isinstance(order, Record) and not self.lease.holder:
+            return
         who = 'nobody operates: take the controls first'
         raise OrderRefusedError(f'{holder.label} operates' if holder else who)
 
@@ -229,10 +241,12 @@ class Operations:
                 self.alarms.acknowledge(order.alarm)
                 return ''
             case Bags():
-                return await self._ask(self.explanations.listing)
+                own = await self._ask(self._plant_of_the_graph)
+                return await self._ask(self.explanations.listing) | {'own_plant': own}
             case Explain():
+                own = '' if order.plant else await self._ask(self._plant_of_the_graph)
                 return await self.explanations.begin(
-                    order.bag, order.plant, order.baseline, order.validate
+                    order.bag, order.plant, order.baseline, order.validate, own
                 )
             case Cancel():
                 return await self.explanations.cancel(order.explanation)
@@ -242,6 +256,18 @@ class Operations:
     async def _ask[T](self, ask: Callable[[], T]) -> T:
         """Wait for the graph in a thread of the pool: the sockets go on meanwhile."""
         return await asyncio.get_running_loop().run_in_executor(self._pool, ask)
+
+    def _plant_of_the_graph(self) -> str:
+        """File of the plant that the graph simulates; a name of the shipped one, or empty."""
+        client = self.graph.client
+        try:
+            file, rig = (
+                read_parameter(client, f'motor_driver.{name}', _LISTED_S).value
+                for name in ('plant_file', 'rig_file')
+            )
+            return str(file or load_rig(rig or None).simulation.plant or NOMINAL)
+        except EndoscopeError:
+            return ''
 
     async def claim(self, client: Client, take: bool) -> str:
         """Make a client the operator; what became of it.
@@ -281,7 +307,6 @@ class Operations:
 
     def _lost(self, holder: str, to: Client) -> None:
         """Tell an operator that another took the lease."""
-        self._taken_ns = time.monotonic_ns()
         self._end_what_moves(holder)
         lost = self.clients.by_id(holder)
         if lost is not None:
@@ -422,7 +447,23 @@ class Operations:
     def _calibrate(self, withdrawn: Callable[[], bool]) -> str:
         if withdrawn():
             raise OrderRefusedError('calibration was withdrawn before it began')
-        return self.graph.client.calibrate(patience_s=_PATIENCE_S).message
+        client = self.graph.client
+        first = client.calibration is None or client.calibration.level != 0
+        found = client.calibrate(patience_s=_PATIENCE_S)
+        wanted = '' if client.compensator is None else client.compensator.values.get('wanted_mode')
+        # What somebody has chosen stays; and nothing changes under a hand, or after a halt.
+        at_rest = not withdrawn() and self.beat.said.state is not DeadManState.ENGAGED
+        if first and at_rest and wanted == CompensatorParameters.mode and _identified(found):
+            self._compensate(PHYSICAL)
+            return f'{found.message}; the compensator is {PHYSICAL} now, and was {wanted}'
+        return found.message
+
+    def _compensate(self, mode: str) -> None:
+        """Set the compensator's mode; the physical ones know the tube itself where it was found."""
+        physical = mode in (PHYSICAL, ADAPTIVE_PHYSICAL)
+        by_plant = physical and _identified(self.graph.client.calibration)
+        values = {'mode': mode, 'selected_by': BY_PLANT if by_plant else BY_CLASS}
+        set_parameters(self.graph.client, 'compensator', values, _PATIENCE_S)
 
     async def _play(self, client: Client, explanation: str) -> str:
         """Have the console play an experiment for as long as the operator holds on."""
@@ -471,10 +512,7 @@ class Operations:
             await self._ask(partial(self._set_console, scale=order.scale))
             self.graph.settings = Settings(self.graph.settings.source, order.scale)
         elif order.compensator is not None:
-            values = {'mode': order.compensator}
-            await self._ask(
-                partial(set_parameters, self.graph.client, 'compensator', values, _PATIENCE_S)
-            )
+            await self._ask(partial(self._compensate, order.compensator))
         return ''
 
     async def close(self) -> None:

@@ -216,6 +216,7 @@ async def _announce(
     print(f'ready         slave {graph.client.state}; Ctrl-C ends', flush=True)
     while started.ended is None:
         await asyncio.sleep(_LOOK_S)
+    graph.ended = started.ended
     print(f'console: the graph has ended with status {started.ended}', flush=True)
     await asyncio.Event().wait()
 

@@ -109,6 +109,7 @@ class View:
             'session': client.session,
             'why': client.why,
             'causes': self._causes(),
+            'graph_ended': self._graph.ended is not None,
             'lease': {
                 'holder': operations.lease.holder,
                 'operators': [
@@ -176,6 +177,11 @@ class View:
 
     def _alarms(self, now_ns: int) -> list[Alarm]:
         """What asks for attention now."""
+        if self._graph.ended is not None:
+            # All else follows from it.
+            why = f'the graph has ended with status {self._graph.ended}'
+            how = 'restart: Ctrl-C in the terminal, then `endoscope console`'
+            return [Alarm('graph', Level.HIGH, f'{why}; {how}')]
         client, operations = self._client, self._operations
         age_s = self._state_age_s(now_ns)
         enabled = client.state == 'ENABLED'
@@ -199,10 +205,6 @@ class View:
             (
                 reason in (Reason.SILENT, Reason.LATE, Reason.BLIND, Reason.STALLED),
                 Alarm('dead_man', Level.MEDIUM, f'the dead-man was released: {reason}'),
-            ),
-            (
-                operations.lease_was_taken(now_ns),
-                Alarm('lease', Level.MEDIUM, 'another operator took the controls'),
             ),
             (
                 client.calibration is None and not silent,

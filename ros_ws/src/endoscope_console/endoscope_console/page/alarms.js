@@ -12,11 +12,13 @@ export const pictureAge = (picture, now) => (Number.isFinite(picture?.age) ? pic
 
 /**
  * @param server the alarms `{id, level, text, latched}` of the last state, or none
- * @param own `{connected, everConnected, pictureAge, gamepadLost}`: whether both sockets are open, and were;
- *   age of the picture in s; a gamepad that does not answer any more
+ * @param own `{connected, everConnected, pictureAge, gamepadLost, mine, lost}`: whether both sockets are open, and were;
+ *   age of the picture in s; a gamepad that does not answer any more; `mine`: whether this page has the controls;
+ *   `lost`: who took them from it just now
  */
 export function standing(server, own) {
-  const alarms = [...(server ?? [])];
+  // Whose hand was let go of, needs to be told only to him.
+  const alarms = (server ?? []).filter(({ id }) => id !== 'dead_man' || own.mine);
   const add = (id, level, text) => {
     if (!alarms.some((alarm) => alarm.id === id)) alarms.push({ id, level, text, latched: false });
   };
@@ -24,10 +26,11 @@ export function standing(server, own) {
     // What was heard before says nothing of now.
     alarms.length = 0;
     add('connection', 'medium', 'No connection to the console: nothing shown here is current. Reconnecting …');
-  } else if (own.connected && own.pictureAge > BLIND_S) {
+  } else if (own.connected && own.pictureAge > BLIND_S && !alarms.some(({ id }) => id === 'graph')) {
     const age = Number.isFinite(own.pictureAge) ? ` is ${own.pictureAge.toFixed(1)} s old` : ' has not come yet';
     add('picture', 'medium', `The picture${age}. Motion is blocked until the view is current.`);
   }
+  if (own.lost) add('lease', 'medium', own.lost);
   if (own.gamepadLost) add('gamepad', 'low', 'The gamepad is gone.');
   return alarms.sort((a, b) => (ORDER[a.level] ?? 3) - (ORDER[b.level] ?? 3));
 }

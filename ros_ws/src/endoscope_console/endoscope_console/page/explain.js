@@ -1,6 +1,6 @@
 /** Explanations of recordings of this machine: asked for, followed, read, and their next experiment played. */
 
-import { $, each, make, toggle, write } from './elements.js';
+import { $, each, make, set, toggle, write } from './elements.js';
 
 export class Explain {
   constructor(app) {
@@ -11,6 +11,7 @@ export class Explain {
       this._ask();
     });
     $('ask-again').addEventListener('click', () => this._look());
+    $('stop-and-explain').addEventListener('click', () => this._stopAndAsk());
   }
 
   /** The page comes into view. */
@@ -22,9 +23,15 @@ export class Explain {
     const { state, mine, role } = this._app;
     const mayAsk = role === 'operator';
     toggle($('ask-go'), 'disabled', !mayAsk);
+    const { recording = false, bag = '' } = state?.recorder ?? {};
+    toggle($('being-recorded'), 'hidden', !recording);
+    write($('being-recorded').querySelector('p'), `${nameOfBag(bag)} is being recorded.`);
+    toggle($('stop-and-explain'), 'disabled', !mayAsk || !this._app.mayRecord());
+    set($('stop-and-explain'), 'title', this._app.mayRecord() ? '' : 'Who operates ends the recording');
     const explanations = state?.explanations ?? [];
     each($('explanations'), explanations, (e) => e.id, (e) => this._card(e), (card, e) => {
       write(card.querySelector('b'), e.bag);
+      write(card.querySelector('.note'), e.plant && `by ${e.plant}`);
       write(card.querySelector('.sentence'), e.error || e.sentence || e.step || '');
       const progress = card.querySelector('progress');
       toggle(progress, 'hidden', !e.running);
@@ -55,13 +62,28 @@ export class Explain {
     fill('baseline', options([{ value: '', text: 'none' }]));
     fill('validate', options([{ value: '', text: 'the end of the recording itself' }]));
     fill('plants', (answer.plants ?? []).map((plant) => ({ value: plant, text: plant })));
-    write($('ask-answer'), bags.length ? '' : 'There is no recording yet. Press Record on the page Operate, and move.');
+    set($('plant'), 'placeholder', answer.own_plant ? `this graph's own: ${answer.own_plant}` : 'a plant.yaml');
+    const recording = this._app.state?.recorder?.recording;
+    write($('ask-answer'), bags.length || recording ? '' : 'There is no recording yet. Press Record on the page Operate, and move.');
   }
 
-  async _ask() {
+  /** End the recording that is under way, and have it explained. */
+  async _stopAndAsk() {
+    const name = nameOfBag(this._app.state?.recorder?.bag ?? '');
+    const answer = await this._app.orders.give({ op: 'record', on: false });
+    if (!answer.ok) {
+      write($('ask-answer'), `Refused: ${answer.why}`);
+      return;
+    }
+    await this._look();
+    $('bag').value = name;
+    await this._ask(name);
+  }
+
+  async _ask(bag = $('bag').value) {
     const value = (id) => $(id).value || null;
     const answer = await this._app.orders.give({
-      op: 'explain', bag: value('bag'), plant: value('plant'), baseline: value('baseline'), validate: value('validate'),
+      op: 'explain', bag: bag || null, plant: value('plant'), baseline: value('baseline'), validate: value('validate'),
     });
     write($('ask-answer'), answer.ok ? 'Being explained; it may take some minutes.' : `Refused: ${answer.why}`);
   }
@@ -74,7 +96,7 @@ export class Explain {
     };
     const { id } = explanation;
     return make('li', { class: 'explanation' },
-      make('b'), make('p', { class: 'sentence', role: 'status' }), make('progress', { max: '1', 'aria-label': 'How far it is' }),
+      make('b'), make('span', { class: 'note' }), make('p', { class: 'sentence', role: 'status' }), make('progress', { max: '1', 'aria-label': 'How far it is' }),
       make('div', { class: 'row' },
         button('open', 'Open the report', ({ target }) => this._open(target.dataset.report)),
         button('play', 'Play the next experiment', () => this._play(id)),
@@ -93,6 +115,8 @@ export class Explain {
     $('report').replaceChildren(make('iframe', { src: path, sandbox: 'allow-scripts', title: 'Report of the explanation' }));
   }
 }
+
+const nameOfBag = (path) => path.split('/').at(-1);
 
 function nameOf(bag) {
   const parts = [bag.name];

@@ -34,17 +34,21 @@ export function lamp(state) {
   return 'OPEN';
 }
 
+/** Whether a calibration has found the class of the tube. */
+export const isCalibrated = (state) => Number.isFinite(state?.calibration?.result?.class_deg);
+
 /** Whether what the supervisor said last still counts. */
 export const stateIsFresh = (state, stateAge) => Boolean(state?.operating_state) && stateAge <= SILENT_STATE_S;
 
 /**
- * The step that comes next, 0 to 4, and what to say:
- * 0 cannot, 1 take the controls, 2 enable, 3 let go first, 4 hold and move.
+ * The step that comes next, 0 to 5, and what to say:
+ * 0 cannot, 1 take the controls, 2 enable, 3 calibrate (or move uncompensated), 4 let go first, 5 hold and move.
  */
-export function nextStep({ connected, current, role, mine, state, stateAge, busy, half, held, touch, why }) {
+export function nextStep({ connected, current, role, mine, state, stateAge, rests, busy, half, held, touch, why }) {
   if (!connected) return { step: 0, text: `Connecting to the console …${why ? ` It said: ${why}.` : ''}` };
   if (!state) return { step: 0, text: 'Waiting for the graph …' };
   if (!current) return { step: 0, text: 'Nothing is heard of the console. Let go: what is shown is not current.' };
+  if (state.graph_ended) return { step: 0, text: 'Nothing moves: the graph has ended. Start endoscope console anew in its terminal.' };
   if (role !== 'operator') return { step: 0, text: 'You are looking on. To operate, open the operator’s address.' };
   const { lease, calibration, playing, dead_man: deadMan } = state;
   if (!mine && lease?.holder) return { step: 1, text: `${nameOf(lease.holder, state)} has the controls. Watch, or take over.` };
@@ -54,6 +58,7 @@ export function nextStep({ connected, current, role, mine, state, stateAge, busy
   if (state.operating_state === 'FAULT') {
     const causes = state.causes ?? [];
     if (causes.length) return { step: 0, text: 'Held. Clear the cause of the fault, then enable.' };
+    if (rests) return { step: 0, text: 'Held. The cause of the fault is gone; Enable can be held in a moment.' };
     return { step: 2, text: 'The cause of the fault is gone. Hold Enable for 1 s.' };
   }
   const orKey = touch ? '.' : ', or key E.';
@@ -62,14 +67,18 @@ export function nextStep({ connected, current, role, mine, state, stateAge, busy
   if (state.operating_state !== 'ENABLED') return { step: 2, text: `Hold Enable for 1 s${orKey} The motors then hold.` };
   if (deadMan?.state === 'ENGAGED') {
     const verb = playing ? `Playing ${played(state)}, ${Math.round(100 * (playing.progress ?? 0))} % done` : 'Following';
-    return { step: 4, text: `${verb}. Let go, and it stops.` };
+    return { step: 5, text: `${verb}. Let go, and it stops.` };
   }
-  if (half) return { step: 4, text: 'One finger is down. Hold the left area and the pad together.' };
+  if (half) return { step: 5, text: 'One finger is down. Hold the left area and the pad together.' };
   if (deadMan?.state === 'READY') {
-    if (playing) return { step: 4, text: `${hold}, and ${played(state)} plays. Let go, and it stops.` };
-    return { step: 4, text: touch ? 'Hold the left area, and drag on the pad.' : 'Hold Space and press an arrow key, or drag on the pad.' };
+    if (playing) return { step: 5, text: `${hold}, and ${played(state)} plays. Let go, and it stops.` };
+    if (!isCalibrated(state)) {
+      const move = touch ? 'hold the left area and drag' : 'hold Space and an arrow key';
+      return { step: 3, text: `Hold Calibrate for 1 s${touch ? '' : ', or key C'}: it moves by itself for some seconds. Or ${move}, uncompensated.` };
+    }
+    return { step: 5, text: touch ? 'Hold the left area, and drag on the pad.' : 'Hold Space and press an arrow key, or drag on the pad.' };
   }
   const missing = deadMan?.missing || deadMan?.reason || '';
-  if (held || busy || missing === 'hands on') return { step: 3, text: 'Let go of everything first, then take hold anew.' };
-  return { step: 3, text: endedForHim(missing) ? `Not ready: ${inWords(missing)}.` : 'Getting ready …' };
+  if (held || busy || missing === 'hands on') return { step: 4, text: 'Let go of everything first, then take hold anew.' };
+  return { step: 4, text: endedForHim(missing) ? `Not ready: ${inWords(missing)}.` : 'Getting ready …' };
 }

@@ -58,12 +58,15 @@ export class Loops {
     ctx.clearRect(0, 0, width, height);
     const most = Math.max(1, ...[before, after].flatMap((l) => [...l.wanted, ...l.actual].map(Math.abs)));
     const reach = STEPS_DEG.find((step) => step >= most) ?? most;
-    const side = Math.min(width, height) / 2 - 3;
-    const x = (deg) => width / 2 + (deg / reach) * side;
-    const y = (deg) => height / 2 - (deg / reach) * side;
+    // Left and below there is room for ticks and names.
+    const [left, below] = [30, 26];
+    const side = Math.min(width - left, height - below) / 2 - 6;
+    const [midX, midY] = [left + (width - left) / 2, (height - below) / 2];
+    const x = (deg) => midX + (deg / reach) * side;
+    const y = (deg) => midY - (deg / reach) * side;
     ctx.strokeStyle = this._colour('line');
     ctx.lineWidth = 1;
-    ctx.strokeRect(width / 2 - side, height / 2 - side, 2 * side, 2 * side);
+    ctx.strokeRect(midX - side, midY - side, 2 * side, 2 * side);
     ctx.beginPath();
     ctx.moveTo(x(-reach), y(0));
     ctx.lineTo(x(reach), y(0));
@@ -86,8 +89,17 @@ export class Loops {
     }
     ctx.fillStyle = this._colour('quiet');
     ctx.font = `10px ${this._colour('sans')}`;
+    ctx.textAlign = 'center';
+    if (!before.wanted.length && !after.wanted.length) ctx.fillText('bend to and fro', midX, midY - side + 13);
+    for (const deg of [-reach, 0, reach]) ctx.fillText(String(deg), x(deg), midY + side + 11);
+    ctx.fillText('wanted, deg', midX, midY + side + 22);
     ctx.textAlign = 'right';
-    if (!before.wanted.length && !after.wanted.length) ctx.fillText('bend to and fro', width / 2 + side - 4, height / 2 - side + 13);
-    ctx.fillText(`±${reach}°`, width / 2 + side - 4, height / 2 + side - 5);
+    for (const deg of [-reach, 0, reach]) ctx.fillText(String(deg), midX - side - 4, y(deg) + 4);
+    ctx.save();
+    ctx.translate(midX - side - 24, midY);
+    ctx.rotate(-Math.PI / 2);
+    ctx.textAlign = 'center';
+    ctx.fillText('actual, deg', 0, 0);
+    ctx.restore();
   }
 }

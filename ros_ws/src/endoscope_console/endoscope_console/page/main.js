@@ -40,13 +40,14 @@ const app = {
   state: null, picture: null, signals: [], modes: [], ceiling: 60, you: null, role: null,
   mine: false, claiming: false, connected: false, everConnected: false, endedHere: '', pictures: 0, picturesLost: 0,
   touch: matchMedia('(pointer: coarse)').matches,
-  whyClosed: '', claimedAt: 0, stateArrived: 0, tab: 'operate',
+  whyClosed: '', whyLost: '', lostAt: -Infinity, claimedAt: 0, stateArrived: 0, tab: 'operate',
   sinceState: () => now() - app.stateArrived,
   stateAge: () => (app.state?.state_age ?? Infinity) + app.sinceState(),
   pictureAge: () => pictureAge(app.picture, now()),
   current: () => app.connected && app.state !== null && app.sinceState() < SILENT_CONSOLE_S,
   sees: () => app.connected && app.pictureAge() < BLIND_S,
   shown: () => app.tab === 'operate' && document.querySelector('dialog[open]') === null,
+  mayRecord: () => app.mine || (app.connected && app.role === 'operator' && !app.state?.lease?.holder),
   show,
   claimed() {
     app.mine = true;
@@ -59,7 +60,10 @@ const app = {
     if (!app.mine) return;
     app.deadMan.letGo(reason || 'given back');
     app.mine = false;
-    if (reason) operate.say(reason);
+    if (reason) {
+      operate.say(reason);
+      [app.whyLost, app.lostAt] = [reason, performance.now()];
+    }
     render();
   },
 };
@@ -163,12 +167,18 @@ telemetry.addEventListener('message', ({ detail }) => {
 });
 for (const socket of [telemetry, command]) {
   socket.addEventListener('refused', ({ detail }) => {
-    write($('token-why'), token ? `The server refused this page: ${detail || 'its key is not known'}. Open the address that it printed when it was started.`
-      : 'Open the address that the command endoscope console printed: it ends with #token= and a key.');
+    write($('token-why'), token ? `The server refused this page: ${detail || 'its key is not known'}. One that was started anew has another key: put the address here that endoscope console has printed.`
+      : 'Put the address here that the command endoscope console has printed: it ends with #token= and a key.');
     if (!$('token').open) $('token').showModal();
   });
 }
 $('token').addEventListener('close', () => {
+  const given = $('token-address').value.trim();
+  if (URL.canParse(given) && /^https?:.*#token=/.test(given)) {
+    // With another key alone the page is loaded anew by its own listener of the hash.
+    location.assign(given);
+    return;
+  }
   telemetry.open();
   command.open();
 });
@@ -253,7 +263,7 @@ for (const name of TABS) {
 }
 
 // The plots have a page of their own only where there is no room beside the view.
-matchMedia('(min-width: 1280px)').addEventListener('change', ({ matches }) => {
+matchMedia('(min-width: 1280px), (max-width: 700px)').addEventListener('change', ({ matches }) => {
   if (matches && app.tab === 'plots') show('operate');
 });
 

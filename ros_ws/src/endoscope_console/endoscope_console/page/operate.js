@@ -3,11 +3,14 @@
 import { SIGN, standing } from './alarms.js';
 import { keysAreTaken } from './dead_man.js';
 import { $, each, make, set, toggle, write } from './elements.js';
-import { inWords, lamp, nameOf, nextStep, played, stateIsFresh } from './guidance.js';
+import { inWords, isCalibrated, lamp, nameOf, nextStep, played, stateIsFresh } from './guidance.js';
 import { HoldButton } from './hold_button.js';
 
 const SCALES = [0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3];
-const ALARMS_SHOWN = 4;
+/** Width in px that an alarm needs to be read, in the one line that they have. */
+const ALARM_PX = 400;
+const LOST_S = 10;
+const CALIBRATE = 3;
 const ANSWER_S = 8;
 const SLIDING_MS = 1000;
 /** Within so long the state tells of a scale that was asked for. */
@@ -88,17 +91,20 @@ export class Operate {
     this._renderLamp();
     this._renderSigns();
     this._renderAlarms();
+    const rests = this._restsAfterFault(fresh);
     const next = nextStep({
-      connected, current: app.current(), role, mine, state, stateAge: age, busy: app.hands.busy, half: app.hands.half, held: app.hands.held,
+      connected, current: app.current(), role, mine, state, stateAge: age, rests, busy: app.hands.busy, half: app.hands.half, held: app.hands.held,
       touch: app.touch, why: app.whyClosed,
     });
     write($('next'), next.text);
     set(document.body, 'data-step', String(next.step));
     for (const item of document.querySelectorAll('#guide li')) {
       const step = Number(item.dataset.step);
-      set(item, 'data-is', step === next.step ? 'now' : step < next.step ? 'done' : 'later');
+      const done = step < next.step && (step !== CALIBRATE || isCalibrated(state));
+      set(item, 'data-is', step === next.step ? 'now' : done ? 'done' : 'later');
     }
-    this._renderOrders(fresh);
+    set(document.body, 'data-ready', String(state?.dead_man?.state === 'READY' && next.step > 0));
+    this._renderOrders(fresh, rests);
     this._renderHand();
     this._renderTube(state ?? {});
     if (this._answered && performance.now() - this._answered > 1000 * ANSWER_S) {
@@ -140,11 +146,12 @@ export class Operate {
     const { app } = this;
     const alarms = standing(app.state?.alarms, {
       connected: app.connected, everConnected: app.everConnected, pictureAge: app.pictureAge(),
-      gamepadLost: app.deadMan?.gamepadLost,
+      gamepadLost: app.deadMan?.gamepadLost, mine: app.mine, lost: performance.now() - app.lostAt < 1000 * LOST_S ? app.whyLost : '',
     });
-    const shown = app.tab === 'see' ? alarms : alarms.slice(0, ALARMS_SHOWN);
+    const room = Math.max(1, Math.floor(window.innerWidth / ALARM_PX));
+    const shown = app.tab === 'see' ? alarms : alarms.slice(0, room);
     if (alarms.length > shown.length) {
-      shown.push({ id: ' more', level: 'low', text: `and ${alarms.length - shown.length} more, see the tab See` });
+      shown.push({ id: ' more', level: 'low', text: `+${alarms.length - shown.length}: tab See` });
     }
     each($('alarms'), shown, (alarm) => `${alarm.id} ${alarm.level}`, (alarm) => {
       const element = make('div', { class: `alarm ${alarm.level}` }, make('span', { class: 'visually-hidden' }, `${SIGN[alarm.level]}: `), make('span', { class: 'text' }));
@@ -157,27 +164,33 @@ export class Operate {
     }, (element, alarm) => {
       const why = inWords(app.state?.dead_man?.reason);
       write(element.querySelector('.text'), alarm.id === 'dead_man' && why ? `The hand was let go of: ${why}.` : alarm.text);
+      set(element, 'title', element.querySelector('.text').textContent);
       const button = element.querySelector('button');
       if (button) toggle(button, 'disabled', app.role !== 'operator');
     });
   }
 
-  _renderOrders(fresh) {
+  /** Whether a FAULT is so young, or its cause so present, that it cannot be left yet. */
+  _restsAfterFault(fresh) {
+    const { state } = this.app;
+    const fault = fresh && state.operating_state === 'FAULT';
+    this._faultSince = fault ? (this._faultSince ?? performance.now()) : null;
+    return fault && (performance.now() - this._faultSince <= 1000 * FAULT_REST_S || Boolean(state.causes?.length));
+  }
+
+  _renderOrders(fresh, rests) {
     const { app } = this;
     const { state, mine } = app;
     const may = mine && app.connected && app.shown();
     const now = fresh ? state.operating_state : null;
     const busy = Boolean(state?.calibration?.running);
-    this._faultSince = now === 'FAULT' ? (this._faultSince ?? performance.now()) : null;
-    const faultOver = now !== 'FAULT'
-      || (performance.now() - this._faultSince > 1000 * FAULT_REST_S && !(state.causes?.length));
     toggle($('pause'), 'disabled', !mine);
     const claim = $('claim');
     const holder = state?.lease?.holder;
     write(claim, mine ? 'Give back' : holder && holder !== app.you ? 'Take over …' : 'Take the controls');
     set(claim, 'class', mine ? '' : 'main');
     toggle(claim, 'disabled', app.claiming || !app.connected || app.role !== 'operator');
-    this._holds.KeyE.enabled = may && now !== null && now !== 'ENABLED' && faultOver;
+    this._holds.KeyE.enabled = may && now !== null && now !== 'ENABLED' && !rests;
     write($('enable').querySelector('span'), now === 'PAUSED' ? 'Resume' : 'Enable');
     this._holds.KeyH.enabled = may && now === 'ENABLED' && !busy;
     this._holds.KeyC.enabled = may && now === 'ENABLED' && !busy;
@@ -225,8 +238,9 @@ export class Operate {
     each(select, modes, (mode) => mode, (mode) => make('option', { value: mode }, mode.replaceAll('_', ' ')), () => {});
     if (document.activeElement !== select && compensator.wanted) select.value = compensator.wanted;
     toggle(select, 'disabled', !mine);
-    set(select, 'title', compensator.mode && compensator.mode !== compensator.wanted ? `in force: ${compensator.mode}` : '');
-    toggle($('record'), 'disabled', !mine);
+    const other = compensator.mode && compensator.mode !== compensator.wanted;
+    write($('compensator-in-force'), other ? `(in force: ${compensator.mode.replaceAll('_', ' ')})` : '');
+    toggle($('record'), 'disabled', !this.app.mayRecord());
     set($('record'), 'aria-pressed', String(Boolean(recorder.recording)));
     write($('record'), recorder.recording ? 'Stop recording' : 'Record');
   }

@@ -13,6 +13,12 @@ export function holding(steps, low, high) {
   return steps.find((step) => step >= most) ?? most;
 }
 
+/** Where an axis that is `room` px high has its ticks: at both ends, and between where there is room. */
+export function ticks(low, high, room) {
+  const parts = room >= 100 ? 4 : room >= 40 ? 2 : 1;
+  return Array.from({ length: parts + 1 }, (_, k) => low + (k * (high - low)) / parts);
+}
+
 const around = (steps) => (_, low, high) => {
   const most = holding(steps, low, high);
   return [-most, most];
@@ -39,14 +45,15 @@ export class Plots {
     this._places = places(signals);
     this._boxes = boxes;
     this._turn = true;
-    const wires = ['wire-x-pos', 'wire-x-neg', 'wire-y-pos', 'wire-y-neg'];
+    // In grey, or to who sees few colours, dashes tell them apart.
+    const wires = [['wire-x-pos', []], ['wire-x-neg', [7, 4]], ['wire-y-pos', [2, 3]], ['wire-y-neg', [9, 3, 2, 3]]];
     // What is wanted lies on top: where both agree, its dashes still show.
     const pair = [['actual', [], true], ['wanted', [6, 4], true]];
     this._plots = [
-      this._plot(boxes[0], pair, around(STEPS_DEG), false),
-      this._plot(boxes[1], pair, around(STEPS_DEG), false),
-      this._plot(boxes[2], [['curve-1', [], false], ['curve-5', [], false]], around(STEPS_ERROR), false),
-      this._plot(boxes[3], wires.map((name) => [name, [], true]), upwards(STEPS_N), true),
+      this._plot(boxes[0], pair, around(STEPS_DEG), 'deg', false),
+      this._plot(boxes[1], pair, around(STEPS_DEG), 'deg', false),
+      this._plot(boxes[2], [['curve-1', [], false], ['curve-5', [5, 3], false]], around(STEPS_ERROR), 'deg', false),
+      this._plot(boxes[3], wires.map(([name, dash]) => [name, dash, true]), upwards(STEPS_N), 'N', true),
     ];
     this._values = boxes.map((box) => [...box.querySelectorAll('[data-value]')]);
     this._sizes = new ResizeObserver(() => this._fit());
@@ -99,8 +106,8 @@ export class Plots {
     });
   }
 
-  /** One plot: `curves` of [colour, dash, whether it comes as min, max, last]. */
-  _plot(box, curves, range, labelled) {
+  /** One plot: `curves` of [colour, dash, whether it comes as min, max, last], their unit, and whether time is told. */
+  _plot(box, curves, range, unit, labelled) {
     const target = box.querySelector('.plot');
     const [line, quiet] = [this._colour('line'), this._colour('quiet')];
     const font = `11px ${this._colour('sans')}`;
@@ -128,11 +135,16 @@ export class Plots {
       scales: { x: { time: false, range: [-SPAN_S, 0] }, y: { range } },
       axes: [
         {
-          stroke: quiet, font, size: labelled ? 22 : 0, gap: 2, space: 80,
+          stroke: quiet, font, size: labelled ? 18 : 0, gap: 2, space: 80,
+          ...(labelled ? { label: 'time', labelFont: font, labelSize: 13, labelGap: -2 } : {}),
           grid: { stroke: line, width: 1 }, ticks: { show: false },
           values: (_, splits) => splits.map((s) => (labelled ? (s === 0 ? 'now' : `${s} s`) : '')),
         },
-        { stroke: quiet, font, size: 40, gap: 4, space: 26, grid: { stroke: line, width: 1 }, ticks: { show: false } },
+        {
+          stroke: quiet, font, size: 34, gap: 4, label: unit, labelFont: font, labelSize: 16, labelGap: 0,
+          splits: ({ bbox }, _, low, high) => ticks(low, high, bbox.height / window.uPlot.pxRatio),
+          grid: { stroke: line, width: 1 }, ticks: { show: false },
+        },
       ],
     }, [[], ...series.slice(1).map(() => [])], target);
   }

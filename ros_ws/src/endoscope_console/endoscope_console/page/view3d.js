@@ -6,6 +6,8 @@ const WANTED = 0.0024;
 const GROUND = -0.005;
 /** Height in px at the foot of the picture that is kept for words. */
 const FOOT = 88;
+/** How far from the wires their tensions are told at least. */
+const LABEL_PX = 78;
 const RINGS_MM = [5, 10, 15];
 const HOME = { azimuth: -0.42, elevation: 0.5, zoom: 1 };
 const WIRES = [
@@ -308,7 +310,11 @@ export class View3d {
     ctx.textBaseline = 'middle';
     WIRES.forEach(({ name, along: [a, b] }, k) => {
       const foot = camera.project([WIRE * a, WIRE * b, GROUND]);
-      const [x, y] = camera.project([0.0088 * a, 0.0088 * b, GROUND]);
+      const end = camera.project([0.0088 * a, 0.0088 * b, GROUND]);
+      // In a small picture too, they leave the section free.
+      const away = Math.max(1, LABEL_PX / Math.hypot(end[0] - foot[0], end[1] - foot[1]));
+      const x = foot[0] + away * (end[0] - foot[0]);
+      const y = Math.min(foot[1] + away * (end[1] - foot[1]), this._height - FOOT - 4);
       ctx.strokeStyle = tensionColour(tensions[k], ceiling, this._tensions);
       ctx.lineWidth = 2;
       ctx.beginPath();

@@ -5,7 +5,7 @@ import { pictureAge, standing } from '../page/alarms.js';
 import { endedForHim, inWords, lamp, nextStep, stateIsFresh } from '../page/guidance.js';
 import { History, Loop } from '../page/history.js';
 import { nearestScale } from '../page/operate.js';
-import { holding, places, scalesOf } from '../page/plots.js';
+import { holding, places, scalesOf, ticks } from '../page/plots.js';
 import { Backoff } from '../page/sockets.js';
 import { Camera, frames, points, tensionColour } from '../page/view3d.js';
 
@@ -28,6 +28,14 @@ test('without a connection only that is said', () => {
   assert.deepEqual(standing([], { ...WELL, connected: false, everConnected: false }), []);
 });
 
+test('who looks on is not told of the hand of another, and an ended graph of nothing else', () => {
+  const said = [{ id: 'dead_man', level: 'medium' }];
+  assert.deepEqual(standing(said, WELL), []);
+  assert.deepEqual(standing(said, { ...WELL, mine: true }).map((a) => a.id), ['dead_man']);
+  assert.deepEqual(standing([], { ...WELL, lost: 'c2 took the controls' }).map((a) => a.text), ['c2 took the controls']);
+  assert.deepEqual(standing([{ id: 'graph', level: 'high' }], { ...WELL, pictureAge: 9 }).map((a) => a.id), ['graph']);
+});
+
 test('age of a picture counts from its newest sample', () => {
   assert.ok(Math.abs(pictureAge({ age: 0.1, arrived: 5 }, 5.25) - 0.35) < 1e-9);
   assert.equal(pictureAge(null, 5), Infinity);
@@ -37,19 +45,23 @@ test('age of a picture counts from its newest sample', () => {
 const base = { connected: true, current: true, role: 'operator', mine: true, stateAge: 0.1, busy: false, half: false, held: false, touch: false };
 const state = (more = {}) => ({ operating_state: 'ENABLED', lease: { holder: '' }, dead_man: { state: 'OPEN', reason: '' }, causes: [], ...more });
 
+const CALIBRATED = { calibration: { result: { class_deg: 30 } } };
+
 test('a stranger is led to the first motion step by step', () => {
   const steps = [
     [{ mine: false }, state({ operating_state: 'DISABLED' }), 1, 'Take the controls'],
     [{ mine: false }, state({ lease: { holder: 'c7', operators: [{ name: 'c7', label: 'operator 7' }] } }), 1, 'operator 7'],
     [{}, state({ operating_state: 'DISABLED' }), 2, 'Hold Enable'],
     [{}, state({ operating_state: 'PAUSED' }), 2, 'Hold Resume'],
-    [{ busy: true }, state(), 3, 'Let go'],
-    [{}, state({ dead_man: { state: 'OPEN', reason: 'blind' } }), 3, 'picture too old'],
-    [{}, state({ dead_man: { state: 'READY', reason: 'released' } }), 4, 'Hold Space and press an arrow'],
-    [{ touch: true }, state({ dead_man: { state: 'READY', reason: '' } }), 4, 'left area'],
-    [{ half: true }, state({ dead_man: { state: 'READY', reason: '' } }), 4, 'together'],
-    [{}, state({ dead_man: { state: 'ENGAGED' } }), 4, 'Following'],
-    [{}, state({ dead_man: { state: 'READY' }, playing: { what: 'file' }, console: { source: 'file' } }), 4, 'the experiment plays'],
+    [{ busy: true }, state(), 4, 'Let go'],
+    [{}, state({ dead_man: { state: 'OPEN', reason: 'blind' } }), 4, 'picture too old'],
+    [{}, state({ dead_man: { state: 'READY', reason: 'released' }, ...CALIBRATED }), 5, 'Hold Space and press an arrow'],
+    [{}, state({ dead_man: { state: 'READY', reason: 'released' } }), 3, 'Hold Calibrate'],
+    [{}, state({ dead_man: { state: 'READY' }, calibration: { result: { class_deg: null } } }), 3, 'Hold Calibrate'],
+    [{ touch: true }, state({ dead_man: { state: 'READY', reason: '' }, ...CALIBRATED }), 5, 'left area'],
+    [{ half: true }, state({ dead_man: { state: 'READY', reason: '' } }), 5, 'together'],
+    [{}, state({ dead_man: { state: 'ENGAGED' } }), 5, 'Following'],
+    [{}, state({ dead_man: { state: 'READY' }, playing: { what: 'file' }, console: { source: 'file' } }), 5, 'the experiment plays'],
   ];
   for (const [more, said, step, words] of steps) {
     const next = nextStep({ ...base, ...more, state: said });
@@ -61,6 +73,7 @@ test('a stranger is led to the first motion step by step', () => {
 test('nothing is promised where nothing can move', () => {
   const cannot = [
     [{ connected: false }, state()], [{ current: false }, state()], [{ role: 'viewer' }, state()], [{ stateAge: 4 }, state()], [{}, null],
+    [{}, state({ graph_ended: true })], [{ rests: true }, state({ operating_state: 'FAULT' })],
     [{}, state({ calibration: { running: true } })], [{}, state({ operating_state: 'FAULT', causes: ['no tracker'] })],
   ];
   for (const [more, said] of cannot) assert.equal(nextStep({ ...base, ...more, state: said }).step, 0);
@@ -141,6 +154,12 @@ test('scales of plots hold all values in steps', () => {
   assert.equal(holding([10, 20, 45], -12, 3), 20);
   assert.equal(holding([10, 20], 0, 70), 70);
   assert.equal(holding([10, 20], null, null), 10);
+});
+
+test('an axis has ticks at both ends, however low it is', () => {
+  assert.deepEqual(ticks(-10, 10, 20), [-10, 10]);
+  assert.deepEqual(ticks(-10, 10, 50), [-10, 0, 10]);
+  assert.deepEqual(ticks(0, 20, 130), [0, 5, 10, 15, 20]);
 });
 
 test('signals are found by the names that hello tells', () => {
