@@ -26,6 +26,7 @@ from endoscope_bags.metadata import (
 )
 from endoscope_bags.qos_profile import QosProfile
 from endoscope_bags.room_on_disk import write_error
+from endoscope_core.atomic_output import make_parent
 
 CHUNK_SECONDS = 0.25
 CHUNK_BYTES = 1 << 20
@@ -105,7 +106,7 @@ class BagWriter:
         hidden = self.path.with_name(f'.partial-{os.getpid()}-{self.path.name}')
         home = hidden if atomic else self.path
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
+            make_parent(self.path)
             if not self._bare:
                 home.mkdir()
         except OSError as error:

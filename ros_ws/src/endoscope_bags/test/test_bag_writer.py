@@ -247,3 +247,12 @@ def test_times_that_do_not_fit_are_refused():
 def test_a_negative_time_is_refused(tmp_path):
     with BagWriter(tmp_path / 'bag') as writer, pytest.raises(MalformedMessageError, match='-3 ns'):
         writer.write_raw('/a', STRING, encode_string('x'), 1, -3)
+
+
+def test_git_ignores_a_folder_of_bags_that_is_made_for_one(tmp_path):
+    (tmp_path / 'mine').mkdir()
+    for folder in ('bags', 'mine', 'other'):
+        with BagWriter(tmp_path / folder / 'bag'):
+            pass
+    assert (tmp_path / 'bags' / '.gitignore').read_text() == '*\n'
+    assert not list(tmp_path.glob('[mo]*/.gitignore'))

@@ -78,6 +78,14 @@ def run_chosen(args: argparse.Namespace, *, dest: str) -> int:
     return int(getattr(args, f'run_{dest}')(args))
 
 
+def finite_number(text: str) -> float:
+    """Read a number for argparse that is neither NaN nor infinite."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
 def add_json_option(parser: argparse.ArgumentParser) -> None:
     """Add `--json` to a command that prints a table; see `print_json`."""
     parser.add_argument(

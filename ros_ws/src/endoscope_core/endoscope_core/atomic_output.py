@@ -130,6 +130,15 @@ def require_free_directory(path: str | Path) -> None:
         ) from error
 
 
+def make_parent(path: Path) -> None:
+    """Make the folder that an output goes to; git ignores a new one that is called `bags`."""
+    folder = path.parent
+    if folder.name == 'bags' and not folder.exists():
+        folder.mkdir(parents=True)
+        (folder / '.gitignore').write_text('*\n', encoding='utf-8')
+    folder.mkdir(parents=True, exist_ok=True)
+
+
 def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
     """Write `text` as UTF-8 to `path`, whole or not at all; errors as in `atomic_file`."""
     with atomic_file(path, overwrite=overwrite) as partial:
@@ -154,7 +163,7 @@ def _named(target: Path) -> Iterator[None]:
 
 
 def _partial_sibling(target: Path) -> Path:
-    target.parent.mkdir(parents=True, exist_ok=True)
+    make_parent(target)
     # The suffix stays last because several writers choose their format by it.
     return target.with_name(f'.partial-{secrets.token_hex(4)}-{target.name}')
 

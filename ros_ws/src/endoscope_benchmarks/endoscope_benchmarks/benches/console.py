@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from endoscope_bringup.subcommands import finite_number
+
 if TYPE_CHECKING:
     from endoscope_benchmarks.console_trials.events import Outcome
     from endoscope_benchmarks.console_trials.hand import Hand
@@ -46,7 +48,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='inputs whose latency is taken (default: %(default)s)',
     )
     parser.add_argument(
-        '--seconds', type=float, default=20.0, help='of each figure of cost (default: %(default)g)'
+        '--seconds',
+        type=finite_number,
+        default=20.0,
+        help='of each figure of cost (default: %(default)g)',
     )
     parser.add_argument(
         '--real-time',

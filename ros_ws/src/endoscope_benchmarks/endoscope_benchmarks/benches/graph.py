@@ -2,6 +2,8 @@
 
 import argparse
 
+from endoscope_bringup.subcommands import finite_number
+
 PROCESS_RATES = (1000, 500, 250, 125)
 
 
@@ -16,13 +18,13 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--seconds',
-        type=float,
+        type=finite_number,
         default=60.0,
         help='length of the run in one process (default: %(default)g)',
     )
     parser.add_argument(
         '--process-seconds',
-        type=float,
+        type=finite_number,
         default=10.0,
         help='length of each run in many processes, 0 for none (default: %(default)g)',
     )

@@ -4,6 +4,8 @@ import argparse
 import time
 from dataclasses import dataclass
 
+from endoscope_bringup.subcommands import finite_number
+
 _STEP_S = 1e-3
 
 
@@ -56,7 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='bits per second (default: %(default)s)',
     )
     parser.add_argument(
-        '--seconds', type=float, default=10.0, help='length of a run (default: %(default)g)'
+        '--seconds', type=finite_number, default=10.0, help='length of a run (default: %(default)g)'
     )
     parser.add_argument('--fast', action='store_true', help='use fast sync read')
 

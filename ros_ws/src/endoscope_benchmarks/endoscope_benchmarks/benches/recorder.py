@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from endoscope_benchmarks.benches.process_cpu import cpu_seconds
+from endoscope_bringup.subcommands import finite_number
 
 TARGET_RATE = 20_000
 TARGET_CPU_SHARE = 0.5
@@ -69,7 +70,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='messages per second (default: %(default)s)',
     )
     parser.add_argument(
-        '--seconds', type=float, default=10.0, help='length of a run (default: %(default)g)'
+        '--seconds', type=finite_number, default=10.0, help='length of a run (default: %(default)g)'
     )
 
 

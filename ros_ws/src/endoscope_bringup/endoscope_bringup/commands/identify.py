@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from endoscope_bringup.seed_argument import seed
+from endoscope_bringup.subcommands import finite_number
 
 if TYPE_CHECKING:
     from endoscope_core.hysteresis.inverse import HysteresisParameters
@@ -61,7 +62,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument('--seed', type=seed, default=0, help='of the search (0)')
     parser.add_argument(
         '--gear',
-        type=float,
+        type=finite_number,
         default=0.5,
         help='motor shaft angle for one radian at the joint (0.5)',
     )
