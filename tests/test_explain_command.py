@@ -197,7 +197,7 @@ def test_a_wrong_key_of_the_plant_is_named_with_the_nearest(rig, tmp_path, capsy
 
 
 def test_one_bad_bag_among_good_ones_is_refused_before_any_work(rig, tmp_path, capsys):
-    bad = write_short_bag(tmp_path / 'bad', leave_out='wires/measured_js')
+    bad = write_short_bag(tmp_path / 'bad', leave_out='slave/measured_js')
     message = refused(capsys, rig, tmp_path / 'out', rig / 'sound', bad)
     assert 'bad' in message
 

@@ -164,13 +164,22 @@ def _counted(silences: int, seconds: float) -> str:
     return f'{silences} ({seconds:.3f} s)' if silences else '0'
 
 
+def losses_told(recording: Recording) -> dict[str, int]:
+    """Messages that were published and not recorded by topic, of topics whose recorder counted."""
+    return {
+        key.removeprefix(LOST_PREFIX): int(text)
+        for key, text in recording.metadata.get(METADATA_RECORD, {}).items()
+        if key.startswith(LOST_PREFIX) and _NUMBER.fullmatch(text)
+    }
+
+
 def bag_information(recording: Recording) -> BagInformation:
     """Look through a recording that was opened with `open_bag`."""
-    notes = dict(recording.metadata.get(METADATA_RECORD, {}))
-    lost = {
-        key.removeprefix(LOST_PREFIX): int(notes.pop(key))
-        for key in list(notes)
-        if key.startswith(LOST_PREFIX) and _NUMBER.fullmatch(notes[key])
+    lost = losses_told(recording)
+    notes = {
+        key: text
+        for key, text in recording.metadata.get(METADATA_RECORD, {}).items()
+        if key.removeprefix(LOST_PREFIX) not in lost
     }
     names = sorted(recording.topics)
     stamped = [n for n in names if begins_with_header(recording.topics[n].definition)]

@@ -8,6 +8,7 @@ BENCHES: tuple[str, ...] = (
     'concealed',
     'criteria',
     'mistakes',
+    'recordings',
     'limits',
     'real',
     'peers',

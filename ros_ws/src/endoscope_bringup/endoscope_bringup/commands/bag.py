@@ -1,4 +1,4 @@
-"""`endoscope bag`: what is in a recording, and saving a damaged one."""
+"""`endoscope bag`: what is in a recording, a stretch of it, and saving a damaged one."""
 
 import argparse
 from pathlib import Path
@@ -7,8 +7,8 @@ from endoscope_bringup.subcommands import add_json_option, print_json
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
-    """Add `bag` with `info` and `recover`."""
-    parser = subparsers.add_parser('bag', help='look into a recording, or save a damaged one')
+    """Add `bag` with `info`, `cut` and `recover`."""
+    parser = subparsers.add_parser('bag', help='look into a recording, cut it, save a damaged one')
     actions = parser.add_subparsers(dest='action', metavar='ACTION', required=True)
     info = actions.add_parser(
         'info',
@@ -21,6 +21,29 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     info.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder, .mcap or .db3 file')
     add_json_option(info)
+    cut = actions.add_parser(
+        'cut',
+        help='write a stretch of a recording to a new one',
+        description='Writes what was received from one time to another. Of latched topics the last '
+        'message before comes first, so that what was in force is known.',
+    )
+    cut.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder, .mcap or .db3 file')
+    cut.add_argument(
+        '--from',
+        dest='begin',
+        type=float,
+        default=0.0,
+        metavar='S',
+        help='in s from the first receipt (0)',
+    )
+    cut.add_argument(
+        '--to',
+        dest='end',
+        type=float,
+        metavar='S',
+        help='in s from the first receipt (the end)',
+    )
+    cut.add_argument('--out', metavar='BAG2', type=Path, required=True, help='the new recording')
     recover = actions.add_parser(
         'recover',
         help='write the sound part of a damaged recording to a new one',
@@ -31,7 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what was found or saved; return 0."""
+    """Print what was found or written; return 0."""
     if args.action == 'info':
         from endoscope_bags import open_bag
         from endoscope_bags.information import bag_information
@@ -41,6 +64,10 @@ def run(args: argparse.Namespace) -> int:
             print_json(information.as_json())
         else:
             print(information)
+    elif args.action == 'cut':
+        from endoscope_bags.cutting import cut
+
+        print(cut(args.bag, args.out, args.begin, args.end))
     else:
         from endoscope_bags.recovery import recover
 

@@ -56,7 +56,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         action='append',
         default=[],
         metavar='TOPIC',
-        choices=['motor/measured_js'],
+        choices=['motor/measured_js', 'wires/measured_js'],
         help='a topic that may be missing',
     )
     parser.add_argument(

@@ -147,11 +147,8 @@ def settle(
         That of all ticks to come, s.
     """
     x[:] = 0.0
-    for i in _SHAFT_ANGLES:
-        x[i] = shaft
     a11, a12, a21, a22 = transition(p[MOTOR_BANDWIDTH], p[MOTOR_DAMPING_RATIO], tick)
     x[TRANSITION], x[TRANSITION + 1], x[TRANSITION + 2], x[TRANSITION + 3] = a11, a12, a21, a22
-    history[COMMAND_HISTORY, :] = shaft
     _lay_out(sheath, p)
     x[FLOOR] = friction_floor(on, p, x)
     # Friction that depends on the tension has to be known before the tension is.
@@ -168,11 +165,31 @@ def settle(
         relax(x, wire, table, sheath[WORK : WORK + 3])
     x[REST_TENSION] = mean_tension(x, WIRE_A, table) - x[FLOOR]
     x[LAGGED_LOAD] = x[LAGGED_LOAD + 1] = x[REST_TENSION]
-    steps = _STEPS_TO_START if shaft != 0.0 else 1
+    turn_to(x, history, sheath, p, on, shaft)
+
+
+@compiled
+def turn_to(x: Array, history: Array, sheath: Array, p: Array, on: Flags, shaft: float) -> None:
+    """Turn the motor of a joint at rest to `shaft`, so slowly that nothing but friction remembers.
+
+    Parameters
+    ----------
+    x, history, sheath : array (states,), array (2, HISTORY), array (SHEATH_ROWS, CELLS + 1)
+        As `settle` leaves them; written.
+    p, on : array (parameters,), array (flags,) of bool
+    shaft : float
+        Rad.
+    """
+    table = sheath[:TABLE_ROWS]
+    begin = x[MOTOR]
+    for i in _SHAFT_ANGLES:
+        x[i] = shaft
+    history[COMMAND_HISTORY, :] = shaft
+    steps = _STEPS_TO_START if shaft != begin else 1
     for k in range(1, steps + 1):
         if length_varies(on) or (functions_act(on) and length_has_some(on)):
             _grow(x, table, p, on, 0.0)
-        x[MOTOR] = shaft * k / steps
+        x[MOTOR] = begin + (shaft - begin) * k / steps
         _wind_up(x, table, p, on, x[MOTOR])
         bend(x, table, p, on, 0.0, 0.0, -0.5 * _SETTLING_TICK, _SETTLING_TICK)
         if functions_act(on) and functions_follow(on):

@@ -17,7 +17,7 @@ from endoscope_core.physics.effects import CATALOGUE, describe
 from endoscope_core.physics.functions import FUNCTIONS, describe_place
 from endoscope_core.physics.functions.acting import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
 from endoscope_core.physics.functions.term import tabulated
-from endoscope_core.physics.kernel import settle
+from endoscope_core.physics.kernel import settle, turn_to
 from endoscope_core.physics.layout import (
     CELLS,
     FRICTION_PROFILE,
@@ -144,9 +144,9 @@ def rest_state(
         From `pack`.
     tick : float
         In s.
-    shaft : array (J,), optional
-        Shaft angle in rad to which each motor has gone since the wires were tightened at zero; zero
-        if not given.
+    shaft : array (J,) or (J, K), optional
+        Shaft angle in rad to which each motor has gone since the wires were tightened at zero, or
+        K angles to which it has gone one after the other; zero if not given.
 
     Returns
     -------
@@ -158,7 +158,10 @@ def rest_state(
     states = np.zeros((joints, SLOTS.states))
     histories = np.zeros((joints, 2, HISTORY))
     sheaths = np.zeros((joints, SHEATH_ROWS, CELLS + 1))
+    way = np.zeros((joints, 1)) if shaft is None else np.reshape(shaft, (joints, -1))
     for j in range(joints):
-        start = 0.0 if shaft is None else float(shaft[j])
-        settle(states[j], histories[j], sheaths[j], parameters[j], on[j], start, tick)
+        joint = (states[j], histories[j], sheaths[j], parameters[j], on[j])
+        settle(*joint, way[j, 0], tick)
+        for angle in way[j, 1:]:
+            turn_to(*joint, angle)
     return states, histories, sheaths

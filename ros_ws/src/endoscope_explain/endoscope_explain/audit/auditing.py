@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from endoscope_core.physics.description import PlantDescription, SensorParameters
+from endoscope_explain.audit.earlier_motion import with_state_at_start
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
 from endoscope_explain.audit.held_pose import with_held_poses
 from endoscope_explain.audit.held_samples import held, held_before_jump, held_findings
@@ -20,7 +21,9 @@ from endoscope_explain.audit.saturation import clipped, saturation_finding
 from endoscope_explain.audit.stamps import (
     find_gaps,
     gap_findings,
+    missing_in,
     order_stamps,
+    silence_findings,
     usual_interval,
 )
 from endoscope_explain.audit.standing_still import (
@@ -31,6 +34,7 @@ from endoscope_explain.audit.standing_still import (
 )
 from endoscope_explain.audit.time_unit import in_seconds, stamp_unit_findings
 from endoscope_explain.recording import Recording, Series
+from endoscope_explain.recording.series import WIRES
 from endoscope_explain.recording.signals import gear, signal_name
 
 LEAST_DURATION_S = 2.0
@@ -71,6 +75,7 @@ def audit_recording(recording: Recording, plant: PlantDescription) -> AuditRepor
         tension=_audited_tension(recording, plant.sensors, findings, noisy),
         bending=_audited_bending(recording, plant, findings, noisy),
     )
+    recording = with_state_at_start(recording, plant, findings)
     order = {Severity.FAULT: 0, Severity.NOTE: 1}
     findings.sort(key=lambda f: order[f.severity])
     return AuditReport(recording, tuple(findings))
@@ -133,13 +138,16 @@ def _without_commandless_times(recording: Recording, findings: list[Finding]) ->
     # A command is in force until the next one: a console that pauses, or whose clutch is released,
     # leaves nothing out. Only where the command has moved on meanwhile some of it is missing, and
     # not even there if the motors have rested: then it began anew from another pose.
+    lost = missing_in(recording.command, gaps[recording.command.topic])
     blind = [
         (a, b)
-        for a, b in _unknown_command(recording.command, gaps[recording.command.topic], end)
+        for a, b in _unknown_command(recording.command, lost, end)
         if not _rests(recording.shaft_position, a + SETTLING_S, b)
     ]
     gaps[recording.command.topic] = tuple(blind)
-    findings += gap_findings(gaps, intervals, recording.joints[0])
+    missing = {topic: missing_in(every[topic], found) for topic, found in gaps.items()}
+    findings += gap_findings(missing, intervals, recording.joints[0])
+    findings += silence_findings(gaps, missing, recording.joints[0])
     if not blind:
         return recording
     changed = {}
@@ -197,8 +205,11 @@ def _audited_motor(
 
 def _audited_tension(
     recording: Recording, sensors: SensorParameters, findings: list[Finding], noisy: bool
-) -> Series:
+) -> Series | None:
     series = recording.tension
+    if series is None:
+        findings.append(_no_load_cells(recording))
+        return None
     interval = usual_interval(series.time)
     wrong = np.zeros(series.valid.shape, bool)
     for j, joint in enumerate(recording.joints):
@@ -228,6 +239,22 @@ def _audited_tension(
             findings += held_findings(joint, signal, series.time, repeated)
             wrong[:, j, wire] = at_limit | repeated
     return series.without(wrong)
+
+
+def _no_load_cells(recording: Recording) -> Finding:
+    torque = recording.shaft_effort is not None
+    beside = 'the torque of the motor alone tells' if torque else 'nothing tells'
+    return Finding(
+        'no_load_cells',
+        Severity.NOTE,
+        recording.joints[0],
+        'recording',
+        (WIRES,),
+        ((0.0, recording.duration),),
+        f'{WIRES} was not recorded: {beside} what acts in the sheaths from what acts in the joint, '
+        'and pretension from friction',
+        'an effect of one of them may be named for one of the other, and no load cell is judged',
+    )
 
 
 def _audited_bending(

@@ -107,6 +107,46 @@ def find_gaps(series: Series, start: float, end: float) -> tuple[tuple[float, fl
     return tuple(gaps)
 
 
+def missing_in(
+    series: Series, gaps: tuple[tuple[float, float], ...]
+) -> tuple[tuple[float, float], ...]:
+    """Gaps in which samples were lost, or may have been: a source may also have paused."""
+    if series.lost is None:
+        return gaps
+    after = np.searchsorted(series.time, [b for _, b in gaps])
+    # What ends early or begins late has lost nothing that is known of.
+    lost = np.append(series.lost, 0)[np.where(after > 0, after, len(series.lost))]
+    return tuple(gap for gap, count in zip(gaps, lost, strict=True) if count)
+
+
+def silence_findings(
+    gaps: dict[str, tuple[tuple[float, float], ...]],
+    missing: dict[str, tuple[tuple[float, float], ...]],
+    joint: str,
+) -> list[Finding]:
+    """Note where topics were silent although nothing was lost."""
+    silent = {t: [gap for gap in found if gap not in missing[t]] for t, found in gaps.items()}
+    every = sorted(gap for found in silent.values() for gap in found)
+    if not every:
+        return []
+    topics = tuple(topic for topic, found in silent.items() if found)
+    longest = max(b - a for a, b in every)
+    return [
+        Finding(
+            'source_paused',
+            Severity.NOTE,
+            joint,
+            'recording',
+            topics,
+            tuple(every),
+            f'{", ".join(topics)} paused ({len(every)} times, up to {longest:.3f} s): nothing was '
+            'lost',
+            'nothing is judged where there are no samples',
+            evidence={'count': float(len(every)), 'longest_s': longest},
+        )
+    ]
+
+
 def gap_findings(
     gaps_by_topic: dict[str, tuple[tuple[float, float], ...]],
     intervals: dict[str, float],

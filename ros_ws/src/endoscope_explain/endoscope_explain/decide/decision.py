@@ -132,6 +132,9 @@ def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
     best_other = max((level.gain(each) for each in others), default=0.0)
     if formula is not None and formula is not best:
         formula = replace(formula, fit=with_form(formula.fit, jobs))
+        if may_be_absent(formula.fit, formula.terms[-1].term):
+            # The function is there; the effect whose formula comes nearest may not be.
+            name, formula = last.id, None
     return MissingTerm(
         last, name, alternatives, gain, max(best_other, 0.0) / gain, level.p_value, formula
     )

@@ -36,6 +36,7 @@ def imagine(plant: PlantDescription, waveform: Waveform) -> Recording:
 
 def is_safe(recording: Recording, tension_limit: float, bending_limit: float) -> bool:
     """Tell whether an imagined motion stays within a tension in N and an angle in rad."""
+    assert recording.tension is not None
     return bool(
         recording.tension.values.max() <= tension_limit
         and np.abs(recording.bending.values).max() <= bending_limit

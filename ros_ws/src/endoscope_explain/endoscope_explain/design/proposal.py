@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.decide.conclusions import spec_of
@@ -58,6 +59,8 @@ def propose(
 
     def smallest(waveform: Waveform) -> float:
         imagined = {name: imagine(p, waveform) for name, p in plants.items()}
+        if recording.tension is None:
+            imagined = {name: replace(r, tension=None) for name, r in imagined.items()}
         return min(
             distance(imagined[a], plants[b], effect.joint) for a, b in permutations(plants, 2)
         )
@@ -110,7 +113,9 @@ def safe_family(
     """List motions that keep every rival within what the rig has been through."""
     j = recording.joints.index(joint)
     reach = float(np.abs(recording.command.values[:, j]).max()) / gear()
-    tension = MARGIN * float(recording.tension.values[recording.tension.valid].max())
+    tension = shipped_rig().tension.calibration_ceiling
+    if recording.tension is not None:
+        tension = MARGIN * float(recording.tension.values[recording.tension.valid].max())
     bending = MARGIN * float(np.abs(recording.bending.values[recording.bending.valid]).max())
     others = tuple(name for name in recording.joints if name != joint)
     safe: list[Waveform] = []

@@ -42,7 +42,7 @@ def simulate_joint(
     """
     inputs = observation.inputs if inputs is None else inputs
     packed, on = parameters[None], flags[None]
-    at_rest = rest_state(packed, on, observation.tick, np.array([observation.start]))
+    at_rest = rest_state(packed, on, observation.tick, observation.start[None])
     out = np.empty((1, inputs.shape[1], OUTPUTS))
     run_joints(*at_rest, packed, on, inputs, False, observation.tick, out)
     return out[0]

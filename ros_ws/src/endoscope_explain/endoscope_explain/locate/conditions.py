@@ -35,8 +35,6 @@ def conditions(recording: Recording, j: int) -> dict[str, Mask]:
     motor = _motor(recording, j, grid)
     speed = _speed(motor)
     bending = np.interp(grid, recording.bending.time, _smoothed(recording.bending.values[:, j], 5))
-    tension = recording.tension.values[:, j].sum(axis=1)
-    tension = np.interp(grid, recording.tension.time, tension)
     moving = np.abs(speed) > STANDING_RAD_PER_S
     found = {
         'in holds': _lasting(~moving, 0.2),
@@ -59,8 +57,11 @@ def conditions(recording: Recording, j: int) -> dict[str, Mask]:
         found.setdefault(f'below -{degrees} of bending', bending < -level)
     within = 0.2 * largest
     found[f'within {np.degrees(within):.0f} deg of straight'] = np.abs(bending) < within
-    high = float(np.quantile(tension, 0.75))
-    found[f'where the wires carry more than {high:.1f} N'] = tension > high
+    if recording.tension is not None:
+        carried = recording.tension.values[:, j].sum(axis=1)
+        tension = np.interp(grid, recording.tension.time, carried)
+        high = float(np.quantile(tension, 0.75))
+        found[f'where the wires carry more than {high:.1f} N'] = tension > high
     for other, name in enumerate(recording.joints):
         if other != j:
             its_speed = _speed(_motor(recording, other, grid))

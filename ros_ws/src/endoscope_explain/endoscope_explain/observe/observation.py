@@ -79,8 +79,8 @@ class JointObservation:
     joint : str
     inputs : array (1, N, INPUTS)
         Input of the compiled physics on ticks.
-    start : float
-        Shaft angle in rad at which the motor rests at first.
+    start : array (K,)
+        Shaft angles in rad to which the motor has gone one after the other; it rests at the last.
     channels : tuple of Channel
     tick : float
         In s.
@@ -88,7 +88,7 @@ class JointObservation:
 
     joint: str
     inputs: Array
-    start: float
+    start: Array
     channels: tuple[Channel, ...]
     tick: float = TICK
 
@@ -152,7 +152,7 @@ def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObserva
         inputs[0, :, IN_COMMAND] = held[:, j]
         inputs[0, :, IN_MOTOR] = np.nan
         channels = _channels(recording, j, joint, plant.sensors, begin, ticks)
-        start = float(inputs[0, 0, IN_COMMAND])
+        start = inputs[0, :1, IN_COMMAND] if recording.start is None else recording.start[j]
         joints.append(JointObservation(joint, inputs, start, channels))
     return tuple(joints)
 
@@ -195,6 +195,7 @@ def _channels(
                 sqrt(white**2 + (step**2 / 12.0 if dithered else 0.0)),
                 0.0 if dithered else step / sqrt(12.0),
                 quantity == 'tension',
+                recording.timing,
             )
         )
     return tuple(channels)
@@ -220,6 +221,7 @@ def _channel(
     white: float,
     rounding: float,
     may_chatter: bool,
+    timing: float,
 ) -> Channel:
     place = time / TICK
     # Stamps on a tick, to the nanosecond, take the tick's own row.
@@ -236,13 +238,18 @@ def _channel(
     if may_chatter:
         scatter = np.add.reduceat(fast_scatter(values, white), first) / count
         noise = np.sqrt(noise**2 + scatter**2 / count)
+    mean_time = np.add.reduceat(time, first) / count
+    mean = np.add.reduceat(values, first) / count
+    if timing > 0.0 and len(mean) > 1:
+        # What comes earlier or later than is known differs by as much as it changes meanwhile.
+        noise = np.hypot(noise, timing * np.gradient(mean, mean_time))
     return Channel(
         signal,
         quantity,
         QUANTITY_UNITS[quantity],
         output,
         StampsOnTicks(tick, place - tick, first, count),
-        np.add.reduceat(time, first) / count,
-        np.add.reduceat(values, first) / count,
+        mean_time,
+        mean,
         noise,
     )

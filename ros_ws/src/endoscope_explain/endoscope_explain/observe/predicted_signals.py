@@ -104,7 +104,7 @@ def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescrip
     """
     parameters, flags = packed_rig(observations, plant)
     inputs = np.concatenate([o.inputs for o in observations])
-    start = np.array([o.start for o in observations])
+    start = np.stack([o.start for o in observations])
     at_rest = rest_state(parameters, flags, TICK, start)
     out = np.empty((len(observations), inputs.shape[1], OUTPUTS))
     run_joints(*at_rest, parameters, flags, inputs, len(observations) > 1, TICK, out)

@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from endoscope_bags.errors import BagError, MissingJointError, MissingTopicError
+from endoscope_bags.information import losses_told
 from endoscope_bags.joint_state_series import JointStateSeries
 from endoscope_bags.recording import Recording as Bag
 from endoscope_bags.recording import open_bag
+from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_core.physics.description import PlantDescription
+from endoscope_explain.recording.in_force import goals_in_force
 from endoscope_explain.recording.series import (
     BENDING,
     COMMAND,
@@ -23,8 +26,10 @@ from endoscope_explain.recording.series import (
 from endoscope_explain.recording.signals import gear, motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_common_time, without_stray
 
-WAIVABLE = (MOTOR,)
+WAIVABLE = (MOTOR, WIRES)
 """Topics that analysis can do without where the caller says so."""
+OPTIONAL = (WIRES,)
+"""Those of them that many rigs do not have: nobody has to say so."""
 
 
 class TooShortError(BagError):
@@ -65,7 +70,7 @@ def recording_from_bag(
     bag = open_bag(path)
     lacking = [t for t in (WIRES, BENDING, MOTOR) if not bag.has(t, namespace)]
     lacking += [] if bag.has(COMMAND, namespace) or bag.has(DESIRED, namespace) else [COMMAND]
-    fatal = [t for t in lacking if t not in without]
+    fatal = [t for t in lacking if t not in without and t not in OPTIONAL]
     if fatal:
         raise MissingTopicError(_lacking_message(bag, fatal))
     notes = [f'{t} was not recorded' for t in lacking]
@@ -86,14 +91,15 @@ def recording_from_bag(
         command = read(DESIRED, 'position')
         command_names = {j: j for j in plant.joints}
         notes.append(f'{COMMAND} was not recorded: {DESIRED} times the gear is taken for it')
-    wires, bending = read(WIRES, 'effort'), read(BENDING, 'position')
+    bending = read(BENDING, 'position')
+    wires = None if WIRES in lacking else read(WIRES, 'effort')
     motor = None if MOTOR in lacking else read(MOTOR, 'position')
 
     has = {
         joint: [
             (command, [command_names[joint]]),
-            (wires, list(wire_names(joint))),
             (bending, [joint]),
+            *([] if wires is None else [(wires, list(wire_names(joint)))]),
             *([] if motor is None else [(motor, [motor_name(joint)])]),
         ]
         for joint in plant.joints
@@ -110,6 +116,13 @@ def recording_from_bag(
 
     every = [s for s in (command, wires, bending, motor) if s is not None]
     require_common_time(path, every)
+    timing = 0.0
+    if motor is not None and bag.has(COMMAND, namespace):
+        in_force = goals_in_force(bag, command, motor, namespace)
+        if in_force is not None:
+            command, timing, told = in_force
+            notes.append(told)
+    counted = losses_told(bag)
     origin_ns = min(int(s.stamp_ns.min()) for s in every)
 
     def series(topic: str, source: JointStateSeries, names: Sequence[str], key: str) -> Series:
@@ -119,7 +132,12 @@ def recording_from_bag(
         if key == 'effort' and topic == WIRES:
             values = values.reshape(len(values), len(joints), 2)
         received = np.asarray((chosen.log_ns - origin_ns) * 1e-9, dtype=np.float64)
-        return Series.of(topic, time, np.ascontiguousarray(values), received)
+        lost = None
+        if source.topic in counted:
+            gaps = SequenceGaps()
+            lost = np.array([gaps.add(n) for n in source.sequence.tolist()], dtype=np.int64)
+        made = Series.of(topic, time, np.ascontiguousarray(values), received)
+        return replace(made, lost=lost)
 
     shaft = series(command.topic, command, [command_names[j] for j in joints], 'position')
     if not bag.has(COMMAND, namespace):
@@ -140,12 +158,13 @@ def recording_from_bag(
         origin=origin_ns * 1e-9,
         joints=tuple(joints),
         command=shaft,
-        tension=series(WIRES, wires, wire_list, 'effort'),
+        tension=None if wires is None else series(WIRES, wires, wire_list, 'effort'),
         bending=series(BENDING, bending, joints, 'position'),
         shaft_position=motors['position'],
         shaft_velocity=motors['velocity'],
         shaft_effort=motors['effort'],
         notes=tuple(notes),
+        timing=timing,
     )
 
 

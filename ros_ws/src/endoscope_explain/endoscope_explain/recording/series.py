@@ -34,6 +34,9 @@ class Series:
     received : array (N,) or None
         When each sample was received, by the recorder's clock, in s from the recording's first
         stamp.
+    lost : array (N,) of int or None
+        Messages that were published and not recorded directly before each sample; None where the
+        recorder does not tell.
     """
 
     topic: str
@@ -41,6 +44,7 @@ class Series:
     values: Array
     valid: Mask
     received: Array | None = None
+    lost: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         if len(self.time) != len(self.values) or self.valid.shape != self.values.shape:
@@ -59,6 +63,7 @@ class Series:
             values=self.values[index],
             valid=self.valid[index],
             received=None if self.received is None else self.received[index],
+            lost=None if self.lost is None else self.lost[index],
         )
 
     def without(self, wrong: Mask) -> 'Series':
@@ -80,26 +85,33 @@ class Recording:
         Joints in the order of every series' columns.
     command : Series
         Motor shaft command in rad, each in force from its stamp until the next one.
-    tension : Series
-        Load cells in N, values (N, J, 2): positive, negative wire.
+    tension : Series or None
+        Load cells in N, values (N, J, 2): positive, negative wire; None on a rig without them.
     bending : Series
         Bending angle in rad from the tracker.
     shaft_position, shaft_velocity, shaft_effort : Series or None
         Motor shaft in rad, rad/s, N m; None where not recorded.
     notes : tuple of str
         What is missing or was taken from elsewhere, in words.
+    start : array (J, K) or None
+        Shaft angles in rad to which each motor had gone, one after the other, when the recording
+        began; the first command alone where None.
+    timing : float
+        By how much (rms, s) it is unknown when what was commanded took effect.
     """
 
     name: str
     origin: float
     joints: tuple[str, ...]
     command: Series
-    tension: Series
+    tension: Series | None
     bending: Series
     shaft_position: Series | None = None
     shaft_velocity: Series | None = None
     shaft_effort: Series | None = None
     notes: tuple[str, ...] = field(default=())
+    start: Array | None = None
+    timing: float = 0.0
 
     def measured(self) -> dict[str, Series]:
         """Return the recorded measured series by their name in this class."""

@@ -1,0 +1,111 @@
+"""Writes a stretch of a recording to a new one, with what was in force when it began."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from endoscope_bags.bag_writer import BagWriter
+from endoscope_bags.errors import BagError
+from endoscope_bags.information import LOST_PREFIX, losses_told
+from endoscope_bags.message_types import MessageType
+from endoscope_bags.recording import open_bag
+from endoscope_bags.sequence_gaps import SequenceGaps
+from endoscope_bags.topic import RawMessage
+from endoscope_core.errors import printable
+
+
+class NoSuchStretchError(BagError, ValueError):
+    """A stretch that a recording does not have."""
+
+
+@dataclass(frozen=True)
+class CutReport:
+    """What `cut` wrote.
+
+    Attributes
+    ----------
+    message_count
+        Messages of the stretch.
+    latched
+        Topics whose last message before the stretch is kept at its beginning.
+    seconds
+        Length of the stretch.
+    """
+
+    message_count: int
+    latched: tuple[str, ...]
+    seconds: float
+
+    def __str__(self) -> str:
+        text = f'{self.message_count} messages over {self.seconds:.3f} s'
+        if self.latched:
+            text += f'; in force at its beginning: {", ".join(self.latched)}'
+        return printable(text)
+
+
+def cut(source: str | Path, target: str | Path, begin: float, end: float | None) -> CutReport:
+    """Write the messages that were received in a stretch of a recording to a new one.
+
+    Of latched topics, the last message before the stretch comes first, as a subscriber who joined
+    then would have heard it; its receipt is the beginning of the stretch.
+
+    Parameters
+    ----------
+    source
+        rosbag2 folder, ``.mcap`` or ``.db3`` file. It is not changed.
+    target
+        The new recording, a folder or ``.mcap`` file; must not exist.
+    begin, end
+        In s from the first receipt; `end` may be None for all that follows.
+
+    Raises
+    ------
+    NoSuchStretchError
+        The stretch is empty, or not within the recording.
+    BagError
+        `source` cannot be read, or `target` exists or cannot be written.
+    """
+    recording = open_bag(source)
+    length = (recording.end_ns - recording.start_ns) * 1e-9
+    last = length if end is None else end
+    if not 0.0 <= begin < last or begin > length:
+        raise NoSuchStretchError(
+            f'{source}: has no stretch from {begin:g} to {last:g} s; it is {length:.3f} s long'
+        )
+    first_ns = recording.start_ns + round(begin * 1e9)
+    last_ns = recording.end_ns if end is None else recording.start_ns + round(last * 1e9)
+    latched = {
+        name
+        for name, topic in recording.topics.items()
+        if topic.qos and all(q.durability == 'transient_local' for q in topic.qos)
+    }
+    in_force: dict[str, RawMessage] = {}
+    with BagWriter(target) as writer:
+        for topic in recording.topics.values():
+            kind = MessageType(topic.type, topic.definition, topic.type_hash)
+            writer.add_topic(topic.name, kind, topic.qos)
+
+        def write(message: RawMessage, log_ns: int) -> None:
+            kind = recording.topics[message.topic].type
+            times = (log_ns, message.publish_ns, message.sequence)
+            writer.write_raw(message.topic, kind, message.data, *times)
+
+        for message in recording.messages(sorted(latched)):
+            if message.log_ns < first_ns:
+                in_force[message.topic] = message
+        for message in in_force.values():
+            write(message, first_ns)
+        numbers = {topic: SequenceGaps() for topic in losses_told(recording)}
+        for message in recording.messages():
+            if first_ns <= message.log_ns <= last_ns:
+                write(message, message.log_ns)
+                if message.topic in numbers:
+                    numbers[message.topic].add(message.sequence)
+        count = writer.message_count - len(in_force)
+        if not count:
+            raise NoSuchStretchError(
+                f'{source}: no message was received from {begin:g} to {last:g} s'
+            )
+        lost = {f'{LOST_PREFIX}{topic}': str(gaps.lost) for topic, gaps in numbers.items()}
+        writer.close({'cut_from': Path(source).name, **lost})
+        seconds = (min(last_ns, recording.end_ns) - first_ns) * 1e-9
+    return CutReport(count, tuple(sorted(in_force)), seconds)

@@ -1,0 +1,1 @@
+"""Recordings of the simulated slave through the live graph, explained with its own plant."""

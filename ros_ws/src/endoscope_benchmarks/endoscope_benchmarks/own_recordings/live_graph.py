@@ -1,0 +1,138 @@
+"""The whole graph in this process, an operator at its topics, and a hand at its handle."""
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.task import Future
+
+from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.errors import EndoscopeError
+from endoscope_nodes.conductor_node import ConductorNode
+from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
+from endoscope_nodes.graph_client import GraphClient
+from endoscope_nodes.graph_parameters import set_parameters
+from endoscope_nodes.handle_sender import HandleSender
+from endoscope_nodes.names import MOTOR_MEASURED
+from endoscope_nodes.recorder_node import RecorderNode
+from endoscope_nodes.runtime import FOREVER_S, Runtime
+
+PATIENCE_S = 60.0
+POLL_S = 0.05
+RATE = {True: 500, False: 1000}
+"""Beats a second in lock-step and in real time."""
+
+
+class LiveGraph(ClosedOnExit):
+    """All nodes, recorder included, in this process.
+
+    Parameters
+    ----------
+    bag
+        Where the recording goes; it lasts from the beginning to :meth:`stop`.
+    domain
+        ROS domain of the graph.
+    lock_step
+        Whether simulated time goes on as the nodes follow, or the wall clock gives the time.
+    overrides
+        Parameter values by node name.
+    """
+
+    def __init__(
+        self,
+        bag: Path,
+        domain: int,
+        *,
+        lock_step: bool,
+        overrides: dict[str, dict[str, object]],
+    ) -> None:
+        given = overrides | {'recorder': {'bag': str(bag)}}
+        if lock_step:
+            # Load cells may fall silent.
+            given['conductor'] = {'timeout': PATIENCE_S, 'wait_for': [MOTOR_MEASURED]}
+        arguments = ['--ros-args', '--log-level', 'fatal']
+        arguments += ['-p', f'use_sim_time:={str(lock_step).lower()}']
+        arguments += ['-p', f'tick_rate:={RATE[lock_step]}']
+        self._runtime = Runtime(arguments, Context(), domain, given)
+        try:
+            for factory in (*SLAVE_NODES, *CONTROL_NODES):
+                self._runtime.add(factory)
+            self._recorder = self._runtime.add(RecorderNode)
+            self.node = self._runtime.add(lambda runtime: EndoscopeNode('operator', runtime))
+            self.client = GraphClient(self.node, self.advance, self.now)
+            self._conductor = self._runtime.add(ConductorNode) if lock_step else None
+            self._runtime.prepare()
+            self._connect()
+        except BaseException:
+            self._runtime.close()
+            raise
+
+    def _connect(self) -> None:
+        limit = time.monotonic() + PATIENCE_S
+        while not (self.client.is_connected() and self._runtime.connected()):
+            if time.monotonic() > limit:
+                raise EndoscopeError('the nodes do not find each other: is multicast allowed?')
+            self._runtime.spin_until(Future(), POLL_S)
+        self.advance(0.5)
+
+    def now(self) -> float:
+        """Time of the graph in s."""
+        return self.node.ticker.now_ns() * 1e-9
+
+    def advance(self, seconds: float) -> None:
+        """Let time go on."""
+        if self._conductor is None:
+            self._runtime.spin_until(Future(), seconds)
+            return
+        done = self._conductor.advance(seconds)
+        self._runtime.spin_until(done, FOREVER_S)
+        done.result()
+
+    def set(self, node: str, **values: Any) -> None:
+        """Set parameters of a node."""
+        set_parameters(self.client, node, values)
+
+    def hold_handle(
+        self, angles: Callable[[float], Sequence[float]], rate: float, seconds: float
+    ) -> None:
+        """Let the slave follow a handle.
+
+        Parameters
+        ----------
+        angles
+            Where the handle is so many s after its clutch was engaged, rad, shape (J,).
+        rate
+            Messages of the handle in a second.
+        seconds
+            How long its clutch is held.
+        """
+        self.set('console', source='master')
+        hand = HandleSender(self.node)
+        try:
+            self.advance(0.3)
+            begin = self.now()
+            hand.press(True, self.node.ticker.now_ns())
+            sent = 0
+            while (since := self.now() - begin) < seconds:
+                hand.send(self.node.ticker.now_ns(), angles(since))
+                sent += 1
+                self.advance(max(0.001, sent / rate - (self.now() - begin)))
+            hand.press(False, self.node.ticker.now_ns())
+            self.advance(0.3)
+        finally:
+            hand.close()
+        self.set('console', source='none')
+
+    def stop(self) -> None:
+        """End the recording."""
+        self._recorder.stop()
+
+    def close(self) -> None:
+        """End all nodes."""
+        try:
+            self.client.close()
+        finally:
+            self._runtime.close()

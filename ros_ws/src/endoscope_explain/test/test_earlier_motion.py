@@ -1,0 +1,75 @@
+"""What a rig had done before its recording began, and what is not judged for that."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from endoscope_core.physics.description import PlantDescription
+from endoscope_explain.audit import audit_recording
+from endoscope_explain.observe.predicted_signals import view
+from endoscope_explain.recording.signals import gear
+
+PLANT = PlantDescription()
+TIME = np.arange(0.0, 14.0, 1e-3)
+SWEEP = 0.9 * np.sin(1.3 * TIME)
+
+
+def since(recording, begin):
+    """A recording that began later."""
+    later = {}
+    for name, series in {'command': recording.command, **recording.measured()}.items():
+        kept = series.taken(series.time >= begin)
+        later[name] = replace(kept, time=kept.time - begin)
+    return recording.with_series(later)
+
+
+def worst(recording):
+    """Largest misfit of any signal with the plant as described, in units of its noise."""
+    seen = view(recording, {'described': PLANT})
+    return max(
+        float(np.sqrt(np.mean(signal.residual('described') ** 2)))
+        for signal in seen.signals.values()
+    )
+
+
+def moved(record, angle):
+    command = gear() * np.stack([angle, -0.7 * angle], axis=1)
+    return record(duration=len(command) * 1e-3, command=command)
+
+
+@pytest.mark.parametrize('begin', [3.1, 5.0])
+def test_a_rig_that_moved_before_is_not_judged_by_what_is_not_known(record, begin):
+    recording = since(moved(record, SWEEP), begin)
+    assert worst(recording) > 2.0
+    audit = audit_recording(recording, PLANT)
+    assert {(f.id, f.joint, str(f.severity)) for f in audit.findings} == {
+        ('earlier_motion', 'bend_x', 'note'),
+        ('earlier_motion', 'bend_y', 'note'),
+    }
+    assert worst(audit.recording) < 1.15
+    told = audit.findings[0]
+    assert told.remedy == f'what is before {told.intervals[0][1]:.2f} s is not judged'
+    early = recording.tension.time < told.intervals[0][1]
+    column = recording.joints.index(told.joint)
+    assert not audit.recording.tension.valid[early, column].any()
+    assert audit.recording.tension.valid[~early, column].all()
+
+
+def test_where_nothing_would_be_left_the_state_is_estimated(record):
+    # The motion is too small ever to wipe out what came before.
+    angle = np.where(TIME < 7.0, SWEEP, SWEEP[7000] + 0.1 * np.sin(2.0 * (TIME - 7.0)))
+    recording = since(moved(record, angle), 7.5)
+    before = worst(recording)
+    audit = audit_recording(recording, PLANT)
+    assert worst(audit.recording) < 1.3 < 5.0 < before
+    assert {f.remedy for f in audit.findings} == {
+        'the state at the start is estimated, and all is judged from it'
+    }
+
+
+def test_a_rig_that_comes_from_zero_is_judged_from_the_beginning(record):
+    recording = moved(record, SWEEP)
+    audit = audit_recording(recording, PLANT)
+    assert audit.findings == ()
+    assert audit.recording.tension.valid.all()

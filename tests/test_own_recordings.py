@@ -1,0 +1,71 @@
+"""Recordings of the simulated slave through the live graph, explained with its own plant."""
+
+import numpy as np
+import pytest
+from private_domain import private_domain
+
+from endoscope_bags.cutting import cut
+from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
+from endoscope_core.physics import PlantDescription
+from endoscope_explain.audit import audit_recording
+from endoscope_explain.explanation import Verdict
+from endoscope_explain.many_bags import explained_case
+from endoscope_explain.observe.predicted_signals import view
+from endoscope_explain.pipeline import Sources
+from endoscope_explain.recording import recording_from_bag
+
+PLANT = PlantDescription()
+
+
+@pytest.fixture(scope='module')
+def recorded(tmp_path_factory):
+    """Three motions that end before their end, rests between them, and the slave disabled once."""
+    bag = tmp_path_factory.mktemp('own') / 'bag'
+    overrides = {'motor_driver': {'seed': 3}}
+    with LiveGraph(bag, private_domain(), lock_step=True, overrides=overrides) as graph:
+        graph.client.ask('enable')
+        graph.set('console', source='motion', motion='periodic')
+        graph.advance(4.3)
+        graph.set('console', source='none')
+        graph.advance(1.0)
+        graph.set('console', source='motion', motion='non_periodic')
+        graph.advance(3.4)
+        graph.set('console', source='none')
+        graph.advance(1.0)
+        graph.client.ask('disable')
+        graph.advance(0.4)
+        graph.client.ask('enable')
+        graph.set('console', source='motion', motion='periodic')
+        graph.advance(2.0)
+        graph.stop()
+    return bag
+
+
+@pytest.fixture(scope='module', params=[(0.0, None), (2.1, None), (5.5, 11.0)])
+def stretch(request, recorded, tmp_path_factory):
+    out = tmp_path_factory.mktemp('cut') / 'cut'
+    cut(recorded, out, *request.param)
+    return out
+
+
+def test_what_is_simulated_is_what_was_in_force(stretch):
+    recording = recording_from_bag(stretch, PLANT)
+    assert any('in its motion sessions is simulated' in note for note in recording.notes)
+    audit = audit_recording(recording, PLANT)
+    assert audit.faults() == ()
+    seen = view(audit.recording, {'described': PLANT})
+    misfit = {
+        name: float(np.sqrt(np.mean(signal.residual('described') ** 2)))
+        for name, signal in seen.signals.items()
+    }
+    assert max(misfit.values()) < 1.15, misfit
+    # All that is judged is as the plant says, not only on average.
+    worst = max(float(np.abs(s.residual('described')).max()) for s in seen.signals.values())
+    assert worst < 6.0
+
+
+def test_a_motion_cut_out_of_a_session_is_consistent(recorded, tmp_path):
+    cut(recorded, tmp_path / 'cut', 5.5, 11.0)
+    case = explained_case(Sources(tmp_path / 'cut', PLANT, quick=True))
+    assert case.verdict is Verdict.CONSISTENT
+    assert case.effects == ()
