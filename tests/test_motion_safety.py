@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState, Joy
 from simulated_graph import TICK_RATE, SimulatedGraph
 
 from endoscope_nodes.diagnostics import OK, WARN
-from endoscope_nodes.names import CORRECTION, SLAVE_COMMAND
+from endoscope_nodes.names import CORRECTION, MOTOR_MEASURED, MOTORS, SLAVE_COMMAND
 from endoscope_nodes.qos import COMMAND
 
 # pytest looks for the fixtures of a test in its own module.
@@ -240,6 +240,68 @@ def test_nothing_moves_unless_enabled(foreign, console):
     console.move(100)
     assert moved.goals == []
     assert moved.of_shafts < STILL
+
+
+def test_after_a_rest_of_two_minutes_all_that_moves_the_slave_is_obeyed():
+    with SimulatedGraph(tick_rate=100, overrides={'calibration': {'motion': 'brief'}}) as graph:
+        graph.enable()
+        session = graph.session
+        shafts = graph.listen(MOTOR_MEASURED, MOTORS)
+        graph.set('console', source='motion')
+        graph.advance(1.5)
+        graph.set('console', source='none')
+        graph.advance(0.5)
+        assert max(map(abs, shafts[-1].position)) > 0.1
+        graph.advance(101.0)
+        graph.command('home')
+        graph.advance(3.0)
+        assert graph.reported('calibration: procedure')['last'] == 'home reached'
+        assert shafts[-1].position == pytest.approx((0.0, 0.0), abs=0.005)
+        assert graph.calibrate()['class_deg']
+        assert graph.session == session
+
+
+def test_home_is_said_to_be_reached_where_it_is(foreign, console):
+    console.move(600)
+    console.hold(0)
+    foreign.advance(0.2)
+    foreign.nodes['motor_driver']._device.set_torque(False)
+    shafts = foreign.listen(MOTOR_MEASURED, MOTORS)
+    foreign.command('home')
+    foreign.advance(0.6)
+    assert max(map(abs, shafts[-1].position)) > 0.1
+    assert foreign.state == 'FAULT'
+    assert 'stands still' in foreign.cause
+    assert 'home reached' not in foreign.reported('calibration: procedure')['last']
+
+
+def test_motors_that_stand_still_under_commands_are_a_fault(foreign, console):
+    foreign.nodes['motor_driver']._device.set_torque(False)
+    for _ in range(30):
+        console.move(10)
+        if foreign.state == 'FAULT':
+            break
+    # 13 counts of the shaft are told within 0.1 s, and 0.3 s are waited for.
+    assert 0.3 <= console._sent / TICK_RATE <= 0.5
+    assert 'motor_x stands still: its goal has gone' in foreign.cause
+
+
+def test_commands_that_are_refused_while_the_clutch_is_held_are_a_fault_and_said(foreign, console):
+    moved = Moved(foreign)
+    console._way = 0.3
+    while foreign.state == 'ENABLED' and console._sent < TICK_RATE:
+        console.tick()
+    assert 0.3 <= console._sent / TICK_RATE <= 0.4
+    assert 'slave/servo_jp: ' in foreign.cause
+    assert 'commands are refused, last: too far from the measured position' in foreign.cause
+    foreign.command('disable')
+    foreign.advance(0.2)
+    foreign.enable()
+    assert moved.goals == []
+    console._way = 0.0
+    console.move(100)
+    assert foreign.state == 'ENABLED'
+    assert len(moved.goals) > 50
 
 
 # ---- the handle

@@ -127,6 +127,8 @@ class Pictures:
     wanted, wanted_ns
         Angles in rad that the console asks of the slave, shape (J,), and when by a steady clock
         they were found here; None where it asks for nothing.
+    drives
+        Whether the compensator puts out commands for the motors: what is wanted is obeyed.
     tracked_age_s
         How long ago the tracker was heard, in s; infinite before.
     """
@@ -140,6 +142,7 @@ class Pictures:
         self.tensions: tuple[float, ...] = ()
         self.wanted: tuple[float, ...] | None = None
         self.wanted_ns = 0
+        self.drives = False
         self.tracked_age_s = math.inf
 
     def make(self, now_ns: int, wall_ns: int) -> bytes:
@@ -156,7 +159,8 @@ class Pictures:
                 columns: NDArray[np.float64] = np.array(values, dtype=float).T
                 for k, column in enumerate(columns):
                     self._envelope.take(signal + k, column)
-        command, measured, _, _, wires = self._streams
+        command, measured, motors, _, wires = self._streams
+        self.drives = motors.position(wall_ns, _FRESH_NS) is not None
         self.wanted = command.position(wall_ns, _FRESH_NS)
         if self.wanted is not None:
             self.wanted_ns = now_ns - max(0, wall_ns - command.heard_ns)

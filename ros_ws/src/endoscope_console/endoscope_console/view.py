@@ -12,7 +12,14 @@ from endoscope_console.graph_side import GraphSide
 from endoscope_console.operations import Operations
 from endoscope_core.rig import Rig
 from endoscope_core.teleop.operator import STATE_NS, DeadManState, Reason
-from endoscope_nodes.graph_client import CONSOLE, LOCK_STEP, PROCEDURE, GraphClient, Health
+from endoscope_nodes.graph_client import (
+    COMMANDS,
+    CONSOLE,
+    LOCK_STEP,
+    PROCEDURE,
+    GraphClient,
+    Health,
+)
 from endoscope_nodes.names import WIRES
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')
@@ -102,7 +109,7 @@ class View:
         said = operations.beat.said
         engaged = said.state is DeadManState.ENGAGED
         alarms = operations.alarms.update({a.id: a for a in self._alarms(now_ns)})
-        settings = self._graph.settings
+        settings, pictures = self._graph.settings, self._graph.pictures
         return {
             'op': 'state',
             'operating_state': client.state,
@@ -121,7 +128,7 @@ class View:
                 'state': said.state,
                 'reason': said.reason or '',
                 'missing': said.missing or '',
-                'following': engaged and self._graph.pictures.wanted is not None,
+                'following': engaged and pictures.wanted is not None and pictures.drives,
                 'counts': said.counts,
             },
             'calibration': {
@@ -160,6 +167,11 @@ class View:
         )
         share = done / length if done is not None and length else 0.0
         return {'what': self._graph.settings.source, 'progress': share}
+
+    def _refused(self) -> str:
+        """Say whose commands are refused rather than obeyed."""
+        said = [self._client.health.get(name) for name in COMMANDS]
+        return next((health.message for health in said if health and health.level == 2), '')
 
     def _nodes(self) -> list[dict[str, Any]]:
         now_ns = time.time_ns()
@@ -221,6 +233,9 @@ class View:
         if factor is not None and factor < _SLOW:
             text = f'a busy machine: simulated at {factor:.1f} of real time'
             found.append((True, Alarm('pace', Level.LOW, text)))
+        refused = self._refused()
+        if refused and enabled:
+            found.append((True, Alarm('refused', Level.MEDIUM, refused)))
         if recorder is not None and recorder.level:
             found.append((True, Alarm('recorder', Level.MEDIUM, recorder.message)))
         return [alarm for is_so, alarm in found if is_so]

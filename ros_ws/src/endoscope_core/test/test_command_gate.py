@@ -111,6 +111,55 @@ def test_after_a_pause_a_stream_begins_anew_at_the_measured_position():
     assert gate.check(1001 * MS, (0.45, 0.0), 1501 * MS, (0.5, 0.0)) is None
 
 
+@pytest.mark.parametrize('pause_s', [1, 50, 99, 101, 120, 300, 3600])
+@pytest.mark.parametrize('drift', [-5e-4, 0.0, 5e-4])
+def test_after_any_pause_a_stream_is_obeyed_whatever_the_clocks_did_meanwhile(pause_s, drift):
+    gate = gate_after(500)
+    for k in range(1, 5001):
+        sent = round((pause_s + 0.5) * 1e9) + k * MS
+        stamp = sent + round(drift * pause_s * 1e9)
+        assert gate.check(stamp, HERE, 500 * MS + sent, HERE) is None
+    assert not gate.unheeded
+
+
+def test_a_machine_that_slept_goes_on():
+    """While it sleeps the clock of the stamps goes on and the monotonic one stands."""
+    gate = gate_after(500)
+    for k in range(1, 500):
+        assert gate.check(600_000 * MS + k * MS, HERE, 1200 * MS + k * MS, HERE) is None
+
+
+def test_a_late_command_after_a_pause_is_refused_and_said_within_a_third_of_a_second():
+    gate = gate_after(500)
+    for k in range(501, 802):
+        assert not gate.unheeded
+        assert gate.check(k * MS, HERE, 3500 * MS + k * MS, HERE) is Refusal.LATE
+    assert gate.unheeded.startswith('301 of the last 301 commands are refused, last: late')
+    gate.reset()
+    assert not gate.unheeded
+
+
+def test_a_stream_is_unheeded_while_more_is_refused_than_obeyed():
+    gate = gate_after(100)
+    for k in range(101, 1101):
+        wanted = (0.0, 0.0) if k % 3 else (math.nan, 0.0)
+        gate.check(k * MS, wanted, 500 * MS + k * MS, HERE)
+        assert not gate.unheeded
+    for k in range(1101, 3000):
+        gate.check(k * MS, HERE if k % 3 == 0 else (math.nan, 0.0), (500 + k) * MS, HERE)
+        if gate.unheeded:
+            break
+    # Of the last second half is refused half a second later; 0.3 s of that are waited for.
+    assert 1101 + 750 <= k <= 1101 + 850
+
+
+def test_one_refused_command_is_no_unheeded_stream():
+    gate = CommandGate(LIMITS)
+    for k in range(20):
+        assert gate.check(k * 300 * MS + 1, (0.5, 0.0), k * 300 * MS, HERE) is Refusal.STEP
+        assert not gate.unheeded
+
+
 def test_an_allowance_is_spent_once():
     """Travel is bounded by the time that went by here, whatever the stamps say."""
     gate = gate_after(2)

@@ -323,6 +323,22 @@ class AnyInterleaving(RuleBasedStateMachine):
         self.speed, self.clutch = speed, held
         self.run(50)
 
+    @rule(seconds=st.sampled_from([1, 1, 1, 1, 60, 101, 101, 3600]))
+    def rest(self, seconds):
+        """Nobody moves for a while; whoever does then is obeyed."""
+        self.into_motion(0.2, 30)
+        self.clutch = False
+        self.run(150)
+        for _ in range(11 * seconds):
+            self.now += 90
+            self.heartbeat(self.supervisor.session)
+            self.compensate()
+            self.drive()
+        obeyed, self.clutch = self.driver.gate.accepted, True
+        self.run(60)
+        if self.valid and self.compensator.name == self.valid:
+            assert self.driver.gate.accepted > obeyed
+
     @rule()
     def fault(self):
         self.word = ''

@@ -28,6 +28,7 @@ from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.control import PhysicalParameters
 from endoscope_core.identification.plant_fit import PlantFitError, plants_of_calibration
 from endoscope_core.safety import StateCommand, TensionGuard
+from endoscope_core.safety.standing_still import TOLD_RAD
 from endoscope_core.signals import SINUSOID, calibration_motion
 from endoscope_nodes.calibration_result import (
     aborted_result,
@@ -51,8 +52,10 @@ from endoscope_nodes.names import (
     HOME_REACHED,
     JOINTS,
     MOTOR_MEASURED,
+    MOTORS,
     NO_SESSION,
     NOT_JUDGED,
+    NOT_REACHED,
     PROCEDURE_WAITING,
     REJECTED,
     SESSION_ENDED,
@@ -300,8 +303,7 @@ class CalibrationNode(EndoscopeNode):
 
     def _finish(self, run: CalibrationRun) -> None:
         if self._homing:
-            self._run = None
-            self._tell(HOME_REACHED, '')
+            self._finish_homing()
             return
         if self._judging is None:
             if run.record is None or not run.record.complete:
@@ -329,6 +331,19 @@ class CalibrationNode(EndoscopeNode):
         self._runs += 1
         self._tell(f'class {verdict.class_deg} deg', '')
         self.get_logger().info(f'{self._last}, probability {verdict.probability:.3f}')
+
+    def _finish_homing(self) -> None:
+        """Say that the slave is home where its shafts are, and only there."""
+        shafts = self._pose.shafts() or ()
+        away = {name: x for name, x in zip(MOTORS, shafts, strict=False) if abs(x) > TOLD_RAD}
+        self._run = None
+        if shafts and not away:
+            self._tell(HOME_REACHED, '')
+            return
+        self._aborts += 1
+        where = ' and '.join(f'{name} at {x:.3f} rad' for name, x in away.items())
+        self._tell(f'home is not reached: {where or "nothing measured"} instead of 0', NOT_REACHED)
+        self.get_logger().error(self._last)
 
     def _refuse(self, reason: str) -> None:
         self._run = None

@@ -18,7 +18,14 @@ from endoscope_core.control import (
 )
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
-from endoscope_core.safety import CommandGate, CommandLimits, MotionLimits, MotionShaper, Refusal
+from endoscope_core.safety import (
+    CommandGate,
+    CommandLimits,
+    MotionLimits,
+    MotionShaper,
+    Refusal,
+    StandingStill,
+)
 from endoscope_nodes.calibration_result import findings_of, is_of_no_class
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report, status
 from endoscope_nodes.endoscope_node import EndoscopeNode
@@ -101,6 +108,7 @@ class CompensatorNode(EndoscopeNode):
         self._source = NOBODY
         self._last_stamp_ns = 0
         self._sent = _AT_ZERO
+        self._answer = StandingStill(MOTORS)
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
         self._beyond_reach = self._beyond_before = 0
@@ -123,7 +131,7 @@ class CompensatorNode(EndoscopeNode):
         self.diagnostics.add('calibration commands', CommandReport(self.calibration_gate))
         self.diagnostics.add('corrections', CommandReport(self.correction_gate))
         self.diagnostics.add('output', self._report)
-        self.ticker.every(TURN_S, self._watch_console)
+        self.ticker.every(TURN_S, self._watch_motion)
         self.ticker.every(0.1, self._publish_state)
 
     def _listen(self, topic: str, callback: Any, gate: CommandGate) -> SenderWatch:
@@ -136,6 +144,8 @@ class CompensatorNode(EndoscopeNode):
             exact=True,
             on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
         )
+        if gate is not self.correction_gate:
+            self._session.obeys(topic, gate)
         return self._session.senders_of(stream.subscription)
 
     def _on_parameters(self, parameters: CompensatorParameters) -> None:
@@ -211,7 +221,7 @@ class CompensatorNode(EndoscopeNode):
         if self._source == CONSOLE:
             self._source = NOBODY
 
-    def _watch_console(self) -> None:
+    def _watch_motion(self) -> None:
         now = self.ticker.monotonic_ns()
         if self._source == CONSOLE and not self.gate.is_fresh(now):
             self._source = NOBODY
@@ -222,6 +232,10 @@ class CompensatorNode(EndoscopeNode):
             self._source = NOBODY
         if self._source == NOBODY:
             self._take_news()
+            return
+        trouble = self._answer.look(self._sent, self._pose.shafts(), now)
+        if trouble:
+            self._session.leave(trouble)
 
     def _may_pass(self, sample: JointSample, senders: SenderWatch, gate: CommandGate) -> bool:
         """Whether a message is of the open session and of the one sender of its topic."""
@@ -326,6 +340,7 @@ class CompensatorNode(EndoscopeNode):
             return dt
         self._sent = shafts
         self.shaper.restart(shafts)
+        self._answer.restart()
         return 0.0
 
     def _correction(self, stamp_ns: int) -> np.ndarray | None:

@@ -45,6 +45,7 @@ SUPERVISOR = 'supervisor: operating state'
 PROCEDURE = 'calibration: procedure'
 CONSOLE = 'console: commands'
 LOCK_STEP = 'conductor: lock-step'
+COMMANDS = ('compensator: commands', 'compensator: calibration commands', 'motor_driver: commands')
 _OPENS = {'enable': 'ENABLED', 'resume': 'ENABLED', 'disable': 'DISABLED', 'pause': 'PAUSED'}
 _TO_MOTION = ('enable', 'resume', 'home')
 # What was refused is told at once; the same words a second later are an old story.

@@ -50,6 +50,6 @@ FACTOR = 'real-time factor'
 EXECUTING, SUCCEEDED, ABORTED, REJECTED = 'executing', 'succeeded', 'aborted', 'rejected'
 BUSY, NO_SESSION, SESSION_ENDED = 'busy', 'no_session', 'session_ended'
 TENSION_CEILING, STREAM_SILENT, TENSION_GAP = 'tension_ceiling', 'stream_silent', 'tension_gap'
-UNKNOWN_TUBE, NOT_JUDGED = 'unknown_tube', 'not_judged'
+UNKNOWN_TUBE, NOT_JUDGED, NOT_REACHED = 'unknown_tube', 'not_judged', 'not_reached'
 # What `calibration/run` answers; the stamp tells this calibration's result from one before it.
 CALIBRATION_BEGUN = f'begun at {{}} ns; {CALIBRATION_RESULT} will say how it went'

@@ -247,7 +247,7 @@ TOPICS = (
         'or `rejected`, `phase` is `returning`, `resting`, `moving` or `judging`, `progress` '
         'goes from 0 to 1, and `code` says why it was aborted or rejected: `busy`, '
         '`no_session`, `session_ended`, `tension_ceiling`, `stream_silent`, `tension_gap`, '
-        '`unknown_tube` or `not_judged`; the message is the same in words',
+        '`unknown_tube`, `not_judged` or `not_reached`; the message is the same in words',
         offered=RESULT,
         asked=RESULT,
         said_by=('calibration',),

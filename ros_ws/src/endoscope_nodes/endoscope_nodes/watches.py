@@ -9,7 +9,7 @@ from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Header
 
 from endoscope_bags.errors import MalformedMessageError
-from endoscope_core.safety import CommandGate, MotionSession
+from endoscope_core.safety import CommandGate, MotionSession, Refusal
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointReader, JointSample
@@ -103,6 +103,7 @@ class SessionWatch:
         self._on_leave = on_leave
         self._told = ('', '')
         self._streams: list[tuple[SenderWatch, Callable[[str], None]]] = []
+        self._gates: list[tuple[str, CommandGate]] = []
         heartbeat = node.create_subscription(Header, MOTION_SESSION, self._hear, EVENT)
         self._supervisors = SenderWatch(node, heartbeat)
         node.diagnostics.add(SESSION_REPORT, self._report)
@@ -129,8 +130,15 @@ class SessionWatch:
         self._streams.append((senders, on_crowd or self.leave))
         return senders
 
+    def obeys(self, topic: str, gate: CommandGate) -> None:
+        """End the node's part where a gate refuses what comes on a topic rather than obey it."""
+        self._gates.append((topic, gate))
+
     def _watch(self) -> None:
         self.turn()
+        for topic, gate in self._gates:
+            if self.name and gate.unheeded:
+                self.leave(f'{topic}: {gate.unheeded}')
         for senders, on_crowd in self._streams:
             crowd = senders.rivals()
             if crowd:
@@ -368,8 +376,10 @@ class CommandReport:
     """What a command gate did, as a diagnostic report.
 
     Refusals since the last report are told from old ones, so that a warning ends when its cause
-    does.  Commands that were lost on the way, because this process or the sender's came too late,
-    are told as such: the hop that starves is the first whose share is low.
+    does.  It is an error where more was refused than obeyed, not counting what comes while the
+    clutch is not held: whoever sends it believes that he moves something.  Commands that were lost
+    on the way, because this process or the sender's came too late, are told as such: the hop that
+    starves is the first whose share is low.
 
     Parameters
     ----------
@@ -383,7 +393,7 @@ class CommandReport:
     def __init__(self, gate: CommandGate, on_starved: Callable[[str], None] | None = None) -> None:
         self._gate = gate
         self._on_starved = on_starved
-        self._reported = 0
+        self._reported = self._without_clutch = 0
         self._accepted = 0
         self._due = 0.0
         self._starved = 0
@@ -395,6 +405,9 @@ class CommandReport:
         values |= {f'refused: {reason}': count for reason, count in gate.refused.items()}
         total = sum(gate.refused.values())
         fresh, self._reported = total - self._reported, total
+        idle = gate.refused[Refusal.CLUTCH]
+        unheeded = fresh - (idle - self._without_clutch)
+        self._without_clutch = idle
         accepted, self._accepted = gate.accepted - self._accepted, gate.accepted
         due, self._due = gate.due - self._due, gate.due
         share = accepted / due if due else 1.0
@@ -407,7 +420,8 @@ class CommandReport:
         if self._starved >= _STARVED_REPORTS and self._on_starved is not None:
             self._on_starved(starved)
         if fresh:
-            return WARN, f'{fresh} commands refused, last: {gate.last_reason}', values
+            said = f'{fresh} of {fresh + accepted} commands refused, last: {gate.last_reason}'
+            return ERROR if unheeded > accepted else WARN, said, values
         if share < _CARRIED:
             return WARN, starved, values
         return OK, 'commands in order', values

@@ -27,6 +27,8 @@ from endoscope_nodes.names import (
     JOINTS,
     MASTER_CLUTCH,
     MASTER_MEASURED,
+    MOTOR_COMMAND,
+    MOTORS,
     PROCEDURE_WAITING,
     SLAVE_COMMAND,
     SLAVE_MEASURED,
@@ -150,12 +152,12 @@ def _signals_noted() -> Iterator[_Signals]:
 
 
 class _Heard:
-    """The last angles on a topic of the joints, and when they came by this machine's clock."""
+    """The last angles of joints or motors on a topic, and when they came by this clock."""
 
-    def __init__(self, client: GraphClient, topic: str) -> None:
+    def __init__(self, client: GraphClient, topic: str, names: tuple[str, ...] = JOINTS) -> None:
         self.position: tuple[float, ...] | None = None
         self.ns = 0
-        self._reader = JointReader(JOINTS)
+        self._reader = JointReader(names)
         client.listen(JointState, topic, self._take, qos=COMMAND)
 
     def _take(self, data: bytes, received_ns: int) -> None:
@@ -190,6 +192,7 @@ class _Teleoperation:
         self._setting: Future | None = None
         self._wanted = _Heard(client, SLAVE_COMMAND)
         self._measured = _Heard(client, SLAVE_MEASURED)
+        self._motors = _Heard(client, MOTOR_COMMAND, MOTORS)
         self._calibrating = _Heard(client, CALIBRATION_COMMAND)
         self._taken_ns = self._gripped_ns = time.time_ns()
         self._home_ns = 0
@@ -337,7 +340,9 @@ class _Teleoperation:
         joints = '  '.join(
             f'{name} {_degrees(wanted, k)}/{_degrees(measured, k)}' for k, name in enumerate(JOINTS)
         )
-        follows = turn.clutch and wanted is not None
+        # What is wanted is obeyed where the compensator makes commands for the motors of it.
+        obeyed = self._motors.since(wall_ns - _FRESH_NS) is not None
+        follows = turn.clutch and wanted is not None and obeyed
         lamp = 'HOME' if turn.homing else 'FOLLOW' if follows else 'HELD' if turn.clutch else 'OPEN'
         speed = f'{math.degrees(self._hand.speed):.0f} deg/s x {self._scale:.2g}'
         line = f'{self._client.state:<8} {lamp:<6} {joints} deg  {speed}'

@@ -10,6 +10,7 @@ from endoscope_core.safety.operating_state import (
     StateCommand,
 )
 from endoscope_core.safety.shaft_motion import ShaftMotion
+from endoscope_core.safety.standing_still import StandingStill
 from endoscope_core.safety.tension_guard import TensionGuard
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     'OperatingStateMachine',
     'Refusal',
     'ShaftMotion',
+    'StandingStill',
     'StateCommand',
     'TensionGuard',
 ]

@@ -2,6 +2,7 @@
 
 import math
 import operator
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -11,6 +12,9 @@ _S_PER_NS = 1e-9
 _JITTER_S = 0.02
 # So many times between stamps tell the usual one.
 _GAPS = 50
+# A stream of which more is refused than obeyed over the last second, for so long, moves nothing.
+_TALLIED_NS = 1_000_000_000
+_UNHEEDED_NS = 300_000_000
 
 
 class Refusal(StrEnum):
@@ -55,10 +59,15 @@ class CommandGate:
     """Obeys a stream of commands while it is complete, finite, in order, in time and in limits.
 
     Age is measured by the receiver's monotonic clock.  The sender's clock may have any offset:
-    the smallest difference between receipt and stamp so far is taken for it (with 0.1 % of the
-    receiver's time for drift).  A command that took longer than that by ``max_age_ns`` is late, and
-    one that took so much less is stamped in the future.  Where the first two commands of a stream
-    do not agree, the first one's stamp is taken for the wrong one.
+    the smallest difference between receipt and stamp in this stream is taken for it (with 0.1 % of
+    the receiver's time for drift).  A command that took longer than that by ``max_age_ns`` is late,
+    and one that took so much less is stamped in the future.  Where the first two commands of a
+    stream do not agree, the first one's stamp is taken for the wrong one.
+
+    Once nothing has come for longer than ``max_age_ns`` the next command begins another stream and
+    tells its offset anew: clocks drift, are set, and stand while a machine sleeps.  Only a command
+    that is late by the offset of the last stream is not believed, and what is refused is no pause:
+    a stream that is late stays late until :meth:`reset`.
 
     Speed is judged by an allowance of travel, which grows by ``max_speed`` with the receiver's time
     and is spent by every command obeyed: stamps cannot stretch it, and it can be spent only once.
@@ -86,6 +95,9 @@ class CommandGate:
 
     def __init__(self, limits: CommandLimits) -> None:
         self.limits = limits
+        self._tally: deque[tuple[int, bool]] = deque()
+        self._obeyed = 0
+        self._outnumbered_ns: int | None = None
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
         self.accepted = 0
         self.due = 0.0
@@ -97,6 +109,7 @@ class CommandGate:
         self._stamp_ns = 0
         self._offset_ns: int | None = None
         self._offset_at_ns = 0
+        self._heard_ns: int | None = None
         self._received_ns: int | None = None
         self._allowance = 0.0
         # Whether only one command of the stream has been obeyed.
@@ -108,6 +121,9 @@ class CommandGate:
         self.last_reason = ''
 
     def _forget_stream(self) -> None:
+        self._tally.clear()
+        self._obeyed = 0
+        self._outnumbered_ns = None
         self._position = ()
         self._stamp_ns = 0
         self._offset_ns = None
@@ -120,6 +136,20 @@ class CommandGate:
         self.refused[refusal] += 1
         self.last_reason = f'{refusal}: {words}' if words else str(refusal)
         return refusal
+
+    @property
+    def unheeded(self) -> str:
+        """Say that the stream is refused rather than obeyed; empty while it is not.
+
+        It is once more than half of the commands judged in the last second were refused, and this
+        has been so for 0.3 s: whoever sends them believes that he moves something.
+        """
+        newest, since = self._heard_ns, self._outnumbered_ns
+        if newest is None or since is None or newest - since < _UNHEEDED_NS:
+            return ''
+        refused = len(self._tally) - self._obeyed
+        of = f'{refused} of the last {len(self._tally)} commands'
+        return f'{of} are refused, last: {self.last_reason}'
 
     def check(
         self,
@@ -148,6 +178,23 @@ class CommandGate:
         Refusal or None
             Why it is refused, or None if it is to be obeyed.
         """
+        longest = self.limits.max_age_ns
+        paused = self._heard_ns is not None and received_ns - self._heard_ns > longest
+        if paused and self._lateness(stamp_ns, received_ns) <= longest:
+            self._forget_stream()
+        self._heard_ns = received_ns
+        refusal = self._judge(stamp_ns, position, received_ns, measured, velocity)
+        self._count(refusal is None, received_ns)
+        return refusal
+
+    def _judge(
+        self,
+        stamp_ns: int,
+        position: Sequence[float],
+        received_ns: int,
+        measured: Sequence[float],
+        velocity: Sequence[float],
+    ) -> Refusal | None:
         if len(position) != len(measured):
             return self.refuse(Refusal.MALFORMED, f'{len(position)} positions')
         for value in (*position, *velocity):
@@ -181,6 +228,17 @@ class CommandGate:
         return self._received_ns is not None and (
             now_ns - self._received_ns <= self.limits.max_age_ns
         )
+
+    def _count(self, obeyed: bool, received_ns: int) -> None:
+        """Keep what became of the commands of the last second."""
+        self._tally.append((received_ns, obeyed))
+        self._obeyed += obeyed
+        while received_ns - self._tally[0][0] > _TALLIED_NS:
+            self._obeyed -= self._tally.popleft()[1]
+        if 2 * self._obeyed >= len(self._tally):
+            self._outnumbered_ns = None
+        elif self._outnumbered_ns is None:
+            self._outnumbered_ns = received_ns
 
     def _commands_in(self, gap_ns: int) -> float:
         self._gaps.append(gap_ns)

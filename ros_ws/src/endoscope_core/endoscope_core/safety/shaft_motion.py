@@ -105,6 +105,8 @@ class ShaftMotion:
         self._stamp_ns = max(self._stamp_ns, stamp_ns)
         if self._held or self.gate.began:
             self._begin()
+            # The clock of another stream may be behind that of the last one.
+            self._stamp_ns = stamp_ns
             period = _FIRST_PERIOD_S
         self._held = ()
         if period > 0.0:
