@@ -178,6 +178,14 @@ def test_one_row_in_which_another_method_is_best_is_marked_so(results):
         assert not any(row.is_best(m) for m in Method if m is not best)
 
 
+def test_the_page_says_whose_equations_the_inverse_uses(page):
+    text = ' '.join(page.split())
+    assert 'uses the equations by which these tubes are simulated' in text
+    # core/test/test_another_simulator.py measures these.
+    assert 'In three tubes of another simulator it left 2 to 3 %' in text
+    assert 'the Bouc-Wen model of the class 15 to 20 %' in text
+
+
 def test_the_table_stands_beside_the_papers(results):
     rows = table_rows(results)
     assert len(rows) == 3 * len(TUBES) * len(MOTIONS)
