@@ -35,7 +35,7 @@ class Asker(GraphClient):
     """
 
     def __init__(self, graph, happens):
-        super().__init__(graph.probe, self._live)
+        super().__init__(graph.probe, self._live, lambda: graph.conductor.now_ns * 1e-9)
         self._graph = graph
         self._happens = happens
         index = next(k for k, (s, _) in enumerate(self._heard) if s.topic == DIAGNOSTICS)

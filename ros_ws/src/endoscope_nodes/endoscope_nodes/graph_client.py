@@ -51,6 +51,8 @@ _TO_MOTION = ('enable', 'resume', 'home')
 # What was refused is told at once; the same words a second later are an old story.
 _JUST_NOW_S = 0.1
 _REPEATED_AFTER_S = 1.0
+# A graph that simulates slower still counts as one that has stopped.
+_SLOWEST = 0.1
 # An `enable` that brings a node's trouble to light is a fault within this time.
 _STEADY_S = 0.3
 # A result tells its duration with nine digits.
@@ -238,12 +240,16 @@ class GraphClient(ClosedOnExit):
 
     def wait_until(self, condition: Callable[[], bool], patience_s: float = PATIENCE_S) -> bool:
         """Listen until something has come true, or for so long; whether it has."""
-        end = self._clock() + patience_s
+        left_s, before = patience_s, self._clock()
         while True:
             self.hear()
             if condition():
                 return True
-            if self._clock() > end:
+            now = self._clock()
+            # What a slow graph says once a second of its time is waited for so much longer.
+            left_s -= (now - before) * max(_SLOWEST, min(1.0, self.factor or 1.0))
+            before = now
+            if left_s < 0.0:
                 return False
             self.serve(POLL_S)
 
