@@ -117,7 +117,6 @@ def test_a_long_table_takes_little_memory_and_shows_how_far_it_is(tmp_path):
         '0',
     )
     assert done.stderr.splitlines()[0] == 'reading the table'
-    # 20 MB of text took 750 MB when its cells were held as lists of texts.
     assert int(peak_kb) < 300_000
 
 

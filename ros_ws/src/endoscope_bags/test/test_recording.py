@@ -196,11 +196,13 @@ def test_a_folder_with_several_files(tmp_path):
 def test_what_is_no_bag_is_named(tmp_path):
     (tmp_path / 'empty.mcap').write_bytes(b'')
     (tmp_path / 'text.mcap').write_text('joint states, sort of, but not in any known format')
+    (tmp_path / 'noise.mcap').write_bytes(bytes(range(256)))
     (tmp_path / 'folder').mkdir()
     for name, error, what in (
         ('absent', BagNotFoundError, 'absent: no such file or folder'),
         ('empty.mcap', NotABagError, 'empty.mcap: empty file'),
-        ('text.mcap', NotABagError, 'text.mcap: not an MCAP recording'),
+        ('text.mcap', NotABagError, 'text.mcap: text, no recording'),
+        ('noise.mcap', NotABagError, 'noise.mcap: not an MCAP recording'),
         ('folder', NotABagError, 'neither metadata.yaml nor any .mcap'),
     ):
         with pytest.raises(error, match=what) as raised:
