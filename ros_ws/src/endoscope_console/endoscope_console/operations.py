@@ -178,7 +178,7 @@ class Operations:
         self.beat.situation = Situation(
             holder=self.lease.holder,
             speaks=self._speaks and bool(self.lease.holder),
-            state_enabled=graph.client.state == 'ENABLED',
+            state_enabled=graph.client.state == 'ENABLED' and graph.ended is None,
             state_ns=graph.heard_ns,
             calibrating=graph.calibrating,
             source=graph.settings.source if self._speaks else '',

@@ -38,7 +38,8 @@ export function lamp(state) {
 export const isCalibrated = (state) => Number.isFinite(state?.calibration?.result?.class_deg);
 
 /** Whether what the supervisor said last still counts. */
-export const stateIsFresh = (state, stateAge) => Boolean(state?.operating_state) && stateAge <= SILENT_STATE_S;
+export const stateIsFresh = (state, stateAge) =>
+  Boolean(state?.operating_state) && !state.graph_ended && stateAge <= SILENT_STATE_S;
 
 /**
  * The step that comes next, 0 to 5, and what to say:

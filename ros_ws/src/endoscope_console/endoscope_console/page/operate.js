@@ -86,7 +86,8 @@ export class Operate {
     const word = fresh ? state.operating_state : state?.operating_state ? `${state.operating_state}?` : '…';
     write($('state'), word);
     set(document.body, 'data-state', fresh ? state.operating_state : 'UNKNOWN');
-    write($('state-why'), fresh ? reasonOf(state) : Number.isFinite(age) ? `not heard for ${age.toFixed(0)} s` : 'waiting for the graph');
+    const heard = Number.isFinite(age) ? `not heard for ${age.toFixed(0)} s` : 'waiting for the graph';
+    write($('state-why'), fresh ? reasonOf(state) : state?.graph_ended ? 'the graph has ended' : heard);
     set($('state-why'), 'title', $('state-why').textContent);
     this._renderLamp();
     this._renderSigns();

@@ -91,6 +91,7 @@ test('a state that is not repeated does not count for longer than 3.5 s', () => 
   assert.equal(stateIsFresh(state(), 3.5), true);
   assert.equal(stateIsFresh(state(), 3.6), false);
   assert.equal(stateIsFresh(null, 0), false);
+  assert.equal(stateIsFresh(state({ graph_ended: true }), 0), false);
 });
 
 test('reasons are words, and unknown ones come as they are', () => {
