@@ -3,6 +3,7 @@
 BENCHES: tuple[str, ...] = (
     'graph',
     'console',
+    'pauses',
     'recorder',
     'explain',
     'concealed',

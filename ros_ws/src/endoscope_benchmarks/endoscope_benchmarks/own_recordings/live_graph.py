@@ -32,36 +32,42 @@ class LiveGraph(ClosedOnExit):
     Parameters
     ----------
     bag
-        Where the recording goes; it lasts from the beginning to :meth:`stop`.
+        Where the recording goes, which lasts from the beginning to :meth:`stop`; None for none.
     domain
         ROS domain of the graph.
     lock_step
         Whether simulated time goes on as the nodes follow, or the wall clock gives the time.
     overrides
         Parameter values by node name.
+    rate
+        Beats a second; by default that of `RATE`.
     """
 
     def __init__(
         self,
-        bag: Path,
+        bag: Path | None,
         domain: int,
         *,
         lock_step: bool,
         overrides: dict[str, dict[str, object]],
+        rate: int = 0,
     ) -> None:
-        given = overrides | {'recorder': {'bag': str(bag)}}
+        given = dict(overrides)
+        if bag is not None:
+            given['recorder'] = {'bag': str(bag)}
         if lock_step:
             # Load cells may fall silent.
             given['conductor'] = {'timeout': PATIENCE_S, 'wait_for': [MOTOR_MEASURED]}
         arguments = ['--ros-args', '--log-level', 'fatal']
         arguments += ['-p', f'use_sim_time:={str(lock_step).lower()}']
-        arguments += ['-p', f'tick_rate:={RATE[lock_step]}']
+        arguments += ['-p', f'tick_rate:={rate or RATE[lock_step]}']
         self._runtime = Runtime(arguments, Context(), domain, given)
         try:
             for factory in (*SLAVE_NODES, *CONTROL_NODES):
                 self._runtime.add(factory)
-            self._recorder = self._runtime.add(RecorderNode)
+            self._recorder = None if bag is None else self._runtime.add(RecorderNode)
             self.node = self._runtime.add(lambda runtime: EndoscopeNode('operator', runtime))
+            self._pose = self._runtime.pose_of(self.node)
             self.client = GraphClient(self.node, self.advance, self.now)
             self._conductor = self._runtime.add(ConductorNode) if lock_step else None
             self._runtime.prepare()
@@ -126,9 +132,15 @@ class LiveGraph(ClosedOnExit):
             hand.close()
         self.set('console', source='none')
 
+    @property
+    def shafts(self) -> tuple[float, ...]:
+        """Measured angles of the shafts in rad, shape (J,)."""
+        return self._pose.shafts() or ()
+
     def stop(self) -> None:
         """End the recording."""
-        self._recorder.stop()
+        if self._recorder is not None:
+            self._recorder.stop()
 
     def close(self) -> None:
         """End all nodes."""
