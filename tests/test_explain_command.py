@@ -150,12 +150,20 @@ def refused(capsys, rig, out, *arguments):
     return output.err
 
 
-@pytest.mark.parametrize(
-    'topic', ['motor/servo_jp', 'motor/measured_js', 'wires/measured_js', 'slave/measured_js']
-)
+@pytest.mark.parametrize('topic', ['motor/servo_jp', 'motor/measured_js', 'slave/measured_js'])
 def test_a_lacking_topic_is_named(rig, tmp_path, capsys, topic):
     bag = write_short_bag(tmp_path / 'bag', leave_out=topic)
     assert topic in refused(capsys, rig, tmp_path / 'out', bag)
+
+
+def test_a_rig_without_load_cells_is_explained_and_what_cannot_be_told_is_said(
+    rig, tmp_path, capsys
+):
+    bag = write_short_bag(tmp_path / 'bag', leave_out='wires/measured_js')
+    assert explain(rig, tmp_path / 'out', bag, '--quick') == 0
+    printed = capsys.readouterr()
+    assert 'audit: wires/measured_js was not recorded: the torque of the motor alone' in printed.err
+    assert printed.out.startswith('The described plant predicts the recording of bend_x.')
 
 
 @pytest.mark.parametrize('value', [np.nan, np.inf])
