@@ -15,7 +15,7 @@ from endoscope_nodes.instrument_model_node import InstrumentModelNode
 from endoscope_nodes.load_cells_node import LoadCellsNode
 from endoscope_nodes.motor_driver_node import MotorDriverNode
 from endoscope_nodes.names import MOTOR_MEASURED
-from endoscope_nodes.program import REAL_TIME, words_for_nobody
+from endoscope_nodes.program import CHECK, REAL_TIME, words_for_nobody
 from endoscope_nodes.recorder_node import RecorderNode
 from endoscope_nodes.runtime import Runtime, run
 from endoscope_nodes.supervisor_node import SupervisorNode
@@ -76,5 +76,10 @@ def _is_simulated(runtime: Runtime) -> bool:
 
 
 def main() -> int:
-    """Run the whole graph in one process."""
-    return run(partial(compose, real_time=REAL_TIME in words_for_nobody(sys.argv[1:])))
+    """Run the whole graph in one process, or say which rate it could have here."""
+    words = words_for_nobody(sys.argv[1:])
+    if CHECK in words:
+        from endoscope_nodes.carried_rate import check
+
+        return check()
+    return run(partial(compose, real_time=REAL_TIME in words))

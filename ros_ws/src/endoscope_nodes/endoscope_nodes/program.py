@@ -9,6 +9,7 @@ from endoscope_core.exit_status import exit_status
 from endoscope_nodes.stop_signals import end_when_asked
 
 REAL_TIME = '--real-time'
+CHECK = '--check'
 _ROS_ARGS = '--ros-args'
 _END_OF_ROS_ARGS = '--'
 _HELP = ('-h', '--help')
@@ -177,5 +178,8 @@ graph = Program(
     'conductor, at real time where the machine can and slower where it cannot; -p speed:=0.0 lets '
     'it go as fast as it can.',
     tuple(program.name for program in (*_COMPOSED, conductor)),
-    ((REAL_TIME, 'by the wall clock, as with a real device: a machine that is busy ends motion'),),
+    (
+        (REAL_TIME, 'by the wall clock, as with a real device: a machine that is busy ends motion'),
+        (CHECK, 'only say which rate this machine carries in real time, as busy as it is now'),
+    ),
 )

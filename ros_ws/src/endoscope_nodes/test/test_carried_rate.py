@@ -1,0 +1,20 @@
+import re
+
+from endoscope_nodes import carried_rate
+
+
+def test_it_is_said_what_arrives_and_which_rate_is_carried(monkeypatch, capfd):
+    monkeypatch.setattr(carried_rate, 'RATES', (250, 100))
+    monkeypatch.setattr(carried_rate, '_COUNTED_S', 1.0)
+    status = carried_rate.check()
+    *tried, verdict = capfd.readouterr().out.splitlines()
+    shares = [
+        float(re.match(r' *(?:250|100) Hz: (\d+\.\d) % of the commands reach', line)[1])
+        for line in tried
+    ]
+    if status == 0:
+        assert shares[-1] >= 99.0
+        assert re.search(r'carries (250|100) Hz in real time', verdict)
+    else:
+        assert len(tried) == 2
+        assert 'does not even carry 100 Hz' in verdict
