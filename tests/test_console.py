@@ -1,6 +1,7 @@
 """The server of the console, operated by pages without a browser: what moves, and what does not."""
 
 import json
+import os
 import signal
 import time
 import urllib.request
@@ -9,12 +10,14 @@ from contextlib import closing, suppress
 import numpy as np
 import pytest
 from console_page import Page
-from console_rig import ConsoleRig, engage, ready
+from console_rig import ConsoleRig, Server, engage, ready
 from diagnostic_msgs.msg import DiagnosticArray
+from private_domain import private_domain
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Joy
 from short_bags import PLANT, one_joint, write_short_bag
 
+from endoscope_bags import open_bag
 from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import EffectSpec, save_plant
 from endoscope_core.signals.command_file import write_command_file
@@ -467,3 +470,22 @@ def test_a_terminated_server_releases_and_gives_back(rig):
         assert rig.stands()
         assert page.wait(lambda: page.closed is not None)
     rig.restart()
+
+
+def test_a_graph_that_is_begun_says_that_it_records_and_rests(tmp_path):
+    rig = tmp_path / 'rig.yaml'
+    rig.write_text('recording: {rest: 1.0}\n')
+    environment = os.environ | {'ROS_DOMAIN_ID': str(private_domain())}
+    server = Server(tmp_path, environment, '--rig', str(rig))
+    try:
+        line = server.said('recorder')
+        assert f'recording automatically to {tmp_path}/bags/recording-' in line
+        assert "--graph '-p autostart:=false'" in line
+        server.said('ready')
+        with Page(server.address, server.token) as page:
+            assert page.wait(lambda: 'at rest' in str(page.state.get('recorder')))
+            assert not page.state['recorder']['recording']
+    finally:
+        assert server.end() == 0
+    (bag,) = (tmp_path / 'bags').glob('recording-*')
+    assert open_bag(bag).metadata['endoscope_bags']['ended'] == 'at rest'

@@ -122,11 +122,18 @@ class RecordingSession:
         self._writer = BagWriter(path, atomic=False, threaded=threaded)
         self._sources: list[_Source] = []
         self._full = ''
+        self._ended = 'on request'
 
     @property
     def path(self) -> Path:
         """The recording."""
         return self._writer.path
+
+    @property
+    def size(self) -> int:
+        """Bytes on the disk."""
+        files = [self.path, *self.path.rglob('*')]
+        return sum(file.stat().st_size for file in files if file.is_file())
 
     def add_topic(
         self,
@@ -203,7 +210,7 @@ class RecordingSession:
             self._full = str(error)
 
     def _notes(self) -> dict[str, str]:
-        notes = {'ended': self._full or 'on request'}
+        notes = {'ended': self._full or self._ended}
         return notes | {
             f'{LOST_PREFIX}{source.topic}': str(source.gaps.lost) for source in self._sources
         }
@@ -217,9 +224,16 @@ class RecordingSession:
             self.path, counts, lost, self._full, self._writer.finished or not self._writer.closed
         )
 
-    def close(self) -> SessionReport:
-        """Finish the recording and say how it went; again is harmless."""
+    def close(self, ended: str = 'on request') -> SessionReport:
+        """Finish the recording and say how it went; again is harmless.
+
+        Parameters
+        ----------
+        ended
+            Why, as it is written into the recording.
+        """
         if not self._writer.closed:
+            self._ended = ended
             for source in self._sources:
                 if not source.announced:
                     self._announce(source)

@@ -14,6 +14,7 @@ import time
 from collections import Counter
 from collections.abc import Iterable
 from contextlib import ExitStack, nullcontext
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -36,7 +37,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.rig import Rig, load_rig
 from endoscope_core.teleop.joy_mapping import JoyMapping, JoyMappingError
 from endoscope_core.teleop.pad import PadHandle
-from endoscope_nodes.graph_client import SUPERVISOR, WHOLE_S
+from endoscope_nodes.graph_client import RECORDER, SUPERVISOR, WHOLE_S, Health
 from endoscope_nodes.names import JOINTS
 from endoscope_nodes.program import NODES, REAL_TIME
 from endoscope_nodes.runtime import GC_THRESHOLDS, SWITCH_INTERVAL_S
@@ -53,6 +54,7 @@ _ANSWERS_S = 1.5
 _LOOK_S = 0.1
 _ENDS_S = 20.0
 _DROPPED_S = 2
+_NOT_UNASKED = "--graph '-p autostart:=false' leaves it to you"
 _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -80,6 +82,15 @@ class _Graph:
             self._words += ['-p', f'rig_file:={args.rig.resolve()}']
         self._words += shlex.split(args.graph)
         self._process: subprocess.Popen | None = None
+
+    def recording(self, said: Health) -> str:
+        """Say whether and where it records, and how it would not."""
+        bag = said.values.get('bag')
+        if bag is None:
+            return said.message
+        if self._process is None:
+            return f'{said.message} to {bag}'
+        return f'{said.message} to {Path(bag).resolve()}; {_NOT_UNASKED}'
 
     async def start_unless_one_answers(self, graph: GraphSide) -> None:
         """Start it, if nobody is there within 1.5 s."""
@@ -213,6 +224,9 @@ async def _announce(
             raise ServingError(f'the graph has ended with status {started.ended}, as it says above')
         await asyncio.sleep(_LOOK_S)
     await _until_whole(graph, started)
+    recorder = graph.client.health.get(RECORDER)
+    if recorder is not None:
+        print(f'recorder      {started.recording(recorder)}', flush=True)
     print(f'ready         slave {graph.client.state}; Ctrl-C ends', flush=True)
     while started.ended is None:
         await asyncio.sleep(_LOOK_S)
@@ -224,7 +238,11 @@ async def _announce(
 async def _until_whole(graph: GraphSide, started: _Graph) -> None:
     """Wait for the streams without which nothing may move, and say for which."""
     client, end, said = graph.client, time.monotonic() + WHOLE_S, ''
-    while (SUPERVISOR not in client.health or client.awaited) and started.ended is None:
+    while started.ended is None:
+        spoke = SUPERVISOR in client.health
+        spoke = spoke and (RECORDER in client.health or 'recorder' not in client.nodes())
+        if spoke and not client.awaited:
+            return
         if client.awaited and client.awaited != said:
             said = client.awaited
             print(f'waiting       {said}', flush=True)

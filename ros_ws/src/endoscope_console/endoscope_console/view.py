@@ -17,18 +17,17 @@ from endoscope_nodes.graph_client import (
     CONSOLE,
     LOCK_STEP,
     PROCEDURE,
+    RECORDER,
     GraphClient,
     Health,
 )
 from endoscope_nodes.names import WIRES
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')
-_RECORDER = 'recorder: recording'
 _TENSE = 0.9
 _LOST_S = 0.5
 _SLOW = 0.9
 _REPEATED_NS = 1_000_000_000
-_NOT_RECORDING = 'not recording'
 _encode = msgspec.json.Encoder().encode
 
 
@@ -69,7 +68,7 @@ class View:
     def whole(self, now_ns: int) -> str:
         """The whole state as JSON, at a steady time in ns."""
         steady = self._told or self._steady(now_ns)
-        recorder = self._client.health.get(_RECORDER)
+        recorder = self._client.health.get(RECORDER)
         return _encode(
             {
                 **steady,
@@ -138,7 +137,7 @@ class View:
                 'result': _result(client.calibration),
             },
             'compensator': _compensator(client.compensator),
-            'recorder': _recorder(client.health.get(_RECORDER)),
+            'recorder': _recorder(client.health.get(RECORDER)),
             'console': {'source': settings.source, 'scale': settings.scale},
             'playing': self._playing(),
             'alarms': alarms,
@@ -199,7 +198,7 @@ class View:
         enabled = client.state == 'ENABLED'
         silent = age_s is None or age_s > 1e-9 * STATE_NS
         tension = max(zip(self._graph.pictures.tensions, WIRES, strict=False), default=None)
-        recorder = client.health.get(_RECORDER)
+        recorder = client.health.get(RECORDER)
         compensator = client.compensator
         reason = operations.beat.said.reason
         factor = client.factor
@@ -279,8 +278,9 @@ def _compensator(said: Health | None) -> dict[str, Any]:
 
 
 def _recorder(said: Health | None) -> dict[str, Any]:
+    bag = '' if said is None else said.values.get('bag', '')
     return {
-        'recording': said is not None and said.message != _NOT_RECORDING,
-        'bag': '' if said is None else said.values.get('bag', ''),
+        'recording': bool(bag),
+        'bag': bag,
         'message': 'silent' if said is None else said.message,
     }

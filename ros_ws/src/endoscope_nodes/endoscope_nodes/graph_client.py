@@ -42,6 +42,7 @@ WHOLE_S = 10.0
 """How long a graph that has just been started may take until all its streams are heard."""
 POLL_S = 0.05
 SUPERVISOR = 'supervisor: operating state'
+RECORDER = 'recorder: recording'
 PROCEDURE = 'calibration: procedure'
 CONSOLE = 'console: commands'
 LOCK_STEP = 'conductor: lock-step'

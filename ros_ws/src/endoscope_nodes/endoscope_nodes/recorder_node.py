@@ -9,6 +9,7 @@ from pathlib import Path
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.validate_topic_name import validate_topic_name
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from endoscope_bags.errors import BagError, UnknownTypeError
@@ -21,11 +22,12 @@ from endoscope_bags.recording_session import (
 )
 from endoscope_core.atomic_output import with_final_names
 from endoscope_core.errors import nearest
-from endoscope_nodes.diagnostics import ERROR, OK, Report
+from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
+from endoscope_nodes.names import OPERATING_STATE, RECORDER_START, RECORDER_STOP
 from endoscope_nodes.node_parameters import RecorderParameters
 from endoscope_nodes.parameters import ParameterError
+from endoscope_nodes.qos import RESULT
 from endoscope_nodes.raw_subscription import RawSubscription
 from endoscope_nodes.recorded_topics import (
     message_class,
@@ -39,6 +41,7 @@ _STAMP = struct.Struct('<iI')
 _SECOND = 1_000_000_000
 _LOOK_PERIOD_S = 0.1
 _UNTYPED_S = 2.0
+_MEGABYTE = 1_000_000
 
 
 @dataclass
@@ -64,6 +67,10 @@ class RecorderNode(EndoscopeNode):
     gives the same bag. Losses, found as gaps in the publishers' numbers, and a full disk are told
     in the diagnostics, in the bag, and by exit code 1.
 
+    A recording that nobody asked for or named ends once the slave has rested, and the next motion
+    session begins another one, until all of them have taken the rig's ``recording.room``. Whoever
+    calls ``recorder/start`` or ``recorder/stop`` decides alone from then on.
+
     Attributes
     ----------
     last_report
@@ -84,6 +91,10 @@ class RecorderNode(EndoscopeNode):
         self._untyped: list[str] = []
         self._last_tick_ns = 0
         self._said_loss = 0
+        self._unasked = p.autostart and not p.bag and self.rig.recording.room > 0
+        self._unasked_bytes = 0
+        self._warning = ''
+        self._active_ns = 0
         self.last_report: SessionReport | None = None
         self.create_service(Trigger, RECORDER_START, self._on_start)
         self.create_service(Trigger, RECORDER_STOP, self._on_stop)
@@ -96,7 +107,10 @@ class RecorderNode(EndoscopeNode):
             _LOOK_PERIOD_S, self._look_around, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self.diagnostics.add('recording', self._report)
-        if p.autostart:
+        if self._unasked:
+            self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
+            self.ticker.every(1.0, self._end_unasked)
+        if p.autostart and (p.bag or self._unasked):
             try:
                 self.start()
             except BagError as error:
@@ -121,7 +135,7 @@ class RecorderNode(EndoscopeNode):
         if self._session is not None:
             there = with_final_names(str(self._session.path))
             raise BagError(f'already recording to {there}; stop that first')
-        path = Path(self._bag or time.strftime('bags/recording-%Y%m%d-%H%M%S'))
+        path = Path(new_bag() if self._unasked else self._bag or new_bag())
         self._session = RecordingSession(path)
         self._said_loss = 0
         self._untyped = list(self._topics)
@@ -130,7 +144,7 @@ class RecorderNode(EndoscopeNode):
         self.get_logger().info(f'recording to {with_final_names(str(path))}')
         return path
 
-    def stop(self) -> SessionReport:
+    def stop(self, ended: str = 'on request') -> SessionReport:
         """End the recording and say how it went.
 
         Raises
@@ -145,7 +159,7 @@ class RecorderNode(EndoscopeNode):
         sources, self._sources, self._to_look_at = self._sources, [], []
         for source in sources:
             source.subscription.close()
-        report = self.last_report = session.close()
+        report = self.last_report = session.close(ended)
         silent = [topic for topic, count in report.counts.items() if not count] + self._untyped
         if silent and (self._asked_for or not report.message_count):
             self.get_logger().warning(f'no message came on {", ".join(silent)}')
@@ -166,6 +180,7 @@ class RecorderNode(EndoscopeNode):
             self.stop()
 
     def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._unasked, self._warning = False, ''
         try:
             response.message = with_final_names(str(self.start()))
             response.success = True
@@ -174,12 +189,47 @@ class RecorderNode(EndoscopeNode):
         return response
 
     def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._unasked = False
         try:
             report = self.stop()
             response.message, response.success = str(report), report.complete
         except BagError as error:
             response.message = str(error)
         return response
+
+    def _on_state(self, message: String) -> None:
+        enabled = message.data == 'ENABLED'
+        if enabled or not self._active_ns:
+            self._active_ns = self.ticker.monotonic_ns()
+        if enabled and self._unasked and self._session is None:
+            try:
+                self.start()
+            except BagError as error:
+                self._give_up(str(error))
+
+    def _end_unasked(self) -> None:
+        """End a recording that nobody asked for, at rest and where there is no room for more."""
+        session = self._session
+        if not self._unasked or session is None:
+            return
+        limits = self.rig.recording
+        full = self._unasked_bytes + session.size >= limits.room * _MEGABYTE
+        # Where no supervisor has been heard, nobody knows of rest.
+        idle_ns = self.ticker.monotonic_ns() - self._active_ns if self._active_ns else 0
+        if not full and idle_ns < limits.rest * _SECOND:
+            return
+        self.stop('no room for more' if full else 'at rest')
+        self._unasked_bytes += session.size
+        if full:
+            self._give_up(
+                f'what was recorded automatically has reached {limits.room:g} MB, '
+                'recording.room of rig.yaml'
+            )
+
+    def _give_up(self, why: str) -> None:
+        self._unasked = False
+        self._warning = f'not recording: {why}; `{self.operate("record start")}` records'
+        self.get_logger().warning(self._warning)
 
     def _subscribe_untyped(self) -> None:
         """Subscribe to the topics whose type is known by now."""
@@ -292,6 +342,10 @@ class RecorderNode(EndoscopeNode):
 
     def _report(self) -> Report:
         if self._session is None:
+            if self._warning:
+                return WARN, self._warning, {}
+            if self._unasked:
+                return OK, 'at rest: records again once the slave is enabled', {}
             return OK, 'not recording', {}
         report = self._session.report()
         values: dict[str, object] = {
@@ -305,7 +359,12 @@ class RecorderNode(EndoscopeNode):
             return ERROR, report.full, values
         if report.lost_count:
             return ERROR, f'{report.lost_count} messages lost', values
-        return OK, 'recording', values
+        return OK, 'recording automatically' if self._unasked else 'recording', values
+
+
+def new_bag() -> str:
+    """Return where a recording goes that has no name."""
+    return time.strftime('bags/recording-%Y%m%d-%H%M%S')
 
 
 def checked_names(topics: tuple[str, ...]) -> tuple[str, ...]:

@@ -36,10 +36,10 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_nodes.stop_signals import end_when_asked
 
     end_when_asked('endoscope')
-    from endoscope_nodes.recorder_node import RecorderNode
+    from endoscope_nodes.recorder_node import RecorderNode, new_bag
     from endoscope_nodes.runtime import run_nodes
 
-    parameters = {'bag': args.out, 'use_sim_time': args.sim_time}
+    parameters = {'bag': args.out or new_bag(), 'use_sim_time': args.sim_time}
     if args.topics:
         parameters['topics'] = args.topics
     return run_nodes([RecorderNode], ros_arguments(parameters, args.namespace))

@@ -5,11 +5,10 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
-from endoscope_nodes.graph_client import CONSOLE, LOCK_STEP, GraphClient, Health
+from endoscope_nodes.graph_client import CONSOLE, LOCK_STEP, RECORDER, GraphClient, Health
 from endoscope_nodes.names import FACTOR, JOINTS
 from endoscope_nodes.program import NODES
 
-RECORDER = 'recorder: recording'
 _LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')
 _FULL_ROUND_S = 1.1
 # These say nothing on /diagnostics.

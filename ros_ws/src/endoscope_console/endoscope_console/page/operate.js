@@ -139,8 +139,8 @@ export class Operate {
     write($('age'), Number.isFinite(age) ? (age < 10 ? `${Math.round(1000 * age)} ms` : 'old') : 'none');
     set($('age'), 'data-old', String(age > 0.3));
     const recorder = app.state?.recorder;
-    write($('recorder'), recorder ? (recorder.recording ? `● ${recorder.bag?.split('/').at(-1) || 'recording'}` : 'off') : '–');
-    set($('recorder'), 'title', recorder?.bag ?? '');
+    write($('recorder'), recorder ? (recorder.recording ? `● ${recorder.bag.split('/').at(-1)}` : recorder.message.split(':')[0]) : '–');
+    set($('recorder'), 'title', recorder ? `${recorder.message} ${recorder.bag}` : '');
   }
 
   _renderAlarms() {

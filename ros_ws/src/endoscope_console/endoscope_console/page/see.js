@@ -48,7 +48,7 @@ export class See {
       ['role here', this._app.role ?? '–'],
       ['session', state.session || 'none'],
       ['time', state.time || '–'],
-      ['recorder', recorder.message || (recorder.recording ? `${recorder.bag}: ${recorder.messages} messages` : 'off')],
+      ['recorder', recorder.recording ? `${recorder.message}: ${recorder.bag}, ${recorder.messages} messages` : recorder.message],
       ['pictures', `${this._app.picturesLost} lost on the way of ${this._app.pictures}`],
     ]);
   }

@@ -213,6 +213,22 @@ class DeviceFacts:
 
 
 @dataclass(frozen=True)
+class RecordingFacts:
+    """When a recording ends that nobody asked for.
+
+    Attributes
+    ----------
+    rest
+        How long in s the slave has not been enabled by then; its next session begins another one.
+    room
+        MB of all such recordings in one run of the graph, after which there are no more; 0: none.
+    """
+
+    rest: float = _fact(1.0, 1e6)
+    room: float = _fact(0.0, 1e6)
+
+
+@dataclass(frozen=True)
 class SimulationFacts:
     """The simulated slave.
 
@@ -245,6 +261,7 @@ class Rig:
     handle: HandleFacts
     instrument: InstrumentFacts
     devices: DeviceFacts
+    recording: RecordingFacts
     simulation: SimulationFacts
 
     def __post_init__(self) -> None:
