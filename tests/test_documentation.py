@@ -1,7 +1,10 @@
 """What README and pages say is so: links, commands, files and everything that can be run."""
 
 import html
+import importlib
+import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -24,6 +27,13 @@ from endoscope_nodes.parameters import described
 from endoscope_nodes.topics import SERVICES, TOPICS
 
 ENDOSCOPE = {*COMMANDS, *commands_of_other_packages()}
+API = {
+    'api_core': ('endoscope_core', ('.physics', '.control', '.signals', '.safety')),
+    'api_bags': ('endoscope_bags', ('',)),
+    'api_devices': ('endoscope_devices', ('.load_cells', '.em_tracker')),
+    'api_explain': ('endoscope_explain', ('',)),
+}
+"""Pages of what packages export, with modules that they have to name."""
 TUTORIAL = WORKSPACE / 'doc/tutorial.md'
 
 each_page = pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -118,6 +128,38 @@ def test_the_site_needs_no_network(site: Path) -> None:
         text = page.read_text(encoding='utf-8')
         assert re.findall(r'<(?:script|img|iframe)[^>]* src="https?://[^"]*"', text) == [], page
         assert re.findall(r'<link rel="stylesheet"[^>]* href="https?://[^"]*"', text) == [], page
+
+
+@pytest.mark.parametrize('columns', ['', '30'])
+def test_pages_keep_what_the_code_says(columns: str, tmp_path: Path) -> None:
+    doc = shutil.copytree(WORKSPACE / 'doc', tmp_path / 'doc')
+    script = [sys.executable, doc / 'reference_pages.py']
+    subprocess.run(script, check=True, env=os.environ | {'COLUMNS': columns})
+    stale = [
+        str(page.relative_to(doc))
+        for page in sorted(doc.rglob('*.md'))
+        if page.read_text() != (WORKSPACE / 'doc' / page.relative_to(doc)).read_text()
+    ]
+    assert stale == [], 'run `make -C ros_ws reference` and commit what it writes'
+
+
+def test_reference_pages_can_be_read_without_the_site() -> None:
+    pages = sorted((WORKSPACE / 'doc/reference').glob('*.md'))
+    text = {page.stem: page.read_text(encoding='utf-8') for page in pages}
+    for page, content in text.items():
+        # The site alone has what autodoc writes; a table names it in the page as well.
+        directives = set(re.findall(r'^```\{([\w-]+)\}', content, flags=re.M))
+        assert directives <= ({'toctree'} if page == 'index' else {'eval-rst'}), page
+        if page in API:
+            assert re.findall(r'^.*\|\s+\|$', content, flags=re.M) == [], 'without a docstring'
+    assert all(f'## endoscope {name}\n' in text['commands'] for name in ENDOSCOPE)
+    assert all(f'## {name}\n' in text['nodes'] for name in program.NODES)
+    assert all(f'| `{topic.name}` |' in text['topics'] for topic in TOPICS)
+    assert all(f'## {name}\n' in text['effects'] for name in CATALOGUE)
+    for page, (package, modules) in API.items():
+        for module in modules:
+            exported = importlib.import_module(f'{package}{module}').__all__
+            assert [name for name in exported if f'| `{name}` | ' not in text[page]] == []
 
 
 def test_reference_pages_have_everything(site: Path) -> None:

@@ -1,12 +1,10 @@
 """How Sphinx builds the pages: `make -C ros_ws doc`, without a network."""
 
 import importlib.util
-import sys
 import tomllib
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))
 
 project = 'endoscope'
 author = 'the endoscope developers'
@@ -20,7 +18,6 @@ extensions = [
     'sphinx.ext.autodoc',
     'numpydoc',
     'matplotlib.sphinxext.plot_directive',
-    'reference_pages',
 ]
 smartquotes = False  # '--' begins an option
 exclude_patterns = ['build']

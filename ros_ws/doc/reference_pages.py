@@ -1,16 +1,23 @@
-"""Directives that write the reference pages from the code that they are about."""
+"""Writes into the reference pages what the code says: `make -C ros_ws reference`.
+
+A page keeps what is made for it between two comments, of which the first names the part. Nothing
+in a part depends on the terminal, the day or the place of the checkout.
+"""
 
 import argparse
+import ast
 import dataclasses
+import importlib
+import inspect
 import math
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from textwrap import dedent
+from types import ModuleType
 from typing import Any
 
 import yaml
-from docutils import nodes
-from docutils.parsers.rst import Directive
-from docutils.statemachine import StringList
-from sphinx.application import Sphinx
 
 from endoscope_bags.table_mapping import EXAMPLE
 from endoscope_bringup.cli import build_parser
@@ -24,20 +31,17 @@ from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.parameters import Described, as_typed, described
 from endoscope_nodes.topics import RECORDED, SERVICES, TOPICS, TRIGGER, Qos, Topic
 
+PAGES = sorted(Path(__file__).parent.rglob('*.md'))
+WIDTH = 100
+"""Columns of a command's usage, whatever the terminal has."""
 
-class _Generated(Directive):
-    """Puts the Markdown of `lines` in its place."""
-
-    def lines(self) -> Iterator[str]:
-        """Yield lines of Markdown."""
-        raise NotImplementedError
-
-    def run(self) -> list[nodes.Node]:
-        """Parse the lines and return what they are."""
-        parsed = nodes.Element()
-        content = StringList(list(self.lines()), source=self.state_machine.document['source'])
-        self.state.nested_parse(content, 0, parsed, match_titles=True)
-        return parsed.children
+CORE = (
+    *('physics', 'signals', 'hysteresis', 'control', 'calibration', 'identification'),
+    *('metrics', 'kinematics', 'safety', 'dataset', 'pages'),
+)
+DEVICES = ('dynamixel', 'load_cells', 'em_tracker')
+_INDENTED = re.compile(r'^(?: {4}.*\n)+', re.M)
+_PART = re.compile(r'(?<=^<!-- made from the code: )(\S+) -->\n.*?(?=^<!-- end -->$)', re.M | re.S)
 
 
 def _table(heading: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:
@@ -50,16 +54,20 @@ def _table(heading: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[st
     yield ''
 
 
+class _Usage(argparse.HelpFormatter):
+    """Folds at one width, whatever COLUMNS says."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, width=WIDTH)
+
+
 def _names(names: Iterable[str]) -> str:
     return ', '.join(f'`{name}`' if ' ' not in name else name for name in names)
 
 
-class Commands(_Generated):
+def _commands() -> Iterator[str]:
     """Every subcommand of `endoscope`, from its parser."""
-
-    def lines(self) -> Iterator[str]:
-        """Yield a section for each command."""
-        yield from _subcommands(build_parser(), 2)
+    yield from _subcommands(build_parser(), 2)
 
 
 def _subcommands(parser: argparse.ArgumentParser, level: int) -> Iterator[str]:
@@ -76,8 +84,10 @@ def _help_of(action: argparse._SubParsersAction, name: str) -> str:
 def _command(name: str, parser: argparse.ArgumentParser, summary: str, level: int) -> Iterator[str]:
     title = parser.prog if level == 2 else name
     yield from ('', f'{"#" * level} {title}', '')
-    yield parser.description or f'{summary[:1].upper()}{summary[1:]}.'
+    described_as = parser.description or f'{summary[:1].upper()}{summary[1:]}.'
+    yield _INDENTED.sub(lambda lines: f'```text\n{dedent(lines[0])}```\n', f'{described_as}\n')
     yield from ('', '```text')
+    parser.formatter_class = _Usage
     yield from (line[len('usage: ') :] for line in parser.format_usage().splitlines())
     yield '```'
     rows = [
@@ -105,42 +115,36 @@ def _spelling(action: argparse.Action) -> str:
     return ', '.join(f'`{option} {value}`' for option in action.option_strings)
 
 
-class Nodes(_Generated):
+def _nodes() -> Iterator[str]:
     """What each node hears, says and serves, from the table of topics."""
-
-    def lines(self) -> Iterator[str]:
-        """Yield a section for each node."""
-        for name in program.NODES:
-            yield from ('', f'## {name}', '', getattr(program, name).purpose)
-            heard = [topic.name for topic in TOPICS if name in topic.heard_by]
-            said = [topic.name for topic in TOPICS if name in topic.said_by]
-            served = [service.name for service in SERVICES if service.served_by == name]
-            rows = [('subscribes', heard), ('publishes', said), ('serves', served)]
-            if name == 'recorder':
-                rows[0] = ('subscribes', [topic.name for topic in TOPICS if topic.recorded])
-            yield from _table(('', ''), [(what, _names(names)) for what, names in rows if names])
+    for name in program.NODES:
+        yield from ('', f'## {name}', '', getattr(program, name).purpose)
+        heard = [topic.name for topic in TOPICS if name in topic.heard_by]
+        said = [topic.name for topic in TOPICS if name in topic.said_by]
+        served = [service.name for service in SERVICES if service.served_by == name]
+        rows = [('subscribes', heard), ('publishes', said), ('serves', served)]
+        if name == 'recorder':
+            rows[0] = ('subscribes', [topic.name for topic in TOPICS if topic.recorded])
+        yield from _table(('', ''), [(what, _names(names)) for what, names in rows if names])
 
 
-class Topics(_Generated):
+def _topics() -> Iterator[str]:
     """Every topic and service of the interface."""
-
-    def lines(self) -> Iterator[str]:
-        """Yield a table of topics, one of their QoS and one of services."""
-        yield from ('', '## What they carry')
-        yield from _table(
-            ('topic', 'type', 'rate', 'content'),
-            [(f'`{t.name}`', f'`{t.type}`', t.rate, t.content) for t in TOPICS],
-        )
-        yield from ('', '## Who speaks to whom')
-        yield from _table(
-            ('topic', 'published by', 'subscribed by', 'recorded', 'QoS offered', 'QoS asked'),
-            [_speakers(topic) for topic in TOPICS],
-        )
-        yield from ('', '## Services', '', f'All are `{TRIGGER}`.')
-        yield from _table(
-            ('service', 'node', 'what it does'),
-            [(f'`{s.name}`', f'`{s.served_by}`', s.purpose) for s in SERVICES],
-        )
+    yield from ('', '## What they carry')
+    yield from _table(
+        ('topic', 'type', 'rate', 'content'),
+        [(f'`{t.name}`', f'`{t.type}`', t.rate, t.content) for t in TOPICS],
+    )
+    yield from ('', '## Who speaks to whom')
+    yield from _table(
+        ('topic', 'published by', 'subscribed by', 'recorded', 'QoS offered', 'QoS asked'),
+        [_speakers(topic) for topic in TOPICS],
+    )
+    yield from ('', '## Services', '', f'All are `{TRIGGER}`.')
+    yield from _table(
+        ('service', 'node', 'what it does'),
+        [(f'`{s.name}`', f'`{s.served_by}`', s.purpose) for s in SERVICES],
+    )
 
 
 def _speakers(topic: Topic) -> tuple[str, ...]:
@@ -158,18 +162,15 @@ def _qos(qos: Qos | None) -> str:
     return '' if qos is None else str(qos)
 
 
-class Parameters(_Generated):
+def _parameters() -> Iterator[str]:
     """The parameters of each node, and of a process."""
-
-    def lines(self) -> Iterator[str]:
-        """Yield a section for each node that has any."""
-        for title, kinds in (('Of every process', OF_PROCESS), *OF_NODE.items()):
-            if kinds:
-                yield from ('', f'## {title}')
-                yield from _table(
-                    ('parameter', 'default', 'allowed', 'unit', 'live', 'what it does'),
-                    [_parameter(one) for kind in kinds for one in described(kind)],
-                )
+    for title, kinds in (('Of every process', OF_PROCESS), *OF_NODE.items()):
+        if kinds:
+            yield from ('', f'## {title}')
+            yield from _table(
+                ('parameter', 'default', 'allowed', 'unit', 'live', 'what it does'),
+                [_parameter(one) for kind in kinds for one in described(kind)],
+            )
 
 
 def _parameter(one: Described) -> tuple[str, ...]:
@@ -184,29 +185,21 @@ def _parameter(one: Described) -> tuple[str, ...]:
     )
 
 
-class NominalPlant(_Generated):
+def _nominal_plant() -> Iterator[str]:
     """A complete plant.yaml of the nominal plant."""
-
-    def lines(self) -> Iterator[str]:
-        """Yield the file."""
-        plant = PlantDescription(
-            effects=(EffectSpec('stribeck_friction', 'bend_x', {'rise': 0.5}),)
-        )
-        content = plant_to_mapping(plant)
-        yield '```yaml'
-        yield from yaml.safe_dump(content, sort_keys=False, default_flow_style=False).splitlines()
-        yield '```'
+    plant = PlantDescription(effects=(EffectSpec('stribeck_friction', 'bend_x', {'rise': 0.5}),))
+    content = plant_to_mapping(plant)
+    yield '```yaml'
+    yield from yaml.safe_dump(content, sort_keys=False, default_flow_style=False).splitlines()
+    yield '```'
 
 
-class PlantKeys(_Generated):
+def _plant_keys() -> Iterator[str]:
     """Bounds and units of every key of a plant.yaml."""
-
-    def lines(self) -> Iterator[str]:
-        """Yield a table for joints and one for sensors."""
-        for title, kind in (('joints', JointParameters), ('sensors', SensorParameters)):
-            yield from ('', f'## {title}')
-            yield from _table(('key', 'nominal', 'allowed', 'unit'), _keys(kind))
-            yield f'What each means: {{class}}`~endoscope_core.physics.{kind.__name__}`.'
+    for title, kind in (('joints', JointParameters), ('sensors', SensorParameters)):
+        yield from ('', f'## {title}')
+        yield from _table(('key', 'nominal', 'allowed', 'unit'), _keys(kind))
+        yield f'What each means: [{kind.__name__}](api_core.md#endoscope_corephysics).'
 
 
 def _keys(kind: type) -> Iterator[tuple[str, ...]]:
@@ -215,86 +208,95 @@ def _keys(kind: type) -> Iterator[tuple[str, ...]]:
         yield f'`{key.name}`', f'`{as_typed(key.default)}`', _range(low, high), unit
 
 
-class Mapping(_Generated):
+def _mapping() -> Iterator[str]:
     """A mapping file with every key."""
-
-    def lines(self) -> Iterator[str]:
-        """Yield the file."""
-        yield from ('```yaml', *EXAMPLE.splitlines(), '```')
+    yield from ('```yaml', *EXAMPLE.splitlines(), '```')
 
 
 def _switch(parameter: Parameter) -> str:
     return ', '.join(f'{_number(v)}: {parameter.said(v)}' for v in parameter.admissible)
 
 
-class Effects(_Generated):
+def _effects() -> Iterator[str]:
     """The catalogue of effects."""
-
-    def lines(self) -> Iterator[str]:
-        """Yield a section for each effect."""
-        for effect in CATALOGUE.values():
-            yield from (
-                '',
-                f'## {effect.id}',
-                '',
-                f'*{effect.stage.capitalize()}.* {effect.physics}',
-            )
-            yield from ('', '```text', effect.equation, '```', '', f'Source: {effect.source}.')
-            yield from _table(
-                ('parameter', 'allowed', 'unit', 'typical', 'off'),
-                [
-                    (
-                        f'`{p.name}`',
-                        _switch(p) if p.is_switch else _range(p.low, p.high),
-                        p.unit,
-                        _number(p.typical),
-                        '' if math.isnan(p.off) else _number(p.off),
-                    )
-                    for p in effect.parameters
-                ],
-            )
-
-
-class Places(_Generated):
-    """The places for functions that the catalogue does not have."""
-
-    def lines(self) -> Iterator[str]:
-        """Yield a table of them."""
+    for effect in CATALOGUE.values():
+        yield from (
+            '',
+            f'## {effect.id}',
+            '',
+            f'*{effect.stage.capitalize()}.* {effect.physics}',
+        )
+        yield from ('', '```text', effect.equation, '```', '', f'Source: {effect.source}.')
         yield from _table(
-            ('place', 'stage', 'what it is', 'symbol', 'range', 'unit', 'within'),
+            ('parameter', 'allowed', 'unit', 'typical', 'off'),
             [
                 (
-                    f'`{place.id}`',
-                    place.stage,
-                    place.physics if place.shape == 'any' else f'{place.physics} {place.shape}',
-                    f'`{place.argument.symbol}`',
-                    f'{_range(place.argument.low, place.argument.high)} {place.argument.unit}',
-                    place.unit,
-                    f'+-{_number(place.largest)}',
+                    f'`{p.name}`',
+                    _switch(p) if p.is_switch else _range(p.low, p.high),
+                    p.unit,
+                    _number(p.typical),
+                    '' if math.isnan(p.off) else _number(p.off),
                 )
-                for place in FUNCTIONS.values()
+                for p in effect.parameters
             ],
         )
 
 
-class Modules(Directive):
-    """The public names of a package, and of the modules of it that are named."""
+def _places() -> Iterator[str]:
+    """The places for functions that the catalogue does not have."""
+    yield from _table(
+        ('place', 'stage', 'what it is', 'symbol', 'range', 'unit', 'within'),
+        [
+            (
+                f'`{place.id}`',
+                place.stage,
+                place.physics if place.shape == 'any' else f'{place.physics} {place.shape}',
+                f'`{place.argument.symbol}`',
+                f'{_range(place.argument.low, place.argument.high)} {place.argument.unit}',
+                place.unit,
+                f'+-{_number(place.largest)}',
+            )
+            for place in FUNCTIONS.values()
+        ],
+    )
 
-    required_arguments = 1
-    has_content = True
 
-    def run(self) -> list[nodes.Node]:
-        """Let autodoc write each of them."""
-        package = self.arguments[0]
-        lines = ['```{eval-rst}']
-        for name in self.content:
-            module = package if name == '.' else f'{package}.{name}'
-            lines += [] if name == '.' else [module, '-' * len(module), '']
-            lines += [f'.. automodule:: {module}', '   :members:', '']
-        parsed = nodes.Element()
-        content = StringList([*lines, '```'], source=self.state_machine.document['source'])
-        self.state.nested_parse(content, 0, parsed, match_titles=True)
-        return parsed.children
+def _modules(package: str, *modules: str) -> Iterator[str]:
+    for name in modules:
+        yield from ('', f'## {package}.{name}')
+        yield from _module(f'{package}.{name}')
+
+
+def _module(name: str) -> Iterator[str]:
+    """Yield a table of what a module exports, and let autodoc write the rest on the site."""
+    module = importlib.import_module(name)
+    exported = sorted(getattr(module, '__all__', ()))
+    if exported:
+        yield from _table(
+            ('name', 'what it is'),
+            [(f'`{one}`', _first_paragraph(_docstring(module, one))) for one in exported],
+        )
+    yield from ('', '```{eval-rst}', f'.. automodule:: {name}', '   :members:', '```')
+
+
+def _docstring(module: ModuleType, name: str) -> str:
+    value = getattr(module, name)
+    if inspect.isclass(value) or inspect.isroutine(value):
+        return inspect.getdoc(value) or ''
+    # A constant has its docstring below it, in the module that assigns it.
+    tree = ast.parse(inspect.getsource(module))
+    for node, after in zip(tree.body, [*tree.body[1:], None], strict=True):
+        if isinstance(node, ast.ImportFrom) and name in [alias.name for alias in node.names]:
+            return _docstring(importlib.import_module(node.module or ''), name)
+        if isinstance(node, ast.Assign | ast.AnnAssign) and isinstance(after, ast.Expr):
+            target = node.target if isinstance(node, ast.AnnAssign) else node.targets[0]
+            if isinstance(target, ast.Name) and target.id == name:
+                return str(ast.literal_eval(after.value))
+    return ''
+
+
+def _first_paragraph(text: str) -> str:
+    return ' '.join(text.split('\n\n', maxsplit=1)[0].split())
 
 
 def _range(low: float, high: float) -> str:
@@ -305,19 +307,32 @@ def _number(value: float) -> str:
     return f'{value:.6g}'
 
 
-def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx of the directives."""
-    for name, directive in (
-        ('commands', Commands),
-        ('nodes', Nodes),
-        ('topics', Topics),
-        ('parameters', Parameters),
-        ('nominal-plant', NominalPlant),
-        ('plant-keys', PlantKeys),
-        ('mapping', Mapping),
-        ('effects', Effects),
-        ('places', Places),
-        ('modules', Modules),
-    ):
-        app.add_directive(f'endoscope-{name}', directive)
-    return {'parallel_read_safe': True}
+PARTS: dict[str, Callable[[], Iterator[str]]] = {
+    'commands': _commands,
+    'nodes': _nodes,
+    'topics': _topics,
+    'parameters': _parameters,
+    'nominal-plant': _nominal_plant,
+    'plant-keys': _plant_keys,
+    'effects': _effects,
+    'places': _places,
+    'mapping': _mapping,
+    'api-core': lambda: _modules('endoscope_core', *CORE),
+    'api-bags': lambda: _module('endoscope_bags'),
+    'api-devices': lambda: _modules('endoscope_devices', *DEVICES),
+    'api-explain': lambda: _module('endoscope_explain'),
+}
+
+
+def with_current_parts(page: str) -> str:
+    """Return the text of a page with its parts as the code has them now."""
+    return _PART.sub(lambda part: f'{part[1]} -->\n\n{_text(PARTS[part[1]]())}\n\n', page)
+
+
+def _text(lines: Iterator[str]) -> str:
+    return re.sub(r'\n{3,}', '\n\n', '\n'.join(lines)).strip('\n')
+
+
+if __name__ == '__main__':
+    for path in PAGES:
+        path.write_text(with_current_parts(path.read_text(encoding='utf-8')), encoding='utf-8')

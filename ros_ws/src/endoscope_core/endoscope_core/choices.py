@@ -5,7 +5,9 @@ The names alone, so that whoever only lists them loads nothing of what they do.
 
 HYSTERESIS_MODELS = ('bouc_wen', 'asymmetric_bouc_wen', 'dahl', 'play', 'prandtl_ishlinskii')
 PHYSICAL = 'physical'
+"""Mode that inverts the plant which a calibration identified."""
 ADAPTIVE_PHYSICAL = 'adaptive_physical'
+"""The same mode with parameters that follow the tracker."""
 MODES = ('none', *HYSTERESIS_MODELS, PHYSICAL, ADAPTIVE_PHYSICAL)
 """Modes of feed-forward compensation."""
 
@@ -21,7 +23,9 @@ FEEDBACK_LAWS = (ADAPTIVE, RECURSIVE_LEAST_SQUARES)
 """Laws by which feedback learns."""
 
 SINUSOID = 'sinusoid'
+"""Name of the calibration sinusoid."""
 BRIEF = 'brief'
+"""Name of the brief calibration."""
 CALIBRATION_MOTIONS = (SINUSOID, BRIEF)
 """Motions by which a tube is judged."""
 

@@ -20,6 +20,7 @@ from endoscope_core.hysteresis.inverse import MODELS, HysteresisParameters
 
 Vector = Sequence[float] | NDArray[np.float64]
 LawParameters = HysteresisParameters | PhysicalParameters
+"""Parameters of a joint, of any mode."""
 
 
 def parameters_of(mode: str) -> type[LawParameters]:

@@ -22,6 +22,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.signals import SINUSOID, calibration_motion
 
 CLASSES_DEG = (40, 50, 60, 70, 80, 90, 100)
+"""Sizes of backlash that the classifier tells apart, deg."""
 PER_CLASS = 30
 SIZE_SPREAD_DEG = 1.0
 ARRAYS_FILE = 'recordings.npz'

@@ -8,10 +8,14 @@ from endoscope_core.signals.signal import FloatArray, Signal, sequence
 from endoscope_core.signals.smooth_ramp import come_to_rest, smooth_step
 
 CALIBRATION_AMPLITUDE = float(np.deg2rad(90.0))
+"""Of the calibration sinusoid, rad."""
 CALIBRATION_FREQUENCY = 1.0
 CALIBRATION_RECORD_DURATION = 9.0
+"""How much of the calibration sinusoid is recorded, s."""
 CALIBRATION_RATE = 1000.0
+"""Rate at which it is recorded, Hz."""
 CALIBRATION_SAMPLES = 9000
+"""How many samples of it are recorded."""
 START_RAMP = 0.5
 RETURN_DURATION = 1.0
 

@@ -27,6 +27,7 @@ MOTIONS: dict[str, Callable[[], Motion]] = {
     'non_periodic': lambda: both_joints(non_periodic_signal()),
     'commissioning': commissioning_motion,
 }
+"""What makes each motion, by its name."""
 
 
 def motion_by_name(name: str) -> Motion:

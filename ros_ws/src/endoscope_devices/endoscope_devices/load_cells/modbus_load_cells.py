@@ -224,3 +224,4 @@ CONNECTIONS: dict[str, Callable[[str, LoadCellCalibration], ModbusLoadCells]] = 
     'modbus_rtu': modbus_rtu,
     'modbus_tcp': modbus_tcp,
 }
+"""What opens load cells, by the name of how they are connected."""
