@@ -45,12 +45,12 @@ def test_a_cut_bag_is_one_line_and_then_recovered(bag, capsys, tmp_path):
 @pytest.mark.parametrize('action', [['info'], ['recover', 'out']])
 def test_what_is_no_bag_is_one_line_and_exit_2(tmp_path, capsys, monkeypatch, action):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / 'text').write_text('no bag')
+    (tmp_path / 'noise').write_bytes(bytes(range(256)))
     command, *rest = action
-    assert main(['bag', command, 'text', *rest]) == 2
+    assert main(['bag', command, 'noise', *rest]) == 2
     [line] = capsys.readouterr().err.splitlines()
-    assert line == 'endoscope: text: not an MCAP recording (wrong first bytes)'
-    assert [p.name for p in tmp_path.iterdir()] == ['text']
+    assert line == 'endoscope: noise: not an MCAP recording (wrong first bytes)'
+    assert [p.name for p in tmp_path.iterdir()] == ['noise']
 
 
 def test_recover_does_not_overwrite(bag, capsys):

@@ -233,7 +233,9 @@ class CompensatorNode(EndoscopeNode):
         if self._source == NOBODY:
             self._take_news()
             return
-        trouble = self._answer.look(self._sent, self._pose.shafts(), now)
+        # By the time of the measurement: motors that are silent do not stand still, and silence
+        # has a reason of its own.
+        trouble = self._answer.look(self._sent, self._pose.shafts(), self._pose.shafts_ns)
         if trouble:
             self._session.leave(trouble)
 

@@ -297,6 +297,8 @@ class MeasuredPose:
     ----------
     tracked
         Newest bending angles of the tracker; None before the first.
+    shafts_ns
+        When the newest shaft angles came, a monotonic time in ns.
     host
         Node that subscribes.
     """
@@ -308,7 +310,7 @@ class MeasuredPose:
         self._shafts_reader = JointReader(MOTORS)
         self._shafts = b''
         self._shafts_stamp = (0, 0)
-        self._shafts_ns = 0
+        self.shafts_ns = 0
         self._joints_reader = JointReader(JOINTS)
         self.tracked: JointSample | None = None
         self._tracked_ns = 0
@@ -329,8 +331,8 @@ class MeasuredPose:
         if len(data) < _STAMP_END:
             return
         now, stamp = self._ticker.monotonic_ns(), _STAMP.unpack_from(data, 4)
-        if stamp > self._shafts_stamp or now - self._shafts_ns > self._timeout_ns:
-            self._shafts, self._shafts_stamp, self._shafts_ns = data, stamp, now
+        if stamp > self._shafts_stamp or now - self.shafts_ns > self._timeout_ns:
+            self._shafts, self._shafts_stamp, self.shafts_ns = data, stamp, now
 
     def _keep_bending(self, data: bytes) -> None:
         sample = _read(self._joints_reader, data)
@@ -343,7 +345,7 @@ class MeasuredPose:
 
     def shafts(self) -> tuple[float, ...] | None:
         """Shaft angles in rad, shape (J,); None while none were read lately."""
-        if not self._shafts or self._silent(self._shafts_ns, self._timeout_ns):
+        if not self._shafts or self._silent(self.shafts_ns, self._timeout_ns):
             return None
         sample = _read(self._shafts_reader, self._shafts)
         return None if sample is None else sample.position

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from endoscope_benchmarks.benches.cases import add_seeds
+from endoscope_bringup.subcommands import finite_number
 
 if TYPE_CHECKING:
     from endoscope_benchmarks.pauses import Row
@@ -23,9 +24,20 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     add_seeds(parser, 'of the rests (1-3)')
     parser.add_argument(
-        '--longest', type=float, default=3600.0, metavar='S', help='longest rest in s (3600)'
+        '--longest',
+        type=_at_least_a_second,
+        default=3600.0,
+        metavar='S',
+        help='longest rest in s (3600)',
     )
     parser.add_argument('--jobs', type=int, default=1, metavar='N', help='side by side (1)')
+
+
+def _at_least_a_second(text: str) -> float:
+    number = finite_number(text)
+    if number < 1.0:
+        raise argparse.ArgumentTypeError(f'{text} is less than a second')
+    return number
 
 
 def run(args: argparse.Namespace) -> int:

@@ -16,6 +16,8 @@ _ANSWERED_S = 0.5
 _FOLLOWED_S = 2.0
 _LAMP = "document.getElementById('lamp')?.textContent"
 _STEP = 'document.body?.dataset.step'
+# Calibrate, which can be left out, or hold and move.
+_MAY_MOVE = ('3', '5')
 _CLAIM = "document.getElementById('claim')"
 _MINE = f'{_CLAIM}?.textContent === "Give back"'
 _FREE = f'{_CLAIM}?.textContent === "Take the controls" && !{_CLAIM}.disabled'
@@ -123,7 +125,7 @@ class Hand(ClosedOnExit):
                 self.let_go()
             elif not self._held:
                 self.take_controls()
-                if self._seen(_STEP) == '4':
+                if self._seen(_STEP) in _MAY_MOVE:
                     for code in codes:
                         self.press(code)
                     since = now

@@ -34,8 +34,10 @@ class StandingStill:
         self._goal_at_rest: list[float] = []
         self._told_ns: list[int | None] = []
 
-    def look(self, goal: Sequence[float], measured: Sequence[float] | None, now_ns: int) -> str:
-        """Take goal and shaft angles in rad, shape (J,), at a monotonic time in ns.
+    def look(
+        self, goal: Sequence[float], measured: Sequence[float] | None, measured_ns: int
+    ) -> str:
+        """Take goal and shaft angles in rad, shape (J,), measured at a monotonic time in ns.
 
         Returns
         -------
@@ -56,11 +58,11 @@ class StandingStill:
                 continue
             told_ns = self._told_ns[k]
             if told_ns is None:
-                self._told_ns[k] = now_ns
-            elif now_ns - told_ns >= PATIENCE_NS:
+                self._told_ns[k] = measured_ns
+            elif measured_ns - told_ns >= PATIENCE_NS:
                 return (
                     f'{self._names[k]} stands still: its goal has gone '
                     f'{abs(wanted - self._goal_at_rest[k]):.2g} rad, and it has not turned for '
-                    f'{(now_ns - told_ns) * 1e-9:.1f} s'
+                    f'{(measured_ns - told_ns) * 1e-9:.1f} s'
                 )
         return ''
