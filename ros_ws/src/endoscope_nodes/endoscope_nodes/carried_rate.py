@@ -52,7 +52,7 @@ def _carried(rate: int) -> tuple[float, str]:
 
         asker.create_subscription(String, OPERATING_STATE, note, RESULT)
         orders = asker.create_publisher(String, STATE_COMMAND, EVENT)
-        runtime.prepare()
+        runtime.prepare(whole_process=True)
         runtime.spin_until(Future(), _FOUND_S)
         orders.publish(String(data='enable'))
         runtime.spin_until(Future(), _ENABLED_S)

@@ -127,9 +127,11 @@ class CompensatorNode(EndoscopeNode):
             DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
         )
         self._results = self._session.senders_of(results, self._doubt_results)
-        self.diagnostics.add('commands', CommandReport(self.gate, self._session.leave))
-        self.diagnostics.add('calibration commands', CommandReport(self.calibration_gate))
-        self.diagnostics.add('corrections', CommandReport(self.correction_gate))
+        self.diagnostics.add('commands', CommandReport(self.gate, self.ticker, self._session.leave))
+        self.diagnostics.add(
+            'calibration commands', CommandReport(self.calibration_gate, self.ticker)
+        )
+        self.diagnostics.add('corrections', CommandReport(self.correction_gate, self.ticker))
         self.diagnostics.add('output', self._report)
         self.ticker.every(TURN_S, self._watch_motion)
         self.ticker.every(0.1, self._publish_state)

@@ -83,7 +83,7 @@ class ControllerNode(EndoscopeNode):
         )
         self._senders = self._session.senders_of(commands.subscription)
         self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
-        self.diagnostics.add('commands', CommandReport(self._gate))
+        self.diagnostics.add('commands', CommandReport(self._gate, self.ticker))
         self.diagnostics.add('feedback', self._report)
 
     def _new_controller(self) -> Controller:

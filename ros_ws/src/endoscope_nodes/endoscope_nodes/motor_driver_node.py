@@ -94,7 +94,9 @@ class MotorDriverNode(EndoscopeNode):
         )
         self._senders = self._session.senders_of(self._commands.subscription)
         self._session.obeys(MOTOR_COMMAND, self.motion.gate)
-        self.diagnostics.add('commands', CommandReport(self.motion.gate, self._session.leave))
+        self.diagnostics.add(
+            'commands', CommandReport(self.motion.gate, self.ticker, self._session.leave)
+        )
         self.diagnostics.add('device', self._report_device, device)
         self.ticker.add(self._on_tick)
 

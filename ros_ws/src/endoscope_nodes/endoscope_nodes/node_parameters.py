@@ -72,9 +72,10 @@ class RealTimeParameters:
     """Parameters of the first node of a process, for all of it."""
 
     realtime_priority: int = parameter(
-        0,
-        'SCHED_FIFO priority of this process, which is locked into memory; 0 for none',
-        low=0,
+        -1,
+        'SCHED_FIFO priority of this process, which is locked into memory; 0 for none; -1 for 40 '
+        'in real time where the limits rtprio and memlock of this user grant it',
+        low=-1,
         high=99,
     )
     cores: tuple[int, ...] = parameter(

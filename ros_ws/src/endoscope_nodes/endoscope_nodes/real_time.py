@@ -18,11 +18,24 @@ _TASKS = Path('/proc/self/task')
 # linux/capability.h and sys/mman.h.
 _CAP_IPC_LOCK = 14
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
+GRANTED_PRIORITY = 40
 
 
 def threads_of_this_process() -> frozenset[int]:
     """Return the numbers by which the kernel knows its threads."""
     return frozenset(int(task.name) for task in _TASKS.iterdir())
+
+
+def granted_priority() -> int:
+    """Priority to take unasked: what the limits of this user grant, 0 for none.
+
+    Only limits tell that somebody meant it; root could have any priority.
+    """
+    if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] != resource.RLIM_INFINITY:
+        return 0
+    allowed = resource.getrlimit(resource.RLIMIT_RTPRIO)[0]
+    unlimited = allowed == resource.RLIM_INFINITY
+    return GRANTED_PRIORITY if unlimited else min(GRANTED_PRIORITY, allowed)
 
 
 def enter_real_time(

@@ -4,6 +4,7 @@ import gc
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TypeVar
 
 import rclpy
@@ -38,6 +39,7 @@ from endoscope_nodes.parameter_sections import check_sections
 from endoscope_nodes.parameters import ParameterError, changed
 from endoscope_nodes.real_time import (
     enter_real_time,
+    granted_priority,
     start_in_the_background,
     threads_of_this_process,
 )
@@ -298,8 +300,14 @@ class Runtime(ClosedOnExit):
             raise RuntimeError('no node has been added yet')
         return self._ticker
 
-    def prepare(self) -> None:
+    def prepare(self, whole_process: bool = False) -> None:
         """Check the parameters and make ready for a long life; call it before the nodes are served.
+
+        Parameters
+        ----------
+        whole_process
+            Whether nothing but the nodes runs here, so that a real-time priority that the system
+            grants may be taken unasked.
 
         Raises
         ------
@@ -307,7 +315,7 @@ class Runtime(ClosedOnExit):
             See :meth:`check_parameters` and :func:`enter_real_time`.
         """
         self.check_parameters()
-        self._enter_real_time()
+        self._enter_real_time(whole_process)
         # A collection that walks over all that was imported would cost many ticks.
         gc.collect()
         gc.freeze()
@@ -315,12 +323,17 @@ class Runtime(ClosedOnExit):
         # By default a thread that writes a recording may keep the executor waiting for 5 ms.
         sys.setswitchinterval(SWITCH_INTERVAL_S)
 
-    def _enter_real_time(self) -> None:
-        if self._real_time == RealTimeParameters():
+    def _enter_real_time(self, whole_process: bool) -> None:
+        node, wanted = self.nodes[0], self._real_time
+        if wanted.realtime_priority < 0:
+            unasked = whole_process and not self.ticker.simulated
+            wanted = replace(wanted, realtime_priority=granted_priority() if unasked else 0)
+            if wanted.realtime_priority:
+                node.get_logger().info(f'real-time priority {wanted.realtime_priority} is taken')
+        if not wanted.realtime_priority and not wanted.cores:
             return
-        node = self.nodes[0]
         urgent = threads_of_this_process() - self._background_threads
-        enter_real_time(node.get_name(), self._real_time, urgent, self.ticker.simulated)
+        enter_real_time(node.get_name(), wanted, urgent, self.ticker.simulated)
 
         def carry_on() -> None:
             timer.cancel()
@@ -427,7 +440,7 @@ def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -
         # The signals outermost: they are heard until the last node is closed.
         with StopSignals(runtime.stop), runtime:
             compose(runtime)
-            runtime.prepare()
+            runtime.prepare(whole_process=True)
             Announcement(runtime)
             runtime.spin()
     except (

@@ -1,6 +1,7 @@
 """What a node watches to know whether it may move the slave: session, senders, clutch, streams."""
 
 import math
+import os
 import struct
 from collections.abc import Callable
 
@@ -374,26 +375,48 @@ def _read(reader: JointReader, data: bytes) -> JointSample | None:
     return sample if sample.position and all(map(math.isfinite, sample.position)) else None
 
 
+def _who_starves(late_ns: int) -> str:
+    load, cores = os.getloadavg()[0], os.cpu_count()
+    who = (
+        f'this process was not run for {late_ns * 1e-6:.0f} ms'
+        if late_ns
+        else 'this process was run in time, so the sender was not'
+    )
+    return (
+        f'{who} (load {load:.1f} on {cores} cores); realtime_priority puts the nodes before other '
+        'programs, and `graph --check` says which tick_rate is carried'
+    )
+
+
 class CommandReport:
     """What a command gate did, as a diagnostic report.
 
     Refusals since the last report are told from old ones, so that a warning ends when its cause
     does.  It is an error where more was refused than obeyed, not counting what comes while the
     clutch is not held: whoever sends it believes that he moves something.  Commands that were lost
-    on the way, because this process or the sender's came too late, are told as such: the hop that
-    starves is the first whose share is low.
+    on the way are told as such, with who was not run and what helps: the hop that starves is the
+    first whose share is low.
 
     Parameters
     ----------
     gate
         The gate.
+    ticker
+        Knows for how long this process was not run.
     on_starved
         Called with the reason when more than half of the commands were lost in two reports in a
         row: a rate of which a half would be carried better.
     """
 
-    def __init__(self, gate: CommandGate, on_starved: Callable[[str], None] | None = None) -> None:
+    def __init__(
+        self,
+        gate: CommandGate,
+        ticker: Ticker,
+        on_starved: Callable[[str], None] | None = None,
+    ) -> None:
         self._gate = gate
+        self._ticker = ticker
+        self._late_ns = 0
         self._on_starved = on_starved
         self._reported = self._without_clutch = 0
         self._accepted = 0
@@ -415,10 +438,8 @@ class CommandReport:
         share = accepted / due if due else 1.0
         values['carried [%]'] = 100.0 * share
         self._starved = self._starved + 1 if share < _HALF else 0
-        starved = (
-            f'{100.0 * share:.0f} % of {due:.0f} commands arrive: give a lower tick_rate, or '
-            'realtime_priority'
-        )
+        late_ns, self._late_ns = self._ticker.late_ns - self._late_ns, self._ticker.late_ns
+        starved = f'{100.0 * share:.0f} % of {due:.0f} commands arrive: {_who_starves(late_ns)}'
         if self._starved >= _STARVED_REPORTS and self._on_starved is not None:
             self._on_starved(starved)
         if fresh:

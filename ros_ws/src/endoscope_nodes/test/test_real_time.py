@@ -25,7 +25,7 @@ try:
     with Runtime(['--ros-args', *sys.argv[1:]], Context(), {DOMAIN}) as runtime:
         idle = threading.Thread(target=threading.Event().wait, daemon=True)
         runtime.add(Example)
-        runtime.prepare()
+        runtime.prepare(whole_process=True)
         runtime.spin()
         idle.start()
         for task in Path('/proc/self/task').iterdir():
@@ -38,16 +38,23 @@ except ParameterError as error:
     print(error, file=sys.stderr)
     sys.exit(2)
 """
+# The limits that an administrator would set; raising them takes more than scheduling does.
+GRANT = """
+import resource
+LIMITS = {resource.RLIMIT_RTPRIO: (30, 30), resource.RLIMIT_MEMLOCK: (-1, -1)}
+resource.getrlimit = LIMITS.__getitem__
+"""
 FIFO, ON_FORK = os.SCHED_FIFO, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
 
 
-def run(*parameters, without=()):
-    """Run the nodes, without some capabilities where this is somebody who has any."""
+def run(*parameters, without=(), first=''):
+    """Run the nodes after some code, without some capabilities where this user has any."""
     given = [word for parameter in parameters for word in ('-p', parameter)]
     drop = ','.join(f'-{name}' for name in without)
     setpriv = ['setpriv', f'--bounding-set={drop}', f'--inh-caps={drop}']
     return subprocess.run(
-        [*(setpriv if drop and os.geteuid() == 0 else []), sys.executable, '-c', SHOW, *given],
+        [*(setpriv if drop and os.geteuid() == 0 else []), sys.executable, '-c', first + SHOW]
+        + given,
         capture_output=True,
         text=True,
         check=False,
@@ -76,6 +83,17 @@ def test_what_carries_messages_is_urgent_and_what_starts_later_is_not():
     assert {tuple(row[3:]) for row in rows} == {(str(min(os.sched_getaffinity(0))),)}
 
 
+def test_what_the_limits_of_a_user_grant_is_taken_unasked_in_real_time_only():
+    done = run('realtime_priority:=30')
+    if done.returncode == 2:
+        pytest.skip('this user may set no real-time priority or lock no memory')
+    done = run(first=GRANT)
+    assert done.returncode == 0, done.stderr
+    assert f'main {ON_FORK} 30' in done.stdout
+    assert 'real-time priority 30 is taken' in done.stdout + done.stderr
+    assert f'main {ON_FORK}' not in run('realtime_priority:=0', first=GRANT).stdout
+
+
 @pytest.mark.parametrize(
     ('parameters', 'without', 'words'),
     [
@@ -85,7 +103,7 @@ def test_what_carries_messages_is_urgent_and_what_starts_later_is_not():
             (),
             'not for simulated time; give 0, or to `graph` --real-time',
         ),
-        (['realtime_priority:=100'], (), 'give a whole number, from 0 to 99'),
+        (['realtime_priority:=100'], (), 'give a whole number, from -1 to 99'),
         (['cores:=[4095]'], (), "'cores' is [4095]; this process may use [0"),
         (['cores:=all'], (), "'cores' is 'all'; give a list"),
     ],

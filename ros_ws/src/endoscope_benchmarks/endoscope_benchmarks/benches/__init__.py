@@ -4,6 +4,7 @@ BENCHES: tuple[str, ...] = (
     'graph',
     'console',
     'pauses',
+    'busy',
     'recorder',
     'explain',
     'concealed',

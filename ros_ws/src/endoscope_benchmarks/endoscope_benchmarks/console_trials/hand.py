@@ -71,8 +71,8 @@ class Hand(ClosedOnExit):
             return self.tab.value(expression)
         return None
 
-    def take_controls(self) -> None:
-        """Become the operator of an enabled slave."""
+    def take_controls(self, enable: bool = True) -> None:
+        """Become the operator, of an enabled slave if wanted."""
         self.let_go()
         end = time.monotonic() + PATIENCE_S
         answer = ''
@@ -85,7 +85,7 @@ class Hand(ClosedOnExit):
                 answer = self._seen(_ANSWER) or answer
             self.console.passes(_LOOK_S)
         client = self.console.client
-        if client.state != 'ENABLED':
+        if enable and client.state != 'ENABLED':
             client.ask('resume' if client.state == 'PAUSED' else 'enable')
 
     def give_back(self) -> None:

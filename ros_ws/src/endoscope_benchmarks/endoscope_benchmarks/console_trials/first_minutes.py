@@ -1,0 +1,161 @@
+"""What somebody does first: the session of README in a shell, and the console in a browser."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from endoscope_benchmarks.console_trials.chromium import BrowserError
+from endoscope_benchmarks.console_trials.hand import Hand
+from endoscope_benchmarks.console_trials.relay import Relay
+from endoscope_benchmarks.console_trials.served_console import ConsoleError, ServedConsole
+from endoscope_nodes.graph_client import GraphRefusedError
+from endoscope_nodes.graph_parameters import set_parameters
+
+_PATIENCE_S = 300.0
+_HELD_S = 1.5
+_LOOK_S = 0.5
+_SESSION = (
+    ('operate enable', r'ENABLED, session-\d+'),
+    ('operate calibrate', r'(?s)class .* deg with probability .*bend_y can be bent from'),
+    ('topics', r'motor/measured_js'),
+    ('topics --hz motor/measured_js --seconds 3', r'motor/measured_js: .* Hz over \d+ messages'),
+    ('operate set console.source motion', r'console.source = motion, was none'),
+    ('operate set compensator.mode physical', r'compensator.mode = physical'),
+    ('operate status', r'ENABLED'),
+    ('operate home', r'home'),
+    ('operate disable', r'DISABLED'),
+)
+
+
+@contextmanager
+def busy_loops(n: int) -> Iterator[None]:
+    """Let programs that never wait run beside; each is worth 1 of load."""
+    loops = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(n)]
+    try:
+        # The load is an average over a minute.
+        time.sleep(60.0 if n else 0.0)
+        yield
+    finally:
+        for loop in loops:
+            loop.kill()
+            loop.wait()
+
+
+def shell_trial(folder: Path, domain: int) -> str:
+    """Go through the session of README; the first step that failed and what it said, or empty."""
+    environment = os.environ | {'ROS_DOMAIN_ID': str(domain)}
+    log = folder / 'graph.log'
+    with log.open('w') as file:
+        graph = subprocess.Popen(
+            [sys.executable, '-m', 'endoscope_nodes.graph'],
+            cwd=folder,
+            env=environment,
+            stdout=file,
+            stderr=subprocess.STDOUT,
+        )
+    try:
+        end = time.monotonic() + _PATIENCE_S
+        while 'ready in' not in log.read_text():
+            if time.monotonic() > end or graph.poll() is not None:
+                return f'graph does not get ready: {log.read_text()[-300:]!r}'
+            time.sleep(_LOOK_S)
+        for words, expected in _SESSION:
+            done = subprocess.run(
+                [sys.executable, '-m', 'endoscope_bringup.cli', *words.split()],
+                cwd=folder,
+                env=environment,
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=_PATIENCE_S,
+            )
+            said = done.stdout + done.stderr
+            if done.returncode or not re.search(expected, said):
+                return f'{words}: exit {done.returncode}, {said[-300:]!r}'
+        graph.send_signal(signal.SIGINT)
+        status = graph.wait(_PATIENCE_S)
+        return f'graph: exit {status}' if status else ''
+    finally:
+        if graph.poll() is None:
+            graph.kill()
+            graph.wait()
+
+
+def console_trial(folder: Path, domain: int) -> str:
+    """Go through the steps of the console's guide; what failed, or empty."""
+    try:
+        with Relay() as network, ServedConsole(folder, domain, (network.address,)) as console:
+            network.target = console.port
+            client = console.client
+            with Hand(console, network) as hand:
+                hand.take_controls(enable=False)
+                _held(hand, 'KeyE')
+                console.until(lambda: client.state == 'ENABLED', 'ENABLED', _PATIENCE_S)
+                _held(hand, 'KeyC')
+                console.until(lambda: client.calibration is not None, 'a result', _PATIENCE_S)
+                for _ in range(3):
+                    hand.move()
+                    console.passes(2.0)
+                    hand.let_go()
+                    console.passes(2.0)
+                if client.state != 'ENABLED':
+                    return f'{client.state}: {client.why}'
+                client.home(_PATIENCE_S)
+                client.ask('disable')
+    except (BrowserError, ConsoleError, GraphRefusedError) as error:
+        return str(error)[:600]
+    return ''
+
+
+def _held(hand: Hand, code: str) -> None:
+    hand.press(code)
+    hand.console.passes(_HELD_S)
+    hand.let_go()
+
+
+@dataclass(frozen=True)
+class LongMotion:
+    """What became of a motion that was played for long.
+
+    Attributes
+    ----------
+    trouble
+        The fault that ended it; empty where none did.
+    recorded, lost
+        Messages.
+    factors
+        Simulated seconds in a real one, as told each second, in order of size.
+    """
+
+    trouble: str
+    recorded: int
+    lost: int
+    factors: tuple[float, ...]
+
+
+def long_motion(folder: Path, domain: int, seconds: float) -> LongMotion:
+    """Play a motion for so long, recorded, with the page open in Chromium."""
+    factors, trouble = [], ''
+    with Relay() as network, ServedConsole(folder, domain, (network.address,)) as console:
+        network.target = console.port
+        client = console.client
+        with Hand(console, network):
+            client.ask('enable')
+            set_parameters(client, 'console', {'source': 'motion'})
+            end = time.monotonic() + seconds
+            while time.monotonic() < end and not trouble:
+                console.passes(1.0)
+                factors.append(client.factor or 0.0)
+                if client.state != 'ENABLED':
+                    trouble = f'{client.state}: {client.why}'
+            health = client.health['recorder: recording']
+            client.ask('disable')
+    recorded = int(float(health.values['messages']))
+    return LongMotion(trouble, recorded, int(float(health.values['lost'])), tuple(sorted(factors)))
