@@ -13,7 +13,10 @@ from operated_graph import OperatedGraph
 from playwright.sync_api import Browser, Page, expect
 
 PATIENCE_MS = 60_000
+# What comes in simulated time comes later on a busy machine.
+expect.set_options()
 """For whatever the page is to show: a busy machine shows it late, and that is no fault here."""
+expect.set_options(timeout=PATIENCE_MS)
 _LONGEST_S = 60.0
 _STILL_S = 0.5
 _GRIP_S = 5.0
@@ -123,7 +126,7 @@ class BrowsedConsole:
 
 def shows(page: Page, name: str, words) -> None:
     """Wait for words in an element."""
-    expect(page.locator(f'#{name}')).to_have_text(words, timeout=PATIENCE_MS)
+    expect(page.locator(f'#{name}')).to_have_text(words)
 
 
 def until(page: Page, condition: Callable[[], bool], what: str = 'it') -> None:
@@ -138,7 +141,7 @@ def until(page: Page, condition: Callable[[], bool], what: str = 'it') -> None:
 def hold(page: Page, name: str) -> None:
     """Hold a button of the page by the mouse, until it has acted."""
     button = page.locator(f'#{name}')
-    expect(button).to_be_enabled(timeout=PATIENCE_MS)
+    expect(button).to_be_enabled()
     box = button.bounding_box()
     page.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
     page.mouse.down()

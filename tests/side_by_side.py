@@ -18,7 +18,6 @@ _IN_REAL_TIME = {
     'test_load_cells_on_modbus',
     'test_motor_faults',
     'test_node_processes',
-    'test_operate',
     'test_real_time',
     'test_recorder',
     'test_recorder_process',

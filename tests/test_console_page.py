@@ -4,7 +4,6 @@ import re
 
 import pytest
 from browsed_console import (
-    PATIENCE_MS,
     BrowsedConsole,
     enable,
     grip,
@@ -370,7 +369,7 @@ def test_home_calibration_and_compensation(console, page):
     expect(page.locator('#answer')).to_contain_text('Home: done')
     page.keyboard.up('KeyH')
     hold(page, 'calibrate')
-    expect(page.locator('#calibration-progress')).to_be_visible(timeout=PATIENCE_MS)
+    expect(page.locator('#calibration-progress')).to_be_visible()
     shows(page, 'next', re.compile('^Calibrating'))
     shows(page, 'class', re.compile(r'^\d+° \(\d+ %\)$'))
     shows(page, 'size', re.compile(r'^\d+\.\d°$'))
@@ -430,16 +429,16 @@ def test_recordings_are_made_and_offered_for_explanation(console, page):
     expect(page.locator('#being-recorded')).to_contain_text('is being recorded')
     expect(page.locator('#asking')).not_to_contain_text('There is no recording yet')
     expect(page.locator('#plant')).to_have_attribute(
-        'placeholder', "this graph's own: nominal_plant", timeout=PATIENCE_MS
+        'placeholder', "this graph's own: nominal_plant"
     )
     page.click('#stop-and-explain')
-    expect(page.locator('#explanations li')).to_have_count(1, timeout=PATIENCE_MS)
+    expect(page.locator('#explanations li')).to_have_count(1)
     expect(page.locator('#explanations li')).to_contain_text('by nominal_plant')
     expect(page.locator('#being-recorded')).to_be_hidden()
     expect(page.locator('#bag option')).to_have_count(1)
     cancel = page.get_by_role('button', name='Cancel')
     cancel.click()
-    expect(cancel).to_be_hidden(timeout=PATIENCE_MS)
+    expect(cancel).to_be_hidden()
     # Nobody types an order into a field.
     page.fill('#plant', 'ehcm')
     page.keyboard.press('Space')
@@ -452,7 +451,7 @@ def test_every_node_is_seen_with_its_health(console, page):
         lambda graph: sorted({name.split(':')[0] for name in graph.diagnostics})
     ):
         row = page.locator('#nodes tr', has=page.get_by_text(node, exact=True))
-        expect(row).to_have_count(1, timeout=PATIENCE_MS)
+        expect(row).to_have_count(1)
         expect(row.locator('.health')).to_have_text(re.compile('ok|warning|error'))
     expect(page.locator('#states li').last).to_contain_text('DISABLED')
     expect(page.locator('#counters')).to_contain_text('pictures')
@@ -509,11 +508,11 @@ def test_a_page_whose_server_ends_says_so_and_comes_back_without_the_controls(co
     with console.page(browser) as page:
         enable(page)
         console.end()
-        expect(page.locator('#alarms')).to_contain_text('No connection', timeout=PATIENCE_MS)
+        expect(page.locator('#alarms')).to_contain_text('No connection')
         shows(page, 'lamp', 'UNKNOWN')
         expect(page.locator('#pause')).to_be_disabled()
         console.start()
-        expect(page.locator('#alarms')).not_to_contain_text('No connection', timeout=PATIENCE_MS)
+        expect(page.locator('#alarms')).not_to_contain_text('No connection')
         shows(page, 'operator', 'nobody')
         # What a browser says of a server that is not there.
         refused = [text for text in page.complaints if 'ERR_CONNECTION_REFUSED' not in text]
@@ -525,12 +524,12 @@ def test_a_page_without_its_key_says_what_to_do(console, browser):
     with browser.new_context() as context:
         page = context.new_page()
         page.goto(f'{console.address}/')
-        expect(page.locator('#token')).to_contain_text('endoscope console', timeout=PATIENCE_MS)
+        expect(page.locator('#token')).to_contain_text('endoscope console')
         page.goto(f'{console.address}/?#token=wrong')
-        expect(page.locator('#token')).to_contain_text('refused this page', timeout=PATIENCE_MS)
+        expect(page.locator('#token')).to_contain_text('refused this page')
         page.fill('#token-address', f'{console.address}/#token={console.viewer}')
         page.get_by_role('button', name='Open', exact=True).click()
-        expect(page.locator('#next')).to_contain_text('You are looking on', timeout=PATIENCE_MS)
+        expect(page.locator('#next')).to_contain_text('You are looking on')
 
 
 @pytest.mark.parametrize(

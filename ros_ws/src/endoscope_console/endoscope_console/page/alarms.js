@@ -31,6 +31,6 @@ export function standing(server, own) {
     add('picture', 'medium', `The picture${age}. Motion is blocked until the view is current.`);
   }
   if (own.lost) add('lease', 'medium', own.lost);
-  if (own.gamepadLost) add('gamepad', 'low', 'The gamepad is gone.');
+  if (own.gamepadLost) add('gamepad', 'medium', 'The gamepad is gone.');
   return alarms.sort((a, b) => (ORDER[a.level] ?? 3) - (ORDER[b.level] ?? 3));
 }
