@@ -21,7 +21,7 @@ from endoscope_bags import open_bag
 from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import EffectSpec, save_plant
 from endoscope_core.signals.command_file import write_command_file
-from endoscope_nodes.graph_client import GraphRefusedError
+from endoscope_nodes.graph_listener import GraphRefusedError
 from endoscope_nodes.handle_sender import HandleSender
 from endoscope_nodes.joined_graph import joined_graph
 from endoscope_nodes.names import CONSOLE_LOG, MASTER_CLUTCH, RECORDER_STOP

@@ -178,6 +178,9 @@ def test_feedback_says_by_codes_how_orders_fare():
             assert {message.status[0].name for message in said} == {'calibration: order'}
             return [{i.key: i.value for i in message.status[0].values} for message in said]
 
+        graph.advance(0.05)
+        [waiting] = told_to_the_end()
+        assert (waiting['order'], waiting['id'], waiting['state']) == ('', '0', 'waiting')
         assert not graph.call_calibration().success
         [rejected] = told_to_the_end()
         assert (rejected['state'], rejected['code']) == ('rejected', 'no_session')
@@ -199,6 +202,11 @@ def test_feedback_says_by_codes_how_orders_fare():
         graph.advance(0.2)
         last = told_to_the_end()[-1]
         assert (last['order'], last['state'], last['code']) == ('home', 'aborted', 'session_ended')
+        # In one instant of simulated time.
+        for _ in range(2):
+            assert not graph.call_calibration().success
+        graph.wait(lambda: len(said) == 2)
+        assert len({order['id'] for order in orders()}) == 2
 
 
 def test_home_returns_to_zero():

@@ -5,7 +5,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from simulated_graph import SimulatedGraph
 
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.graph_client import GraphClient, GraphRefusedError
+from endoscope_nodes.graph_client import GraphClient
+from endoscope_nodes.graph_listener import GraphRefusedError
 from endoscope_nodes.joined_graph import joined_graph
 from endoscope_nodes.names import DIAGNOSTICS
 
@@ -83,6 +84,39 @@ def test_a_result_that_was_there_before_is_not_taken(graph):
     second = calibrate(graph, lambda: None)
     assert second.level == 0
     assert second.stamp_ns - float(second.values['duration']) * 1e9 >= first.stamp_ns
+
+
+def go_home(graph, happens):
+    with Asker(graph, None) as asker:
+        asker.wait_for(lambda: asker.graph_ns > 0, 'the supervisor')
+        asker._happens = happens
+        return asker.home(patience_s=5.0)
+
+
+def test_an_order_is_known_by_codes_whatever_is_said_of_it(graph, monkeypatch):
+    calibration = graph.nodes['calibration']
+    tell = calibration._tell
+    monkeypatch.setattr(calibration, '_tell', lambda last, code='': tell(f'so: {last}', code))
+    assert go_home(graph, lambda: None) == 'so: home reached'
+    # The one before, which ended well, is latched.
+    with pytest.raises(GraphRefusedError, match=r'so: aborted while .*: the motion session has'):
+        go_home(graph, lambda: graph.command('pause'))
+    enable(graph)
+    assert calibrate(graph, lambda: None).level == 0
+
+
+def test_a_rejected_home_is_told_and_the_order_underway_is_known(graph):
+    with GraphClient(graph.probe, graph.advance) as client:
+        client.wait_for(lambda: bool(client.orders), 'calibration')
+        assert client.underway is None
+        assert graph.call_calibration().success
+        with pytest.raises(GraphRefusedError, match='home: busy: '):
+            client.home(5.0)
+        assert client.underway.order == 'calibrate'
+        graph.command('pause')
+        client.wait_for(lambda: client.underway is None, 'the end')
+        with pytest.raises(GraphRefusedError, match="'home' is not possible in PAUSED"):
+            client.home(5.0)
 
 
 class Unheard(GraphClient):

@@ -15,7 +15,7 @@ from simulated_graph import SimulatedGraph
 
 from endoscope_bringup.operating.status import status_of
 from endoscope_nodes.graph import compose
-from endoscope_nodes.graph_client import LOCK_STEP
+from endoscope_nodes.graph_listener import LOCK_STEP
 from endoscope_nodes.graph_parameters import set_parameters
 from endoscope_nodes.joined_graph import joined_graph
 from endoscope_nodes.names import FACTOR

@@ -14,28 +14,22 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 from rclpy.time import Time
-from sensor_msgs.msg import JointState
 
 from endoscope_console.pictures import Pictures
 from endoscope_core.choices import PLAYS
 from endoscope_nodes.diagnostics import OK, WARN, status
-from endoscope_nodes.graph_client import CONSOLE, PROCEDURE, GraphClient, GraphRefusedError
+from endoscope_nodes.graph_client import GraphClient
+from endoscope_nodes.graph_listener import CONSOLE, GraphRefusedError
 from endoscope_nodes.handle_sender import handle_senders
 from endoscope_nodes.joined_graph import joined_node
-from endoscope_nodes.names import (
-    CALIBRATION_COMMAND,
-    CONSOLE_LOG,
-    PROCEDURE_WAITING,
-)
-from endoscope_nodes.qos import EVENT, profile
-from endoscope_nodes.topics import Qos
+from endoscope_nodes.names import CONSOLE_LOG, FINISHED
+from endoscope_nodes.qos import EVENT
 
 NODE = 'console_web'
 
 _ASKED = ('source', 'scale')
 _POLL_S = 0.01
 _SETTINGS_NS = 1_000_000_000
-_CALIBRATING_NS = 150_000_000
 _SERVED_UNTIL_S = 5.0
 
 
@@ -103,15 +97,8 @@ class GraphSide:
         self.heard_ns = 0
         self.ended: int | None = None
         self._state_ns = 0
-        self._calibrating_ns = 0
         self._asking: Future | None = None
         self._asked_ns = 0
-        client.listen(
-            JointState,
-            CALIBRATION_COMMAND,
-            self._on_calibration,
-            qos=profile(Qos(1, reliable=False)),
-        )
         self._log = client.node.create_publisher(DiagnosticArray, CONSOLE_LOG, EVENT)
 
     def hear(self, now_ns: int) -> None:
@@ -148,25 +135,11 @@ class GraphSide:
             source, scale = map(parameter_value_to_python, answer.values)
             self.settings = Settings(str(source), float(scale))
 
-    def _on_calibration(self, data: bytes, received_ns: int) -> None:
-        self._calibrating_ns = received_ns
-
-    @property
-    def calibrating(self) -> bool:
-        """Whether a calibration or a way home has the slave."""
-        return time.time_ns() - self._calibrating_ns < _CALIBRATING_NS or self.procedure != ''
-
-    @property
-    def procedure(self) -> str:
-        """What calibration does now, in its words; empty for nothing."""
-        said = self.client.health.get(PROCEDURE)
-        return '' if said is None or said.message == PROCEDURE_WAITING else said.message
-
     @property
     def plays(self) -> bool:
         """Whether the console node moves the slave by itself."""
         said = self.client.health.get(CONSOLE)
-        return self.settings.source in PLAYS and (said is None or said.message != 'finished')
+        return self.settings.source in PLAYS and (said is None or said.values[FINISHED] != 'True')
 
     def others_at_the_handle(self) -> list[str]:
         """Names of nodes that speak for the handle while this one does not.

@@ -45,9 +45,9 @@ from endoscope_core.teleop.frames import InputFrame
 from endoscope_core.teleop.lease import Lease
 from endoscope_core.teleop.operator import DeadManState, Reason
 from endoscope_nodes.calibration_result import REACH
-from endoscope_nodes.graph_client import CONSOLE, GraphRefusedError, Health
+from endoscope_nodes.graph_listener import CONSOLE, GraphRefusedError, Health
 from endoscope_nodes.graph_parameters import read_parameter, set_parameters
-from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
+from endoscope_nodes.names import FINISHED, RECORDER_START, RECORDER_STOP
 from endoscope_nodes.node_parameters import CompensatorParameters
 
 _PATIENCE_S = 10.0
@@ -159,7 +159,7 @@ class Operations:
             why = 'its page was silent for 2 s'
             self._holder.client.tell({'op': 'lost', 'by': '', 'why': why})
             self._lease_ended(self._holder.client, why)
-        if self._holder.moves and not self._holder.waits and not self.graph.calibrating:
+        if self._holder.moves and not self._holder.waits and self.graph.client.underway is None:
             self._holder.moves = ''
         played = self._played
         if played is not None and not played.ends and self._is_over(played):
@@ -170,7 +170,7 @@ class Operations:
     def _is_over(self, played: _Played) -> bool:
         """Whether the console has said, since it was asked to play, that it is at the end."""
         said = self.graph.client.health.get(CONSOLE)
-        heard = said is not None and said.message == 'finished'
+        heard = said is not None and said.values[FINISHED] == 'True'
         return heard and time.monotonic_ns() - played.begun_ns > _NEXT_WORD_NS
 
     def _tell_beat(self) -> None:
@@ -180,7 +180,7 @@ class Operations:
             speaks=self._speaks and bool(self.lease.holder),
             state_enabled=graph.client.state == 'ENABLED' and graph.ended is None,
             state_ns=graph.heard_ns,
-            calibrating=graph.calibrating,
+            calibrating=graph.client.underway is not None,
             source=graph.settings.source if self._speaks else '',
             pictures=pictures.made,
             playing=self._played is not None,

@@ -12,15 +12,8 @@ from endoscope_console.graph_side import GraphSide
 from endoscope_console.operations import Operations
 from endoscope_core.rig import Rig
 from endoscope_core.teleop.operator import STATE_NS, DeadManState, Reason
-from endoscope_nodes.graph_client import (
-    COMMANDS,
-    CONSOLE,
-    LOCK_STEP,
-    PROCEDURE,
-    RECORDER,
-    GraphClient,
-    Health,
-)
+from endoscope_nodes.graph_client import GraphClient
+from endoscope_nodes.graph_listener import COMMANDS, CONSOLE, LOCK_STEP, RECORDER, Health
 from endoscope_nodes.names import WIRES
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')
@@ -108,7 +101,7 @@ class View:
         said = operations.beat.said
         engaged = said.state is DeadManState.ENGAGED
         alarms = operations.alarms.update({a.id: a for a in self._alarms(now_ns)})
-        settings, pictures = self._graph.settings, self._graph.pictures
+        settings, pictures, order = self._graph.settings, self._graph.pictures, client.underway
         return {
             'op': 'state',
             'operating_state': client.state,
@@ -131,9 +124,9 @@ class View:
                 'counts': said.counts,
             },
             'calibration': {
-                'running': bool(self._graph.procedure),
-                'step': self._graph.procedure,
-                'progress': self._progress(),
+                'running': order is not None,
+                'step': '' if order is None else order.words,
+                'progress': 0.0 if order is None else order.progress,
                 'result': _result(client.calibration),
             },
             'compensator': _compensator(client.compensator),
@@ -152,10 +145,6 @@ class View:
         said = self._client.health.get('supervisor: operating state')
         text = '' if said is None else said.values.get('present causes', '')
         return [cause for cause in text.split('; ') if cause]
-
-    def _progress(self) -> float:
-        said = self._client.health.get(PROCEDURE)
-        return 0.0 if said is None else _number(said, 'progress') or 0.0
 
     def _playing(self) -> dict[str, Any] | None:
         if not self._graph.plays:

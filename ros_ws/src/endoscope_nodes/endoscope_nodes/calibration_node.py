@@ -1,11 +1,12 @@
 """Finds the tube's hysteresis class: moves the slave as calibration asks, judges its wires."""
 
 import contextlib
+import dataclasses
 from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -36,40 +37,42 @@ from endoscope_nodes.calibration_result import (
     refused_result,
     successful_result,
 )
-from endoscope_nodes.diagnostics import ERROR, OK, Report, status
+from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.names import (
-    ABORTED,
-    BUSY,
-    CALIBRATION_BEGUN,
     CALIBRATION_COMMAND,
     CALIBRATION_FEEDBACK,
     CALIBRATION_NUMBERS,
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
-    EXECUTING,
-    HOME_REACHED,
     JOINTS,
     MOTOR_MEASURED,
     MOTORS,
+    SLAVE_MEASURED,
+    STATE_COMMAND,
+    WIRES,
+    WIRES_MEASURED,
+)
+from endoscope_nodes.node_parameters import CalibrationParameters
+from endoscope_nodes.order_feedback import (
+    ABORTED,
+    BUSY,
+    CALIBRATE,
+    EXECUTING,
+    HOME,
     NO_SESSION,
     NOT_JUDGED,
     NOT_REACHED,
-    PROCEDURE_WAITING,
     REJECTED,
     SESSION_ENDED,
-    SLAVE_MEASURED,
-    STATE_COMMAND,
     STREAM_SILENT,
     SUCCEEDED,
     TENSION_CEILING,
     TENSION_GAP,
     UNKNOWN_TUBE,
-    WIRES,
-    WIRES_MEASURED,
+    OrderFeedback,
 )
-from endoscope_nodes.node_parameters import CalibrationParameters
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime import Runtime, run_nodes
@@ -107,8 +110,9 @@ class CalibrationNode(EndoscopeNode):
         self._aborts = 0
         self._refused = 0
         self._last = ''
-        self._last_ns = 0
-        self._fed = '', 0
+        self._order = OrderFeedback()
+        self._newest = 0
+        self._fed_ns = 0
         self._guard = TensionGuard(WIRES, self.rig.tension.calibration_ceiling)
         self._commands = JointPublisher(
             self, CALIBRATION_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
@@ -147,47 +151,24 @@ class CalibrationNode(EndoscopeNode):
     def _on_run(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.message = self._start(homing=False)
         response.success = not response.message
-        response.message = response.message or CALIBRATION_BEGUN.format(self._began_ns)
+        response.message = response.message or f'begun; {CALIBRATION_FEEDBACK} says how it fares'
         return response
 
     def _on_state_command(self, message: String) -> None:
         if message.data == StateCommand.HOME:
-            trouble = self._start(homing=True)
-            if trouble:
-                self.get_logger().warning(f'home: {trouble}')
-                self._last, self._last_ns = f'home: {trouble}', self.ticker.now_ns()
-                self.diagnostics.publish()
+            self._start(homing=True)
 
-    def _tell(self, last: str, code: str) -> None:
+    def _tell(self, last: str, code: str = '') -> None:
         """Say at once what has come of a procedure, and why it was aborted, if it was."""
-        self._last, self._last_ns = last, self.ticker.now_ns()
-        self._feed(ABORTED if code else SUCCEEDED, last, code)
+        self._last = last
+        self._feed(state=ABORTED if code else SUCCEEDED, code=code, progress=1.0, words=last)
         self.diagnostics.publish()
 
-    def _feed(self, state: str, words: str, code: str = '', progress: float = 1.0) -> None:
+    def _feed(self, **changes: Any) -> None:
         """Say how the order that is obeyed fares."""
-        self._say_of(
-            'home' if self._homing else 'calibrate', self._began_ns, state, words, code, progress
-        )
-
-    def _say_of(
-        self, order: str, begun_ns: int, state: str, words: str, code: str, progress: float
-    ) -> None:
-        now = self.ticker.now_ns()
-        values: dict[str, object] = {
-            'order': order,
-            'id': begun_ns,
-            'state': state,
-            'phase': self._phase,
-            'progress': progress,
-            'code': code,
-        }
-        message = DiagnosticArray()
-        message.header.stamp = Time(nanoseconds=now).to_msg()
-        level = OK if state in (EXECUTING, SUCCEEDED) else ERROR
-        message.status = [status('calibration: order', level, words, values)]
-        self._feedback.publish(message)
-        self._fed = self._phase, now
+        self._order = dataclasses.replace(self._order, phase=self._phase, **changes)
+        self._fed_ns = self.ticker.now_ns()
+        self._feedback.publish(self._order.message(self._fed_ns))
 
     @property
     def _phase(self) -> str:
@@ -200,10 +181,17 @@ class CalibrationNode(EndoscopeNode):
         """Begin, or say why not."""
         trouble, code = self._obstacle()
         shafts = self._pose.shafts()
+        now = self.ticker.now_ns()
+        # Several may be given in one instant of simulated time.
+        self._newest = max(self._newest + 1, now)
+        order = OrderFeedback(HOME if homing else CALIBRATE, self._newest)
         if trouble or shafts is None:
-            order = 'home' if homing else 'calibrate'
-            self._say_of(order, self.ticker.now_ns(), REJECTED, trouble, code, 0.0)
+            rejected = dataclasses.replace(order, state=REJECTED, code=code, words=trouble)
+            self._feedback.publish(rejected.message(now))
+            self._last = f'{order.order}: {trouble}'
+            self.get_logger().warning(self._last)
             return trouble
+        self._order, self._began_ns = order, now
         self._commands.session = self._session.name
         self._run = CalibrationRun(
             [x / self.rig.joints.gear for x in shafts],
@@ -215,10 +203,9 @@ class CalibrationNode(EndoscopeNode):
             self._motion,
         )
         self._homing = homing
-        self._began_ns = self.ticker.now_ns()
         self._bending = BendingRecord(len(JOINTS))
         self._judging = None
-        self._feed(EXECUTING, str(self._run.step), progress=0.0)
+        self._feed(state=EXECUTING, words=str(self._run.step))
         self.diagnostics.publish()
         return ''
 
@@ -258,6 +245,8 @@ class CalibrationNode(EndoscopeNode):
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         run = self._run
         if run is None:
+            if not self._fed_ns:
+                self._feed()
             return
         trouble = self._trouble()
         if trouble:
@@ -266,8 +255,8 @@ class CalibrationNode(EndoscopeNode):
         command = run.command(stamp_ns, periods)
         if command is not None:
             self._commands.publish(stamp_ns, *command.position, *command.velocity)
-        if self._phase != self._fed[0] or stamp_ns - self._fed[1] >= _FED_NS:
-            self._feed(EXECUTING, str(run.step), progress=run.progress)
+        if self._phase != self._order.phase or stamp_ns - self._fed_ns >= _FED_NS:
+            self._feed(words=str(run.step), progress=run.progress)
         if run.record is not None and run.record.complete and self._judging is None:
             self._judge(run)
         if self._run is not None and run.step is CalibrationStep.DONE:
@@ -329,7 +318,7 @@ class CalibrationNode(EndoscopeNode):
         )
         self._run = None
         self._runs += 1
-        self._tell(f'class {verdict.class_deg} deg', '')
+        self._tell(f'class {verdict.class_deg} deg')
         self.get_logger().info(f'{self._last}, probability {verdict.probability:.3f}')
 
     def _finish_homing(self) -> None:
@@ -338,7 +327,7 @@ class CalibrationNode(EndoscopeNode):
         away = {name: x for name, x in zip(MOTORS, shafts, strict=False) if abs(x) > TOLD_RAD}
         self._run = None
         if shafts and not away:
-            self._tell(HOME_REACHED, '')
+            self._tell('home reached')
             return
         self._aborts += 1
         where = ' and '.join(f'{name} at {x:.3f} rad' for name, x in away.items())
@@ -363,8 +352,10 @@ class CalibrationNode(EndoscopeNode):
         if run is None:
             return
         self._aborts += 1
-        self._tell(f'aborted while {run.step}: {reason}', code)
-        self.get_logger().error(self._last)
+        self.get_logger().error(f'aborted while {run.step}: {reason}')
+        self._tell(
+            f'aborted while {run.step}: {reason}' if self._homing else f'aborted: {reason}', code
+        )
         if not self._homing:
             now = self.ticker.now_ns()
             self._publish(aborted_result(now, reason, str(run.step), (now - self._began_ns) * 1e-9))
@@ -375,11 +366,10 @@ class CalibrationNode(EndoscopeNode):
             'aborted': self._aborts,
             'refused': self._refused,
             'last': self._last,
-            'since last [s]': (self.ticker.now_ns() - self._last_ns) * 1e-9,
             'peak tension [N]': self._guard.peak,
         }
         if self._run is None:
-            return OK, PROCEDURE_WAITING, values
+            return OK, 'waiting', values
         values['progress'] = self._run.progress
         return OK, str(self._run.step), values
 

@@ -34,6 +34,7 @@ from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubsc
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
     CALIBRATION_RESULT,
+    FINISHED,
     JOINTS,
     MASTER_CLUTCH,
     MASTER_MEASURED,
@@ -348,6 +349,7 @@ class ConsoleNode(EndoscopeNode):
             'clutch held': self._clutch.held,
             'following': handle.engaged,
             'lag [s]': handle.lag,
+            FINISHED: self.finished,
         }
         values |= {f'handle refused: {reason}': n for reason, n in handle.refused.items()}
         refused = sum(handle.refused.values())
@@ -369,7 +371,7 @@ class ConsoleNode(EndoscopeNode):
             values['progress [s]'] = min(self._next, len(self._played)) * TICK_S
             values['length [s]'] = len(self._played) * TICK_S
             if self.finished:
-                return OK, 'finished', values
+                return OK, FINISHED, values
             return OK, WAITING if self._waits_for_the_clutch else 'playing', values
         if source == FOLLOW_THE_HANDLE and not handle.alive(self.ticker.monotonic_ns()):
             return WARN, f'{MASTER_MEASURED} is silent', values

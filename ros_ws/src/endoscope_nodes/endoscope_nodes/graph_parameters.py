@@ -17,7 +17,8 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.task import Future
 
 from endoscope_core.errors import EndoscopeError, nearest
-from endoscope_nodes.graph_client import PATIENCE_S, GraphClient, GraphRefusedError, NoGraphError
+from endoscope_nodes.graph_client import GraphClient
+from endoscope_nodes.graph_listener import PATIENCE_S, GraphRefusedError, NoGraphError
 
 _ROS_OWN = ('qos_overrides.', 'start_type_description_service')
 _WANTED = {

@@ -38,18 +38,11 @@ LOAD_CELLS_TARE = 'load_cells/tare'
 REGISTER_STRAIGHT = 'em_tracker/register_straight'
 MOTOR_REBOOT = 'motor/reboot'
 
-# What `calibration: procedure` says on /diagnostics where nothing is being done, and of a way home.
-PROCEDURE_WAITING = 'waiting'
-HOME_REACHED = 'home reached'
-# What is said of a stream that has to be there before the slave may move, and was never heard.
-NOT_RECEIVED = 'has not been received'
 # What `conductor: lock-step` says on /diagnostics: simulated seconds in a real one.
 FACTOR = 'real-time factor'
-# What `calibration/feedback` says of an order, as the states of a ROS action's goal are called, and
-# why one was rejected or aborted.
-EXECUTING, SUCCEEDED, ABORTED, REJECTED = 'executing', 'succeeded', 'aborted', 'rejected'
-BUSY, NO_SESSION, SESSION_ENDED = 'busy', 'no_session', 'session_ended'
-TENSION_CEILING, STREAM_SILENT, TENSION_GAP = 'tension_ceiling', 'stream_silent', 'tension_gap'
-UNKNOWN_TUBE, NOT_JUDGED, NOT_REACHED = 'unknown_tube', 'not_judged', 'not_reached'
-# What `calibration/run` answers; the stamp tells this calibration's result from one before it.
-CALIBRATION_BEGUN = f'begun at {{}} ns; {CALIBRATION_RESULT} will say how it went'
+# What `supervisor: operating state` says there of a refused command: why, by a code of
+# :class:`endoscope_core.safety.Answer` and in words, and when; and which streams never came.
+REFUSAL, REFUSAL_CODE, REFUSED_NS = 'last refusal', 'refusal code', 'refused at [ns]'
+AWAITED = 'awaited'
+# What `console: commands` says there of a motion that it plays.
+FINISHED = 'finished'

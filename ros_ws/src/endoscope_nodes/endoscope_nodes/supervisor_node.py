@@ -7,17 +7,21 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
-from endoscope_core.safety import OperatingState, OperatingStateMachine, TensionGuard
+from endoscope_core.safety import Answer, OperatingState, OperatingStateMachine, TensionGuard
 from endoscope_core.safety.motion_session import HEARTBEAT_S
 from endoscope_nodes.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointSample, JointSubscription
 from endoscope_nodes.names import (
+    AWAITED,
     DIAGNOSTICS,
     MOTION_SESSION,
     MOTOR_COMMAND,
     MOTOR_MEASURED,
     OPERATING_STATE,
+    REFUSAL,
+    REFUSAL_CODE,
+    REFUSED_NS,
     STATE_COMMAND,
     WIRES,
     WIRES_MEASURED,
@@ -44,14 +48,14 @@ class SupervisorNode(EndoscopeNode):
         self._timeout_ns = self.rig.timeouts.stream_ns
         self.machine = OperatingStateMachine()
         self._guard = TensionGuard(WIRES, self.rig.tension.ceiling)
-        self._last_refusal = ''
-        self._refused_ns = 0
+        self._refused, self._refused_ns = Answer(True), 0
         self._own = f'{self.get_namespace().rstrip("/")}/'
         self._watched = [self.resolve_topic_name(t.name) for t in TOPICS if t.one_sender]
         self._states = self.create_publisher(String, OPERATING_STATE, RESULT)
         self._sessions = self.create_publisher(Header, MOTION_SESSION, EVENT)
         self._motor = StreamWatch(self.ticker, MOTOR_MEASURED)
         self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
+        self._streams = self._motor, self._wires
         self.create_subscription(
             JointState, MOTOR_MEASURED, self._motor.note, SENSOR_ASKED, raw=True
         )
@@ -92,12 +96,12 @@ class SupervisorNode(EndoscopeNode):
         before, now = self.machine.state, self.ticker.now_ns()
         answer = self.machine.command(message.data, now)
         if not answer.accepted:
-            self._last_refusal, self._refused_ns = answer.reason, now
+            self._refused, self._refused_ns = answer, now
             self.get_logger().warning(answer.reason)
             # Whoever asked waits for the reason.
             self.diagnostics.publish()
         elif self.machine.state != before:
-            self._last_refusal = ''
+            self._refused = answer
             self.get_logger().info(f'{before} -> {self.machine.state} {self.machine.session}')
             self._publish()
 
@@ -116,7 +120,7 @@ class SupervisorNode(EndoscopeNode):
                 self._note(status.name, f'{name}: {status.message}' if wrong else '')
 
     def _check(self) -> None:
-        for watch in (self._motor, self._wires):
+        for watch in self._streams:
             self._note(watch.topic, watch.trouble(self._timeout_ns))
         deserted = self.machine.session and not self.count_publishers(MOTOR_COMMAND)
         self._note('compensator', f'nobody sends {MOTOR_COMMAND}' if deserted else '')
@@ -138,8 +142,10 @@ class SupervisorNode(EndoscopeNode):
             'session': machine.session,
             'cause': machine.cause,
             'present causes': '; '.join(machine.present_causes.values()),
-            'last refusal': self._last_refusal,
-            'since last refusal [s]': (self.ticker.now_ns() - self._refused_ns) * 1e-9,
+            AWAITED: '; '.join(w.trouble(0) for w in self._streams if not w.ever_heard),
+            REFUSAL: self._refused.reason,
+            REFUSAL_CODE: self._refused.code,
+            REFUSED_NS: self._refused_ns,
             'peak tension [N]': self._guard.peak,
         }
         if machine.state is OperatingState.FAULT:

@@ -242,12 +242,13 @@ TOPICS = (
         names.CALIBRATION_FEEDBACK,
         _DIAGNOSTICS,
         'on change and 10 Hz while it calibrates or goes home, latched',
-        'status `calibration: order`, for programs: `order` is `calibrate` or `home`, `id` '
-        'the time in ns at which it was given, `state` is `executing`, `succeeded`, `aborted` '
-        'or `rejected`, `phase` is `returning`, `resting`, `moving` or `judging`, `progress` '
-        'goes from 0 to 1, and `code` says why it was aborted or rejected: `busy`, '
-        '`no_session`, `session_ended`, `tension_ceiling`, `stream_silent`, `tension_gap`, '
-        '`unknown_tube`, `not_judged` or `not_reached`; the message is the same in words',
+        'status `calibration: order`, for programs: `order` is `calibrate` or `home`, `id` the '
+        'time in ns at which it was given, or just after it where another has that, `state` is '
+        '`executing`, `succeeded`, `aborted` or `rejected`, and `waiting` before the first order; '
+        '`phase` is `returning`, `resting`, `moving` or `judging`, `progress` goes from 0 to 1, '
+        'and `code` says why it was aborted or rejected: `busy`, `no_session`, `session_ended`, '
+        '`tension_ceiling`, `stream_silent`, `tension_gap`, `unknown_tube`, `not_judged` or '
+        '`not_reached`; the message is the same in words',
         offered=RESULT,
         asked=RESULT,
         said_by=('calibration',),

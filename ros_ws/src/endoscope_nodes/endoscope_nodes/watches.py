@@ -20,7 +20,6 @@ from endoscope_nodes.names import (
     MOTION_SESSION,
     MOTOR_MEASURED,
     MOTORS,
-    NOT_RECEIVED,
     SLAVE_MEASURED,
 )
 from endoscope_nodes.qos import EVENT, SENSOR_ASKED
@@ -266,6 +265,11 @@ class StreamWatch:
         self._heard_ns = self._ticker.monotonic_ns()
         self._late_ns = self._ticker.late_ns
 
+    @property
+    def ever_heard(self) -> bool:
+        """Whether the stream was heard at all."""
+        return self._heard_ns is not None
+
     def heard(self, timeout_ns: int) -> bool:
         """Whether the stream was heard within ``timeout_ns``."""
         if self._heard_ns is None:
@@ -278,7 +282,7 @@ class StreamWatch:
         if self.heard(timeout_ns):
             return ''
         if self._heard_ns is None:
-            return f'{self.topic} {NOT_RECEIVED}'
+            return f'{self.topic} has not been received'
         age = self._ticker.monotonic_ns() - self._heard_ns
         deaf = self._ticker.late_ns - self._late_ns
         late = f', {deaf * 1e-6:.0f} ms of which this process was not run itself' if deaf else ''

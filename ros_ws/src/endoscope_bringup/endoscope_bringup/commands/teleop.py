@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
     check_terminal()
     from endoscope_bringup.operating.teleoperation import teleoperate
-    from endoscope_nodes.graph_client import GraphRefusedError
+    from endoscope_nodes.graph_listener import GraphRefusedError
     from endoscope_nodes.joined_graph import joined_graph
 
     try:

@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     import sys
 
     from endoscope_bringup.operating.listening import echo, listing, rate
-    from endoscope_nodes.graph_client import GraphRefusedError
+    from endoscope_nodes.graph_listener import GraphRefusedError
     from endoscope_nodes.joined_graph import joined_graph
 
     count = 1 if args.once else args.count

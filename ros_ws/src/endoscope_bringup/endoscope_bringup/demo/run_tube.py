@@ -29,7 +29,8 @@ from endoscope_nodes.calibration_result import REACH
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.graph import CONTROL_NODES, SHOWING_NODES, SLAVE_NODES
-from endoscope_nodes.graph_client import GraphClient, GraphRefusedError
+from endoscope_nodes.graph_client import GraphClient
+from endoscope_nodes.graph_listener import GraphRefusedError
 from endoscope_nodes.graph_parameters import set_parameters
 from endoscope_nodes.names import CALIBRATION_COMMAND, JOINTS
 from endoscope_nodes.recorder_node import RecorderNode

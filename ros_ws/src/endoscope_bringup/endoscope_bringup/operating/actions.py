@@ -8,7 +8,8 @@ from typing import Any
 
 from endoscope_bringup.operating.status import calibration_in_words, status_of
 from endoscope_bringup.progress_line import ShareBar
-from endoscope_nodes.graph_client import GraphClient, GraphRefusedError
+from endoscope_nodes.graph_client import GraphClient
+from endoscope_nodes.graph_listener import GraphRefusedError
 from endoscope_nodes.graph_parameters import read_parameter, read_parameters, set_parameters
 from endoscope_nodes.names import (
     LOAD_CELLS_TARE,

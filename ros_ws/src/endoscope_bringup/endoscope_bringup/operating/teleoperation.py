@@ -17,22 +17,21 @@ from endoscope_bringup.operating.terminal import Terminal, TerminalLostError
 from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import printable
 from endoscope_core.teleop import KeyboardHandle, Request, Turn
-from endoscope_nodes.graph_client import CONSOLE, PROCEDURE, GraphClient, GraphRefusedError
+from endoscope_nodes.graph_client import GraphClient
+from endoscope_nodes.graph_listener import CONSOLE, GraphRefusedError
 from endoscope_nodes.graph_parameters import read_parameter, request_parameters, set_parameters
 from endoscope_nodes.handle_sender import HandleSender, handle_senders
 from endoscope_nodes.joint_stream import JointReader
 from endoscope_nodes.names import (
-    CALIBRATION_COMMAND,
-    HOME_REACHED,
     JOINTS,
     MASTER_CLUTCH,
     MASTER_MEASURED,
     MOTOR_COMMAND,
     MOTORS,
-    PROCEDURE_WAITING,
     SLAVE_COMMAND,
     SLAVE_MEASURED,
 )
+from endoscope_nodes.order_feedback import HOME, SUCCEEDED
 from endoscope_nodes.qos import COMMAND
 
 _TURN_NS = 10_000_000
@@ -193,9 +192,9 @@ class _Teleoperation:
         self._wanted = _Heard(client, SLAVE_COMMAND)
         self._measured = _Heard(client, SLAVE_MEASURED)
         self._motors = _Heard(client, MOTOR_COMMAND, MOTORS)
-        self._calibrating = _Heard(client, CALIBRATION_COMMAND)
         self._taken_ns = self._gripped_ns = time.time_ns()
-        self._home_ns = 0
+        # Orders that calibration had before the key for home was pressed; None while it is not.
+        self._home: frozenset[int] | None = None
         self._quit = False
         self._note = ''
 
@@ -236,9 +235,9 @@ class _Teleoperation:
     def _let_go(self) -> None:
         """Release the clutch before anything else, and do not leave a way home to itself."""
         self._sender.press(False, time.time_ns())
-        if self._home_ns and not self._is_home():
+        if self._home is not None and not self._is_home(self._home):
             self._client.order('pause')
-        self._home_ns = 0
+        self._home = None
 
     def _suspend(self) -> None:
         """Stop as Ctrl-Z asks, and go on with a new grip when the shell says so."""
@@ -266,10 +265,10 @@ class _Teleoperation:
             self._gripped_ns = wall_ns
             self._sender.press(turn.clutch, wall_ns)
         self._sender.send(wall_ns, turn.position)
-        if turn.homing != bool(self._home_ns):
+        if turn.homing != (self._home is not None):
             if turn.homing:
-                self._home_ns = wall_ns
-                self._client.order('home')
+                self._home = frozenset(self._client.orders)
+                self._client.order(HOME)
             else:
                 self._let_go()
         for request in turn.requests:
@@ -290,19 +289,13 @@ class _Teleoperation:
             source = console.values.get('source', FOLLOW_THE_HANDLE)
             if source != FOLLOW_THE_HANDLE:
                 return f'console.source is {source}'
-        if not self._home_ns and self._calibrating.since(wall_ns - _FRESH_NS):
+        if self._home is None and self._client.underway is not None:
             return 'a calibration or a way home has the slave'
         return ''
 
-    def _is_home(self) -> bool:
-        said = self._client.health.get(PROCEDURE)
-        if said is None or said.message != PROCEDURE_WAITING:
-            return False
-        ago_s = float(said.values.get('since last [s]', math.inf))
-        return (
-            said.values.get('last') == HOME_REACHED
-            and ago_s <= (said.received_ns - self._home_ns) * 1e-9
-        )
+    def _is_home(self, known: frozenset[int]) -> bool:
+        order = self._client.order_since(known, HOME)
+        return order is not None and order.state == SUCCEEDED
 
     def _obey(self, request: Request) -> None:
         if request is Request.QUIT:

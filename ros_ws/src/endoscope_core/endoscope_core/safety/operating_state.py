@@ -8,6 +8,7 @@ States and commands follow the Collaborative Robotics Toolkit (Su et al., IEEE I
 from dataclasses import dataclass
 from enum import StrEnum
 
+UNKNOWN_COMMAND, WRONG_STATE, CAUSES_PRESENT = 'unknown_command', 'wrong_state', 'causes_present'
 _NS_PER_MS = 1_000_000
 
 
@@ -38,12 +39,14 @@ class Answer:
     ----------
     accepted
         Whether it was carried out.
-    reason
-        Why not; empty when accepted.
+    reason, code
+        Why not, in words and as `UNKNOWN_COMMAND`, `WRONG_STATE` or `CAUSES_PRESENT`; empty when
+        accepted.
     """
 
     accepted: bool
     reason: str = ''
+    code: str = ''
 
 
 _ALLOWED = {
@@ -107,15 +110,19 @@ class OperatingStateMachine:
             command = StateCommand(text)
         except ValueError:
             known = ', '.join(StateCommand)
-            return Answer(False, f"unknown state command '{text}'; known are {known}")
+            return Answer(
+                False, f"unknown state command '{text}'; known are {known}", UNKNOWN_COMMAND
+            )
         if self.state not in _ALLOWED[command]:
             extra = f' ({self.cause}); use enable once the cause is gone' if self.cause else ''
-            return Answer(False, f"'{command}' is not possible in {self.state}{extra}")
+            return Answer(False, f"'{command}' is not possible in {self.state}{extra}", WRONG_STATE)
         if command is StateCommand.HOME:
             return Answer(True)
         state = _LEADS_TO[command]
         if state is OperatingState.ENABLED and self._present:
-            return Answer(False, 'not enabled: ' + '; '.join(self._present.values()))
+            return Answer(
+                False, f'not enabled: {"; ".join(self._present.values())}', CAUSES_PRESENT
+            )
         if state is not OperatingState.ENABLED:
             self.session = ''
         elif not self.session:

@@ -1,0 +1,68 @@
+"""The message ``calibration/feedback``: how an order to calibrate or to go home fares."""
+
+from dataclasses import asdict, dataclass
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.time import Time
+
+from endoscope_nodes.diagnostics import ERROR, OK, status
+
+CALIBRATE, HOME = 'calibrate', 'home'
+# States, as those of a ROS action's goal are called; no order was given yet in the first.
+WAITING, EXECUTING, SUCCEEDED = 'waiting', 'executing', 'succeeded'
+ABORTED, REJECTED = 'aborted', 'rejected'
+# Why an order was rejected or aborted.
+BUSY, NO_SESSION, SESSION_ENDED = 'busy', 'no_session', 'session_ended'
+TENSION_CEILING, STREAM_SILENT, TENSION_GAP = 'tension_ceiling', 'stream_silent', 'tension_gap'
+UNKNOWN_TUBE, NOT_JUDGED, NOT_REACHED = 'unknown_tube', 'not_judged', 'not_reached'
+
+
+@dataclass(frozen=True)
+class OrderFeedback:
+    """How an order fares, by codes.
+
+    Attributes
+    ----------
+    order
+        `CALIBRATE` or `HOME`; empty before the first.
+    id
+        No other order has it: the time in ns at which this one was given, or just after it.
+    state, phase, code
+        What became of it, what is done for it now, and why it was rejected or aborted.
+    progress
+        From 0 to 1.
+    words
+        The same for a person.
+    """
+
+    order: str = ''
+    id: int = 0
+    state: str = WAITING
+    phase: str = ''
+    progress: float = 0.0
+    code: str = ''
+    words: str = ''
+
+    def message(self, stamp_ns: int) -> DiagnosticArray:
+        """Write it, at a time in ns."""
+        values = asdict(self)
+        level = ERROR if self.state in (ABORTED, REJECTED) else OK
+        message = DiagnosticArray()
+        message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+        message.status = [status('calibration: order', level, values.pop('words'), values)]
+        return message
+
+    @classmethod
+    def of_message(cls, message: DiagnosticArray) -> 'OrderFeedback':
+        """Read it."""
+        [said] = message.status
+        texts = {item.key: item.value for item in said.values}
+        return cls(
+            texts['order'],
+            int(texts['id']),
+            texts['state'],
+            texts['phase'],
+            float(texts['progress']),
+            texts['code'],
+            said.message,
+        )
