@@ -25,7 +25,7 @@ from endoscope_core.signals import motion_by_name
 @pytest.fixture(scope='module')
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp('learning') / 'data'
-    assert main(['dataset', '--out', str(folder), '--seed', '5', '--per-class', '2']) == 0
+    assert main(['dataset', '--out', str(folder), '--seed', '5', '--n', '14']) == 0
     return folder
 
 
@@ -86,7 +86,7 @@ def test_training_leaves_weights_that_tell_sizes(data, tmp_path):
     ('folds', 'words'),
     [
         ('1', '1 folds cannot be made of 2 recorded tubes a class: give 2 to 2 folds'),
-        ('5', 'give 2 to 2 folds, or make more of them with `endoscope dataset --per-class`'),
+        ('5', 'give 2 to 2 folds, or make more of them with `endoscope dataset --n`'),
         ('-3', 'give 2 to 2 folds'),
     ],
 )
@@ -100,14 +100,14 @@ def test_folds_that_cannot_be_made_are_one_line(data, tmp_path, capsys, folds, w
 
 def test_one_recording_a_class_trains_nothing(tmp_path, capsys):
     folder, out = tmp_path / 'data', tmp_path / 'weights.safetensors'
-    assert main(['dataset', '--out', str(folder), '--per-class', '1']) == 0
+    assert main(['dataset', '--out', str(folder), '--n', '7']) == 0
     assert main(['train', '--data', str(folder), '--out', str(out)]) == 2
     [line] = capsys.readouterr().err.splitlines()
     assert 'of 1 recorded tubes a class: at least 2 a class are needed' in line
 
 
 def test_a_data_set_without_room_on_the_disk_is_named(tmp_path):
-    program = f'{sys.executable} -m endoscope_bringup.cli dataset --per-class 1 --out data'
+    program = f'{sys.executable} -m endoscope_bringup.cli dataset --n 7 --out data'
     done = subprocess.run(
         ['bash', '-c', f'ulimit -f 20; {program}'],
         cwd=tmp_path,
@@ -126,7 +126,7 @@ def test_training_the_papers_network_leaves_weights_that_classify(data, tmp_path
     options = ['--model', 'cnn', '--folds', '2']
     assert main(['train', '--data', str(data), '--out', str(out), *options]) == 0
     described = json.loads(out.with_suffix('.json').read_text())
-    assert described['command'].startswith('endoscope dataset --seed 5 --per-class 2')
+    assert described['command'].startswith('endoscope dataset --seed 5 --n 14')
     assert np.sum(described['held_out']['confusion']) == 14
     result = TensionClassifier.load(out).classify(load_dataset(data).tension[0])
     assert sum(result.probabilities.values()) == pytest.approx(1.0)
@@ -205,7 +205,9 @@ def test_a_bag_that_does_not_say_what_the_motors_did_is_refused(calibration, tmp
         ['identify', 'nowhere', '--model', 'unheard_of'],
         ['identify', 'nowhere'],
         ['train', '--data', 'nowhere', '--out', 'x.safetensors'],
-        ['dataset', '--out', 'x', '--per-class', '0'],
+        ['dataset', '--out', 'x', '--n', '0'],
+        ['dataset', '--out', 'x', '--n', '8'],
+        ['dataset', '--out', 'x', '--reset-pretension'],
         ['dataset', '--out', 'x', '--motion', 'breif'],
     ],
 )

@@ -94,6 +94,25 @@ def test_where_a_tube_is_bent_changes_its_tensions_at_the_same_size():
     assert np.sqrt(np.mean((first - second) ** 2)) > 0.1
 
 
+def tube_and_hands(dataset, key):
+    """What a key of joint x is in each recording, by the bend where it changes with it."""
+    return [entry['joints']['bend_x'][key] for entry in dataset.manifest['recordings']]
+
+
+def test_one_instrument_is_the_same_as_mounted_in_every_tube(small):
+    one = make_dataset(seed=3, per_class=1, one_instrument=True)
+    again = make_dataset(seed=3, per_class=1, one_instrument=True, reset_pretension=True)
+    np.testing.assert_allclose(np.rad2deg(one.backlash_size), CLASSES_DEG, atol=1.1)
+    for key in ('joint_radius', 'pretension'):
+        assert len(set(tube_and_hands(small, key))) == 7
+        assert len(set(tube_and_hands(one, key))) == 1
+    assert len(set(tube_and_hands(again, 'joint_radius'))) == 1
+    assert len(set(tube_and_hands(again, 'pretension'))) == 7
+    assert (again.manifest['instruments'], again.manifest['reset_pretension']) == ('one', True)
+    with pytest.raises(DatasetError, match='of many instruments'):
+        make_dataset(seed=3, per_class=1, reset_pretension=True)
+
+
 def test_a_brief_calibration_is_of_the_same_tubes(small):
     brief = make_dataset(seed=3, per_class=1, motion='brief')
     assert brief.tension.shape == (7, 3140, 4)

@@ -11,15 +11,30 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'dataset',
         help='simulate calibration recordings of known backlash size',
-        description='Writes recordings.npz and manifest.json to DIR: calibrations of random rigs '
-        'in random tubes, seven classes of backlash size from 40 to 100 deg.',
+        description='Writes recordings.npz and manifest.json to DIR: calibrations of random rigs, '
+        'or of one, in random tubes, seven classes of backlash size from 40 to 100 deg.',
     )
     parser.add_argument(
         '--out', type=Path, required=True, metavar='DIR', help='new or empty folder'
     )
     parser.add_argument('--seed', type=seed, default=7, help='the same seed, the same data set (7)')
     parser.add_argument(
-        '--per-class', type=int, default=30, metavar='N', help='recordings of each class (30)'
+        '--n',
+        type=int,
+        default=210,
+        metavar='N',
+        help='recordings, as many of each of the seven classes (210)',
+    )
+    parser.add_argument(
+        '--instruments',
+        choices=('one', 'many'),
+        default='many',
+        help='one: the same as mounted in every tube; many: another in each (many)',
+    )
+    parser.add_argument(
+        '--reset-pretension',
+        action='store_true',
+        help='set the pretension of the one instrument by hand before each recording',
     )
     parser.add_argument(
         '--motion',
@@ -31,10 +46,20 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     """Make and write the data set; return 0."""
     from endoscope_core.atomic_output import require_free_directory
-    from endoscope_core.dataset import make_dataset, save_dataset
+    from endoscope_core.dataset import CLASSES_DEG, DatasetError, make_dataset, save_dataset
 
     require_free_directory(args.out)
-    dataset = make_dataset(args.seed, args.per_class, _print_progress, args.motion)
+    classes = len(CLASSES_DEG)
+    if args.n < classes or args.n % classes:
+        raise DatasetError(f'--n {args.n}: give a multiple of {classes}, the number of classes')
+    dataset = make_dataset(
+        args.seed,
+        args.n // classes,
+        _print_progress,
+        args.motion,
+        one_instrument=args.instruments == 'one',
+        reset_pretension=args.reset_pretension,
+    )
     save_dataset(dataset, args.out)
     print(
         f'{args.out}: {len(dataset.class_deg)} recordings, manifest SHA-256 {dataset.manifest_hash}'

@@ -134,7 +134,7 @@ def _of_dataset(args: argparse.Namespace) -> dict[str, object]:
     found = identify_classes(dataset, lead, args.seed, args.per_class, _report, args.model)
     made = dataset.manifest
     command = (
-        f'endoscope dataset --seed {made["seed"]} --per-class {made["per_class"]} '
+        f'endoscope dataset --seed {made["seed"]} --n {len(dataset.class_deg)} '
         f'--out DATA && endoscope identify DATA --model {args.model} --seed {args.seed} '
         f'--per-class {args.per_class}'
     )

@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     dataset = load_dataset(args.data)
     made = dataset.manifest
     command = (
-        f'endoscope dataset --seed {made["seed"]} --per-class {made["per_class"]} '
+        f'endoscope dataset --seed {made["seed"]} --n {len(dataset.class_deg)} '
         f'--motion {dataset.motion} --out DATA && endoscope train --model {args.model} '
         f'--seed {args.seed} --folds {args.folds} --data DATA --out {out.name}'
     )

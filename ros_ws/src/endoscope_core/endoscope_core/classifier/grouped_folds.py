@@ -64,7 +64,7 @@ def grouped_folds(
         may = f'give 2 to {least} folds' if least >= 2 else 'at least 2 a class are needed'
         raise DatasetError(
             f'{folds} folds cannot be made of {least} recorded tubes a class: {may}, or make more '
-            'of them with `endoscope dataset --per-class`'
+            'of them with `endoscope dataset --n`'
         )
     # Only training divides rows: a node that classifies would load it for nothing, and for seconds.
     from sklearn.model_selection import StratifiedGroupKFold

@@ -14,9 +14,11 @@ from endoscope_core.atomic_output import atomic_directory
 from endoscope_core.dataset.calibration_recording import record_calibration
 from endoscope_core.dataset.rig_variation import (
     GREATEST_UNEVENNESS,
+    Instrument,
     TubeConfiguration,
     configuration_of_size,
     random_instrument,
+    with_pretension_reset,
 )
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.signals import SINUSOID, calibration_motion
@@ -89,8 +91,11 @@ def make_dataset(
     per_class: int = PER_CLASS,
     progress: Callable[[int, int], None] | None = None,
     motion: str = SINUSOID,
+    *,
+    one_instrument: bool = False,
+    reset_pretension: bool = False,
 ) -> CalibrationDataset:
-    """Simulate the data set; each recording is another rig in another tube.
+    """Simulate the data set; each recording is of another tube.
 
     Parameters
     ----------
@@ -103,11 +108,16 @@ def make_dataset(
     motion : str
         Calibration motion that is recorded. Rigs, tubes and sizes do not depend on it: the size
         is always that under the sinusoid.
+    one_instrument : bool
+        Whether all recordings are of one instrument, as mounted, rather than each of another.
+    reset_pretension : bool
+        Whether its pretension is set by hand before each recording.
 
     Raises
     ------
     DatasetError
-        If `per_class` is not positive or `seed` is negative.
+        If `per_class` is not positive or `seed` is negative, or the pretension is to be reset of
+        instruments of which each is another anyway.
     UnknownCalibrationError
         If there is no motion of that name.
     """
@@ -116,6 +126,9 @@ def make_dataset(
         raise DatasetError(
             f'per_class = {per_class} must be positive and seed = {seed} not negative'
         )
+    if reset_pretension and not one_instrument:
+        raise DatasetError('the pretension is set anew for each recording of many instruments')
+    instrument = _of_all_classes(seed) if one_instrument else None
     total = per_class * len(CLASSES_DEG)
     configurations: list[TubeConfiguration] = []
     recordings = []
@@ -123,7 +136,7 @@ def make_dataset(
     for class_deg in CLASSES_DEG:
         for k in range(per_class):
             generator = np.random.default_rng([seed, class_deg, k])
-            configuration = _draw(generator, class_deg)
+            configuration = _draw(generator, class_deg, instrument, reset_pretension)
             noise_seed = int(generator.integers(2**31))
             recordings.append(record_calibration(configuration.plant, noise_seed, calibration))
             configurations.append(configuration)
@@ -161,6 +174,8 @@ def make_dataset(
             for k, configuration in enumerate(configurations)
         ],
     }
+    if one_instrument:
+        manifest |= {'instruments': 'one', 'reset_pretension': reset_pretension}
     return CalibrationDataset(**arrays, manifest=manifest)
 
 
@@ -211,14 +226,37 @@ def load_dataset(folder: str | Path) -> CalibrationDataset:
     return dataset
 
 
-def _draw(generator: np.random.Generator, class_deg: int) -> TubeConfiguration:
+def _draw(
+    generator: np.random.Generator,
+    class_deg: int,
+    instrument: Instrument | None,
+    reset_pretension: bool,
+) -> TubeConfiguration:
     size = np.deg2rad(class_deg + SIZE_SPREAD_DEG * generator.uniform(-1.0, 1.0))
     for _ in range(_MOST_RIGS):
         unevenness = float(generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS))
-        configuration = configuration_of_size(random_instrument(generator), float(size), unevenness)
+        used = instrument or random_instrument(generator)
+        if reset_pretension:
+            used = with_pretension_reset(used, generator)
+        configuration = configuration_of_size(used, float(size), unevenness)
         if configuration is not None:
             return configuration
     raise DatasetError(f'no instrument of {_MOST_RIGS} reaches a backlash size of {class_deg} deg')
+
+
+def _of_all_classes(seed: int) -> Instrument:
+    """An instrument that tubes give the smallest and the greatest of the sizes.
+
+    Hardly any has both in evenly bent tubes; where the friction sits along the tube matters too.
+    """
+    uneven = 0.75 * GREATEST_UNEVENNESS
+    ends = (CLASSES_DEG[0] - SIZE_SPREAD_DEG, uneven), (CLASSES_DEG[-1] + SIZE_SPREAD_DEG, -uneven)
+    generator = np.random.default_rng(seed)
+    for _ in range(_MOST_RIGS):
+        instrument = random_instrument(generator)
+        if all(configuration_of_size(instrument, float(np.deg2rad(x)), u) for x, u in ends):
+            return instrument
+    raise DatasetError(f'no instrument of {_MOST_RIGS} reaches all backlash sizes')
 
 
 def _arrays_hash(arrays: dict[str, NDArray[Any]]) -> str:

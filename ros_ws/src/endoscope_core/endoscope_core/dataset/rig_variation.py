@@ -107,6 +107,12 @@ def random_instrument(generator: np.random.Generator) -> Instrument:
     )
 
 
+def with_pretension_reset(instrument: Instrument, generator: np.random.Generator) -> Instrument:
+    """The same instrument, whose pretension was set by hand once more."""
+    other = random_instrument(generator)
+    return replace(instrument, pretension=other.pretension, tightening=other.tightening)
+
+
 def in_tube(
     instrument: Instrument,
     bend: float,
