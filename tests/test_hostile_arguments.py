@@ -1,17 +1,66 @@
 """Every command with arguments that cannot be used: one line, exit 2, no defect."""
 
 import argparse
+import contextlib
 import itertools
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
+from short_bags import PLANT, write_short_bag
 
 from endoscope_bringup.cli import build_parser, main
+from endoscope_core.physics import save_plant
 
-CALLED = {'bench', 'demo', 'operate', 'teleop', 'topics', 'record', 'replay', 'console', 'doctor'}
+CALLED = {
+    'bench',
+    'demo',
+    'operate',
+    'teleop',
+    'topics',
+    'record',
+    'replay',
+    'console',
+    'doctor',
+}
 """Those that run, listen or wait whatever the files: only their numbers are tried."""
 FILES = ('missing', 'folder', 'empty', 'random', 'nan.csv')
-NUMBERS = ('nan', 'x', '1e400')
+NUMBERS = ('nan', 'x', '1e400', '-1', '-1e300', f'{10**300}')
+BLOCKED = ('random/below', '/proc/bag')
+"""Outputs that nobody can write, root neither: below a file, and in a folder of the kernel's."""
+MAPPING = """
+time: {column: time, unit: s}
+topics: {slave/measured_js: {position: {bend_x: {column: angle, unit: rad}}}}
+"""
+WRITING = (
+    'simulate --plant plant.yaml --commands bag --out',
+    'explain bag --plant plant.yaml --quick --out',
+    'invert --plant plant.yaml --motion periodic --out',
+    'convert table.csv --mapping mapping.yaml --out',
+    'convert table.csv --propose',
+    'bag cut bag --out',
+    'bag recover bag',
+    'dataset --n 7 --out',
+    'identify bag --model play --out',
+)
+READING = (
+    'explain bag --plant plant.yaml --quick --out out --baseline',
+    'explain bag --plant plant.yaml --quick --out out --validate',
+    'convert table.csv --out out --mapping',
+    'console --rig',
+)
+PRINTING = (
+    '--version',
+    '--help',
+    'effects',
+    'effects --json',
+    'completion bash',
+    'bench --help',
+)
+PROGRESS = ('reading the table', 'slave/measured_js')
+"""What `convert` says first of what it is at."""
 _NO_NUMBER = (None, str)
 
 
@@ -32,7 +81,9 @@ def required(parser, value, out):
     """Arguments that a command wants, each with the same value; what it writes goes to `out`."""
     words = []
     for action in parser._actions:
-        if action.required or (not action.option_strings and action.nargs not in ('?', '*')):
+        if action.required or (
+            not action.option_strings and action.nargs not in ('?', '*')
+        ):
             given = next(iter(action.choices)) if action.choices else value
             given = out if action.dest == 'out' else given
             words += [*action.option_strings[-1:], str(given)]
@@ -49,18 +100,20 @@ def hostile(tmp_path, monkeypatch):
     return tmp_path
 
 
-def ends_in_one_line(words, capsys):
+def ends_in_one_line(words, capsys, beside=()):
     """Call a command; whether it refused, with one line that says no defect."""
     try:
         status = main([str(word) for word in words])
     except SystemExit as stop:
         status = stop.code
-    said = capsys.readouterr().err.splitlines()
+    said = [line for line in capsys.readouterr().err.splitlines() if line not in beside]
     assert 'defect' not in ' '.join(said), (words, said)
     assert (status, len(said)) == (2, 1), (words, status, said)
 
 
-@pytest.mark.parametrize('path', [p for p in COMMANDS if p[0] not in CALLED], ids=' '.join)
+@pytest.mark.parametrize(
+    'path', [p for p in COMMANDS if p[0] not in CALLED], ids=' '.join
+)
 def test_files_that_cannot_be_used_are_one_line(path, hostile, capsys):
     takes_files = any(a.required and a.dest != 'out' for a in COMMANDS[path]._actions)
     for kind in FILES if takes_files else ():
@@ -80,6 +133,48 @@ def test_numbers_that_are_none_are_one_line(path, hostile, capsys):
     for action, number in itertools.product(numeric, NUMBERS):
         words = [*path, *required(parser, hostile / 'missing', hostile / 'out')]
         ends_in_one_line([*words, f'{action.option_strings[-1]}={number}'], capsys)
+
+
+@pytest.fixture(scope='module')
+def sound(tmp_path_factory):
+    """A folder with a plant, a bag, a table and its mapping that can be used."""
+    folder = tmp_path_factory.mktemp('sound')
+    save_plant(PLANT, folder / 'plant.yaml')
+    write_short_bag(folder / 'bag')
+    (folder / 'table.csv').write_text('time,angle\n' + '0.1,0.5\n0.2,0.6\n')
+    (folder / 'mapping.yaml').write_text(MAPPING)
+    return folder
+
+
+@pytest.mark.parametrize('blocked', BLOCKED)
+@pytest.mark.parametrize('words', WRITING)
+def test_outputs_that_cannot_be_written_are_one_line(
+    words, blocked, hostile, sound, capsys
+):
+    with contextlib.chdir(sound):
+        ends_in_one_line([*words.split(), hostile / blocked], capsys, beside=PROGRESS)
+
+
+@pytest.mark.parametrize('kind', FILES[:-1])
+@pytest.mark.parametrize('words', READING)
+def test_optional_files_that_cannot_be_used_are_one_line(
+    words, kind, hostile, sound, capsys
+):
+    with contextlib.chdir(sound):
+        ends_in_one_line([*words.split(), hostile / kind], capsys)
+
+
+@pytest.mark.parametrize('words', PRINTING)
+def test_a_reader_that_has_gone_is_no_defect(words):
+    # As with `| head -0`; and the output is more than a pipe holds, or less.
+    read, write = os.pipe()
+    os.close(read)
+    program = [sys.executable, '-m', 'endoscope_bringup.cli', *words.split()]
+    done = subprocess.run(
+        program, stdout=write, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(write)
+    assert (done.returncode, done.stderr) == (1, '')
 
 
 def is_number(action):

@@ -9,8 +9,8 @@ def seed(text: str) -> int:
     Raises
     ------
     argparse.ArgumentTypeError
-        It is no whole number of at least 0, as numpy's and torch's generators need it.
+        It is no whole number from 0 to 2^32 - 1, as numpy's and torch's generators need it.
     """
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f'{text!r} is no seed: give a whole number from 0 on')
+    if not text.isdecimal() or int(text) >= 2**32:
+        raise argparse.ArgumentTypeError(f'{text!r} is no seed: give 0 to {2**32 - 1}')
     return int(text)

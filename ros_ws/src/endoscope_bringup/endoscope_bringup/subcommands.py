@@ -6,7 +6,7 @@ import itertools
 import json
 import math
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NoReturn
 
 from endoscope_core.errors import nearest, printable
@@ -78,12 +78,21 @@ def run_chosen(args: argparse.Namespace, *, dest: str) -> int:
     return int(getattr(args, f'run_{dest}')(args))
 
 
-def finite_number(text: str) -> float:
-    """Read a number for argparse that is neither NaN nor infinite."""
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError(text)
-    return value
+def within[T: (int, float)](low: T, high: T, kind: type[T]) -> Callable[[str], T]:
+    """Return a type for argparse: a number of a kind from `low` to `high`, both allowed."""
+
+    def number(text: str) -> T:
+        value = kind(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f'{text} is not between {low:g} and {high:g}')
+        return value
+
+    return number
+
+
+COUNT = within(1, 1_000_000, int)
+SECONDS = within(1e-3, 3600.0, float)
+"""A time to wait."""
 
 
 def add_json_option(parser: argparse.ArgumentParser) -> None:

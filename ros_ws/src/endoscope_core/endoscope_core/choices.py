@@ -38,6 +38,9 @@ PLAYS = ('motion', 'file')
 SOURCES = ('none', *PLAYS, FOLLOW_THE_HANDLE)
 """Where the console's commands come from."""
 
+WAIVABLE = ('motor/measured_js', 'wires/measured_js')
+"""Topics that an explanation can do without where the caller says so."""
+
 SIMULATED = 'simulated'
 MOTOR_DEVICES = (SIMULATED, 'dynamixel')
 LOAD_CELL_DEVICES = (SIMULATED, 'modbus_rtu', 'modbus_tcp')

@@ -6,7 +6,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from endoscope_bringup.subcommands import finite_number
+from endoscope_bringup.subcommands import COUNT, within
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -19,10 +19,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'home. Then the simulated slave plays a motion for a while beside Chromium and two busy '
         'loops, recorded. Exits 1 where a step failed, a fault came or a message was lost.',
     )
-    parser.add_argument('--n', type=int, default=20, metavar='N', help='of each (20)')
-    parser.add_argument('--loops', type=int, default=7, metavar='N', help='busy loops (7)')
+    parser.add_argument('--n', type=COUNT, default=20, metavar='N', help='of each (20)')
+    parser.add_argument('--loops', type=within(0, 64, int), default=7, metavar='N', help='busy loops (7)')
     parser.add_argument(
-        '--minutes', type=finite_number, default=30.0, metavar='M', help='of the long motion (30)'
+        '--minutes', type=within(0.0, 1440.0, float), default=30.0, metavar='M', help='of the long motion (30)'
     )
 
 

@@ -3,6 +3,7 @@
 import argparse
 
 from endoscope_bringup.seed_argument import seed
+from endoscope_bringup.subcommands import COUNT
 
 RATES = (100, 125, 200, 250, 450, 500, 990, 1000)
 GAPS_MS = (20, 30, 40, 50, 60)
@@ -21,7 +22,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'if at some rate a class is wrong or more than one known tube of a hundred is refused.',
     )
     parser.add_argument('--seed', type=seed, default=1, help='chooses tubes, rigs and noise (1)')
-    parser.add_argument('--tubes', type=int, default=10, metavar='N', help='tubes a class (10)')
+    parser.add_argument('--tubes', type=COUNT, default=10, metavar='N', help='tubes a class (10)')
 
 
 def run(args: argparse.Namespace) -> int:

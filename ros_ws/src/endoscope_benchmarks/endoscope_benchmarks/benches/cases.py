@@ -9,6 +9,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from endoscope_bringup.seed_argument import seed
+from endoscope_bringup.subcommands import COUNT
 from endoscope_core.errors import EndoscopeError
 
 
@@ -22,13 +24,34 @@ def add_case_options(parser: argparse.ArgumentParser, strata: Sequence[str] | No
         help=f'kinds of cases (default: {" ".join(strata or ["all"])})',
     )
     add_seeds(parser, 'of the cases (default: 1-3)')
-    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='cases side by side (1)')
+    add_jobs(parser)
     parser.add_argument('--json', type=Path, metavar='FILE', help='file for all rows')
 
 
 def add_seeds(parser: argparse.ArgumentParser, what: str) -> None:
     """Add `--seeds`."""
     parser.add_argument('--seeds', type=seeds, default=range(1, 4), metavar='A-B', help=what)
+
+
+def add_jobs(parser: argparse.ArgumentParser, default: int = 1) -> None:
+    """Add `--jobs`."""
+    parser.add_argument(
+        '--jobs', type=COUNT, default=default, metavar='N', help=f'side by side ({default})'
+    )
+
+
+def side_by_side(
+    jobs: int, function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]
+) -> Iterator[tuple[int, Any]]:
+    """Yield how many calls are done, and what each returned, as they are done."""
+    from concurrent.futures import as_completed
+
+    from endoscope_core.worker_pool import worker_pool
+
+    with worker_pool(jobs) as pool:
+        futures = [pool.submit(function, *call) for call in calls]
+        for done, future in enumerate(as_completed(futures), 1):
+            yield done, future.result()
 
 
 def require_known(kind: str, names: Collection[str], known: Collection[str]) -> None:
@@ -72,4 +95,4 @@ def seeds(text: str) -> range:
     found = re.fullmatch(r'(\d+)(?:-(\d+))?', text)
     if not found or int(found[2] or found[1]) < int(found[1]):
         raise argparse.ArgumentTypeError(f'{text!r} are no seeds: give 1-20, or 7')
-    return range(int(found[1]), int(found[2] or found[1]) + 1)
+    return range(seed(found[1]), seed(found[2] or found[1]) + 1)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from endoscope_bringup.subcommands import finite_number
+from endoscope_bringup.subcommands import COUNT, within
 
 if TYPE_CHECKING:
     from endoscope_benchmarks.console_trials.events import Outcome
@@ -38,18 +38,18 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'frames of the page. Exits 1 where something moved without a new grip.',
     )
     parser.add_argument(
-        '--repetitions', type=int, default=30, help='of each event (default: %(default)s)'
+        '--repetitions', type=COUNT, default=30, help='of each event (default: %(default)s)'
     )
     parser.add_argument('--only', nargs='+', metavar='EVENT', help='events to try; `all` for all')
     parser.add_argument(
         '--inputs',
-        type=int,
+        type=COUNT,
         default=30,
         help='inputs whose latency is taken (default: %(default)s)',
     )
     parser.add_argument(
         '--seconds',
-        type=finite_number,
+        type=within(0.0, 86400.0, float),
         default=20.0,
         help='of each figure of cost (default: %(default)g)',
     )

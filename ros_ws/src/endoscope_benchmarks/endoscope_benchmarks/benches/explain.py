@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from endoscope_benchmarks.benches.cases import add_jobs
+
 TRUTH = '.truth.json'
 
 
@@ -36,12 +38,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='explain labelled recordings and compare with what was concealed',
         description='Explains every NAME.mcap of FOLDER that has a NAME.truth.json, with the '
         "folder's plant.yaml, and prints what was said beside what was concealed. "
-        'NAME.baseline.mcap is the same rig when it was well, NAME.second.mcap a second recording '
+        'NAME.baseline.mcap is a healthy recording of the same rig, NAME.second.mcap a second one '
         'to judge on. Exits 1 if one is wrong.',
     )
     parser.add_argument('folder', type=Path, metavar='FOLDER', help='of labelled recordings')
     parser.add_argument('--only', nargs='+', metavar='NAME', help='these cases alone')
-    parser.add_argument('--jobs', type=int, default=2, metavar='N', help='processes (2)')
+    add_jobs(parser, default=2)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -12,6 +12,7 @@ from random import Random
 from typing import TYPE_CHECKING
 
 from endoscope_bringup.seed_argument import seed
+from endoscope_bringup.subcommands import COUNT
 
 if TYPE_CHECKING:
     from endoscope_benchmarks.process_faults.process_faults import Outcome
@@ -38,9 +39,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'an enable did not work.',
     )
     parser.add_argument(
-        '--repetitions', type=int, default=100, help='of each fault (default: %(default)s)'
+        '--repetitions', type=COUNT, default=100, help='of each fault (default: %(default)s)'
     )
-    parser.add_argument('--rate', type=int, default=500, help='beats/s (default: %(default)s)')
+    parser.add_argument('--rate', type=COUNT, default=500, help='beats/s (default: %(default)s)')
     parser.add_argument('--composed', action='store_true', help='all nodes in one process')
     parser.add_argument('--seed', type=seed, default=1, help='of all chance (default: 1)')
     parser.add_argument('--only', nargs='+', metavar='FAULT', help='faults to try (default: all)')

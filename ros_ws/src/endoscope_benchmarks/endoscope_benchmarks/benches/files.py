@@ -3,7 +3,9 @@
 import argparse
 import sys
 
+from endoscope_benchmarks.benches.cases import add_jobs
 from endoscope_bringup.seed_argument import seed
+from endoscope_bringup.subcommands import COUNT
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -16,11 +18,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'ended otherwise than in one line or a correct answer.',
     )
     parser.add_argument(
-        '--cases', type=int, default=300, metavar='N', help='files of each kind (300)'
+        '--cases', type=COUNT, default=300, metavar='N', help='files of each kind (300)'
     )
     parser.add_argument('--seed', type=seed, default=0, help='of the spoiling (0)')
     parser.add_argument('--only', nargs='+', metavar='KIND', help='kinds to try (default: all)')
-    parser.add_argument('--jobs', type=int, default=2, metavar='N', help='processes (2)')
+    add_jobs(parser, default=2)
 
 
 def run(args: argparse.Namespace) -> int:

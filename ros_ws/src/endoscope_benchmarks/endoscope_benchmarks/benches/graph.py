@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_bringup.subcommands import finite_number
+from endoscope_bringup.subcommands import within
 
 PROCESS_RATES = (1000, 500, 250, 125)
 
@@ -18,13 +18,13 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--seconds',
-        type=finite_number,
+        type=within(0.0, 86400.0, float),
         default=60.0,
         help='length of the run in one process (default: %(default)g)',
     )
     parser.add_argument(
         '--process-seconds',
-        type=finite_number,
+        type=within(0.0, 86400.0, float),
         default=10.0,
         help='length of each run in many processes, 0 for none (default: %(default)g)',
     )

@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_benchmarks.benches.cases import add_seeds
+from endoscope_benchmarks.benches.cases import add_jobs, add_seeds, require_known, side_by_side
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -15,27 +15,19 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument('--effects', nargs='+', metavar='ID', help='(default: all that are drawn)')
     add_seeds(parser, 'of the rigs (default: 1-3)')
-    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='effects side by side (1)')
+    add_jobs(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print a line for each effect; return 0."""
-    from concurrent.futures import as_completed
-
     from endoscope_benchmarks.concealed.formulas import DRAWN
     from endoscope_benchmarks.concealed.limits import limit_of
-    from endoscope_core.errors import EndoscopeError
-    from endoscope_core.worker_pool import worker_pool
 
-    for name in args.effects or ():
-        if name not in DRAWN:
-            raise EndoscopeError(f"'{name}' is not drawn; known are {', '.join(DRAWN)}")
-    with worker_pool(args.jobs) as pool:
-        futures = [pool.submit(limit_of, effect, args.seeds) for effect in args.effects or DRAWN]
-        for future in as_completed(futures):
-            found = future.result()
-            named = f'{100.0 * found.share:.2g} %' if found.share == found.share else 'never'
-            weaker = ', '.join(m or 'nothing' for m in found.missed_as) or '-'
-            numbers = '; '.join(found.numbers)
-            print(f'| `{found.effect}` | {named} | {numbers} | {weaker} |', flush=True)
+    require_known('drawn effect', args.effects or (), DRAWN)
+    calls = [(effect, args.seeds) for effect in args.effects or DRAWN]
+    for _, found in side_by_side(args.jobs, limit_of, calls):
+        named = f'{100.0 * found.share:.2g} %' if found.share == found.share else 'never'
+        weaker = ', '.join(m or 'nothing' for m in found.missed_as) or '-'
+        numbers = '; '.join(found.numbers)
+        print(f'| `{found.effect}` | {named} | {numbers} | {weaker} |', flush=True)
     return 0

@@ -4,7 +4,7 @@ import argparse
 from concurrent.futures import Executor
 from pathlib import Path
 
-from endoscope_benchmarks.benches.cases import seeds
+from endoscope_benchmarks.benches.cases import add_jobs, seeds
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -26,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         '--derive', action='store_true', help='derive the deciding numbers from the right ones'
     )
     parser.add_argument('--write', type=Path, metavar='FILE', help='module for them')
-    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='side by side (1)')
+    add_jobs(parser)
 
 
 def run(args: argparse.Namespace) -> int:

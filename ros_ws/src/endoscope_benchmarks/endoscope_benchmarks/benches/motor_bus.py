@@ -4,7 +4,7 @@ import argparse
 import time
 from dataclasses import dataclass
 
-from endoscope_bringup.subcommands import finite_number
+from endoscope_bringup.subcommands import within
 
 _STEP_S = 1e-3
 
@@ -52,13 +52,16 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--bauds',
-        type=int,
+        type=within(1, 10**8, int),
         nargs='+',
         default=[57_600, 1_000_000, 4_000_000],
         help='bits per second (default: %(default)s)',
     )
     parser.add_argument(
-        '--seconds', type=finite_number, default=10.0, help='length of a run (default: %(default)g)'
+        '--seconds',
+        type=within(0.0, 86400.0, float),
+        default=10.0,
+        help='length of a run (default: %(default)g)',
     )
     parser.add_argument('--fast', action='store_true', help='use fast sync read')
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from endoscope_benchmarks.benches.papers_tables import TABLES
 from endoscope_bringup.seed_argument import seed
+from endoscope_bringup.subcommands import COUNT
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -19,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument('--seed', type=seed, default=1, help='chooses tubes, rigs and noise (1)')
     parser.add_argument(
-        '--tubes', type=int, default=5, metavar='N', help='tube configurations of each row (5)'
+        '--tubes', type=COUNT, default=5, metavar='N', help='tube configurations of each row (5)'
     )
     parser.add_argument(
         '--only',

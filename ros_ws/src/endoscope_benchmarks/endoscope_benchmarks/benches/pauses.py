@@ -5,8 +5,8 @@ import itertools
 import math
 from typing import TYPE_CHECKING
 
-from endoscope_benchmarks.benches.cases import add_seeds
-from endoscope_bringup.subcommands import finite_number
+from endoscope_benchmarks.benches.cases import add_jobs, add_seeds, side_by_side
+from endoscope_bringup.subcommands import within
 
 if TYPE_CHECKING:
     from endoscope_benchmarks.pauses import Row
@@ -25,38 +25,27 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     add_seeds(parser, 'of the rests (1-3)')
     parser.add_argument(
         '--longest',
-        type=_at_least_a_second,
+        type=within(1.0, 1e6, float),
         default=3600.0,
         metavar='S',
         help='longest rest in s (3600)',
     )
-    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='side by side (1)')
-
-
-def _at_least_a_second(text: str) -> float:
-    number = finite_number(text)
-    if number < 1.0:
-        raise argparse.ArgumentTypeError(f'{text} is less than a second')
-    return number
+    add_jobs(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print a line for each rest and a table; return 1 if the graph was silent after one."""
-    from concurrent.futures import as_completed
-
     from endoscope_benchmarks.pauses import rested_and_moved
-    from endoscope_core.worker_pool import worker_pool
 
     rows = []
-    with worker_pool(args.jobs) as pool:
-        futures = [pool.submit(rested_and_moved, seed, args.longest) for seed in args.seeds]
-        for future in as_completed(futures):
-            rows.append(row := future.result())
-            print(
-                f'{len(rows)} of {len(futures)}: seed {row.seed}, {row.rest_s:.0f} s, then '
-                f'{row.asked}: {row.became}, {row.within_s:.2f} s after the first command',
-                flush=True,
-            )
+    calls = [(seed, args.longest) for seed in args.seeds]
+    for done, row in side_by_side(args.jobs, rested_and_moved, calls):
+        rows.append(row)
+        print(
+            f'{done} of {len(calls)}: seed {row.seed}, {row.rest_s:.0f} s, then {row.asked}: '
+            f'{row.became}, {row.within_s:.2f} s after the first command',
+            flush=True,
+        )
     return _print_table(rows)
 
 

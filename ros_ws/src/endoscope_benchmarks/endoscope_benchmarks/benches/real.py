@@ -4,6 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from endoscope_benchmarks.benches.cases import add_jobs
+
 PAGE = 'real.html'
 
 
@@ -21,7 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--out', type=Path, default=Path(PAGE), metavar='FILE', help=f'page to write ({PAGE})'
     )
-    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='tasks side by side (1)')
+    add_jobs(parser)
 
 
 def run(args: argparse.Namespace) -> int:

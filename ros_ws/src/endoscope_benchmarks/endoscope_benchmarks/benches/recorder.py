@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from endoscope_benchmarks.benches.process_cpu import cpu_seconds
-from endoscope_bringup.subcommands import finite_number
+from endoscope_bringup.subcommands import COUNT, within
 
 TARGET_RATE = 20_000
 TARGET_CPU_SHARE = 0.5
@@ -64,13 +64,16 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--rates',
-        type=int,
+        type=COUNT,
         nargs='+',
         default=[5_000, 10_000, TARGET_RATE],
         help='messages per second (default: %(default)s)',
     )
     parser.add_argument(
-        '--seconds', type=finite_number, default=10.0, help='length of a run (default: %(default)g)'
+        '--seconds',
+        type=within(0.0, 86400.0, float),
+        default=10.0,
+        help='length of a run (default: %(default)g)',
     )
 
 

@@ -5,7 +5,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from endoscope_benchmarks.benches.cases import add_seeds
+from endoscope_benchmarks.benches.cases import add_jobs, add_seeds, side_by_side
+from endoscope_bringup.subcommands import COUNT
 
 if TYPE_CHECKING:
     from endoscope_benchmarks.own_recordings.trial import Row
@@ -22,21 +23,19 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'others, first runs are reported. What is done already in DIR is not done again.',
     )
     add_seeds(parser, 'of the recordings (1-3)')
-    parser.add_argument('--n', type=int, metavar='N', help='so many of them only')
+    parser.add_argument('--n', type=COUNT, metavar='N', help='so many of them only')
     parser.add_argument(
         '--out', type=Path, default=Path('own_recordings'), metavar='DIR', help='for bags and rows'
     )
-    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='side by side (1)')
+    add_jobs(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print a line for each recording and a table; return 0."""
-    from concurrent.futures import as_completed
     from dataclasses import asdict
 
     from endoscope_benchmarks.own_recordings.trial import Row, recorded_and_explained
     from endoscope_core.atomic_output import write_text
-    from endoscope_core.worker_pool import worker_pool
 
     seeds = list(args.seeds)[: args.n]
     args.out.mkdir(parents=True, exist_ok=True)
@@ -46,14 +45,11 @@ def run(args: argparse.Namespace) -> int:
         for seed, file in files.items()
         if file.exists()
     }
-    with worker_pool(args.jobs) as pool:
-        left = [seed for seed in seeds if seed not in rows]
-        futures = [pool.submit(recorded_and_explained, seed, args.out) for seed in left]
-        for future in as_completed(futures):
-            row = future.result()
-            rows[row.seed] = row
-            write_text(files[row.seed], json.dumps(asdict(row), indent=1) + '\n')
-            print(f'{len(rows)} of {len(seeds)}: {_line(row)}', flush=True)
+    calls = [(seed, args.out) for seed in seeds if seed not in rows]
+    for _, row in side_by_side(args.jobs, recorded_and_explained, calls):
+        rows[row.seed] = row
+        write_text(files[row.seed], json.dumps(asdict(row), indent=1) + '\n')
+        print(f'{len(rows)} of {len(seeds)}: {_line(row)}', flush=True)
     _print_table([rows[seed] for seed in seeds])
     return 0
 

@@ -2,6 +2,8 @@
 
 import argparse
 
+from endoscope_bringup.subcommands import COUNT
+
 TARGET = 1000.0
 SECONDS = 10.0
 COARSE_TICK = 5e-3
@@ -18,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--runs',
-        type=int,
+        type=COUNT,
         default=7,
         metavar='N',
         help='runs of each, of which the fastest counts (default 7)',

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from endoscope_bringup.subcommands import add_json_option, print_json
+from endoscope_bringup.subcommands import add_json_option, print_json, within
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -31,7 +31,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     cut.add_argument(
         '--from',
         dest='begin',
-        type=float,
+        type=within(0.0, 1e9, float),
         default=0.0,
         metavar='S',
         help='in s from the first receipt (0)',
@@ -39,7 +39,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     cut.add_argument(
         '--to',
         dest='end',
-        type=float,
+        type=within(0.0, 1e9, float),
         metavar='S',
         help='in s from the first receipt (the end)',
     )

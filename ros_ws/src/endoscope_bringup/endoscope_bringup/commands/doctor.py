@@ -3,7 +3,7 @@
 import argparse
 from dataclasses import asdict
 
-from endoscope_bringup.subcommands import add_json_option, print_json
+from endoscope_bringup.subcommands import add_json_option, print_json, within
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -21,7 +21,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument('--baud', type=int, nargs='+', help='speeds to try (default: all)')
     parser.add_argument(
-        '--reboot', type=int, metavar='ID', help='restart this servo (with one --port and --baud)'
+        '--reboot',
+        type=within(0, 252, int),
+        metavar='ID',
+        help='restart this servo (with one --port and --baud)',
     )
     add_json_option(parser)
 

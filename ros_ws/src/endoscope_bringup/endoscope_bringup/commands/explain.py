@@ -6,7 +6,8 @@ from functools import partial
 from pathlib import Path
 
 from endoscope_bringup.progress_line import ProgressLine
-from endoscope_bringup.subcommands import add_json_option, print_json
+from endoscope_bringup.subcommands import COUNT, add_json_option, print_json, within
+from endoscope_core.choices import WAIVABLE
 from endoscope_core.errors import EndoscopeError
 
 STEPS = 5
@@ -41,7 +42,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         '--baseline',
         type=Path,
         metavar='BAG0',
-        help='the same rig when it was well: only what is new is explained',
+        help='a healthy recording of the same rig: only what is new is explained',
     )
     parser.add_argument(
         '--validate',
@@ -56,7 +57,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         action='append',
         default=[],
         metavar='TOPIC',
-        choices=['motor/measured_js', 'wires/measured_js'],
+        choices=WAIVABLE,
         help='a topic that may be missing',
     )
     parser.add_argument(
@@ -64,7 +65,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--band',
-        type=_positive_share,
+        type=within(1e-6, 100.0, float),
         default=0.15,
         metavar='SHARE',
         help="by which share the plant's parameters may differ from the rig's: 3 for a rig that "
@@ -72,7 +73,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--effects',
-        type=_positive,
+        type=COUNT,
         default=2,
         metavar='N',
         help='how many effects to look for on a joint at most: 4 for a rig that the plant never '
@@ -85,7 +86,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'explain all of them together',
     )
     parser.add_argument(
-        '--jobs', type=_positive, default=2, metavar='N', help='tasks side by side (default 2)'
+        '--jobs', type=COUNT, default=2, metavar='N', help='tasks side by side (default 2)'
     )
     parser.add_argument(
         '--quick', action='store_true', help='leave out the black boxes and the next experiment'
@@ -148,17 +149,3 @@ def _seconds(args: argparse.Namespace) -> list[Path | None]:
             'give it once, or once for each'
         )
     return given
-
-
-def _positive_share(text: str) -> float:
-    share = float(text)
-    if not 0.0 < share <= 100.0:
-        raise argparse.ArgumentTypeError(f'{text} is not between 0 and 100')
-    return share
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f'{number} is not positive')
-    return number

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import finite_number
+from endoscope_bringup.subcommands import COUNT, within
 
 if TYPE_CHECKING:
     from endoscope_core.hysteresis.inverse import HysteresisParameters
@@ -62,13 +62,13 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument('--seed', type=seed, default=0, help='of the search (0)')
     parser.add_argument(
         '--gear',
-        type=finite_number,
+        type=within(1e-3, 1e3, float),
         default=0.5,
         help='motor shaft angle for one radian at the joint (0.5)',
     )
     parser.add_argument(
         '--per-class',
-        type=int,
+        type=COUNT,
         default=30,
         metavar='N',
         help='of a data set, use at most N recordings of each class (30)',

@@ -2,6 +2,8 @@
 
 import argparse
 
+from endoscope_bringup.subcommands import SECONDS
+
 MOVING = ('enable', 'resume', 'home', 'calibrate')
 DONE, REFUSED = 0, 1
 
@@ -45,7 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     common.add_argument(
         '--timeout',
-        type=positive,
+        type=SECONDS,
         default=10.0,
         metavar='S',
         help='how long to wait for an answer (default: %(default)g)',
@@ -68,14 +70,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
             )
         if name == 'record':
             action.add_argument('what', choices=('start', 'stop'))
-
-
-def positive(text: str) -> float:
-    """Read a time in s for argparse: more than none, an hour at most."""
-    value = float(text)
-    if not 0.0 < value <= 3600.0:
-        raise ValueError(text)
-    return value
 
 
 def run(args: argparse.Namespace) -> int:

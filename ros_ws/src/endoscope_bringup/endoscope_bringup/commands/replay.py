@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_bringup.subcommands import finite_number
+from endoscope_bringup.subcommands import within
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -16,7 +16,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument('bag', metavar='BAG', help='rosbag2 folder or .mcap file')
     parser.add_argument(
         '--speed',
-        type=finite_number,
+        type=within(0.01, 100.0, float),
         default=1.0,
         help='recorded seconds in a real one, 0.01 to 100 (default: %(default)g)',
     )
@@ -26,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument('--no-clock', action='store_true', help='do not publish /clock')
     parser.add_argument(
         '--delay',
-        type=finite_number,
+        type=within(0.0, 3600.0, float),
         default=1.0,
         help='seconds in which readers can be found before the first message '
         '(default: %(default)g)',

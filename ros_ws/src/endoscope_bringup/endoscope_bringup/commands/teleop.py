@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_bringup.commands.operate import positive
+from endoscope_bringup.subcommands import SECONDS, within
 
 _KEYS = """\
 keys:
@@ -46,14 +46,14 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--speed',
-        type=_speed,
+        type=within(3.0, 57.0, float),
         default=17.0,
         metavar='DEG_S',
         help='of the handle at the start, 3 to 57 deg/s (default: %(default)g)',
     )
     parser.add_argument(
         '--scale',
-        type=positive,
+        type=within(0.01, 10.0, float),
         help="slave motion for one radian of the handle; default the console's own",
     )
     parser.add_argument(
@@ -61,18 +61,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--timeout',
-        type=positive,
+        type=SECONDS,
         default=10.0,
         metavar='S',
         help='how long to wait for an answer of the graph (default: %(default)g)',
     )
-
-
-def _speed(text: str) -> float:
-    value = float(text)
-    if not 3.0 <= value <= 57.0:
-        raise ValueError(text)
-    return value
 
 
 def run(args: argparse.Namespace) -> int:

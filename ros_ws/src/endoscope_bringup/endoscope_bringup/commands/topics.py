@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_bringup.commands.operate import positive
+from endoscope_bringup.subcommands import COUNT, SECONDS
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -19,8 +19,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     what.add_argument('--echo', metavar='NAME', help='print what a topic says')
     parser.add_argument('--once', action='store_true', help='with --echo: only one message')
-    parser.add_argument('--count', type=int, metavar='N', help='end after N messages')
-    parser.add_argument('--seconds', type=positive, metavar='S', help='end after S seconds')
+    parser.add_argument('--count', type=COUNT, metavar='N', help='end after N messages')
+    parser.add_argument('--seconds', type=SECONDS, metavar='S', help='end after S seconds')
     parser.add_argument('--json', action='store_true', help='JSON; one object a line with --echo')
     parser.add_argument(
         '--namespace',
@@ -29,7 +29,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         '--timeout',
-        type=positive,
+        type=SECONDS,
         default=10.0,
         metavar='S',
         help='how long to wait for a sender (default: %(default)g)',

@@ -113,13 +113,7 @@ def _messages(
     seconds: float | None,
     patience_s: float,
 ) -> Iterator[tuple[bytes, int, type]]:
-    """Bytes, time of receipt in ns and class of each message, as they come.
-
-    Raises
-    ------
-    NoGraphError
-        Nobody sends it, or nothing comes in time.
-    """
+    """Bytes, time of receipt in ns and class of each message; NoGraphError where none comes."""
     full = _full(client, name)
     if not client.wait_until(lambda: bool(_senders(client, full)), patience_s):
         raise NoGraphError(f'nobody sends {name} in {client.where}{_hint(client, name)}')

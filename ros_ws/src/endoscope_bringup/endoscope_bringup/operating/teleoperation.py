@@ -93,13 +93,7 @@ def _check_consent(source: str, taken: bool) -> None:
 
 
 def _wait_for_the_handles_place(client: GraphClient) -> None:
-    """Two senders of the handle would be a fault.
-
-    Raises
-    ------
-    GraphRefusedError
-        Somebody else speaks for it.
-    """
+    """Raise GraphRefusedError where somebody else speaks for the handle and does not go."""
     if not client.wait_until(lambda: not handle_senders(client.node), _GONE_S):
         others = ' and '.join(handle_senders(client.node))
         raise GraphRefusedError(
