@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from sensor_msgs.msg import JointState
 
 from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
-from endoscope_core.safety.standing_still import STILL_RAD
+from endoscope_core.control.smoothing import COUNT
 from endoscope_nodes.names import CALIBRATION_COMMAND, CALIBRATION_RUN, SLAVE_COMMAND
 from endoscope_nodes.qos import COMMAND
 
@@ -75,7 +75,7 @@ def _asked(graph: LiveGraph, what: str) -> tuple[str, float]:
         graph.client.hear()
         since = graph.now() - (commanded[0] if commanded else begin)
         moved = max(abs(a - b) for a, b in zip(graph.shafts, before, strict=True))
-        if moved > STILL_RAD:
+        if moved > 2.0 * COUNT:
             result.append(('obeyed', since))
         elif graph.client.state != 'ENABLED':
             result.append((f'{graph.client.state}: {graph.client.why}', since))

@@ -8,9 +8,9 @@ MS = 1_000_000
 NAMES = ('motor_x', 'motor_y')
 
 
-def watched(goal, shaft, turns=100, every_ms=40):
+def watched(goal, shaft, turns=100, every_ms=40, resolution=0.0015):
     """Turn at which a goal and a shaft (each of a time in s) are told of; None for never."""
-    watch = StandingStill(NAMES)
+    watch = StandingStill(NAMES, resolution)
     for k in range(turns):
         t = k * every_ms * 1e-3
         said = watch.look(goal(t), shaft(t), k * every_ms * MS)
@@ -34,6 +34,14 @@ def test_a_motor_that_follows_late_is_not():
 
 def test_nor_one_that_creeps_nor_one_that_rests_beside_its_goal():
     assert watched(lambda t: (0.01 * t, 0.3), lambda t: (0.01 * t - 0.05, 0.25)) is None
+
+
+def test_one_that_trembles_by_its_encoders_counts_is_and_by_more_is_not():
+    def trembles(t):
+        return 0.0, 0.004 * (round(25 * t) % 2)
+
+    assert watched(lambda t: (0.0, t), trembles) is None
+    assert watched(lambda t: (0.0, t), trembles, resolution=0.003) is not None
 
 
 def test_one_that_stops_on_its_way_is():

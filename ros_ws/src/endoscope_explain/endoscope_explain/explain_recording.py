@@ -60,7 +60,7 @@ def explain_recording(
     plant : PlantDescription
         The simulation that the engineer has.
     baseline : Recording, optional
-        Of the same rig when it was well; only what is new since is explained.
+        Healthy, of the same rig; only what is new since is explained.
     band : float
         Relative tolerance by which a healthy rig's parameters may differ from the plant's.
     most_effects : int

@@ -47,7 +47,7 @@ class Sources:
     plant : PlantDescription
         The simulation that an engineer has.
     baseline : Path or None
-        A recording of the same rig when it was well.
+        A healthy recording of the same rig.
     validate : Path or None
         A second recording of the same rig to judge on.
     without : collection of str

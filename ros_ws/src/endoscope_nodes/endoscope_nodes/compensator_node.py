@@ -108,7 +108,7 @@ class CompensatorNode(EndoscopeNode):
         self._source = NOBODY
         self._last_stamp_ns = 0
         self._sent = _AT_ZERO
-        self._answer = StandingStill(MOTORS)
+        self._answer = StandingStill(MOTORS, self.rig.motors.resolution)
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
         self._beyond_reach = self._beyond_before = 0

@@ -109,6 +109,8 @@ class MotorFacts:
         Largest distance in rad of two goals that follow each other.
     entry_step
         Largest distance in rad from the measured position to the first command of a stream.
+    resolution
+        One count of their encoders in rad.
     """
 
     reach: float = _fact(0.01, 20.0)
@@ -116,6 +118,7 @@ class MotorFacts:
     acceleration: float = _fact(0.1, 1e5)
     step: float = _fact(1e-4, 1.0)
     entry_step: float = _fact(0.001, 1.0)
+    resolution: float = _fact(0.0, 0.1)
 
 
 @dataclass(frozen=True)

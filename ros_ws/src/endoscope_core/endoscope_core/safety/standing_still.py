@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 
-STILL_RAD = 2 * 0.0015339807878856412
-"""Two counts of an encoder of 4096: a shaft that turns by no more stands still."""
 TOLD_RAD = 0.02
-"""13 counts.  With the position gain that an XM430-W350 comes with (800, that is 6.25 of 885 steps
-of duty for a count) they are worth 9 % of its stall torque of 4.1 N m, or 0.4 N m: several times
-what wires of 60 N on a pulley of 2.4 mm hold (e-Manual, control table, Position P Gain)."""
+"""13 counts of an encoder of 4096.  With the position gain that an XM430-W350 comes with (800, that
+is 6.25 of 885 steps of duty for a count) they are worth 9 % of its stall torque of 4.1 N m, or
+0.4 N m: several times what wires of 60 N on a pulley of 2.4 mm hold (e-Manual, control table,
+Position P Gain)."""
 PATIENCE_NS = 300_000_000
 
 
@@ -22,10 +21,13 @@ class StandingStill:
     ----------
     names
         Of the J motors.
+    resolution
+        One count of their encoders in rad; a shaft that turns by no more than two stands still.
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, names: Sequence[str], resolution: float) -> None:
         self._names = tuple(names)
+        self._still = 2.0 * resolution
         self.restart()
 
     def restart(self) -> None:
@@ -51,7 +53,7 @@ class StandingStill:
             self._rest, self._goal_at_rest = list(measured), list(goal)
             self._told_ns = [None] * len(self._rest)
         for k, (wanted, shaft) in enumerate(zip(goal, measured, strict=True)):
-            if abs(shaft - self._rest[k]) > STILL_RAD:
+            if abs(shaft - self._rest[k]) > self._still:
                 self._rest[k], self._goal_at_rest[k] = shaft, wanted
             if abs(wanted - self._goal_at_rest[k]) <= TOLD_RAD:
                 self._told_ns[k] = None

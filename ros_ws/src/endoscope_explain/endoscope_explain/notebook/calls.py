@@ -9,6 +9,7 @@ from typing import Any, overload
 from numpy.typing import ArrayLike
 
 from endoscope_bags import open_bag
+from endoscope_core.choices import WAIVABLE
 from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_core.physics import PlantDescription, PlantFileError, load_plant, recording_faults
 from endoscope_core.physics.packing import pack
@@ -18,7 +19,6 @@ from endoscope_explain.notebook.arrays import commands_from
 from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.notebook.signals import Signals, read
 from endoscope_explain.pipeline import Progress, Sources
-from endoscope_explain.recording.bag_source import WAIVABLE
 from endoscope_explain.search.levels import MOST_EFFECTS
 from endoscope_explain.simulation.answer_bag import write_answer
 

@@ -12,6 +12,7 @@ from endoscope_bags.joint_state_series import JointStateSeries
 from endoscope_bags.recording import Recording as Bag
 from endoscope_bags.recording import open_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
+from endoscope_core.choices import WAIVABLE
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.recording.in_force import goals_in_force
 from endoscope_explain.recording.series import (
@@ -26,10 +27,8 @@ from endoscope_explain.recording.series import (
 from endoscope_explain.recording.signals import gear, motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_common_time, without_stray
 
-WAIVABLE = (MOTOR, WIRES)
-"""Topics that analysis can do without where the caller says so."""
 OPTIONAL = (WIRES,)
-"""Those of them that many rigs do not have: nobody has to say so."""
+"""Those of `WAIVABLE` that many rigs do not have: nobody has to say so."""
 
 
 class TooShortError(BagError):
