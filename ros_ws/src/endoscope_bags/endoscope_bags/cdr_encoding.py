@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from endoscope_bags.errors import MalformedMessageError
-from endoscope_bags.message_types import DIAGNOSTIC_ARRAY, STRING, typestore
+from endoscope_bags.message_types import STRING, typestore
 
 _LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 _NANOSECONDS = 1_000_000_000
@@ -183,39 +183,6 @@ def encode_clock(time_ns: int) -> bytes:
 def encode_string(text: str) -> bytes:
     """Encode one `std_msgs/msg/String`."""
     return serialise(STRING, typestore().types[STRING](data=text))
-
-
-def encode_diagnostics(
-    stamp_ns: int, statuses: Sequence[tuple[int, str, str, dict[str, str]]], hardware_id: str = ''
-) -> bytes:
-    """Encode one `diagnostic_msgs/msg/DiagnosticArray`.
-
-    Parameters
-    ----------
-    stamp_ns
-        Header stamp in ns since the epoch.
-    statuses
-        For each status its level (0 ok, 1 warning, 2 error, 3 stale), name, message and values.
-    hardware_id
-        The same in every status.
-    """
-    types = typestore().types
-    seconds, nanoseconds = divmod(stamp_ns, _NANOSECONDS)
-    stamp = types['builtin_interfaces/msg/Time'](sec=seconds, nanosec=nanoseconds)
-    header = types['std_msgs/msg/Header'](stamp=stamp, frame_id='')
-    key_value = types['diagnostic_msgs/msg/KeyValue']
-    status = types['diagnostic_msgs/msg/DiagnosticStatus']
-    entries = [
-        status(
-            level=level,
-            name=name,
-            message=message,
-            hardware_id=hardware_id,
-            values=[key_value(key=k, value=v) for k, v in values.items()],
-        )
-        for level, name, message, values in statuses
-    ]
-    return serialise(DIAGNOSTIC_ARRAY, types[DIAGNOSTIC_ARRAY](header=header, status=entries))
 
 
 def serialise(type_name: str, message: Any) -> bytes:

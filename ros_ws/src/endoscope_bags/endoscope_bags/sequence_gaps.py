@@ -34,11 +34,6 @@ class SequenceGaps:
         # First and last number of what is missing; the latest gaps only.
         self._missing: list[tuple[int, int]] = []
 
-    @property
-    def publisher_count(self) -> int:
-        """Publishers told apart so far; one that was restarted counts again."""
-        return len(self._last)
-
     def add(self, sequence: int, count_publishers: Callable[[], int] = one_publisher) -> int:
         """Note a message and return how many were lost directly before it.
 

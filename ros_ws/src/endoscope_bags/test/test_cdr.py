@@ -9,7 +9,6 @@ from endoscope_bags.cdr_decoding import Payloads
 from endoscope_bags.cdr_encoding import (
     TransformEncoder,
     encode_clock,
-    encode_diagnostics,
     encode_joint_state,
     encode_joint_states,
     encode_poses,
@@ -19,7 +18,6 @@ from endoscope_bags.errors import MalformedMessageError, NonFiniteError
 from endoscope_bags.joint_state_series import decode_joint_states, decode_poses
 from endoscope_bags.message_types import (
     CLOCK,
-    DIAGNOSTIC_ARRAY,
     JOINT_STATE,
     POSE_STAMPED,
     STRING,
@@ -152,12 +150,6 @@ def test_the_other_messages_are_read_back_by_rosbags():
     clock = store.deserialize_cdr(encode_clock(12_000_000_034), CLOCK)
     assert (clock.clock.sec, clock.clock.nanosec) == (12, 34)
     assert store.deserialize_cdr(encode_string('ENABLED'), STRING).data == 'ENABLED'
-    data = encode_diagnostics(5 * 10**9 + 6, [(2, 'a: b', 'broken', {'k': 'v'})], 'rig')
-    array = store.deserialize_cdr(data, DIAGNOSTIC_ARRAY)
-    status = array.status[0]
-    assert (array.header.stamp.sec, array.header.stamp.nanosec) == (5, 6)
-    assert (status.level, status.name, status.message) == (2, 'a: b', 'broken')
-    assert (status.values[0].key, status.values[0].value) == ('k', 'v')
 
 
 def test_shapes_that_do_not_fit_are_refused():

@@ -9,10 +9,10 @@ from mcap.writer import CompressionType, Writer
 
 from endoscope_bags import BagError, BagWriter, open_bag
 from endoscope_bags.cdr_encoding import (
-    encode_diagnostics,
     encode_joint_state,
     encode_poses,
     encode_string,
+    serialise,
 )
 from endoscope_bags.errors import (
     AmbiguousTopicError,
@@ -28,7 +28,7 @@ from endoscope_bags.errors import (
     TruncatedBagError,
     UnsupportedBagError,
 )
-from endoscope_bags.message_types import DIAGNOSTIC_ARRAY, JOINT_STATE, POSE_STAMPED, STRING
+from endoscope_bags.message_types import DIAGNOSTIC_ARRAY, JOINT_STATE, POSE_STAMPED, STRING, typestore
 
 MS = 10**6
 
@@ -134,11 +134,27 @@ def test_bytes_that_do_not_decode_are_named(tmp_path):
         list(bag.decoded('/robot/left/motor/measured_js'))
 
 
+def one_status(values):
+    types = typestore().types
+    status = types['diagnostic_msgs/msg/DiagnosticStatus'](
+        level=0,
+        name='n',
+        message='m',
+        hardware_id='',
+        values=[
+            types['diagnostic_msgs/msg/KeyValue'](key=k, value=v) for k, v in values.items()
+        ],
+    )
+    stamp = types['builtin_interfaces/msg/Time'](sec=0, nanosec=9)
+    header = types['std_msgs/msg/Header'](stamp=stamp, frame_id='')
+    return types[DIAGNOSTIC_ARRAY](header=header, status=[status])
+
+
 def test_poses_and_other_types(tmp_path):
     with BagWriter(tmp_path / 'bag') as writer:
         pose = encode_poses([3], [[1, 2, 3]], [[0, 0, 0, 1]], frame_id='base')[0]
         writer.write_raw('/e/tracker/measured_cp', POSE_STAMPED, pose, 1)
-        state = encode_diagnostics(9, [(0, 'n', 'm', {'k': 'v'})])
+        state = serialise(DIAGNOSTIC_ARRAY, one_status({'k': 'v'}))
         writer.write_raw('/e/compensator/state', DIAGNOSTIC_ARRAY, state, 2)
     bag = open_bag(tmp_path / 'bag')
     poses = bag.poses('tracker/measured_cp')

@@ -314,13 +314,7 @@ def _check_privacy(args: argparse.Namespace) -> None:
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    """Listen at one address.
-
-    Raises
-    ------
-    ServingError
-        Somebody else does, or this machine has no such address.
-    """
+    """Listen at one address; ServingError where somebody else does, or there is no such address."""
     family = socket.AF_INET6 if ':' in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

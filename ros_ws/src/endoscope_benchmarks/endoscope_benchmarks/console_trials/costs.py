@@ -19,7 +19,6 @@ from endoscope_benchmarks.console_trials.served_console import ServedConsole
 
 VIEWERS = 4
 _STILL_S = 0.3
-_SEEN_S = 2.0
 _DIAGNOSTICS_S = 1.5
 _PAINTED = "performance.getEntriesByName('first-contentful-paint')[0]?.startTime"
 _FRAMES = """new Promise((done) => {

@@ -158,11 +158,6 @@ class TrackerFeedback[Law: JointLaw]:
         self._history: deque[_Desired] = deque()
 
     @property
-    def activated(self) -> bool:
-        """Whether the controller has been asked to act."""
-        return self._activated
-
-    @property
     def weight(self) -> float:
         """Share of the correction that is applied, 0 to 1; the largest of the joints."""
         return max(output.weight for output in self._outputs)

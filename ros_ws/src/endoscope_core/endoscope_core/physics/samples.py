@@ -73,10 +73,6 @@ class RecordingFaults:
             self.outliers + other.outliers,
         )
 
-    def tracker_stamp(self, time: ArrayLike) -> Array:
-        """What the tracker's clock says at a time, both in s since the start."""
-        return np.asarray(time, dtype=np.float64) * (1.0 + self.skew)
-
     def tracker_time(self, stamp: ArrayLike) -> Array:
         """When the tracker's clock says `stamp`, both in s since the start."""
         return np.asarray(stamp, dtype=np.float64) / (1.0 + self.skew)

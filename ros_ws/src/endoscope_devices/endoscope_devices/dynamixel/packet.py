@@ -18,7 +18,6 @@ STATUS = 0x55
 PREFIX_SIZE = 7
 CRC_SIZE = 2
 STATUS_OVERHEAD = 11
-INSTRUCTION_OVERHEAD = 10
 
 _STUFFED = b'\xff\xff\xfd\xfd'
 _BARE = b'\xff\xff\xfd'
