@@ -105,8 +105,8 @@ class BagWriter:
     def _make_home(self, atomic: bool) -> Path:
         hidden = self.path.with_name(f'.partial-{os.getpid()}-{self.path.name}')
         home = hidden if atomic else self.path
-        make_parent(self.path)
         try:
+            make_parent(self.path)
             if not self._bare:
                 home.mkdir()
         except OSError as error:

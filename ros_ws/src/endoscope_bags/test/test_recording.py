@@ -28,7 +28,13 @@ from endoscope_bags.errors import (
     TruncatedBagError,
     UnsupportedBagError,
 )
-from endoscope_bags.message_types import DIAGNOSTIC_ARRAY, JOINT_STATE, POSE_STAMPED, STRING, typestore
+from endoscope_bags.message_types import (
+    DIAGNOSTIC_ARRAY,
+    JOINT_STATE,
+    POSE_STAMPED,
+    STRING,
+    typestore,
+)
 
 MS = 10**6
 
@@ -141,9 +147,7 @@ def one_status(values):
         name='n',
         message='m',
         hardware_id='',
-        values=[
-            types['diagnostic_msgs/msg/KeyValue'](key=k, value=v) for k, v in values.items()
-        ],
+        values=[types['diagnostic_msgs/msg/KeyValue'](key=k, value=v) for k, v in values.items()],
     )
     stamp = types['builtin_interfaces/msg/Time'](sec=0, nanosec=9)
     header = types['std_msgs/msg/Header'](stamp=stamp, frame_id='')

@@ -118,11 +118,18 @@ def require_free_directory(path: str | Path) -> None:
             raise OutputExistsError(f'{target} is not empty: remove it or name another folder')
     elif target.exists():
         raise OutputExistsError(f'{target} is a file: name a folder')
-    _require_place(target)
+    require_place(target)
 
 
-def _require_place(target: Path) -> None:
-    """Raise OutputPlaceError where nothing can be made."""
+def require_place(path: str | Path) -> None:
+    """Check, before long work, that something can be made at `path`.
+
+    Raises
+    ------
+    OutputPlaceError
+        The folder that it would be made in takes nothing.
+    """
+    target = Path(path).absolute()
     place = next(parent for parent in target.parents if parent.exists())
     if not place.is_dir():
         raise OutputPlaceError(f'{target} cannot be made: {place} is a file')
@@ -136,14 +143,7 @@ def _require_place(target: Path) -> None:
 
 
 def make_parent(path: Path) -> None:
-    """Make the folder that an output goes to; git ignores a new one that is called `bags`.
-
-    Raises
-    ------
-    OutputPlaceError
-        Nothing can be made there.
-    """
-    _require_place(path.absolute())
+    """Make the folder that an output goes to; git ignores a new one that is called `bags`."""
     folder = path.parent
     if folder.name == 'bags' and not folder.exists():
         folder.mkdir(parents=True)

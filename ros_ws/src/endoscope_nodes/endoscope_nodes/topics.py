@@ -107,6 +107,8 @@ class Service:
     device: str = ''
 
 
+TRIGGER = 'std_srvs/srv/Trigger'
+
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 _STREAM = '1 kHz'

@@ -20,9 +20,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'loops, recorded. Exits 1 where a step failed, a fault came or a message was lost.',
     )
     parser.add_argument('--n', type=COUNT, default=20, metavar='N', help='of each (20)')
-    parser.add_argument('--loops', type=within(0, 64, int), default=7, metavar='N', help='busy loops (7)')
     parser.add_argument(
-        '--minutes', type=within(0.0, 1440.0, float), default=30.0, metavar='M', help='of the long motion (30)'
+        '--loops', type=within(0, 64, int), default=7, metavar='N', help='busy loops (7)'
+    )
+    parser.add_argument(
+        '--minutes',
+        type=within(0.0, 1440.0, float),
+        default=30.0,
+        metavar='M',
+        help='of the long motion (30)',
     )
 
 

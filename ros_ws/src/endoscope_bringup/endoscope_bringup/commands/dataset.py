@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 
 from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -21,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument('--seed', type=seed, default=7, help='the same seed, the same data set (7)')
     parser.add_argument(
         '--n',
-        type=COUNT,
+        type=int,
         default=210,
         metavar='N',
         help='recordings, as many of each of the seven classes (210)',

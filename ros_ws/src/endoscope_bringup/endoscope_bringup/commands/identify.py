@@ -79,10 +79,13 @@ def run(args: argparse.Namespace) -> int:
     """Identify and write; return 0."""
     import json
 
-    from endoscope_core.atomic_output import write_text
+    from endoscope_core.atomic_output import require_place, write_text
     from endoscope_core.dataset import is_dataset
     from endoscope_core.errors import EndoscopeError
 
+    for file in (args.out, args.output, args.figure, args.table):
+        if file is not None:
+            require_place(file)
     if args.folder is not None:
         return _of_tubes(args)
     if args.output is not None or args.figure is not None:

@@ -43,11 +43,13 @@ def run(args: argparse.Namespace) -> int:
     """Plan and write; return 0."""
     import numpy as np
 
+    from endoscope_core.atomic_output import require_place
     from endoscope_core.control.iterated_inverse import iterated_inverse
     from endoscope_core.physics import load_plant
     from endoscope_core.physics.simulator import TICK
     from endoscope_core.signals.command_file import write_command_file
 
+    require_place(args.out)
     plant = load_plant(args.plant)
     joints = plant.joint_names()
     angle, velocity = _from_straight(*_desired(args.motion, joints, TICK), TICK)

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT
 
 if TYPE_CHECKING:
     from endoscope_core.dataset import CalibrationDataset
@@ -39,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument('--seed', type=seed, default=0, help='of weights, batches and folds (0)')
     parser.add_argument(
-        '--folds', type=COUNT, default=5, metavar='K', help='of the cross-validation (5)'
+        '--folds', type=int, default=5, metavar='K', help='of the cross-validation (5)'
     )
     parser.add_argument(
         '--plots',
