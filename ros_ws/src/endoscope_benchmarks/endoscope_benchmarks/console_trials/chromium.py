@@ -28,7 +28,14 @@ _ARGUMENTS = (
 )
 _PATIENCE_S = 60.0
 _LOOK_S = 0.02
-KEYS = {'Space': (' ', 32), 'ArrowLeft': ('ArrowLeft', 37), 'ArrowRight': ('ArrowRight', 39)}
+KEYS = {
+    'Space': (' ', 32),
+    'ArrowLeft': ('ArrowLeft', 37),
+    'ArrowRight': ('ArrowRight', 39),
+    'KeyC': ('c', 67),
+    'KeyE': ('e', 69),
+    'KeyH': ('h', 72),
+}
 """Keys by their place on the keyboard: what they type, and their number."""
 
 

@@ -54,7 +54,7 @@ def shell_trial(folder: Path, domain: int) -> str:
     log = folder / 'graph.log'
     with log.open('w') as file:
         graph = subprocess.Popen(
-            [sys.executable, '-m', 'endoscope_nodes.graph'],
+            [Path(sys.executable).with_name('graph')],
             cwd=folder,
             env=environment,
             stdout=file,
