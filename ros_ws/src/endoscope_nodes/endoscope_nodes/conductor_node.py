@@ -35,9 +35,10 @@ class BarrierTimeout(EndoscopeError, TimeoutError):
 class ConductorNode(EndoscopeNode):
     """Publishes ``/clock`` in lock-step with the graph.
 
-    The next tick comes once every topic of ``wait_for``, and every other stream that answered the
-    tick before, has published a message with this tick's stamp.  In one process this makes the
-    content of every message a function of parameters and seeds alone.
+    The next tick comes once every topic of ``wait_for``, and every other stream of another process
+    that answered the tick before, has published a message with this tick's stamp, and the nodes of
+    this process have dealt with all that they sent each other.  In one process this makes the
+    content of every message a function of parameters and seeds alone, however busy the machine is.
 
     With a ``speed`` time goes on at that pace where the machine can, and slower where it cannot.
     """
@@ -53,6 +54,7 @@ class ConductorNode(EndoscopeNode):
         self._now_ns = round(p.start * 1e9) - self._tick_ns
         self._until_ns = self._now_ns
         self._answered: dict[str, int] = dict.fromkeys(FOLLOWED, 0)
+        self._full_name = {topic: self.resolve_topic_name(topic) for topic in FOLLOWED}
         self._pending: set[str] = set()
         self._tracker = SampleClock(p.tracker_rate)
         self._looked = 0
@@ -64,6 +66,7 @@ class ConductorNode(EndoscopeNode):
         self.ticks = 0
         self.failure: BarrierTimeout | None = None
         self._clock_out = self.create_publisher(ClockMessage, runtime.clock, LOCK_STEP)
+        self.ticker.in_flight.landed = self._go_on
         for topic in FOLLOWED:
             self.create_subscription(JointState, topic, self._answer_to(topic), LOCK_STEP, raw=True)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -82,7 +85,7 @@ class ConductorNode(EndoscopeNode):
         self._future = Future()
         self._looked = 0
         self._due_ns = time.monotonic_ns()
-        if not self._pending:
+        if not self._is_waiting:
             self._step()
         return self._future
 
@@ -103,9 +106,13 @@ class ConductorNode(EndoscopeNode):
 
         return answer
 
+    @property
+    def _is_waiting(self) -> bool:
+        return bool(self._pending or self.ticker.in_flight.count)
+
     def _go_on(self) -> None:
         """Give the next tick if the last one is answered and, where there is a pace, it is due."""
-        if self._pending:
+        if self._is_waiting:
             return
         if self._period_ns:
             now = time.monotonic_ns()
@@ -127,6 +134,8 @@ class ConductorNode(EndoscopeNode):
         tracked = self._tracker.due(now)
         self._pending.update(self._settings.wait_for)
         for topic, stamp in self._answered.items():
+            if self.ticker.in_flight.sent_by_us(self._full_name[topic]):
+                continue
             if topic == SLAVE_MEASURED:
                 if tracked and now - stamp < 1.5e9 / self._settings.tracker_rate:
                     self._pending.add(topic)
@@ -138,12 +147,13 @@ class ConductorNode(EndoscopeNode):
     def _look(self) -> None:
         """Repeat a tick that may have been lost, give streams up that have ended."""
         self._course.append((time.monotonic_ns(), self._now_ns))
-        if not self._pending or self._future is None:
+        if not self._is_waiting or self._future is None:
             return
         # Time in which this process was not run itself has kept nobody from being heard.
         self._looked += 1
         waited = self._looked * self._look_s
         if waited > self._settings.grace:
+            self.ticker.in_flight.give_up()
             self._clock_out.publish(encode_clock(self._now_ns))
             self._pending.intersection_update(self._settings.wait_for)
             self._go_on()

@@ -1,12 +1,13 @@
 """What every node of the endoscope has: its runtime, the shared ticker, parameters, diagnostics."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.event_handler import QoSSubscriptionEventType
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 from rclpy.time import Time
 
@@ -72,6 +73,30 @@ class EndoscopeNode(Node):
             name: value for name, value in changed(values).items() if name not in self._by_default
         }
         return values
+
+    def create_subscription(
+        self, msg_type: type, topic: str, callback: Any, qos_profile: Any, **how: Any
+    ) -> Subscription:
+        """Subscribe; in simulated time the next tick waits until the callback is done."""
+        if self._is_in_lock_step:
+            name = self.resolve_topic_name(topic)
+            callback = self.ticker.in_flight.taken(self, name, callback)
+        return super().create_subscription(msg_type, topic, callback, qos_profile, **how)
+
+    def create_publisher(
+        self, msg_type: type, topic: str, qos_profile: Any, **how: Any
+    ) -> Publisher:
+        """Offer a topic; in simulated time the next tick waits for its readers."""
+        publisher = super().create_publisher(msg_type, topic, qos_profile, **how)
+        if self._is_in_lock_step:
+            counted = self.ticker.in_flight.sent(publisher.topic_name, publisher.publish)
+            publisher.publish = counted  # type: ignore[assignment, method-assign]
+        return publisher
+
+    @property
+    def _is_in_lock_step(self) -> bool:
+        ticker = getattr(self, 'ticker', None)
+        return ticker is not None and ticker.simulated
 
     def matched_event(self, subscription: Subscription) -> rclpy_implementation.EventHandle:
         """Return what counts the senders of a subscription, to be asked; it ends with the node."""

@@ -9,6 +9,7 @@ from rclpy.node import Node
 from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock as ClockMessage
 
+from endoscope_nodes.in_flight import InFlight
 from endoscope_nodes.names import CLOCK
 from endoscope_nodes.qos import SENSOR_ASKED
 
@@ -49,6 +50,8 @@ class Ticker:
     late_ns
         Time that this process was not run though a beat was due, so far, in ns; delays of up to
         5 ms, which every desktop kernel makes, do not count.
+    in_flight
+        What the nodes of this process have sent each other in simulated time.
     paced
         Whether simulated time goes no faster than a person's: set by who gives it in this process.
     """
@@ -60,6 +63,7 @@ class Ticker:
         self.ticks = 0
         self.missed = 0
         self.late_ns = 0
+        self.in_flight = InFlight()
         self.paced = False
         self._hand_ns = self._hand_at_ns = 0
         self._slow_ns = 0
@@ -74,7 +78,9 @@ class Ticker:
         # system clock must not look like a step of the motion.
         self._offset_ns = time.time_ns() - time.monotonic_ns()
         if simulated:
-            node.create_subscription(ClockMessage, clock, self._on_clock, SENSOR_ASKED, raw=True)
+            topic = node.resolve_topic_name(clock)
+            take = self.in_flight.taken(node, topic, self._on_clock)
+            node.create_subscription(ClockMessage, clock, take, SENSOR_ASKED, raw=True)
 
     @property
     def rate(self) -> int:
@@ -130,6 +136,7 @@ class Ticker:
             if not kept(item.callback) and item.timer is not None:
                 self._node.destroy_timer(item.timer)
         self._periodic = [item for item in self._periodic if kept(item.callback)]
+        self.in_flight.forget(owners)
 
     def every(self, seconds: float, callback: Callable[[], None]) -> None:
         """Call ``callback()`` at a slower pace, without asking for the 1 kHz beat.
