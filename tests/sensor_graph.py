@@ -130,14 +130,14 @@ class SensorGraph(ProbedGraph):
         It is given again until it is answered: the executor may drop what comes between two spins.
         """
         supervisor = self.nodes['supervisor']
-        supervisor._last_refusal = ''
+        before = supervisor._refused
         for _ in range(100):
             self.command(text)
             self.serve(0.05)
-            if supervisor._last_refusal:
+            if supervisor._refused is not before:
                 break
         assert self.state != 'ENABLED'
-        return supervisor._last_refusal
+        return supervisor._refused.reason
 
     def play(self) -> None:
         """Let the console move both joints."""
