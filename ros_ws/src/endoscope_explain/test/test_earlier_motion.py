@@ -73,3 +73,14 @@ def test_a_rig_that_comes_from_zero_is_judged_from_the_beginning(record):
     audit = audit_recording(recording, PLANT)
     assert audit.findings == ()
     assert audit.recording.tension.valid.all()
+
+
+def test_a_past_that_no_reversals_explain_is_left_out_though_little_is_left(record):
+    # How fast the rig came is not estimated: the joint's damping keeps it from where it rests.
+    angle = 0.6 * np.sin(9.0 * np.minimum(TIME, 3.1))
+    angle = np.where(TIME < 6.0, angle, angle + 0.7 * np.sin(1.5 * (TIME - 6.0)))[:9400]
+    command = gear() * np.stack([angle, angle], axis=1)
+    recording = since(record(duration=9.4, command=command), 4.0)
+    audit = audit_recording(recording, PLANT)
+    assert {f.remedy for f in audit.findings} == {'what is before 4.94 s is not judged'}
+    assert worst(audit.recording) < 1.3 < 3.0 < worst(recording)

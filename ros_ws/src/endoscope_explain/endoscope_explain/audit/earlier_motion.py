@@ -1,9 +1,11 @@
 """What the rig had done before the recording began, as far as it still shows.
 
 Friction remembers the last reversals of the motor until greater motion wipes them out (return-point
-memory). Where the readings are not those of a rig that came straight from zero, the two reversals
-that explain them best are taken for its past, and what depends on the past is not judged. Nor is
-what a motor does that was turning already, until its servo has forgotten how.
+memory). Where the readings are not those of a rig that came straight from zero, the reversals that
+explain them best are taken for its past, and what depends on the past is not judged, if enough is
+left without it or if only that part is not as the plant says: how fast the rig came matters too,
+and is not estimated. Nor is what a motor does that was turning already, until its servo has
+forgotten how.
 """
 
 from dataclasses import replace
@@ -11,6 +13,7 @@ from math import log
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.stats import chi2
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.kernel import run_joints
@@ -29,6 +32,8 @@ LEAST_S = 2.0
 MOST_REVERSALS = 5
 SCALES = 8
 """How often the motors' reach is halved for the angles that are tried for each reversal."""
+RARE = 1e-3
+"""Noise alone makes a misfit as large as this seldom."""
 STEPS = 40
 """Of the search that goes on from the best of them, for each reversal."""
 
@@ -67,7 +72,8 @@ def with_state_at_start(
             way, unjudged, estimated = past.here, begin + past.turns_until, past.estimated()
             if estimated is not None:
                 way, end = estimated, begin + past.shows_until
-                unjudged = end if _is_enough(recording, j, end) else unjudged
+                if _is_enough(recording, j, end) or past.alone_is_unexplained(way):
+                    unjudged = end
                 findings.append(_finding(observation.joint, begin, end, unjudged, way))
             elif past.turns_until:
                 findings.append(_finding(observation.joint, begin, unjudged, unjudged, way))
@@ -94,7 +100,7 @@ class _Past:
     ) -> None:
         self._observation, self._packed, self._on = observation, packed, on
         reach = shipped_rig().motors.reach
-        times = np.concatenate([c.time for c in observation.channels])
+        self._times = times = np.concatenate([c.time for c in observation.channels])
         shaft = np.concatenate(
             [np.full(len(c.time), c.quantity == 'shaft_position') for c in observation.channels]
         )
@@ -146,6 +152,14 @@ class _Past:
         return np.concatenate(
             [(c.predicted(outputs) - c.value) / c.noise for c in self._observation.channels]
         )
+
+    def alone_is_unexplained(self, way: Array) -> bool:
+        """Whether the readings differ from the plant's while the past shows, and not after it."""
+        left = self._left(way) ** 2
+        early, later = left[self._early], left[self._times >= self.shows_until]
+        if not len(later):
+            return False
+        return bool(chi2.sf(early.sum(), len(early)) < RARE <= chi2.sf(later.sum(), len(later)))
 
     def _misfit(self, way: Array) -> float:
         return float(np.sum(self._left(way, self._cut)[self._early] ** 2))
