@@ -19,7 +19,7 @@ PLANT = PlantDescription()
 
 @pytest.fixture(scope='module')
 def recorded(tmp_path_factory):
-    """Three motions that end before their end, rests between them, and the slave disabled once."""
+    """Motions that end before their end, a pause in one, rests, and the slave disabled once."""
     bag = tmp_path_factory.mktemp('own') / 'bag'
     overrides = {'motor_driver': {'seed': 3}}
     with LiveGraph(bag, private_domain(), lock_step=True, overrides=overrides) as graph:
@@ -29,7 +29,11 @@ def recorded(tmp_path_factory):
         graph.set('console', source='none')
         graph.advance(1.0)
         graph.set('console', source='motion', motion='non_periodic')
-        graph.advance(3.4)
+        graph.advance(1.9)
+        graph.client.ask('pause')
+        graph.advance(0.5)
+        graph.client.ask('resume')
+        graph.advance(1.5)
         graph.set('console', source='none')
         graph.advance(1.0)
         graph.client.ask('disable')
