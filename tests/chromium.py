@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 from playwright.sync_api import Browser, Page, Route, sync_playwright
 
@@ -27,11 +27,12 @@ def chromium() -> Iterator[Browser]:
 
 @contextmanager
 def drawn(
-    content: str, headers: dict[str, str] | None = None, **how: bool
+    content: str, headers: dict[str, str] | None = None, within: Browser | None = None, **how: bool
 ) -> Iterator[tuple[Page, list[str]]]:
     """A page that has been drawn, and what the browser complains of.
 
-    Any request but that for the page itself is such a complaint.
+    Any request but that for the page itself is such a complaint. Without a browser to draw it
+    within it has one of its own.
     """
     complaints: list[str] = []
 
@@ -42,8 +43,11 @@ def drawn(
             complaints.append(f'asked for {route.request.url}')
             route.abort()
 
-    with chromium() as browser:
-        page = browser.new_page(viewport={'width': 1200, 'height': 900}, **how)
+    with (
+        nullcontext(within) if within else chromium() as browser,
+        browser.new_context(viewport={'width': 1200, 'height': 900}, **how) as context,
+    ):
+        page = context.new_page()
         page.route('**/*', answer)
         page.on('console', lambda message: complaints.append(f'{message.type}: {message.text}'))
         page.on('pageerror', lambda error: complaints.append(str(error)))

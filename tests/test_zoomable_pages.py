@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from chromium import drawn
-from playwright.sync_api import Frame, Locator, Page, expect
+from chromium import chromium, drawn
+from playwright.sync_api import Browser, Frame, Locator, Page, expect
 
 from endoscope_core.pages.zoomable import Curve, Plot, figure_html, head, scripts
 
@@ -50,6 +50,12 @@ CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
 </script>"""
 
 
+@pytest.fixture(scope='module')
+def browser() -> Iterator[Browser]:
+    with chromium() as browser:
+        yield browser
+
+
 @pytest.mark.parametrize(
     ('size', 'log', 'ticks'),
     [
@@ -59,11 +65,13 @@ CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
         (300.0, True, {'1', '10', '100'}),
     ],
 )
-def test_places_on_an_axis_are_told_apart(size: float, log: bool, ticks: set[str]) -> None:
+def test_places_on_an_axis_are_told_apart(
+    browser: Browser, size: float, log: bool, ticks: set[str]
+) -> None:
     values = np.geomspace(0.5, size, 200) if log else np.linspace(-size, size, 200)
     plot = Plot('value', 'time (s)', (Curve('one', TIME[:200], values),), log=log)
     content = f'<html><head>{head()}{WRITTEN}</head><body>{figure_html([plot])}{scripts()}'
-    with drawn(content) as (page, _):
+    with drawn(content, within=browser) as (page, _):
         expect(page.locator('.plots.is-drawn')).to_be_visible()
         seen = page.evaluate('written.map((text) => text.replace("\u2212", "-"))')
     assert ticks <= set(seen)
@@ -71,8 +79,8 @@ def test_places_on_an_axis_are_told_apart(size: float, log: bool, ticks: set[str
 
 
 @pytest.fixture
-def page() -> Iterator[Page]:
-    with drawn(page_of_plots()) as (page, complaints):
+def page(browser: Browser) -> Iterator[Page]:
+    with drawn(page_of_plots(), within=browser) as (page, complaints):
         yield page
         assert complaints == []
 
@@ -216,14 +224,14 @@ def test_the_look_follows_the_reader_and_paper_is_light(
     assert inked(page, 1, 'wanted')[0] > 0
 
 
-def test_it_works_in_a_sandboxed_frame_that_allows_scripts_alone() -> None:
+def test_it_works_in_a_sandboxed_frame_that_allows_scripts_alone(browser: Browser) -> None:
     policy = f'<meta http-equiv="content-security-policy" content="{POLICY}">'
     framed = page_of_plots().replace('<head>', f'<head>{policy}')
     outside = (
         '<link rel="icon" href="data:,"><iframe sandbox="allow-scripts" width="1000" height="800" '
         f'srcdoc="{escape(framed)}"></iframe>'
     )
-    with drawn(outside) as (page, complaints):
+    with drawn(outside, within=browser) as (page, complaints):
         frame = page.frames[1]
         drag(page, frame.locator('.u-over').nth(1), 0.25, 0.5)
         assert across(frame, 2) == pytest.approx([5.0, 10.0], abs=0.1)
@@ -231,15 +239,16 @@ def test_it_works_in_a_sandboxed_frame_that_allows_scripts_alone() -> None:
     assert complaints == []
 
 
-def test_it_works_under_the_policy_of_a_server() -> None:
-    with drawn(page_of_plots(), {'content-security-policy': POLICY}) as (page, complaints):
+def test_it_works_under_the_policy_of_a_server(browser: Browser) -> None:
+    policy = {'content-security-policy': POLICY}
+    with drawn(page_of_plots(), policy, browser) as (page, complaints):
         expect(page.locator('.plots.is-drawn')).to_have_count(1)
         assert inked(page, 1, 'wanted')[0] > 0
     assert complaints == []
 
 
-def test_without_javascript_it_says_so_and_has_the_numbers() -> None:
-    with drawn(page_of_plots(), java_script_enabled=False) as (page, complaints):
+def test_without_javascript_it_says_so_and_has_the_numbers(browser: Browser) -> None:
+    with drawn(page_of_plots(), within=browser, java_script_enabled=False) as (page, complaints):
         expect(page.get_by_text('Without JavaScript')).to_be_visible()
         page.get_by_text('Numbers', exact=True).click()
         expect(page.get_by_role('cell', name='20000')).to_be_visible()
