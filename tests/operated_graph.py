@@ -1,6 +1,7 @@
 """The simulated graph, and programs beside it that operate it from a shell or a terminal."""
 
 import fcntl
+import io
 import os
 import pty
 import re
@@ -10,11 +11,15 @@ import sys
 import termios
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from unittest.mock import patch
 
 import numpy as np
 from simulated_graph import SimulatedGraph
 
+from endoscope_bringup.cli import main
 from endoscope_nodes.names import JOINTS, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
 from endoscope_nodes.recorder_node import RecorderNode
 
@@ -95,8 +100,27 @@ class OperatedGraph(SimulatedGraph):
             process.kill()
             process.communicate()
 
-    def run(self, *words) -> tuple[int, str, str]:
-        return self.finish(self.start(*words, '--timeout', '60'))
+    def run(self, *words, timeout=60) -> tuple[int, str, str]:
+        """Exit status, stdout and stderr of a command in this process, while the graph goes on."""
+        out, errors, over = io.StringIO(), io.StringIO(), threading.Event()
+
+        def live() -> None:
+            while not over.is_set():
+                self.pace()
+
+        with (
+            patch.dict(os.environ, self.environment),
+            redirect_stdout(out),
+            redirect_stderr(errors),
+            ThreadPoolExecutor(1) as thread,
+        ):
+            living = thread.submit(live)
+            try:
+                status = main([*words, '--timeout', str(timeout)])
+            finally:
+                over.set()
+        living.result()
+        return status, out.getvalue(), errors.getvalue()
 
 
 @dataclass

@@ -4,13 +4,13 @@ import json
 import math
 import re
 import signal
-import subprocess
 
 import pytest
-from operated_graph import ENDOSCOPE, OperatedGraph
+from operated_graph import OperatedGraph
 from private_domain import private_domain
 from std_msgs.msg import String
 
+from endoscope_bringup.cli import main
 from endoscope_nodes.qos import EVENT
 
 
@@ -191,8 +191,7 @@ def test_the_parameters_of_a_node_are_listed_with_their_values_and_ranges(graph)
 
 
 def test_an_unknown_node_is_named_with_the_nearest(graph):
-    process = graph.start('operate', 'get', 'compensater.mode', '--timeout', '2')
-    status, _, errors = graph.finish(process)
+    status, _, errors = graph.run('operate', 'get', 'compensater.mode', timeout=2)
     assert status == 2
     assert errors.strip().endswith('; did you mean compensator?')
 
@@ -200,7 +199,7 @@ def test_an_unknown_node_is_named_with_the_nearest(graph):
 def test_what_only_a_device_can_do_is_refused_by_the_simulated_slave(graph):
     status, said = operate(graph, 'tare')
     assert (status, said) == (1, 'tare: simulated cells have no zero to find')
-    status, out, errors = graph.finish(graph.start('operate', 'reboot', '--timeout', '1'))
+    status, out, errors = graph.run('operate', 'reboot', timeout=1)
     assert (status, out) == (1, '')
     assert errors.startswith('reboot: nobody serves motor/reboot in ')
 
@@ -236,17 +235,11 @@ def test_status_names_every_node_and_the_source_of_the_console(graph):
 
 
 @pytest.mark.parametrize('words', [['status'], ['enable'], ['get', 'console.scale'], ['calibrate']])
-def test_without_a_graph_it_says_what_was_not_found(words):
+def test_without_a_graph_it_says_what_was_not_found(words, monkeypatch, capsys):
     domain = private_domain()
-    process = subprocess.run(
-        [*ENDOSCOPE, 'operate', *words, '--timeout', '0.5'],
-        env=OperatedGraph.environment_of(domain),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert process.returncode == 1
-    assert process.stderr == (
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+    assert main(['operate', *words, '--timeout', '0.5']) == 1
+    assert capsys.readouterr().err == (
         f'{words[0]}: no graph answers in namespace /endoscope, ROS_DOMAIN_ID {domain}: '
         'start one with `graph`\n'
     )
@@ -263,10 +256,10 @@ def test_without_a_graph_it_says_what_was_not_found(words):
         ['topics', '--hz', 'a', '--echo', 'b'],
     ],
 )
-def test_wrong_usage_is_one_line_and_exit_status_2(words):
-    process = subprocess.run([*ENDOSCOPE, *words], capture_output=True, text=True, check=False)
-    assert process.returncode == 2
-    assert len(process.stderr.splitlines()) == 1
+def test_wrong_usage_is_one_line_and_exit_status_2(words, capsys):
+    with pytest.raises(SystemExit, match='2'):
+        main(words)
+    assert len(capsys.readouterr().err.splitlines()) == 1
 
 
 # ---- topics
@@ -345,8 +338,7 @@ def test_control_characters_of_a_stranger_are_shown_and_steer_no_terminal(graph)
 
 
 def test_a_topic_that_nobody_sends_is_named_with_the_nearest(graph):
-    process = graph.start('topics', '--hz', 'wire/measured_js', '--timeout', '2')
-    status, _, errors = graph.finish(process)
+    status, _, errors = graph.run('topics', '--hz', 'wire/measured_js', timeout=2)
     assert status == 1
     assert errors.startswith('topics: nobody sends wire/measured_js in namespace /endoscope')
     assert 'did you mean wires/measured_js?' in errors
