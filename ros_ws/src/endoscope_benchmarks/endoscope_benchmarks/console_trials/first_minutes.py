@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,8 @@ from endoscope_nodes.graph_listener import GraphRefusedError
 from endoscope_nodes.graph_parameters import set_parameters
 
 _PATIENCE_S = 300.0
-_HELD_S = 1.5
+_HELD_S = 10.0
+_TRIES = 3
 _LOOK_S = 0.5
 _SESSION = (
     ('operate enable', r'ENABLED, session-\d+'),
@@ -96,9 +97,9 @@ def console_trial(folder: Path, domain: int) -> str:
             client = console.client
             with Hand(console, network) as hand:
                 hand.take_controls(enable=False)
-                _held(hand, 'KeyE')
+                _hold_until(hand, 'KeyE', lambda: client.state == 'ENABLED')
                 console.until(lambda: client.state == 'ENABLED', 'ENABLED', _PATIENCE_S)
-                _held(hand, 'KeyC')
+                _hold_until(hand, 'KeyC', lambda: bool(client.underway or client.calibration))
                 console.until(lambda: client.calibration is not None, 'a result', _PATIENCE_S)
                 for _ in range(3):
                     hand.move()
@@ -114,10 +115,18 @@ def console_trial(folder: Path, domain: int) -> str:
     return ''
 
 
-def _held(hand: Hand, code: str) -> None:
-    hand.press(code)
-    hand.console.passes(_HELD_S)
-    hand.let_go()
+def _hold_until(hand: Hand, code: str, begun: Callable[[], bool]) -> None:
+    """Hold a key as the guide says until it is seen to act; once more where it did not."""
+    console = hand.console
+    for _ in range(_TRIES):
+        end = time.monotonic() + _HELD_S
+        hand.press(code)
+        while not begun() and time.monotonic() < end:
+            console.passes(_LOOK_S)
+        hand.let_go()
+        if begun():
+            return
+        console.passes(_LOOK_S)
 
 
 @dataclass(frozen=True)
