@@ -181,8 +181,7 @@ class Recording:
         """
         matches = self._matches(suffix, namespace)
         if not matches:
-            found = ', '.join(sorted(self.topics)) or 'none'
-            raise MissingTopicError(f'{self.path}: lacks topic {suffix}; it has {found}')
+            raise MissingTopicError(self.lacking(suffix))
         if len(matches) > 1:
             raise AmbiguousTopicError(
                 f'{self.path}: {suffix} could be {" or ".join(matches)}; give the namespace'
@@ -192,6 +191,14 @@ class Recording:
     def has(self, suffix: str, namespace: str | None = None) -> bool:
         """Tell whether `find` would find at least one topic."""
         return bool(self._matches(suffix, namespace))
+
+    def lacking(self, *suffixes: str) -> str:
+        """Say that topics were not recorded or are empty, and which have messages."""
+        empty = [n for n in self.topics if any(n.endswith(f'/{s.strip("/")}') for s in suffixes)]
+        if empty:
+            return f'{self.path}: no message was recorded on {", ".join(sorted(empty))}'
+        found = ', '.join(n for n in sorted(self.topics) if self.topics[n].message_count)
+        return f'{self.path}: lacks topic {" and ".join(suffixes)}; it has {found or "none"}'
 
     def _matches(self, suffix: str, namespace: str | None) -> list[str]:
         relative = suffix.strip('/')

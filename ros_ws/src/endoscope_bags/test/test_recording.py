@@ -35,6 +35,7 @@ from endoscope_bags.message_types import (
     STRING,
     typestore,
 )
+from endoscope_bags.qos_profile import SENSOR_QOS
 
 MS = 10**6
 
@@ -311,3 +312,14 @@ def test_no_damage_makes_the_reader_crash(tmp_path):
                 bag = open_bag(damaged, salvage=salvage)
                 for topic in bag.topics:
                     bag.payloads(topic)
+
+
+def test_a_topic_without_a_message_is_said_to_be_empty(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        for topic in ('/a/motor/servo_jp', '/a/wires/measured_js'):
+            writer.add_topic(topic, JOINT_STATE, [SENSOR_QOS])
+        wires = encode_joint_state(['w'], 0, effort=[1.0])
+        writer.write_raw('/a/wires/measured_js', JOINT_STATE, wires, 0)
+    bag = open_bag(tmp_path / 'bag')
+    with pytest.raises(MissingTopicError, match=r'no message was recorded on /a/motor/servo_jp$'):
+        bag.joint_state('motor/servo_jp')

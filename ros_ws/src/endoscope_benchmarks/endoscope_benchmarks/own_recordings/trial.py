@@ -18,7 +18,8 @@ from endoscope_explain.pipeline import Sources
 from endoscope_explain.report.sentences import verdict_sentence
 from endoscope_nodes.names import JOINTS
 
-UNNAMED = (Verdict.CONSISTENT, Verdict.PARAMETERS_DIFFER, Verdict.INSUFFICIENT_DATA)
+REFUSED = 'refused'
+UNNAMED = (Verdict.CONSISTENT, Verdict.PARAMETERS_DIFFER, Verdict.INSUFFICIENT_DATA, REFUSED)
 
 
 @dataclass(frozen=True)
@@ -84,14 +85,19 @@ def recorded_and_explained(seed: int, folder: Path) -> Row:
         begin, end = 0.0, length
     cut(home / 'whole', home / 'cut', begin, end)
     shutil.rmtree(home / 'whole')
-    explained = explained_case(Sources(home / 'cut', plant, quick=True))
+    try:
+        explained = explained_case(Sources(home / 'cut', plant, quick=True))
+        verdict, sentence = str(explained.verdict), verdict_sentence(explained)
+    except EndoscopeError as error:
+        # A stretch in which nothing was commanded.
+        verdict, sentence = REFUSED, str(error)
     way = 'lock-step' if case.lock_step else 'real time'
     return Row(
         seed,
         f'{way}: {", ".join(case.actions)}{ended}',
         end - begin,
-        str(explained.verdict),
-        verdict_sentence(explained),
+        verdict,
+        sentence,
         load,
         time.monotonic() - begun,
     )

@@ -178,8 +178,7 @@ def with_unrecorded(plant: PlantDescription, described: PlantDescription) -> Pla
 
 
 def _lacking_message(bag: Bag, topics: Sequence[str]) -> str:
-    found = ', '.join(sorted(bag.topics)) or 'none'
-    text = f'{bag.path}: lacks topic {", ".join(topics)}; it has {found}'
+    text = bag.lacking(*topics)
     waivable = [t for t in topics if t in WAIVABLE]
     if waivable and len(waivable) == len(topics):
         text += f'; to explain it all the same give --without {waivable[0]}'

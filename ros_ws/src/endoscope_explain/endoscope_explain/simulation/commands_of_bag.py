@@ -56,10 +56,7 @@ def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommand
         series = recording.joint_state(DESIRED, finite=('position',))
         names = {joint: joint for joint in plant.joints}
     else:
-        found = ', '.join(sorted(recording.topics)) or 'none'
-        raise NoCommandsError(
-            f'{recording.path}: lacks topic {COMMAND} or {DESIRED}; it has {found}'
-        )
+        raise NoCommandsError(recording.lacking(COMMAND, DESIRED))
     require_running_stamps(recording.path, series)
     joints = tuple(joint for joint, name in names.items() if name in series.names)
     if not joints:
