@@ -7,9 +7,6 @@ Made by `endoscope bench criteria` from 28 cases of `endoscope bench concealed`,
 LEAST_SHARE = 1
 """Share of the best gain from which on another name may be the true one: such sets of names hold it
 in 90%."""
-SURE, RIVALLED = 3.98, 0
-"""Logarithm of the odds that a name without a rival is right, and what a rival that gains as much
-takes away."""
 BEYOND_FORM = 1.61
 """What is left over what the worst rig of another form leaves, of the worst channel: 95%
 of right explanations leave less."""

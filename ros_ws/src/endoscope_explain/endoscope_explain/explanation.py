@@ -74,8 +74,6 @@ class NamedEffect:
     ----------
     id, joint : str
         Catalogue id and joint name.
-    probability : float
-        Calibrated probability that this effect is present.
     parameters : mapping of str to Estimate
         Fitted parameters by name.
     alternatives : tuple of str
@@ -86,7 +84,6 @@ class NamedEffect:
 
     id: str
     joint: str
-    probability: float
     parameters: Mapping[str, Estimate]
     alternatives: tuple[str, ...] = ()
     evidence: Mapping[str, float] = field(default_factory=dict)

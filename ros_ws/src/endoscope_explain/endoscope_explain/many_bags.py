@@ -26,7 +26,7 @@ SUMMARY = (
     'bag',
     'verdict',
     'effects',
-    'probabilities',
+    'margins',
     'nominal_rmse_over_noise',
     'augmented_rmse_over_noise',
     'runtime_s',
@@ -210,8 +210,8 @@ def summary(name: str, reported: Reported) -> dict[str, Any]:
         'bag': name,
         'verdict': content['verdict'],
         'effects': [
-            {key: effect[key] for key in ('id', 'joint', 'probability')}
-            for effect in content['effects']
+            {'id': each['id'], 'joint': each['joint'], 'margin': each['evidence'].get('margin')}
+            for each in content['effects']
         ],
         'nominal_rmse_over_noise': _largest(content['fit']['nominal']),
         'augmented_rmse_over_noise': _largest(content['fit']['augmented']),
@@ -226,7 +226,8 @@ def summary_table(reports: Mapping[str, Reported]) -> str:
         line = summary(name, reported)
         effects = line['effects']
         line['effects'] = ' '.join(f'{e["id"]}@{e["joint"]}' for e in effects)
-        line['probabilities'] = ' '.join(f'{e["probability"]:.3f}' for e in effects)
+        margins = [each['margin'] for each in effects]
+        line['margins'] = ' '.join('-' if m is None else f'{m:.1f}' for m in margins)
         for key in ('nominal_rmse_over_noise', 'augmented_rmse_over_noise'):
             # Where the rig moved too little to tell, nothing was fitted.
             line[key] = '' if line[key] is None else f'{line[key]:.2f}'

@@ -88,7 +88,6 @@ def stribeck_case(stribeck_recording):
     effect = NamedEffect(
         EXPLAINED.id,
         EXPLAINED.joint,
-        0.97,
         {name: Estimate(v, 0.9 * v, 1.1 * v, '-') for name, v in EXPLAINED.parameters.items()},
         ('viscous_friction',),
         {'gain': 120.0},

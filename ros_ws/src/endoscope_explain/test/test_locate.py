@@ -21,7 +21,6 @@ def located(record, effect_id, joint='bend_x', **parameters):
     effect = NamedEffect(
         effect_id,
         joint,
-        1.0,
         {k: Estimate(v, v, v, '-') for k, v in parameters.items()},
     )
     (place,) = locate_effects(recording, plant, [effect])

@@ -14,7 +14,6 @@ PLANT = PlantDescription()
 RIVALLED = NamedEffect(
     'transport_delay',
     'bend_x',
-    0.5,
     {},
     ('actuator_lag',),
 )
@@ -79,6 +78,6 @@ def test_where_no_motion_is_safe_none_is_proposed(record):
 
 
 def test_without_a_rival_there_is_nothing_to_separate(record):
-    effect = NamedEffect('transport_delay', 'bend_x', 0.9, {})
+    effect = NamedEffect('transport_delay', 'bend_x', {})
     plant = with_effect('transport_delay')
     assert propose(record(plant, duration=3.0), plant, effect) is None

@@ -58,7 +58,8 @@ def check_report(report):
             'evidence',
         }
         assert effect['stage'] in STAGES
-        assert 0 <= effect['probability'] <= 1
+        assert effect['probability'] is None, 'not measured yet'
+        assert effect['evidence'].get('margin', 0) >= 0
         assert effect['equation']
         assert effect['source']
         for estimate in effect['parameters'].values():

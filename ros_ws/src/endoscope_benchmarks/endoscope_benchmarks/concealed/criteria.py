@@ -11,7 +11,6 @@ from textwrap import fill
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from endoscope_benchmarks.concealed.trial import Row
 
@@ -21,8 +20,6 @@ HOLDS = 0.9
 """Chance with which sets hold the truth and intervals the true number."""
 ADEQUATE = 0.95
 """Share of right explanations that are called adequate."""
-_PRIOR = 3.0
-"""Spread of the prior of a logarithm of odds: 1 to 20 either way."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +27,6 @@ class Criteria:
     """Deciding numbers; their meaning is in `endoscope_explain.criteria`."""
 
     LEAST_SHARE: float
-    SURE: float
-    RIVALLED: float
     BEYOND_FORM: float
     REACH: float
 
@@ -46,8 +41,6 @@ class Bank:
         Share of the best gain that the truth has.
     sizes : list of array
         Shares of all names of the same cases.
-    rival, right : array (m,), array (m,)
-        Share of the best other name, and whether the first one is right.
     beyond, exact : array (k,), array (k,)
         What is left over what another form leaves, and whether all was said rightly.
     errors : array (l,)
@@ -56,8 +49,6 @@ class Bank:
 
     truth: Array
     sizes: list[Array]
-    rival: Array
-    right: Array
     beyond: Array
     exact: NDArray[np.bool_]
     errors: Array
@@ -66,14 +57,11 @@ class Bank:
 def bank_of(rows: Sequence[Row]) -> Bank:
     """Collect what rows say."""
     known = [row for row in rows if math.isfinite(row.truth_share)]
-    said = [row for row in rows if math.isfinite(row.rival)]
     left = [row for row in rows if math.isfinite(row.beyond_form)]
     errors = np.array([e for row in rows if row.exact for e in row.errors])
     return Bank(
         np.array([row.truth_share for row in known]),
         [np.array(row.shares) for row in known],
-        np.array([row.rival for row in said]),
-        np.array([row.first and bool(row.concealed) for row in said], dtype=float),
         np.array([row.beyond_form for row in left]),
         np.array([row.exact for row in left], dtype=bool),
         errors[np.isfinite(errors)],
@@ -88,11 +76,8 @@ def derived(bank: Bank) -> Criteria:
     ValueError
         If it has too few cases for the quantiles.
     """
-    sure, rivalled = _odds(bank)
     return Criteria(
         1.0 - conformal(1.0 - bank.truth, HOLDS),
-        sure,
-        rivalled,
         conformal(bank.beyond[bank.exact], ADEQUATE),
         conformal(bank.errors, HOLDS),
     )
@@ -110,23 +95,6 @@ def conformal(scores: Array, chance: float) -> float:
     if rank > len(scores):
         raise ValueError(f'{len(scores)} scores are too few for a chance of {chance}: give more')
     return float(np.sort(scores)[rank - 1])
-
-
-def _odds(bank: Bank) -> tuple[float, float]:
-    """Logarithm of the odds of a name without a rival, and what a rival as good takes away."""
-
-    def loss(at: Array) -> float:
-        odds = at[0] - at[1] * bank.rival
-        likelihood = bank.right * odds - np.logaddexp(0.0, odds)
-        return float(-np.sum(likelihood) + 0.5 * np.sum((at / _PRIOR) ** 2))
-
-    found = minimize(loss, np.array([_PRIOR, _PRIOR]), bounds=[(None, None), (0.0, None)])
-    return float(found.x[0]), float(found.x[1])
-
-
-def probability(criteria: Criteria, rival: Array) -> Array:
-    """Probability of names by the share of their best rivals."""
-    return np.asarray(1.0 / (1.0 + np.exp(criteria.RIVALLED * rival - criteria.SURE)))
 
 
 def sensitivity(bank: Bank, criteria: Criteria) -> str:
@@ -148,17 +116,12 @@ def sensitivity(bank: Bank, criteria: Criteria) -> str:
     def reach(factor: float) -> str:
         return f'{factor:.3g}: {np.mean(bank.errors <= factor):.0%}'
 
-    def brier(sure: float) -> str:
-        given = Criteria(0.0, sure, criteria.RIVALLED, 0.0, 0.0)
-        return f'{sure:.3g}: {np.mean((probability(given, bank.rival) - bank.right) ** 2):.3f}'
-
     of_three = (0.5, 1.0, 2.0)
     line(
         'LEAST_SHARE',
         'sets that hold the truth, names in a set',
         [sets(k * criteria.LEAST_SHARE) for k in of_three],
     )
-    line('SURE', "Brier's score of probabilities", [brier(k * criteria.SURE) for k in of_three])
     line(
         'BEYOND_FORM',
         'right, and wrong explanations called adequate',
@@ -179,9 +142,6 @@ def source(criteria: Criteria, made_by: str) -> str:
 LEAST_SHARE = {criteria.LEAST_SHARE:.3g}
 """Share of the best gain from which on another name may be the true one: such sets of names hold it
 in {HOLDS:.0%}."""
-SURE, RIVALLED = {criteria.SURE:.3g}, {criteria.RIVALLED:.3g}
-"""Logarithm of the odds that a name without a rival is right, and what a rival that gains as much
-takes away."""
 BEYOND_FORM = {criteria.BEYOND_FORM:.3g}
 """What is left over what the worst rig of another form leaves, of the worst channel: {ADEQUATE:.0%}
 of right explanations leave less."""

@@ -41,8 +41,6 @@ class Row(Judgement):
     verdict : str
     said : tuple of str
         Names with their joints, most certain first.
-    probability : float
-        Of the first name; NaN where none is said.
     held, intervals : int
         Intervals that hold the true number, of how many: those of the plant, and of the numbers of
         named effects that could be measured another way.
@@ -56,8 +54,8 @@ class Row(Judgement):
         The same of each name that was tried, the best first.
     beyond_form : float
         What is left over what rigs of another form leave, of the worst joint.
-    rival : float
-        Gain of the best other name over that of the first one; NaN where none is said.
+    margin : float
+        Gain of the first name less that of the best other one; NaN where none is said.
     errors : tuple of float
         Error of each number over what its interval would allow on that side with a `REACH` of one.
     """
@@ -70,7 +68,6 @@ class Row(Judgement):
     left: float
     verdict: str
     said: tuple[str, ...]
-    probability: float = math.nan
     held: int = 0
     intervals: int = 0
     nominal: float = math.nan
@@ -80,7 +77,7 @@ class Row(Judgement):
     truth_share: float = math.nan
     shares: tuple[float, ...] = ()
     beyond_form: float = math.nan
-    rival: float = math.nan
+    margin: float = math.nan
     errors: tuple[float, ...] = ()
 
     def line(self) -> str:
@@ -135,7 +132,6 @@ def row_of(case: Case) -> Row:
         left=left(case.bare, case.true, case.recording.command.values) if case.laws else 0.0,
         verdict=str(said.verdict),
         said=tuple(f'{each.name}@{each.joint}' for each in names),
-        probability=said.effects[0].probability if said.effects else math.nan,
         held=sum(error <= 1.0 for error in errors),
         intervals=len(errors),
         nominal=nominal,
@@ -145,7 +141,7 @@ def row_of(case: Case) -> Row:
         truth_share=max(true, default=0.0) if law and shares else math.nan,
         shares=tuple(sorted(shares.values(), reverse=True)),
         beyond_form=said.beyond_form,
-        rival=said.effects[0].evidence['rival'] if said.effects else math.nan,
+        margin=said.effects[0].evidence['margin'] if said.effects else math.nan,
         errors=tuple(REACH * error for error in errors),
         **vars(judgement),
     )

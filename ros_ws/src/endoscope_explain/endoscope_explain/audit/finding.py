@@ -40,8 +40,6 @@ class Finding:
         One sentence for a person.
     remedy : str
         What was done so that the rest can be explained.
-    probability : float
-        That this is what it is named.
     parameters : mapping of str to Estimate
     evidence : mapping of str to float
     """
@@ -54,7 +52,6 @@ class Finding:
     intervals: tuple[tuple[float, float], ...]
     text: str
     remedy: str
-    probability: float = 1.0
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     evidence: Mapping[str, float] = field(default_factory=dict)
 

@@ -13,17 +13,17 @@ from endoscope_explain.fit.free_parameters import FORM_SPREAD
 
 
 def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[NamedEffect, ...]:
-    """Merge the effects that the audit found into those of the engine, most certain first.
+    """Merge the effects that the audit found into the engine's, these after its own.
 
     An effect that both found is listed once, as the engine fitted it.
     """
     known = {(e.id, e.joint) for e in explanation.effects}
     found = [
-        NamedEffect(f.id, f.joint, f.probability, f.parameters, (), f.evidence)
+        NamedEffect(f.id, f.joint, f.parameters, (), f.evidence)
         for f in audit.faults()
         if f.id in CATALOGUE and (f.id, f.joint) not in known
     ]
-    return tuple(sorted([*explanation.effects, *found], key=lambda e: -e.probability))
+    return (*found, *explanation.effects)
 
 
 def combined_verdict(explanation: Explanation, audit: AuditReport) -> Verdict:

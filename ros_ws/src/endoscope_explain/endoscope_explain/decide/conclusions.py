@@ -69,7 +69,7 @@ NOMINAL_UNITS = {name: unit for name, (_, unit) in NOMINAL.items()}
 def named(
     observations: tuple[JointObservation, ...], decisions: list[Decision]
 ) -> tuple[NamedEffect, ...]:
-    """Chosen effects of all joints, the most certain first and each id once before any again."""
+    """Chosen effects of all joints, the furthest ahead of others first; each id once at first."""
     ordered = sorted(
         (
             _named(observation.joint, decision, term)
@@ -77,7 +77,7 @@ def named(
             for term in decision.missing
             if term.is_known
         ),
-        key=lambda e: (-e.probability, -e.evidence['gain']),
+        key=lambda e: -e.evidence['margin'],
     )
     # A clock belongs to a device, not to a joint; a tracker's fault shows on both. Each id comes
     # once before any comes again.
@@ -96,7 +96,6 @@ def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
     return NamedEffect(
         term.name,
         joint,
-        term.probability,
         {}
         if fitted is None
         else effect_estimates(
@@ -108,7 +107,7 @@ def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
         {
             'gain': term.gain,
             'p_value': term.p_value,
-            'rival': term.rival,
+            'margin': term.margin,
             'explained': decision.explained,
             'as_formula': float(modelled),
         },

@@ -1,12 +1,11 @@
 """From what was tried on one joint to what is said about it."""
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.criteria import BEYOND_FORM, RIVALLED, SURE
+from endoscope_explain.criteria import BEYOND_FORM
 from endoscope_explain.fit.evidence import misfit
 from endoscope_explain.fit.intervals import may_be_absent
 from endoscope_explain.fit.other_forms import with_form
@@ -29,8 +28,8 @@ class MissingTerm:
         Names of terms that the recording does not tell from it, nearest first.
     gain : float
         Logarithm of the evidence that it brings.
-    rival : float
-        Share of that which the best other name brings.
+    margin : float
+        By how much more than the best other name.
     p_value : float
         Chance that a rig in which nothing is missing shows as much.
     formula : Composition or None
@@ -41,7 +40,7 @@ class MissingTerm:
     name: str
     alternatives: tuple[str, ...]
     gain: float
-    rival: float
+    margin: float
     p_value: float
     formula: Composition | None
 
@@ -49,11 +48,6 @@ class MissingTerm:
     def is_known(self) -> bool:
         """Whether it is an effect of the catalogue."""
         return self.name in CATALOGUE
-
-    @property
-    def probability(self) -> float:
-        """That the name is right, given how near the best other one comes."""
-        return 1.0 / (1.0 + math.exp(-(SURE - RIVALLED * self.rival)))
 
 
 @dataclass(frozen=True)
@@ -135,9 +129,8 @@ def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
         if may_be_absent(formula.fit, formula.terms[-1].term):
             # The function is there; the effect whose formula comes nearest may not be.
             name, formula = last.id, None
-    return MissingTerm(
-        last, name, alternatives, gain, max(best_other, 0.0) / gain, level.p_value, formula
-    )
+    margin = gain - max(best_other, 0.0)
+    return MissingTerm(last, name, alternatives, gain, margin, level.p_value, formula)
 
 
 def _name(level: Level, one: Composition) -> str:

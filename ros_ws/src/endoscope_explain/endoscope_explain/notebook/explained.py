@@ -25,7 +25,7 @@ from endoscope_explain.report.writing import write_report
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_EFFECTS = ('effect', 'joint', 'probability', 'number', 'value', '90 % interval', 'unit')
+_EFFECTS = ('effect', 'joint', 'not told from', 'number', 'value', '90 % interval', 'unit')
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ class Explained:
     def _effect_rows(self) -> list[tuple[str, ...]]:
         rows: list[tuple[str, ...]] = []
         for effect in self.effects:
-            named = (effect.id, effect.joint, f'{effect.probability:.2f}')
+            named = (effect.id, effect.joint, ', '.join(effect.alternatives) or '-')
             for one in numbers_of(effect) or [Shown('-', '-', '-', '-', '-')]:
                 rows.append((*named, one.name, one.value, f'{one.low} to {one.high}', one.unit))
                 named = ('', '', '')

@@ -57,7 +57,8 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         'id': effect.id,
         'joint': effect.joint,
         'stage': effect.stage,
-        'probability': effect.probability,
+        # As long as it is not measured on cases that go wrong, too; evidence has the margin.
+        'probability': None,
         'equation': effect.definition.equation,
         'source': effect.definition.source,
         'parameters': {

@@ -19,8 +19,7 @@ HEADLINES = {
 EVIDENCE = {
     'gain': 'log evidence that it adds, in nats',
     'p_value': 'share of rigs without it in which as much is found',
-    'probability': 'that it is there',
-    'rival': 'share of that which the best other name adds',
+    'margin': 'nats by which it adds more than the best other name',
     'as_formula': '1 where the plant has its formula, 0 where it has a fitted function',
     'explained': 'share of the excess misfit that is gone with all that was found',
     'count': 'samples that show it',
@@ -51,7 +50,7 @@ def verdict_sentence(case: ExplainedCase) -> str:
     if case.verdict is Verdict.UNKNOWN_PHYSICS:
         return _unknown(case)
     if case.effects:
-        named = [f'{e.id} on {e.joint} ({_percent(e)})' for e in case.effects[:MOST_NAMED]]
+        named = [_named(e) for e in case.effects[:MOST_NAMED]]
         more = len(case.effects) - len(named)
         named += [f'{more} more'] if more else []
         missing = case.verdict is Verdict.MISSING_PHYSICS
@@ -150,8 +149,10 @@ def _unknown(case: ExplainedCase) -> str:
     return f'Missing on {term.joint}: {what[0].lower()}{what[1:]}{states}.'
 
 
-def _percent(effect: NamedEffect) -> str:
-    return f'{100 * effect.probability:.0f} %'
+def _named(effect: NamedEffect) -> str:
+    """An effect, and the name that the recording cannot tell from it."""
+    rival = f' or {effect.alternatives[0]}' if effect.alternatives else ''
+    return f'{effect.id}{rival} on {effect.joint}'
 
 
 def _all(names: Sequence[str]) -> str:
