@@ -37,7 +37,7 @@ def test_a_stop_is_named_shown_and_exported(rig, tmp_path, capsys):
     assert explain(rig, out, rig / 'stopped.mcap', '--validate', rig / 'stopped.mcap') == 0
     printed = capsys.readouterr()
     first, *rest = printed.out.splitlines()
-    assert first.startswith('The simulation leaves out joint_stop on bend_x (')
+    assert first.startswith('The simulation leaves out joint_stop on bend_x.')
     assert any(line.startswith('    angle_deg 6.') for line in rest)
     assert rest[-1] == f'Report: {out / "report.html"}'
     assert 'refitting the nominal plant' in printed.err
