@@ -21,7 +21,7 @@ from endoscope_nodes.qos import EVENT, profile
 from endoscope_nodes.topics import Qos
 
 CONSOLE = [sys.executable, '-m', 'endoscope_bringup.cli', 'console']
-OF_THE_GRAPH = ['--ros-args', '-p', 'source:=master', '-p', 'tick_rate:=500']
+OF_THE_GRAPH = ['--ros-args', '-p', 'source:=master', '-p', 'tick_rate:=250']
 _GRAPH = 'import sys; from endoscope_nodes.program import graph; sys.exit(graph())'
 PATIENCE_S = 240.0
 _QUEUE = profile(Qos(2000, reliable=False))

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from unittest.mock import patch
 
 import numpy as np
-from simulated_graph import SimulatedGraph
+from simulated_graph import TICK_RATE, SimulatedGraph
 
 from endoscope_bringup.cli import main
 from endoscope_nodes.names import JOINTS, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
@@ -47,13 +47,15 @@ _DELAY_S, _PERIOD_S, _LONGEST_HOLD_S = 0.4, 1.0 / 30.0, 6.0
 class OperatedGraph(SimulatedGraph):
     """The whole graph, recorder included, no faster than real time while a program is at it."""
 
-    def __init__(self, folder, extra=(), **values) -> None:
+    def __init__(self, folder, extra=(), tick_rate=TICK_RATE, **values) -> None:
         overrides = {'recorder': {'bag': str(folder / 'bag'), 'autostart': False}}
         overrides |= {
             'calibration': {'motion': 'brief'},
             'conductor': {'wait_for': ['motor/measured_js']},
         }
-        super().__init__(extra=(*extra, RecorderNode), overrides=overrides | values)
+        super().__init__(
+            extra=(*extra, RecorderNode), overrides=overrides | values, tick_rate=tick_rate
+        )
         self.goals = self.listen(MOTOR_COMMAND, MOTORS)
         self.wanted = self.listen(SLAVE_COMMAND, JOINTS)
         self.advance(0.1)
