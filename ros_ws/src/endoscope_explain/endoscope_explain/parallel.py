@@ -2,9 +2,11 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from threading import Thread
 from typing import Any
+
+_LOOK_S = 1.0
 
 
 def parallel_map[Task, Result](
@@ -36,9 +38,16 @@ def parallel_map[Task, Result](
         # An executor's threads would keep an interrupted program until their tasks are done.
         Thread(target=_work, args=(function, waiting), daemon=True).start()
     try:
-        return [future.result() for future in futures]
+        return [_awaited(future) for future in futures]
     finally:
         waiting.clear()
+
+
+def _awaited[Result](future: Future[Result]) -> Result:
+    # A signal that comes just as a wait begins is acted upon only once the wait is over.
+    while wait([future], _LOOK_S).not_done:
+        pass
+    return future.result()
 
 
 def _work(function: Callable[[Any], Any], waiting: deque[tuple[Future[Any], Any]]) -> None:
