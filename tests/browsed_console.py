@@ -13,12 +13,12 @@ from operated_graph import OperatedGraph
 from playwright.sync_api import Browser, Page, expect
 
 PATIENCE_MS = 60_000
-# What comes in simulated time comes later on a busy machine.
-expect.set_options()
 """For whatever the page is to show: a busy machine shows it late, and that is no fault here."""
 expect.set_options(timeout=PATIENCE_MS)
 _LONGEST_S = 60.0
 _STILL_S = 0.5
+_HEARD_NS = 50_000_000
+"""Within which a node acts upon what another has heard."""
 _GRIP_S = 5.0
 _SHARE = "(button) => button.style.getPropertyValue('--share')"
 _WATCH_POLICY = """
@@ -102,8 +102,9 @@ class BrowsedConsole:
         return float(np.ptp(goals, axis=0).max()) if goals else 0.0
 
     def stands(self, page: Page) -> bool:
-        """Whether nothing moves for half a second."""
-        begin = self.now_ns
+        """Whether nothing moves for half a second, once the graph has heard of the release."""
+        until(page, lambda: not any(list(self.graph.clutches)[-1:]))
+        begin = self.now_ns + _HEARD_NS
         until(page, lambda: self.now_ns > begin + _STILL_S * 1e9)
         return self.moved(begin) < 1e-9
 

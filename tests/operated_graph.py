@@ -17,10 +17,12 @@ from dataclasses import dataclass
 from unittest.mock import patch
 
 import numpy as np
+from sensor_msgs.msg import Joy
 from simulated_graph import TICK_RATE, SimulatedGraph
 
 from endoscope_bringup.cli import main
-from endoscope_nodes.names import JOINTS, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
+from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
+from endoscope_nodes.qos import EVENT
 from endoscope_nodes.recorder_node import RecorderNode
 
 ENDOSCOPE = [sys.executable, '-m', 'endoscope_bringup.cli']
@@ -58,6 +60,10 @@ class OperatedGraph(SimulatedGraph):
         )
         self.goals = self.listen(MOTOR_COMMAND, MOTORS)
         self.wanted = self.listen(SLAVE_COMMAND, JOINTS)
+        self.clutches: list[int] = []
+        self.probe.create_subscription(
+            Joy, MASTER_CLUTCH, lambda m: self.clutches.append(m.buttons[0]), EVENT
+        )
         self.advance(0.1)
         self._due = time.monotonic()
 

@@ -1,6 +1,7 @@
 """The recorder node: everything published is in the bag, as it was published."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from endoscope_bags.message_types import message_type
 from endoscope_nodes.diagnostics import OK, WARN
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import EVENT, LOCK_STEP, RESULT, SENSOR_ASKED, SENSOR_OFFERED
+from endoscope_nodes.recorder_node import new_bag
 
 MS = 10**6
 
@@ -269,6 +271,17 @@ def test_what_nobody_asked_for_has_little_room_and_its_end_is_a_warning(tmp_path
         assert said_of(session)[:2] == (OK, 'recording')
         assert session.recorder.last_report.complete
     assert session.runtime.exit_code == 0
+
+
+def test_recordings_without_a_name_have_different_ones_within_a_second(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr('time.strftime', lambda how: how.replace('%', ''))
+    names = []
+    for _ in range(3):
+        names.append(new_bag())
+        Path(names[-1]).mkdir(parents=True)
+    assert len(set(names)) == 3
+    assert names[1:] == [f'{names[0]}-2', f'{names[0]}-3']
 
 
 def test_without_room_nothing_is_recorded_unasked(tmp_path, monkeypatch):

@@ -181,7 +181,7 @@ class Recording:
         """
         matches = self._matches(suffix, namespace)
         if not matches:
-            raise MissingTopicError(self.lacking(suffix))
+            raise MissingTopicError(self.lacking(suffix, namespace=namespace))
         if len(matches) > 1:
             raise AmbiguousTopicError(
                 f'{self.path}: {suffix} could be {" or ".join(matches)}; give the namespace'
@@ -192,23 +192,27 @@ class Recording:
         """Tell whether `find` would find at least one topic."""
         return bool(self._matches(suffix, namespace))
 
-    def lacking(self, *suffixes: str) -> str:
-        """Say that topics were not recorded or are empty, and which have messages."""
-        empty = [n for n in self.topics if any(n.endswith(f'/{s.strip("/")}') for s in suffixes)]
-        if empty:
-            return f'{self.path}: no message was recorded on {", ".join(sorted(empty))}'
-        found = ', '.join(n for n in sorted(self.topics) if self.topics[n].message_count)
-        return f'{self.path}: lacks topic {" and ".join(suffixes)}; it has {found or "none"}'
+    def lacking(self, *suffixes: str, namespace: str | None = None) -> str:
+        """Say that topics, none of which `has` finds, are empty or not there, and which are."""
+        empty = [name for suffix in suffixes for name in self._called(suffix, namespace)]
+        absent = [suffix for suffix in suffixes if not self._called(suffix, namespace)]
+        said = [f'no message was recorded on {", ".join(empty)}'] if empty else []
+        if absent:
+            found = ', '.join(n for n in sorted(self.topics) if self.topics[n].message_count)
+            said.append(f'lacks topic {" and ".join(absent)}; it has {found or "none"}')
+        return f'{self.path}: {"; ".join(said)}'
 
     def _matches(self, suffix: str, namespace: str | None) -> list[str]:
+        names = self._called(suffix, namespace)
+        return [name for name in names if self.topics[name].message_count]
+
+    def _called(self, suffix: str, namespace: str | None) -> list[str]:
         relative = suffix.strip('/')
         if suffix.startswith('/') or namespace is not None:
             within = (namespace or '').strip('/')
             wanted = f'/{within}/{relative}' if within else f'/{relative}'
-            names = [wanted] if wanted in self.topics else []
-        else:
-            names = [n for n in self.topics if ('/' + n.lstrip('/')).endswith('/' + relative)]
-        return sorted(name for name in names if self.topics[name].message_count)
+            return [wanted] if wanted in self.topics else []
+        return sorted(n for n in self.topics if ('/' + n.lstrip('/')).endswith('/' + relative))
 
     def joint_state(
         self,

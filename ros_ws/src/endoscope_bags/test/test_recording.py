@@ -323,3 +323,9 @@ def test_a_topic_without_a_message_is_said_to_be_empty(tmp_path):
     bag = open_bag(tmp_path / 'bag')
     with pytest.raises(MissingTopicError, match=r'no message was recorded on /a/motor/servo_jp$'):
         bag.joint_state('motor/servo_jp')
+    with pytest.raises(MissingTopicError, match=r'lacks topic wires/measured_js; it has /a/wires'):
+        bag.joint_state('wires/measured_js', namespace='/b')
+    assert bag.lacking('motor/servo_jp', 'slave/servo_jp').endswith(
+        ': no message was recorded on /a/motor/servo_jp; '
+        'lacks topic slave/servo_jp; it has /a/wires/measured_js'
+    )

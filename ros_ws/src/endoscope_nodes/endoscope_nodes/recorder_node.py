@@ -1,5 +1,6 @@
 """Records topics into a bag: every message as it came, counted, with what was lost."""
 
+import itertools
 import math
 import struct
 import time
@@ -363,8 +364,10 @@ class RecorderNode(EndoscopeNode):
 
 
 def new_bag() -> str:
-    """Return where a recording goes that has no name."""
-    return time.strftime('bags/recording-%Y%m%d-%H%M%S')
+    """Return where a recording goes that has no name; several of one second are numbered."""
+    first = time.strftime('bags/recording-%Y%m%d-%H%M%S')
+    numbered = (f'{first}-{n}' for n in itertools.count(2))
+    return next(name for name in itertools.chain([first], numbered) if not Path(name).exists())
 
 
 def checked_names(topics: tuple[str, ...]) -> tuple[str, ...]:

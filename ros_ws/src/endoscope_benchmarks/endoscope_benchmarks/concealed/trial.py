@@ -54,8 +54,6 @@ class Row(Judgement):
         The same of each name that was tried, the best first.
     beyond_form : float
         What is left over what rigs of another form leave, of the worst joint.
-    margin : float
-        Gain of the first name less that of the best other one; NaN where none is said.
     errors : tuple of float
         Error of each number over what its interval would allow on that side with a `REACH` of one.
     """
@@ -77,7 +75,6 @@ class Row(Judgement):
     truth_share: float = math.nan
     shares: tuple[float, ...] = ()
     beyond_form: float = math.nan
-    margin: float = math.nan
     errors: tuple[float, ...] = ()
 
     def line(self) -> str:
@@ -141,7 +138,6 @@ def row_of(case: Case) -> Row:
         truth_share=max(true, default=0.0) if law and shares else math.nan,
         shares=tuple(sorted(shares.values(), reverse=True)),
         beyond_form=said.beyond_form,
-        margin=said.effects[0].evidence['margin'] if said.effects else math.nan,
         errors=tuple(REACH * error for error in errors),
         **vars(judgement),
     )

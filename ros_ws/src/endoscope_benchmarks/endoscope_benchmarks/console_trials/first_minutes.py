@@ -117,16 +117,12 @@ def console_trial(folder: Path, domain: int) -> str:
 
 def _hold_until(hand: Hand, code: str, begun: Callable[[], bool]) -> None:
     """Hold a key as the guide says until it is seen to act; once more where it did not."""
-    console = hand.console
     for _ in range(_TRIES):
-        end = time.monotonic() + _HELD_S
         hand.press(code)
-        while not begun() and time.monotonic() < end:
-            console.passes(_LOOK_S)
+        acts = hand.console.client.wait_until(begun, _HELD_S)
         hand.let_go()
-        if begun():
+        if acts:
             return
-        console.passes(_LOOK_S)
 
 
 @dataclass(frozen=True)

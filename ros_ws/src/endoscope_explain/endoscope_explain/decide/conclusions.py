@@ -69,7 +69,7 @@ NOMINAL_UNITS = {name: unit for name, (_, unit) in NOMINAL.items()}
 def named(
     observations: tuple[JointObservation, ...], decisions: list[Decision]
 ) -> tuple[NamedEffect, ...]:
-    """Chosen effects of all joints, the furthest ahead of others first; each id once at first."""
+    """Chosen effects of all joints, what explains most first; each id once before any again."""
     ordered = sorted(
         (
             _named(observation.joint, decision, term)
@@ -77,7 +77,7 @@ def named(
             for term in decision.missing
             if term.is_known
         ),
-        key=lambda e: -e.evidence['margin'],
+        key=lambda e: -e.evidence['gain'],
     )
     # A clock belongs to a device, not to a joint; a tracker's fault shows on both. Each id comes
     # once before any comes again.

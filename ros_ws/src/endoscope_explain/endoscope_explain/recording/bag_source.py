@@ -71,7 +71,7 @@ def recording_from_bag(
     lacking += [] if bag.has(COMMAND, namespace) or bag.has(DESIRED, namespace) else [COMMAND]
     fatal = [t for t in lacking if t not in without and t not in OPTIONAL]
     if fatal:
-        raise MissingTopicError(_lacking_message(bag, fatal))
+        raise MissingTopicError(_lacking_message(bag, fatal, namespace))
     notes = [f'{t} was not recorded' for t in lacking]
 
     def read(topic: str, quantity: str) -> JointStateSeries:
@@ -177,8 +177,8 @@ def with_unrecorded(plant: PlantDescription, described: PlantDescription) -> Pla
     )
 
 
-def _lacking_message(bag: Bag, topics: Sequence[str]) -> str:
-    text = bag.lacking(*topics)
+def _lacking_message(bag: Bag, topics: Sequence[str], namespace: str | None) -> str:
+    text = bag.lacking(*topics, namespace=namespace)
     waivable = [t for t in topics if t in WAIVABLE]
     if waivable and len(waivable) == len(topics):
         text += f'; to explain it all the same give --without {waivable[0]}'
