@@ -5,6 +5,7 @@ import signal
 import subprocess
 import termios
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -64,6 +65,16 @@ def moved(typist):
     return np.subtract(typist.wanted[-1].position, typist.wanted[0].position)
 
 
+def strayed(graph, typist, joint):
+    """How far a joint was asked to go within grips, rad: each begins where the slave is measured.
+
+    A busy machine makes several grips of one, and so many steps are no motion.
+    """
+    grips = sum(after > before for before, after in pairwise([0, *graph.clutches]))
+    steps = np.abs(np.diff([goal.position[joint] for goal in typist.wanted]))
+    return np.sort(steps)[: len(steps) - grips].sum()
+
+
 def check_left_as_found(graph, typist, kitty=False):
     typist.until(lambda: graph.clutches[-1] == 0, 'the release')
     assert source(graph) == 'none'
@@ -81,8 +92,7 @@ def test_a_held_key_moves_the_slave_and_its_release_stops_it(graph):
         assert not typist.goals
         typist.hold(UP, until=lambda: moved(typist)[1] > FAR)
         assert 'FOLLOW' in typist.text
-        # A busy machine makes several grips of it, each from where the slave is measured.
-        assert abs(moved(typist)[0]) < FAR / 3
+        assert strayed(graph, typist, joint=0) < 0.01
         typist.shows('OPEN')
         assert 1 in graph.clutches
         assert graph.clutches[-1] == 0
@@ -91,7 +101,7 @@ def test_a_held_key_moves_the_slave_and_its_release_stops_it(graph):
         typist.hold(A, until=lambda: moved(typist)[0] < -FAR)
         typist.shows('OPEN')
         assert typist.stands()
-        assert abs(moved(typist)[1]) < FAR / 3
+        assert strayed(graph, typist, joint=1) < 0.01
         typist.type(b'q')
         assert typist.end() == 0
         check_left_as_found(graph, typist)
