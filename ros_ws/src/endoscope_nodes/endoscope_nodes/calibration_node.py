@@ -19,7 +19,6 @@ from endoscope_core.calibration import (
     TensionGapError,
 )
 from endoscope_core.classifier.classification import (
-    CellReadings,
     ClassificationResult,
     Classifier,
     ClassifierError,
@@ -266,24 +265,22 @@ class CalibrationNode(EndoscopeNode):
         if run.record is None:
             return
         try:
-            tension, cells = run.record.resampled(), run.record.cells()
+            tension = run.record.resampled()
         except TensionGapError as error:
             self._abort(str(error), TENSION_GAP)
             return
         if self.ticker.paced or not self.ticker.simulated:
-            self._judging = self._thread.submit(self._judgement, self._classifier, tension, cells)
+            self._judging = self._thread.submit(self._judgement, self._classifier, tension)
             return
         self._judging = Future()
         try:
-            self._judging.set_result(self._judgement(self._classifier, tension, cells))
+            self._judging.set_result(self._judgement(self._classifier, tension))
         except (ClassifierError, PlantFitError) as error:
             self._judging.set_exception(error)
 
-    def _judgement(
-        self, classifier: Classifier, tension: np.ndarray, cells: CellReadings
-    ) -> _Judgement:
+    def _judgement(self, classifier: Classifier, tension: np.ndarray) -> _Judgement:
         """What the tensions (N, 4) say; the plant is not looked for in a tube that is refused."""
-        verdict = classifier.classify(tension, cells)
+        verdict = classifier.classify(tension)
         if not self._settings.identify_plant:
             return verdict, ()
         time = np.arange(len(tension)) * TICK_NS * 1e-9

@@ -164,6 +164,6 @@ def _judged(
     for stamp, tension in zip(stamps.tolist(), readings, strict=True):
         record.add(round(stamp), tension.tolist())
     try:
-        return classifier.classify(record.resampled(), record.cells()), ''
+        return classifier.classify(record.resampled()), ''
     except (TensionGapError, UnseenTensionError) as error:
         return None, str(error)

@@ -1,13 +1,9 @@
-"""`endoscope train`: a classifier of wire tensions from a data set."""
+"""`endoscope train`: the classifier of wire tensions, from simulated rigs."""
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from endoscope_bringup.seed_argument import seed
-
-if TYPE_CHECKING:
-    from endoscope_core.dataset import CalibrationDataset
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -15,11 +11,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'train',
         help='train the tension classifier',
-        description='Cross-validates a classifier with held-out tube configurations, trains it on '
-        'all of DIR, and writes FILE and a JSON file of the same name that says how.',
-    )
-    parser.add_argument(
-        '--data', type=Path, required=True, metavar='DIR', help='data set of `endoscope dataset`'
+        description="Simulates calibrations of random rigs, trains the first paper's 1D-CNN on "
+        'them, calibrates its intervals and refusals on other rigs, and writes FILE and a JSON '
+        'file of the same name that says how. Interrupted, the same command goes on from '
+        'FILE.part. It needs PyTorch: `make -C ros_ws train` installs it.',
     )
     parser.add_argument(
         '--out',
@@ -29,101 +24,56 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='weights to write, by custom with suffix .safetensors',
     )
     parser.add_argument(
-        '--model',
-        choices=('size', 'cnn'),
-        default='size',
-        help='size: regresses the backlash size with an interval, and refuses what it does not '
-        "know; cnn: the first paper's 1D-CNN, for the sinusoid only, which needs PyTorch: "
-        '`make -C ros_ws train` installs it (size)',
+        '--motion',
+        default='sinusoid',
+        help="calibration motion: the first paper's sinusoid of 9 s, or brief (sinusoid)",
     )
-    parser.add_argument('--seed', type=seed, default=0, help='of weights, batches and folds (0)')
+    parser.add_argument('--seed', type=seed, default=0, help='of rigs, weights and batches (0)')
     parser.add_argument(
-        '--folds', type=int, default=5, metavar='K', help='of the cross-validation (5)'
+        '--n', type=int, default=5000, metavar='N', help='rigs to train with (5000)'
     )
     parser.add_argument(
-        '--plots',
-        type=Path,
-        metavar='DIR',
-        help='new folder for SVG plots of what held-out tubes say: classes confused, and with '
-        'size the calibration of its intervals',
+        '--steps', type=int, default=6000, metavar='N', help='steps of 64 recordings (6000)'
+    )
+    parser.add_argument(
+        '--plots', type=Path, metavar='DIR', help='new folder for an SVG plot of the training curve'
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Validate, train and write; return 0."""
+    """Train and write; return 0."""
     from endoscope_core.atomic_output import require_free_directory
-    from endoscope_core.classifier.weights_file import weights_path
-    from endoscope_core.dataset import load_dataset
+    from endoscope_core.classifier.weights_file import save_weights, weights_path
+    from endoscope_core.signals import calibration_motion
 
     out = weights_path(args.out)
     if args.plots is not None:
         require_free_directory(args.plots)
-    dataset = load_dataset(args.data)
-    made = dataset.manifest
+    calibration_motion(args.motion)
+    from endoscope_core.classifier.cnn_training import CnnTraining, description_of, train_cnn
+
+    settings = CnnTraining.of_size(args.n, args.steps)
+    kept = out.with_name(f'{out.name}.part')
+    trained = train_cnn(args.motion, args.seed, settings, kept, _print_line)
     command = (
-        f'endoscope dataset --seed {made["seed"]} --n {len(dataset.class_deg)} '
-        f'--motion {dataset.motion} --out DATA && endoscope train --model {args.model} '
-        f'--seed {args.seed} --folds {args.folds} --data DATA --out {out.name}'
+        f'endoscope train --motion {args.motion} --seed {args.seed} --n {args.n} '
+        f'--steps {args.steps} --out {out.name}'
     )
-    if args.model == 'cnn':
-        line = _train_cnn(args, dataset, out, command)
-    else:
-        line = _train_size(args, dataset, out, command)
-    print(f'{out}: {line} on held-out tube configurations')
-    return 0
-
-
-def _train_cnn(
-    args: argparse.Namespace, dataset: 'CalibrationDataset', out: Path, command: str
-) -> str:
-    from endoscope_core.classifier.training import (
-        cross_validate,
-        save_network,
-        train_network,
-        use_one_thread,
-    )
-
-    use_one_thread()
-    validation = cross_validate(dataset, args.seed, args.folds, _print_line)
-    network = train_network(dataset.tension, dataset.class_deg, args.seed)
-    save_network(out, network, dataset, validation, command, args.seed)
+    described = description_of(trained, settings, args.seed, command)
+    save_weights(out, trained.classifier.weights, described)
+    kept.unlink(missing_ok=True)
     if args.plots is not None:
-        from endoscope_bringup.learning.classifier_figures import confusion_figure, save_figures
+        from endoscope_bringup.learning.classifier_figures import save_figures, training_figure
 
-        save_figures(args.plots, {'confusion': confusion_figure(validation, '1D-CNN')})
-    return f'{100.0 * validation.mean_accuracy:.2f} % right'
-
-
-def _train_size(
-    args: argparse.Namespace, dataset: 'CalibrationDataset', out: Path, command: str
-) -> str:
-    import math
-
-    from endoscope_core.classifier.size_training import (
-        save_size_classifier,
-        validated_size_classifier,
-    )
-
-    classifier, validation = validated_size_classifier(dataset, args.seed, args.folds, _print_line)
-    save_size_classifier(out, classifier, dataset, validation, command, args.seed)
-    if args.plots is not None:
-        from endoscope_bringup.learning.classifier_figures import (
-            confusion_figure,
-            intervals_figure,
-            save_figures,
+        save_figures(args.plots, {'training': training_figure(trained.curve)})
+    for rate, told in trained.held_out.items():
+        print(
+            f'{out}: rigs held out, read at {rate}: nearest class right in '
+            f'{100.0 * told["nearest_class_right"]:.1f} %, {told["size_rmse_deg"]:.2f} deg rms, '
+            f'{100.0 * told["intervals_hold"]:.0f} % of sizes in their interval, '
+            f'{100.0 * told["refused"]:.1f} % refused'
         )
-
-        figures = {
-            'confusion': confusion_figure(validation.classes, 'by backlash size'),
-            'intervals': intervals_figure(validation, dataset.backlash_size),
-        }
-        save_figures(args.plots, figures)
-    coverage = 100.0 * sum(validation.coverage) / len(validation.coverage)
-    rmse = math.sqrt(sum(x * x for x in validation.rmse) / len(validation.rmse))
-    return (
-        f'{100.0 * validation.classes.mean_accuracy:.2f} % right, {math.degrees(rmse):.2f} deg rms '
-        f'with {coverage:.0f} % of sizes in their interval,'
-    )
+    return 0
 
 
 def _print_line(line: str) -> None:

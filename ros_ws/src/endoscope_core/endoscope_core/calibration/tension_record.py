@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.classifier.classification import CellReadings
 from endoscope_core.errors import EndoscopeError
 
 Array = NDArray[np.float64]
@@ -22,8 +21,6 @@ that can be measured and the brief motion 0.14 deg of backlash size; one of 60 m
 LONGEST_INTERVAL_NS = 12_500_000
 """Longest interval in which an instant may lie on average: 100 Hz, a quarter for lost readings."""
 
-_SPAN = 5
-
 
 class TensionGapError(EndoscopeError, ValueError):
     """Too few tensions came for the record to be judged."""
@@ -34,11 +31,9 @@ class TensionRecord:
 
     The readings come when the line carries them: their rate is known from their stamps alone, and
     any from 100 Hz on will do.  Between two readings the tension is taken for a straight line.  The
-    classifier reads means over 50 ms, which hold what a calibration has to tell: over 10 ms a
-    straight line misses the tension by less than one reading's noise all but where a wire turns
-    from pulling to paying out.  A smoother curve would gain nothing that these means show, and a
-    filter that takes noise away takes the turning of the loop with it.  Interpolated tensions are
-    less noisy than readings, so `cells` says what the readings were.
+    classifier is trained with readings joined so: over 10 ms a straight line misses the tension by
+    less than one reading's noise all but where a wire turns from pulling to paying out, and a
+    filter that takes noise away takes the turning of the loop with it.
 
     Parameters
     ----------
@@ -118,28 +113,6 @@ class TensionRecord:
         grid = np.arange(self._samples) * self._period_ns
         values = self._values[: self._count]
         return np.stack([np.interp(grid, since, column) for column in values.T], axis=1)
-
-    def cells(self) -> CellReadings:
-        """How the load cells were read.
-
-        The noise of a cell is the rms of its fourth divided differences, each in units of what
-        white noise of 1 N would have there.  They are nothing for a cubic: at 100 Hz the motion
-        still adds less than a quarter to them, where second differences gain a half (both as
-        Gasser, Sroka, Jennen-Steinmetz, Biometrika 73(3), 1986, estimate noise from readings at
-        uneven distances, there with second ones).
-        """
-        values = self._values[: self._count]
-        interval = float(self._mean_interval(self._intervals())) * 1e-9
-        if self._count < _SPAN:
-            return CellReadings((0.0,) * values.shape[1], interval)
-        seconds = (self._stamps[: self._count] - self.start_ns) * 1e-9
-        spans = np.lib.stride_tricks.sliding_window_view(seconds, _SPAN)
-        apart = spans[:, :, None] - spans[:, None, :] + np.eye(_SPAN)
-        weights = 1.0 / np.prod(apart, axis=2)
-        weights /= np.linalg.norm(weights, axis=1, keepdims=True)
-        readings = np.lib.stride_tricks.sliding_window_view(values, _SPAN, axis=0)
-        differences = np.einsum('ns,nws->nw', weights, readings)
-        return CellReadings(tuple(np.sqrt(np.mean(differences**2, axis=0)).tolist()), interval)
 
     def _intervals(self) -> NDArray[np.int64]:
         """Times in ns between readings, cut off where the record begins and ends."""

@@ -58,34 +58,14 @@ class ClassificationResult:
         return self.interval is not None and self.interval[0] <= size <= self.interval[1]
 
 
-@dataclass(frozen=True)
-class CellReadings:
-    """How load cells were read, which tensions interpolated to 1 kHz no longer show.
-
-    Parameters
-    ----------
-    noise : tuple of float
-        Rms noise of one reading of each cell in N, shape (4,).
-    interval : float
-        Length in s of the interval between readings in which an instant lies on average.
-    """
-
-    noise: tuple[float, ...]
-    interval: float
-
-
 class Classifier(Protocol):
     """Names the class of a tube from the tensions of one calibration."""
 
     motion: str
     """Name of the calibration motion whose tensions it reads."""
 
-    def classify(
-        self, tension: ArrayLike, cells: CellReadings | None = None
-    ) -> ClassificationResult:
+    def classify(self, tension: ArrayLike) -> ClassificationResult:
         """Class of the tensions (N, 4) in N at 1 kHz from the start of the motion.
-
-        Without `cells` each of them is a reading.
 
         Raises
         ------
@@ -113,10 +93,3 @@ def checked_tension(
     if not np.all(np.isfinite(array)):
         raise ClassifierError('the tensions hold values that are not finite')
     return array
-
-
-def result_of(classes_deg: tuple[int, ...], weights: list[float]) -> ClassificationResult:
-    """Result with a probability for each class."""
-    probabilities = dict(zip(classes_deg, weights, strict=True))
-    likeliest = max(probabilities, key=lambda size: probabilities[size])
-    return ClassificationResult(likeliest, probabilities[likeliest], probabilities)

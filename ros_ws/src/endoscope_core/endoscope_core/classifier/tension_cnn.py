@@ -6,39 +6,38 @@ import numpy as np
 from torch import Tensor, nn
 
 from endoscope_core.classifier.classification import WIRES
-from endoscope_core.classifier.inference import CHANNELS, STRIDE
+from endoscope_core.classifier.cnn_classifier import CHANNELS, STRIDE
 from endoscope_core.classifier.standardised_tension import StandardisedTension
 
 
 class TensionCnn(StandardisedTension):
     """Eight convolutions with batch normalisation and ReLU, then a dense layer.
 
-    Eight strides of three reduce 9000 samples to exactly one, so that the dense layer sees one
-    feature vector of the whole recording. Softmax belongs to the loss in training and to the
-    caller otherwise.
+    Eight unpadded strides of three reduce 6,561 samples to exactly one: of 9,000 the last 2,439
+    are not seen. Softmax belongs to the loss in training and to the caller otherwise.
 
     Parameters
     ----------
-    classes : int
-        Number of classes.
+    outputs : int
+        Of the dense layer: a logit for each class, and what else it is to tell.
     """
 
-    def __init__(self, classes: int) -> None:
+    def __init__(self, outputs: int) -> None:
         super().__init__()
         layers: list[nn.Module] = []
         for width, wider in pairwise((WIRES, *CHANNELS)):
             layers += [nn.Conv1d(width, wider, STRIDE, STRIDE), nn.BatchNorm1d(wider), nn.ReLU()]
         self.features = nn.Sequential(*layers)
-        self.dense = nn.Linear(CHANNELS[-1], classes)
+        self.dense = nn.Linear(CHANNELS[-1], outputs)
 
     def forward(self, tension: Tensor) -> Tensor:
-        """Logits (R, classes) of tensions (R, 4, 9000) in N."""
+        """Outputs (R, O) of tensions, or their courses, (R, 4, N)."""
         features = self.features(self.unitless(tension))
         logits: Tensor = self.dense(features.flatten(1))
         return logits
 
     def weights(self) -> dict[str, np.ndarray]:
-        """Weights as `TensionClassifier` takes them: each normalisation within its convolution."""
+        """Weights as `evaluated` takes them: each normalisation within its convolution."""
         state = {name: value.double().numpy() for name, value in self.state_dict().items()}
         found = {'offset': state['offset'][:, 0], 'scale': state['scale'][:, 0]}
         for k in range(len(CHANNELS)):

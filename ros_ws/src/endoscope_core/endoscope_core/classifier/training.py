@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +18,12 @@ except ModuleNotFoundError as error:
     ) from error
 
 from endoscope_core.classifier.grouped_folds import CrossValidation, grouped_folds
-from endoscope_core.classifier.inference import CHANNELS
 from endoscope_core.classifier.recurrence_plot_cnn import RecurrencePlotCnn
-from endoscope_core.classifier.size_training import Progress
 from endoscope_core.classifier.tension_cnn import TensionCnn
 from endoscope_core.classifier.tension_mlp import TensionMlp
-from endoscope_core.classifier.weights_file import CNN, WeightsFileError, save_weights
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 
+Progress = Callable[[str], None]
 Network = TensionCnn | TensionMlp | RecurrencePlotCnn
 
 NETWORKS: dict[str, Callable[[int], Network]] = {
@@ -134,27 +131,6 @@ def cross_validate(
             right = np.mean(named[test] == dataset.class_deg[test])
             progress(f'fold {k + 1} of {folds}: {100.0 * right:.1f} % right')
     return CrossValidation.of(dataset.class_deg, named, split)
-
-
-def save_network(
-    path: str | Path,
-    network: Network,
-    dataset: CalibrationDataset,
-    validation: CrossValidation,
-    command: str,
-    seed: int,
-) -> None:
-    """Write a 1D-CNN and how it was made; parameters as of `save_weights`.
-
-    Raises
-    ------
-    WeightsFileError
-        If the network is another, which is only compared with it, or `path` cannot hold weights.
-    """
-    if not isinstance(network, TensionCnn):
-        raise WeightsFileError(f'{path}: weights of a {type(network).__name__} are not kept')
-    own = {'channels': list(CHANNELS), 'training': vars(TrainingSettings())}
-    save_weights(path, network.weights(), CNN, own, dataset, validation, command, seed)
 
 
 def use_one_thread() -> None:

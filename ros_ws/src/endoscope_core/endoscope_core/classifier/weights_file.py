@@ -13,16 +13,12 @@ from safetensors import SafetensorError
 
 from endoscope_core.atomic_output import write_bytes, write_text
 from endoscope_core.classifier.classification import ClassifierError
-from endoscope_core.classifier.grouped_folds import CrossValidation
-from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 from endoscope_core.errors import EndoscopeError
 
-SCHEMA = 4
-CNN = 'cnn'
-SIZE = 'size'
+SCHEMA = 5
 SEAL = 'sha256'
 LARGEST_WEIGHTS, LARGEST_DESCRIPTION = 16 << 20, 1 << 20
-"""In bytes. The largest that come with this package have 222 kB and 1.5 kB."""
+"""In bytes. The largest that come with this package have 218 kB and 3 kB."""
 
 
 class WeightsFileError(EndoscopeError, ValueError):
@@ -44,34 +40,9 @@ def weights_path(path: str | Path) -> Path:
 
 
 def save_weights(
-    path: str | Path,
-    state: Mapping[str, np.ndarray],
-    kind: str,
-    own: Mapping[str, Any],
-    dataset: CalibrationDataset,
-    validation: CrossValidation,
-    command: str,
-    seed: int,
+    path: str | Path, state: Mapping[str, np.ndarray], description: Mapping[str, Any]
 ) -> None:
-    """Write ``path`` and the JSON file of the same name beside it.
-
-    Parameters
-    ----------
-    path : path
-        Of the weights; suffix .safetensors by custom.
-    state : mapping of str to ndarray
-    kind : str
-        `CNN` or `SIZE`.
-    own : mapping
-        What a description of that kind has to say besides; in `held_out`, of the validation.
-    dataset : CalibrationDataset
-        That the classifier was trained on, all of it.
-    validation : CrossValidation
-        On the same data set.
-    command : str
-        That made them.
-    seed : int
-        Of the training.
+    """Write arrays to ``path`` and a description to the JSON file of the same name beside it.
 
     Raises
     ------
@@ -79,31 +50,10 @@ def save_weights(
         If `path` cannot hold weights.
     """
     path = weights_path(path)
-    held_out = {
-        'grouped_by': 'tube configuration',
-        'accuracy': list(validation.accuracy),
-        'mean_accuracy': validation.mean_accuracy,
-        'confusion': validation.confusion.tolist(),
-    }
-    description = {
-        'schema': SCHEMA,
-        'kind': kind,
-        'motion': dataset.motion,
-        'classes_deg': list(CLASSES_DEG),
-        **own,
-        'command': command,
-        'seed': seed,
-        'dataset': {
-            'manifest_sha256': dataset.manifest_hash,
-            'seed': dataset.manifest['seed'],
-            'per_class': dataset.manifest['per_class'],
-        },
-        'held_out': held_out | own.get('held_out', {}),
-    }
-    state = {name: np.asarray(array, order='C') for name, array in state.items()}
-    data = safetensors.numpy.save(state)
+    described = {'schema': SCHEMA, 'kind': 'cnn', **description}
+    data = safetensors.numpy.save({k: np.asarray(x, order='C') for k, x in state.items()})
     write_bytes(path, data)
-    write_text(path.with_suffix('.json'), json.dumps(sealed(description, data), indent=1) + '\n')
+    write_text(path.with_suffix('.json'), json.dumps(sealed(described, data), indent=1) + '\n')
 
 
 def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
@@ -119,7 +69,7 @@ def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, np.ndarray
     for each, largest in ((path, LARGEST_WEIGHTS), (sidecar, LARGEST_DESCRIPTION)):
         if not each.is_file():
             raise ClassifierError(
-                f'{each} is missing: make classifier weights with `endoscope train`'
+                f'{each} is missing: make classifier weights with `endoscope train --out FILE`'
             )
         if each.stat().st_size > largest:
             raise ClassifierError(f'{each} holds no classifier weights: larger than {largest} B')
@@ -130,8 +80,8 @@ def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, np.ndarray
         raise unusable(sidecar, error) from error
     if not isinstance(description, dict) or description.get('schema') != SCHEMA:
         raise ClassifierError(
-            f'{sidecar} holds no classifier weights of schema {SCHEMA}: train again with '
-            '`endoscope train`'
+            f'{sidecar} holds no classifier weights of schema {SCHEMA}: make new ones with '
+            '`endoscope train --out FILE`'
         )
     if description.get(SEAL) != sealed(description, data)[SEAL]:
         raise ClassifierError(

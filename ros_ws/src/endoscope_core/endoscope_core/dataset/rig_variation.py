@@ -86,24 +86,25 @@ class TubeConfiguration:
         return float(np.mean(self.joint_sizes))
 
 
-def random_instrument(generator: np.random.Generator) -> Instrument:
+def random_instrument(generator: np.random.Generator, widening: float = 1.0) -> Instrument:
     """An instrument that is off by what manufacture, wear and handling give.
 
     The relative spreads are `RELATIVE_SPREAD`, uniform, four fifths of each common to both joints;
-    pretension is set by hand with a standard deviation of 0.1 N.
+    pretension is set by hand with a standard deviation of 0.1 N. All are `widening` times as wide.
     """
     common = {key: generator.uniform(-1.0, 1.0) for key in RELATIVE_SPREAD}
     own = {name: {key: generator.uniform(-1.0, 1.0) for key in RELATIVE_SPREAD} for name in JOINTS}
     return Instrument(
         {
             name: {
-                key: 1.0 + spread * ((1.0 - JOINT_SHARE) * common[key] + JOINT_SHARE * each[key])
+                key: 1.0
+                + widening * spread * ((1.0 - JOINT_SHARE) * common[key] + JOINT_SHARE * each[key])
                 for key, spread in RELATIVE_SPREAD.items()
             }
             for name, each in own.items()
         },
-        {name: PRETENSION_DEVIATION * generator.normal() for name in JOINTS},
-        {name: TIGHTENING_SPREAD * generator.uniform(-1.0, 1.0) for name in JOINTS},
+        {name: widening * PRETENSION_DEVIATION * generator.normal() for name in JOINTS},
+        {name: widening * TIGHTENING_SPREAD * generator.uniform(-1.0, 1.0) for name in JOINTS},
     )
 
 

@@ -1,0 +1,275 @@
+"""Names the class of a tube by the first paper's 1D-CNN, or says that it is none of them."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from endoscope_core.classifier.classification import (
+    LEVEL,
+    WIRES,
+    ClassificationResult,
+    UnseenTensionError,
+    checked_tension,
+)
+from endoscope_core.signals import calibration_motion
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+
+STRIDE = 3
+"""Step and width of each convolution."""
+CHANNELS = (16, 16, 32, 32, 64, 64, 64, 64)
+"""Outputs of the eight convolutions, which the paper does not give."""
+INPUT = STRIDE ** len(CHANNELS)
+"""Samples that eight unpadded strides of three reduce to exactly one."""
+SLACK = 0.5
+"""Tension in N that is added before the logarithm, which a slack wire has none of."""
+MIDDLE, UNIT = math.radians(70.0), math.radians(20.0)
+"""The size is an output in these units."""
+LEAST_DEVIATION = math.radians(0.1)
+OWN_OUTPUTS = 3
+"""After the classes: size, logarithm of its deviation, and logit of 'none of these'."""
+HALF_CLASS = math.radians(5.0)
+_NORMAL = NormalDist()
+
+_NONE = 'the tensions are what disturbed cells or another motion give'
+_FAR = 'the tensions are too far from those of all known tubes'
+
+
+@dataclass(frozen=True)
+class HeldOutCalibration:
+    """What rigs held out from the training say of the network.
+
+    Parameters
+    ----------
+    inflation : float
+        Half the width of an interval, in the network's standard deviations.
+    ceiling : float
+        Distance of the features from which on tensions are unlike any known.
+    """
+
+    inflation: float
+    ceiling: float
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the network makes of R recordings.
+
+    Parameters
+    ----------
+    size, deviation : ndarray, shape (R,)
+        Backlash size in rad, mean of the joints, and the standard deviation of its error as the
+        network takes it, before calibration on rigs held out.
+    none : ndarray, shape (R,)
+        Probability that the tensions are of no tube but of disturbed cells or another motion.
+    distance : ndarray, shape (R,)
+        Of the features from those of the training (Mahalanobis).
+    """
+
+    size: Array
+    deviation: Array
+    none: Array
+    distance: Array
+
+
+def course(tension: ArrayLike, motion: str) -> Single:
+    """What the network reads of recordings (..., N, 4) in N at 1 kHz: (..., 6561, 4).
+
+    Friction acts on tension as a factor (Euler-Eytelwein), which its logarithm makes a summand.
+    The last 6,561 samples are a settled period and what repeats of it: before that, tensions depend
+    on the motion from which the rig was called to its calibration.  The settled period of a shorter
+    motion is stretched to as many instants.
+    """
+    return logarithm(stretched(np.asarray(tension, dtype=np.float32)[..., first(motion) :, :]))
+
+
+def first(motion: str) -> int:
+    """First sample of a calibration motion's record that `course` reads."""
+    recorded = calibration_motion(motion)
+    return recorded.samples - INPUT if recorded.samples > INPUT else recorded.settled
+
+
+def stretched(tension: Single) -> Single:
+    """Samples (..., M, 4) joined by straight lines and read at 6,561 instants."""
+    samples = tension.shape[-2]
+    if samples == INPUT:
+        return tension
+    at = np.linspace(0.0, samples - 1, INPUT)
+    left = np.minimum(at.astype(np.intp), samples - 2)
+    share = (at - left).astype(np.float32)[:, None]
+    return (1.0 - share) * tension[..., left, :] + share * tension[..., left + 1, :]
+
+
+def logarithm(tension: Single) -> Single:
+    """log(max(T, 0) + 0.5 N)."""
+    return np.log(np.maximum(tension, np.float32(0.0)) + np.float32(SLACK))
+
+
+def cnn_shapes(classes: int) -> dict[str, tuple[int, ...]]:
+    """Shape of each array of weights of the network for a number of classes.
+
+    `offset` and `scale` are each wire's mean and spread in the training; a filter has a row for
+    each sample of its window and each channel of that sample. `centre` and `whitening` make the
+    features of the training white.
+    """
+    shapes: dict[str, tuple[int, ...]] = {'offset': (WIRES,), 'scale': (WIRES,)}
+    for k, (width, wider) in enumerate(zip((WIRES, *CHANNELS), CHANNELS, strict=False)):
+        shapes |= {f'filter.{k}': (STRIDE * width, wider), f'bias.{k}': (wider,)}
+    outputs, features = classes + OWN_OUTPUTS, CHANNELS[-1]
+    shapes |= {'dense': (features, outputs), 'bias': (outputs,)}
+    return shapes | {'centre': (features,), 'whitening': (features, features)}
+
+
+def evaluated(weights: Mapping[str, Single], courses: Single) -> tuple[Array, Array]:
+    """Outputs (R, O) and features (R, 64) of courses (R, 6561, 4).
+
+    Batch normalisation is part of the convolutions here: once trained it is linear.
+    """
+    # Numbers that overflow end in an answer that is none, which loading refuses.
+    with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+        signal = (courses - weights['offset']) / weights['scale']
+        for k in range(len(CHANNELS)):
+            windows = signal.reshape(len(signal), -1, STRIDE * signal.shape[2])
+            signal = np.maximum(windows @ weights[f'filter.{k}'] + weights[f'bias.{k}'], 0.0)
+        features = signal[:, 0]
+        outputs = features @ weights['dense'] + weights['bias']
+    return outputs.astype(np.float64), features.astype(np.float64)
+
+
+class CnnClassifier:
+    """A trained network, calibrated on rigs held out from it.
+
+    Parameters
+    ----------
+    weights : mapping of str to ndarray of float32
+        Of the shapes that `cnn_shapes` gives.
+    calibration : HeldOutCalibration
+    classes_deg : tuple of int
+        Backlash sizes of the classes in deg.
+    motion : str
+        Calibration motion whose tensions it reads.
+    """
+
+    def __init__(
+        self,
+        weights: Mapping[str, Single],
+        calibration: HeldOutCalibration,
+        classes_deg: tuple[int, ...],
+        motion: str,
+    ) -> None:
+        self.weights = weights
+        self.calibration = calibration
+        self.classes_deg = classes_deg
+        self.motion = motion
+        self._samples = calibration_motion(motion).samples
+
+    def classify(self, tension: ArrayLike) -> ClassificationResult:
+        """Class, backlash size and interval of one calibration.
+
+        Parameters
+        ----------
+        tension : array_like, shape (N, 4)
+            N at 1 kHz from the start of the motion, wires in the order x_pos, x_neg, y_pos, y_neg.
+
+        Raises
+        ------
+        UnseenTensionError
+            If the tensions are unlike any of the training, or their size is none of the classes.
+        ClassifierError
+            If the shape is another or a value is not finite.
+        """
+        array = checked_tension(tension, (self._samples, WIRES))
+        judgement = self.judged(course(array, self.motion)[None])
+        [reason] = self.reasons_to_refuse(judgement)
+        if reason:
+            raise UnseenTensionError(f'none of the classes: {reason}')
+        return self.results(judgement)[0]
+
+    def judged(self, courses: Single) -> Judgement:
+        """What the network makes of courses (R, 6561, 4)."""
+        outputs, features = evaluated(self.weights, courses)
+        with np.errstate(over='ignore', invalid='ignore'):
+            size, logarithm_of, none = outputs[:, len(self.classes_deg) :].T
+            white = (features - self.weights['centre']) @ self.weights['whitening']
+            return Judgement(
+                MIDDLE + UNIT * size,
+                LEAST_DEVIATION + UNIT * np.exp(logarithm_of),
+                1.0 / (1.0 + np.exp(-none)),
+                np.sqrt(np.sum(np.square(white), axis=1)),
+            )
+
+    def reasons_to_refuse(self, judgement: Judgement) -> list[str]:
+        """Why each of R recordings is none of the classes; empty where it may be one."""
+        smallest, greatest = self._range
+        found = []
+        for none, distance, (low, high) in zip(
+            judgement.none, judgement.distance, self._intervals(judgement), strict=True
+        ):
+            if none > 0.5:
+                found.append(_NONE)
+            elif distance > self.calibration.ceiling:
+                found.append(_FAR)
+            elif low > greatest or high < smallest:
+                found.append(
+                    f'the backlash size is between {math.degrees(low):.1f} and '
+                    f'{math.degrees(high):.1f} deg, outside the {math.degrees(smallest):.0f} to '
+                    f'{math.degrees(greatest):.0f} deg of the classes'
+                )
+            else:
+                found.append('')
+        return found
+
+    def results(self, judgement: Judgement) -> list[ClassificationResult]:
+        """Result for each of R recordings, whether it is to be refused or not."""
+        borders = np.deg2rad(self.classes_deg[1:]) - HALF_CLASS
+        spread = self._half_width(judgement) / _NORMAL.inv_cdf(0.5 + 0.5 * LEVEL)
+        found = []
+        for size, deviation, interval in zip(
+            judgement.size.tolist(), spread.tolist(), self._intervals(judgement), strict=True
+        ):
+            below = [_NORMAL.cdf((border - size) / deviation) for border in borders.tolist()]
+            weights = np.diff([0.0, *below, 1.0]).tolist()
+            probabilities = dict(zip(self.classes_deg, weights, strict=True))
+            nearest = min(self.classes_deg, key=lambda each: abs(math.radians(each) - size))
+            found.append(
+                ClassificationResult(nearest, probabilities[nearest], probabilities, size, interval)
+            )
+        return found
+
+    @property
+    def _range(self) -> tuple[float, float]:
+        ends = np.deg2rad([self.classes_deg[0], self.classes_deg[-1]])
+        return float(ends[0] - HALF_CLASS), float(ends[1] + HALF_CLASS)
+
+    def _intervals(self, judgement: Judgement) -> list[tuple[float, float]]:
+        half = self._half_width(judgement)
+        low, high = judgement.size - half, judgement.size + half
+        return list(zip(low.tolist(), high.tolist(), strict=True))
+
+    def _half_width(self, judgement: Judgement) -> Array:
+        return judgement.deviation * self.calibration.inflation
+
+
+def calibration_of(held_out: Judgement, true: Array) -> HeldOutCalibration:
+    """Calibration on R recordings of rigs held out, whose true sizes (R,) in rad are known.
+
+    Intervals: split conformal prediction with errors in units of the network's own deviation
+    (Lei et al., J. Am. Stat. Assoc. 113(523), 2018, sections 2.2 and 5.2). Ceiling: 99.5 % of
+    known tubes are not refused, neither for their distance nor as none of the classes.
+    """
+    scores = np.sort(np.abs(held_out.size - true) / held_out.deviation)
+    rank = min(len(scores), math.ceil((len(scores) + 1) * LEVEL))
+    far = np.where(held_out.none > 0.5, np.inf, held_out.distance)
+    finite = np.max(held_out.distance)
+    return HeldOutCalibration(
+        float(scores[rank - 1]), float(min(np.quantile(far, KNOWN, method='lower'), finite))
+    )
+
+
+KNOWN = 0.995
+"""Share of known tubes that are not to be refused."""

@@ -1,0 +1,360 @@
+"""Trains the classifier on simulated rigs and measures, on others, how far it is to be trusted."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.errors import EndoscopeError
+
+try:
+    import torch
+    from torch import Tensor, nn
+except ModuleNotFoundError as error:
+    raise EndoscopeError(
+        'training the networks of the first paper needs PyTorch: run `make -C ros_ws train`, '
+        'which says how large it is'
+    ) from error
+
+from endoscope_core.classifier.cnn_classifier import (
+    LEAST_DEVIATION,
+    MIDDLE,
+    OWN_OUTPUTS,
+    UNIT,
+    CnnClassifier,
+    HeldOutCalibration,
+    Judgement,
+    calibration_of,
+    evaluated,
+    first,
+    logarithm,
+    stretched,
+)
+from endoscope_core.classifier.disturbance import READING_PERIODS, STRANGE, read, read_of_all_kinds
+from endoscope_core.classifier.tension_cnn import TensionCnn
+from endoscope_core.dataset import CLASSES_DEG
+from endoscope_core.dataset.training_rigs import (
+    TrainingRigs,
+    held_out_rigs,
+    strange_rigs,
+    training_rigs,
+)
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+Report = Callable[[str], None]
+
+KEPT_EVERY = 500
+"""Steps after which the training is kept, to be resumed."""
+_STANDARD = 256
+_WHITENED = 2048
+_RIDGE = 1e-3
+_LEAST_RIGS, _LEAST_STEPS = 40, 10
+
+
+@dataclass(frozen=True)
+class CnnTraining:
+    """How much is simulated, and how the network is trained with it.
+
+    Parameters
+    ----------
+    rigs, strange, held_out : int
+        Simulated rigs to train with; recordings of slack wires and other motions; rigs on which
+        intervals and refusals are calibrated.
+    steps, batch, warm_up : int
+        Steps of AdamW with recordings in each; in the first `warm_up` the size is learnt by its
+        squared error, then by its likelihood.
+    spoilt : float
+        Share of a batch that is of no tube.
+    learning_rate, smoothing : float
+        Peak of one cycle; of the labels.
+    """
+
+    rigs: int = 5000
+    strange: int = 500
+    held_out: int = 1000
+    steps: int = 6000
+    batch: int = 64
+    warm_up: int = 600
+    spoilt: float = 0.15
+    learning_rate: float = 4e-3
+    smoothing: float = 0.02
+
+    @classmethod
+    def of_size(cls, rigs: int, steps: int) -> 'CnnTraining':
+        """Training with so many rigs and steps, and what belongs to them.
+
+        Raises
+        ------
+        EndoscopeError
+            If they are too few to train or to calibrate with.
+        """
+        if rigs < _LEAST_RIGS or steps < _LEAST_STEPS:
+            raise EndoscopeError(
+                f'--n {rigs} and --steps {steps}: at least {_LEAST_RIGS} rigs and {_LEAST_STEPS} '
+                'steps are needed'
+            )
+        return cls(rigs, rigs // 10, rigs // 5, steps, warm_up=steps // 10)
+
+
+@dataclass(frozen=True)
+class TrainedCnn:
+    """A classifier, and how it came about.
+
+    Parameters
+    ----------
+    classifier : CnnClassifier
+    curve : list of tuple of (int, float)
+        Steps and mean loss since the entry before.
+    held_out : dict
+        What the rigs held out say for each reading rate: share of right classes, rms error of the
+        size in deg, share of sizes in their interval, and of rigs refused. Half of the rigs
+        calibrate the intervals that the other half is judged by.
+    """
+
+    classifier: CnnClassifier
+    curve: list[tuple[int, float]]
+    held_out: dict[str, Any]
+
+
+def train_cnn(
+    motion: str,
+    seed: int,
+    settings: CnnTraining | None = None,
+    kept: Path | None = None,
+    report: Report = lambda _: None,
+) -> TrainedCnn:
+    """Simulate, train and calibrate; the same seed on the same machine gives the same weights.
+
+    Parameters
+    ----------
+    motion : str
+        Calibration motion, one of `CALIBRATION_MOTIONS`.
+    seed : int
+        Of rigs, first weights and batches.
+    settings : CnnTraining, optional
+    kept : path, optional
+        File in which the training is kept and from which it goes on where it was interrupted.
+    report : callable
+        Takes lines of progress.
+    """
+    settings = settings or CnnTraining()
+    torch.set_num_threads(1)
+    torch.use_deterministic_algorithms(True)
+    begin = first(motion)
+    sources = (
+        ('rigs to train with', training_rigs, settings.rigs),
+        ('strange recordings', strange_rigs, settings.strange),
+        ('rigs held out', held_out_rigs, settings.held_out),
+    )
+    known, strange, held_out = (
+        make(seed, count, motion, begin, _counted(report, name)) for name, make, count in sources
+    )
+    network, curve = _trained(known, strange, seed, settings, kept, report)
+    weights = network.weights() | _white(network, known, seed)
+    unlimited = HeldOutCalibration(1.0, np.inf)
+    raw = CnnClassifier(weights, unlimited, CLASSES_DEG, motion)
+    judgements = {
+        period: _judged(
+            raw, read(held_out.tension, np.random.default_rng([seed, 6, period]), period)
+        )
+        for period in READING_PERIODS
+    }
+    half = len(held_out.size) // 2
+    calibration = _calibration(judgements, held_out.size, slice(None))
+    judge = CnnClassifier(
+        weights, _calibration(judgements, held_out.size, slice(half)), CLASSES_DEG, motion
+    )
+    rest = slice(half, None)
+    told = {
+        f'{1000 // period} Hz': _figures(judge, _rows(j, rest), held_out.size[rest])
+        for period, j in judgements.items()
+    }
+    return TrainedCnn(CnnClassifier(weights, calibration, CLASSES_DEG, motion), curve, told)
+
+
+def description_of(trained: TrainedCnn, settings: CnnTraining, seed: int, command: str) -> dict:
+    """What the file beside the weights says."""
+    return {
+        'motion': trained.classifier.motion,
+        'classes_deg': list(CLASSES_DEG),
+        **asdict(trained.classifier.calibration),
+        'command': command,
+        'date': datetime.now(UTC).date().isoformat(),
+        'seed': seed,
+        'training': asdict(settings),
+        'held_out': trained.held_out,
+        'curve': [[step, round(loss, 4)] for step, loss in trained.curve],
+    }
+
+
+def loss_of(outputs: Tensor, size: Tensor, smoothing: float, warm: bool) -> Tensor:
+    """Mean loss of outputs (B, 10) for sizes (B,) in rad, NaN where there is no tube.
+
+    Cross-entropy of the classes, squared error or Gaussian likelihood of the size, and binary
+    cross-entropy of 'none of these'.
+    """
+    classes = len(CLASSES_DEG)
+    none = torch.isnan(size)
+    loss = nn.functional.binary_cross_entropy_with_logits(outputs[:, -1], none.float())
+    told, true = outputs[~none], size[~none]
+    centres = torch.deg2rad(torch.tensor(CLASSES_DEG, dtype=true.dtype))
+    nearest = torch.argmin((true[:, None] - centres).abs(), dim=1)
+    loss = loss + nn.functional.cross_entropy(told[:, :classes], nearest, label_smoothing=smoothing)
+    error = told[:, classes] - (true - MIDDLE) / UNIT
+    if warm:
+        return loss + torch.mean(error**2)
+    deviation = LEAST_DEVIATION / UNIT + torch.exp(told[:, classes + 1])
+    return loss + torch.mean(torch.log(deviation) + 0.5 * (error / deviation) ** 2)
+
+
+def batch_of(
+    known: TrainingRigs,
+    strange: TrainingRigs,
+    settings: CnnTraining,
+    generator: np.random.Generator,
+) -> tuple[Single, Array]:
+    """Courses (B, 6561, 4) and sizes (B,) of one batch."""
+    spoilt = round(settings.batch * settings.spoilt)
+    rows = generator.integers(len(known.size), size=settings.batch)
+    tension, size = known.tension[rows], known.size[rows]
+    kinds = list(STRANGE.values())
+    for row in range(spoilt):
+        if row % 3 == 0:
+            tension[row] = strange.tension[generator.integers(len(strange.tension))]
+        else:
+            tension[row] = kinds[generator.integers(len(kinds))](tension[row], generator)
+        size[row] = np.nan
+    order = generator.permutation(settings.batch)
+    readings = read_of_all_kinds(tension[order], generator)
+    return logarithm(stretched(readings)), size[order]
+
+
+def _trained(
+    known: TrainingRigs,
+    strange: TrainingRigs,
+    seed: int,
+    settings: CnnTraining,
+    kept: Path | None,
+    report: Report,
+) -> tuple[TensionCnn, list[tuple[int, float]]]:
+    torch.manual_seed(seed)
+    network = TensionCnn(len(CLASSES_DEG) + OWN_OUTPUTS)
+    some = read(known.tension[:_STANDARD], np.random.default_rng([seed, 4]))
+    network.standardise_by(_as_input(logarithm(stretched(some))))
+    optimiser = torch.optim.AdamW(network.parameters(), lr=settings.learning_rate)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, settings.learning_rate, total_steps=settings.steps
+    )
+    begin, curve = 0, []
+    parts = {'network': network, 'optimiser': optimiser, 'schedule': schedule}
+    made = {'seed': seed, **asdict(settings)}
+    if kept is not None and kept.is_file():
+        state = torch.load(kept, weights_only=True)
+        if state['made'] == made:
+            for name, part in parts.items():
+                part.load_state_dict(state[name])
+            begin, curve = state['step'], state['curve']
+            report(f'goes on after step {begin} of {settings.steps}')
+    network.train()
+    losses = []
+    for step in range(begin, settings.steps):
+        generator = np.random.default_rng([seed, 5, step])
+        courses, size = batch_of(known, strange, settings, generator)
+        optimiser.zero_grad()
+        warm = step < settings.warm_up
+        loss = loss_of(
+            network(_as_input(courses)),
+            torch.from_numpy(size.astype(np.float32)),
+            settings.smoothing,
+            warm,
+        )
+        loss.backward()
+        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimiser.step()
+        schedule.step()
+        losses.append(loss.item())
+        if (step + 1) % KEPT_EVERY == 0 or step + 1 == settings.steps:
+            curve.append((step + 1, float(np.mean(losses))))
+            report(f'step {step + 1} of {settings.steps}: loss {curve[-1][1]:.3f}')
+            losses = []
+            if kept is not None:
+                state = {name: part.state_dict() for name, part in parts.items()}
+                torch.save(state | {'step': step + 1, 'curve': curve, 'made': made}, kept)
+    network.eval()
+    return network, curve
+
+
+def _white(network: TensionCnn, known: TrainingRigs, seed: int) -> dict[str, Single]:
+    """Mean of the features of the training, and what makes them white."""
+    some = read_of_all_kinds(known.tension[:_WHITENED], np.random.default_rng([seed, 7]))
+    features = np.concatenate(
+        [
+            evaluated(network.weights(), logarithm(stretched(part)))[1]
+            for part in np.array_split(some, max(1, len(some) // 64))
+        ]
+    )
+    covariance = np.cov(features.T)
+    covariance += _RIDGE * np.mean(np.diag(covariance)) * np.eye(len(covariance))
+    whitening = np.linalg.cholesky(np.linalg.inv(covariance))
+    return {
+        'centre': features.mean(axis=0).astype(np.float32),
+        'whitening': np.ascontiguousarray(whitening, dtype=np.float32),
+    }
+
+
+def _judged(classifier: CnnClassifier, readings: Single) -> Judgement:
+    parts = [
+        classifier.judged(logarithm(stretched(part)))
+        for part in np.array_split(readings, max(1, len(readings) // 64))
+    ]
+    return _joined(parts)
+
+
+def _joined(parts: list[Judgement]) -> Judgement:
+    return Judgement(*(np.concatenate(each) for each in zip(*map(_columns, parts), strict=True)))
+
+
+def _rows(judgement: Judgement, rows: slice) -> Judgement:
+    return Judgement(*(column[rows] for column in _columns(judgement)))
+
+
+def _columns(judgement: Judgement) -> tuple[Array, ...]:
+    return judgement.size, judgement.deviation, judgement.none, judgement.distance
+
+
+def _calibration(judgements: dict[int, Judgement], size: Array, rows: slice) -> HeldOutCalibration:
+    parts = [_rows(judgement, rows) for judgement in judgements.values()]
+    return calibration_of(_joined(parts), np.tile(size[rows], len(parts)))
+
+
+def _figures(judge: CnnClassifier, judgement: Judgement, size: Array) -> dict[str, float]:
+    results = judge.results(judgement)
+    refused = [bool(reason) for reason in judge.reasons_to_refuse(judgement)]
+    nearest = [min(CLASSES_DEG, key=lambda c: abs(np.deg2rad(c) - true)) for true in size]
+    right = [result.class_deg == each for result, each in zip(results, nearest, strict=True)]
+    holds = [result.holds(true) for result, true in zip(results, size.tolist(), strict=True)]
+    return {
+        'nearest_class_right': round(float(np.mean(right)), 4),
+        'size_rmse_deg': round(
+            float(np.rad2deg(np.sqrt(np.mean((judgement.size - size) ** 2)))), 3
+        ),
+        'intervals_hold': round(float(np.mean(holds)), 4),
+        'refused': round(float(np.mean(refused)), 4),
+    }
+
+
+def _counted(report: Report, name: str) -> Callable[[int, int], None]:
+    def count(done: int, total: int) -> None:
+        if done % 500 == 0 or done == total:
+            report(f'{name}: {done} of {total}')
+
+    return count
+
+
+def _as_input(courses: Single) -> Tensor:
+    return torch.from_numpy(courses).transpose(1, 2).contiguous()

@@ -1,0 +1,188 @@
+"""Rigs without end for the training of the classifier: drawn from a seed, simulated, never kept."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.dataset.rig_variation import (
+    GREATEST_UNEVENNESS,
+    calibration_command,
+    in_tube,
+    random_instrument,
+)
+from endoscope_core.metrics import NoLoopError, width_at_mid_height
+from endoscope_core.physics import EffectSpec, PlantDescription, simulate
+from endoscope_core.physics.family import MOST_BENT
+from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+LEAST_SIZE, GREATEST_SIZE = np.deg2rad([24.0, 128.0])
+WIDENING = 1.25
+"""Instruments trained on are off by so much more than those that the classifier is to know."""
+_EXTREME = 0.2
+_STRAIGHT, _BENT = np.deg2rad([60.0, 240.0])
+_SLIPPERY, _ROUGH = (0.1, 0.8), (1.0, 1.5)
+_EARLIER = 1000
+"""Samples of the motion before the calibration."""
+
+
+@dataclass(frozen=True)
+class TrainingRigs:
+    """R recordings without noise, N samples at 1 kHz.
+
+    Parameters
+    ----------
+    tension : ndarray of float32, shape (R, N, 4)
+        N.
+    size : ndarray, shape (R,)
+        Backlash size in rad under the sinusoid, mean of the joints; NaN where the recording is of
+        slack wires or of another motion.
+    """
+
+    tension: NDArray[np.float32]
+    size: Array
+
+
+def training_rigs(
+    seed: int, count: int, motion: str, begin: int, progress: Progress | None = None
+) -> TrainingRigs:
+    """Rigs of wide spreads with tubes of any size from 24 to 128 deg, from sample `begin` on.
+
+    One of five is nearly straight and slippery, one of five very bent and rough; all begin from
+    the end of a random earlier motion.
+    """
+
+    def draw(generator: np.random.Generator) -> PlantDescription:
+        plant = _tube(generator, (0.0, MOST_BENT), WIDENING)
+        kind = generator.random()
+        if kind < _EXTREME:
+            plant = _rubbed(_tube(generator, (0.0, _STRAIGHT), WIDENING), generator, _SLIPPERY)
+        elif kind < 2.0 * _EXTREME:
+            plant = _rubbed(_tube(generator, (_BENT, MOST_BENT), WIDENING), generator, _ROUGH)
+        return plant
+
+    return _simulated([seed, 1], count, motion, begin, draw, (LEAST_SIZE, GREATEST_SIZE), progress)
+
+
+def held_out_rigs(
+    seed: int, count: int, motion: str, begin: int, progress: Progress | None = None
+) -> TrainingRigs:
+    """Rigs as data sets hold them, of any size that the classes span, none of them trained on."""
+    ends = (np.deg2rad(35.0), np.deg2rad(105.0))
+    return _simulated(
+        [seed, 2], count, motion, begin, lambda g: _tube(g, (0.0, MOST_BENT)), ends, progress
+    )
+
+
+def strange_rigs(
+    seed: int, count: int, motion: str, begin: int, progress: Progress | None = None
+) -> TrainingRigs:
+    """Rigs with slack wires, and motors that did something else than a calibration."""
+    recorded = calibration_motion(motion)
+    found = []
+    for number in range(count):
+        generator = np.random.default_rng([seed, 3, number])
+        plant = _tube(generator, (0.0, MOST_BENT))
+        command = calibration_command(plant, recorded)
+        kind = generator.integers(5)
+        if kind == 0:
+            joint = str(generator.choice(list(plant.joints)))
+            slack = EffectSpec('wire_slack', joint, {'length_m': generator.uniform(0.7e-3, 2.5e-3)})
+            plant = replace(plant, effects=(*plant.effects, slack))
+        elif kind == 1:
+            command *= generator.uniform(0.3, 0.85)
+        elif kind == 2:
+            command = _paced(command, recorded, generator.uniform(0.4, 0.85))
+        elif kind == 3:
+            command[:, generator.integers(command.shape[1])] = 0.0
+        else:
+            command *= 0.0
+        wires = simulate(plant, command).tension.reshape(len(command), -1)
+        found.append(wires[begin:].astype(np.float32))
+        if progress is not None:
+            progress(number + 1, count)
+    return TrainingRigs(np.stack(found), np.full(count, np.nan))
+
+
+def _simulated(
+    seed: list[int],
+    count: int,
+    motion: str,
+    begin: int,
+    draw: Callable[[np.random.Generator], PlantDescription],
+    sizes: tuple[float, float],
+    progress: Progress | None,
+) -> TrainingRigs:
+    recorded, sinusoid = calibration_motion(motion), calibration_motion()
+    tensions: list[NDArray[np.float32]] = []
+    found: list[float] = []
+    number = 0
+    while len(found) < count:
+        generator = np.random.default_rng([*seed, number])
+        number += 1
+        try:
+            plant = draw(generator)
+        except ValueError:
+            # Widened spreads leave what a plant may be, now and then.
+            continue
+        command = calibration_command(plant, recorded)
+        earlier = _earlier_motion(generator, command.shape[1])
+        whole = simulate(plant, np.concatenate([earlier, command]))
+        size = _size(plant, sinusoid, whole if motion == sinusoid.name else None)
+        if not sizes[0] <= size <= sizes[1]:
+            continue
+        wires = whole.tension.reshape(len(whole.time), -1)[_EARLIER + begin :]
+        tensions.append(wires.astype(np.float32))
+        found.append(size)
+        if progress is not None:
+            progress(len(found), count)
+    return TrainingRigs(np.stack(tensions), np.array(found))
+
+
+def _size(plant: PlantDescription, sinusoid: CalibrationMotion, whole: object) -> float:
+    """Mean backlash size in rad; zero where there is no loop."""
+    if whole is None:
+        bending = simulate(plant, calibration_command(plant, sinusoid)).bending_true
+    else:
+        bending = whole.bending_true[_EARLIER:]  # type: ignore[attr-defined]
+    settled = bending[sinusoid.settled :]
+    time = np.arange(sinusoid.settled, sinusoid.samples) / CALIBRATION_RATE
+    desired, _ = sinusoid.signal(time)
+    try:
+        return float(np.mean([width_at_mid_height(desired, column) for column in settled.T]))
+    except NoLoopError:
+        return 0.0
+
+
+def _tube(
+    generator: np.random.Generator, bends: tuple[float, float], widening: float = 1.0
+) -> PlantDescription:
+    instrument = random_instrument(generator, widening)
+    unevenness = widening * generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS)
+    return in_tube(instrument, generator.uniform(*bends), unevenness)
+
+
+def _rubbed(
+    plant: PlantDescription, generator: np.random.Generator, factors: tuple[float, float]
+) -> PlantDescription:
+    factor = generator.uniform(*factors)
+    joints = {
+        name: replace(joint, capstan_exponent=factor * joint.capstan_exponent)
+        for name, joint in plant.joints.items()
+    }
+    return replace(plant, joints=joints)
+
+
+def _earlier_motion(generator: np.random.Generator, joints: int) -> Array:
+    """From rest to a random angle and back to zero."""
+    phase = np.linspace(0.0, 2.0 * np.pi, _EARLIER)[:, None]
+    return 0.5 * (1.0 - np.cos(phase)) * generator.uniform(-0.75, 0.75, joints)
+
+
+def _paced(command: Array, motion: CalibrationMotion, pace: float) -> Array:
+    time = np.arange(motion.samples) / CALIBRATION_RATE
+    return np.stack([np.interp(pace * time, time, column) for column in command.T], axis=1)
