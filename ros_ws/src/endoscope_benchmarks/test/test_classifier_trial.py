@@ -6,7 +6,6 @@ import pytest
 from endoscope_benchmarks.trials.never_seen_tube import never_seen_tube
 from endoscope_benchmarks.trials.unusual_recordings import UNUSUAL
 from endoscope_core.classifier.classification import UnseenTensionError
-from endoscope_core.classifier.inference import TensionClassifier
 from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.dataset import record_calibration
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
@@ -39,15 +38,3 @@ def test_unusual_tensions_are_refused_with_a_reason(shipped, kind):
     tension = UNUSUAL[kind](generator, never_seen_tube(0, 70, 70.0).plant, motion)
     with pytest.raises(UnseenTensionError, match='none of the classes: '):
         shipped.classify(tension)
-
-
-@pytest.mark.parametrize('class_deg', [40, 70, 100])
-def test_it_names_the_class_of_a_tube_it_has_not_seen(class_deg):
-    tube = never_seen_tube(0, class_deg, class_deg)
-    result = TensionClassifier.load_default().classify(
-        record_calibration(tube.plant, seed=5).tension
-    )
-    assert result.class_deg == class_deg
-    assert result.probability == max(result.probabilities.values())
-    assert sum(result.probabilities.values()) == pytest.approx(1.0)
-    assert np.rad2deg(result.expected_size) == pytest.approx(class_deg, abs=15.0)

@@ -11,7 +11,6 @@ from endoscope_bags import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bringup.cli import main
-from endoscope_core.classifier.inference import TensionClassifier
 from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.dataset import load_dataset
 from endoscope_core.hysteresis import BoucWenParameters, bouc_wen_forward
@@ -66,44 +65,31 @@ def test_a_data_set_does_not_replace_what_is_there(data, capsys):
     assert 'is not empty' in capsys.readouterr().err
 
 
-def test_training_leaves_weights_that_tell_sizes(data, tmp_path):
+def test_training_leaves_weights_with_how_they_were_made(tmp_path):
+    pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
     out, plots = tmp_path / 'weights.safetensors', tmp_path / 'plots'
-    options = ['--folds', '2', '--plots', str(plots)]
-    assert main(['train', '--data', str(data), '--out', str(out), *options]) == 0
-    for name, words in (('confusion', 'true class'), ('intervals', 'within their interval')):
-        svg = (plots / f'{name}.svg').read_text()
-        assert svg.startswith('<svg')
-        assert words in svg
+    options = ['--n', '40', '--steps', '10', '--seed', '3', '--plots', str(plots)]
+    assert main(['train', '--out', str(out), *options]) == 0
+    assert (plots / 'training.svg').read_text().startswith('<svg')
     described = json.loads(out.with_suffix('.json').read_text())
-    assert '--motion sinusoid' in described['command']
-    assert '--model size' in described['command']
-    dataset = load_dataset(data)
-    result = load_classifier(out).classify(dataset.tension[0])
-    assert result.size == pytest.approx(dataset.backlash_size[0], abs=np.deg2rad(5.0))
+    assert described['command'] == (
+        'endoscope train --motion sinusoid --seed 3 --n 40 --steps 10 --out weights.safetensors'
+    )
+    assert described['kind'] == 'cnn'
+    assert (described['training']['rigs'], described['training']['held_out']) == (40, 8)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        'plots',
+        'weights.json',
+        'weights.safetensors',
+    ]
+    assert load_classifier(out).motion == 'sinusoid'
 
 
-@pytest.mark.parametrize(
-    ('folds', 'words'),
-    [
-        ('1', '1 folds cannot be made of 2 recorded tubes a class: give 2 to 2 folds'),
-        ('5', 'give 2 to 2 folds, or make more of them with `endoscope dataset --n`'),
-        ('-3', 'give 2 to 2 folds'),
-    ],
-)
-def test_folds_that_cannot_be_made_are_one_line(data, tmp_path, capsys, folds, words):
-    out = tmp_path / 'weights.safetensors'
-    assert main(['train', '--data', str(data), '--out', str(out), '--folds', folds]) == 2
+def test_too_small_a_training_is_one_line(tmp_path, capsys):
+    pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
+    assert main(['train', '--out', str(tmp_path / 'x.safetensors'), '--n', '3']) == 2
     [line] = capsys.readouterr().err.splitlines()
-    assert words in line
-    assert not out.exists()
-
-
-def test_one_recording_a_class_trains_nothing(tmp_path, capsys):
-    folder, out = tmp_path / 'data', tmp_path / 'weights.safetensors'
-    assert main(['dataset', '--out', str(folder), '--n', '7']) == 0
-    assert main(['train', '--data', str(folder), '--out', str(out)]) == 2
-    [line] = capsys.readouterr().err.splitlines()
-    assert 'of 1 recorded tubes a class: at least 2 a class are needed' in line
+    assert 'at least 40 rigs and 10 steps are needed' in line
 
 
 def test_a_data_set_without_room_on_the_disk_is_named(tmp_path):
@@ -120,24 +106,11 @@ def test_a_data_set_without_room_on_the_disk_is_named(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_training_the_papers_network_leaves_weights_that_classify(data, tmp_path):
-    pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
-    out = tmp_path / 'weights.safetensors'
-    options = ['--model', 'cnn', '--folds', '2']
-    assert main(['train', '--data', str(data), '--out', str(out), *options]) == 0
-    described = json.loads(out.with_suffix('.json').read_text())
-    assert described['command'].startswith('endoscope dataset --seed 5 --n 14')
-    assert np.sum(described['held_out']['confusion']) == 14
-    result = TensionClassifier.load(out).classify(load_dataset(data).tension[0])
-    assert sum(result.probabilities.values()) == pytest.approx(1.0)
-
-
-def test_without_pytorch_one_line_says_how_to_get_it(data, tmp_path, monkeypatch, capsys):
+def test_without_pytorch_one_line_says_how_to_get_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, 'torch', None)
-    monkeypatch.delitem(sys.modules, 'endoscope_core.classifier.training', raising=False)
-    options = ['--data', str(data), '--out', 'weights.safetensors']
-    assert main(['train', '--model', 'cnn', *options]) == 2
+    monkeypatch.delitem(sys.modules, 'endoscope_core.classifier.cnn_training', raising=False)
+    assert main(['train', '--out', 'weights.safetensors']) == 2
     assert capsys.readouterr().err == (
         'endoscope: training the networks of the first paper needs PyTorch: run '
         '`make -C ros_ws train`, which says how large it is\n'
@@ -204,7 +177,8 @@ def test_a_bag_that_does_not_say_what_the_motors_did_is_refused(calibration, tmp
         ['identify', 'nowhere', '--model', 'bouc_wen'],
         ['identify', 'nowhere', '--model', 'unheard_of'],
         ['identify', 'nowhere'],
-        ['train', '--data', 'nowhere', '--out', 'x.safetensors'],
+        ['train', '--motion', 'breif', '--out', 'x.safetensors'],
+        ['train', '--out', 'x.json'],
         ['dataset', '--out', 'x', '--n', '0'],
         ['dataset', '--out', 'x', '--n', '8'],
         ['dataset', '--out', 'x', '--reset-pretension'],

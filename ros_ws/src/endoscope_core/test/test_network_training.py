@@ -1,30 +1,22 @@
 """Training of the networks of the first paper, where PyTorch is installed."""
 
-import dataclasses
-import json
-
 import numpy as np
 import pytest
 
-from endoscope_core.classifier.grouped_folds import CrossValidation
-from endoscope_core.classifier.inference import TensionClassifier
-from endoscope_core.classifier.weights_file import WeightsFileError
+from endoscope_core.classifier.cnn_classifier import INPUT, evaluated
+from endoscope_core.classifier.grouped_folds import grouped_folds
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 
 torch = pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
 
-from endoscope_core.classifier.recurrence_plot_cnn import (  # noqa: E402
-    PIXELS,
-    RecurrencePlotCnn,
-    recurrence_plots,
-)
+from endoscope_core.classifier.cnn_training import CnnTraining, loss_of, train_cnn  # noqa: E402
+from endoscope_core.classifier.recurrence_plot_cnn import PIXELS, recurrence_plots  # noqa: E402
 from endoscope_core.classifier.tension_cnn import TensionCnn  # noqa: E402
 from endoscope_core.classifier.training import (  # noqa: E402
     NETWORKS,
     TrainingSettings,
     cross_validate,
     predict,
-    save_network,
     train_network,
     use_one_thread,
 )
@@ -113,23 +105,53 @@ def test_folds_never_split_a_configuration(easy, monkeypatch):
         assert all(np.sum(easy.configuration[rows] == c) == 2 for c in inside)
 
 
-def test_saved_weights_give_the_same_answer(easy, tmp_path):
-    network = train_network(easy.tension, easy.class_deg, 1, dataclasses.replace(SHORT, epochs=2))
-    validation = cross_validate(easy, 1, 2, settings=dataclasses.replace(SHORT, epochs=1))
-    path = tmp_path / 'weights.safetensors'
-    save_network(path, network, easy, validation, 'endoscope train', 1)
-    described = json.loads(path.with_suffix('.json').read_text())
-    assert described['dataset']['manifest_sha256'] == easy.manifest_hash
-    assert described['held_out']['mean_accuracy'] == validation.mean_accuracy
-    result = TensionClassifier.load(path).classify(easy.tension[0])
-    expected = predict(network, easy.tension[:1])[0]
-    np.testing.assert_allclose(list(result.probabilities.values()), expected, atol=1e-6)
+def test_folds_keep_a_configuration_on_one_side(easy):
+    for train, test in grouped_folds(easy, 0, 2):
+        assert not set(easy.configuration[train]) & set(easy.configuration[test])
+        assert len(train) + len(test) == len(easy.class_deg)
 
 
-def test_weights_do_not_go_where_their_description_goes(easy, tmp_path):
-    nothing = CrossValidation((1.0,), np.eye(7, dtype=np.int64))
-    with pytest.raises(WeightsFileError, match='RecurrencePlotCnn are not kept'):
-        save_network(tmp_path / 'x.safetensors', RecurrencePlotCnn(7), easy, nothing, '', 0)
-    assert list(tmp_path.iterdir()) == []
-    with pytest.raises(WeightsFileError, match=r'suffix \.safetensors'):
-        save_network(tmp_path / 'x.json', TensionCnn(7), easy, nothing, '', 0)
+def test_judging_without_pytorch_gives_what_pytorch_gives():
+    torch.manual_seed(0)
+    network = TensionCnn(10)
+    courses = torch.randn(16, 4, INPUT)
+    network.standardise_by(courses)
+    network(courses)
+    network.eval()
+    expected = network(courses).detach().numpy()
+    found, features = evaluated(network.weights(), courses.transpose(1, 2).numpy())
+    assert features.shape == (16, 64)
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+def test_the_loss_is_least_for_the_truth():
+    size = torch.deg2rad(torch.tensor([70.0, float('nan')]))
+    right = torch.full((2, 10), -9.0)
+    right[0, 3], right[0, 7], right[1, 9] = 9.0, 0.0, 9.0
+    for column, value in ((7, 1.0), (9, 3.0), (3, -9.0)):
+        wrong = right.clone()
+        wrong[0, column] = value
+        for warm in (True, False):
+            assert loss_of(wrong, size, 0.02, warm) > loss_of(right, size, 0.02, warm) + 0.5
+
+
+def test_an_interrupted_training_goes_on_to_the_same_weights(tmp_path, monkeypatch):
+    from endoscope_core.classifier import cnn_training
+
+    monkeypatch.setattr(cnn_training, 'KEPT_EVERY', 2)
+    settings = CnnTraining(rigs=6, strange=3, held_out=6, steps=4, batch=8, warm_up=2)
+    whole = train_cnn('sinusoid', 3, settings)
+    kept, lines = tmp_path / 'part', []
+
+    def interrupt(line):
+        if line.startswith('step 2'):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_cnn('sinusoid', 3, settings, kept, interrupt)
+    again = train_cnn('sinusoid', 3, settings, kept, lines.append)
+    assert 'goes on after step 2 of 4' in lines
+    for name, array in whole.classifier.weights.items():
+        np.testing.assert_array_equal(array, again.classifier.weights[name])
+    assert whole.classifier.calibration == again.classifier.calibration
+    assert [step for step, _ in again.curve] == [2, 4]

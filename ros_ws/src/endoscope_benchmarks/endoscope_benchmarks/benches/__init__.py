@@ -16,6 +16,7 @@ BENCHES: tuple[str, ...] = (
     'peers',
     'simulate',
     'calibration_rate',
+    'cells',
     'papers',
     'motor_bus',
     'motor_faults',

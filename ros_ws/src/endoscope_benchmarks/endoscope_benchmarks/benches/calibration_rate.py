@@ -33,7 +33,6 @@ def run(args: argparse.Namespace) -> int:
         tubes_of_all_classes,
     )
     from endoscope_benchmarks.trials.unusual_recordings import UNUSUAL
-    from endoscope_core.classifier.inference import TensionClassifier
     from endoscope_core.classifier.shipped import load_classifier
     from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 
@@ -68,16 +67,6 @@ def run(args: argparse.Namespace) -> int:
                     for k, tube in enumerate(tubes)
                 ]
                 print(f'{amount:5d} ms {_row(trials)}')
-    print('\nthe 1D-CNN of the first paper, sinusoid')
-    # It names a class for any tension.
-    network = TensionClassifier.load_default()
-    tubes = tubes_of_all_classes(args.seed, args.tubes, calibration_motion())
-    for rate in RATES:
-        trials = [
-            judged_at_rate(network, tube, rate, args.seed + k) for k, tube in enumerate(tubes)
-        ]
-        right = sum(t.result is not None and t.result.class_deg == t.class_deg for t in trials)
-        print(f'{rate:5d} Hz {100.0 * right / len(trials):5.1f} % right')
     return 0 if kept else 1
 
 

@@ -14,7 +14,6 @@ from numpy.random import Generator
 
 from endoscope_benchmarks.hostile_files.spoiling import boundary, spoiled_bytes, spoiled_yaml
 from endoscope_core.classifier.classification import WIRES, ClassifierError, UnseenTensionError
-from endoscope_core.classifier.inference import DEFAULT_WEIGHTS
 from endoscope_core.classifier.shipped import load_classifier, shipped_weights
 from endoscope_core.classifier.weights_file import sealed
 from endoscope_core.signals import SINUSOID, calibration_motion
@@ -33,28 +32,24 @@ class _Program:
 
 
 class WeightsCase:
-    """Weights of either kind that come with the project, spoiled and loaded."""
+    """Weights that come with the project, spoiled and loaded."""
 
     name = 'weights'
 
     def __init__(self, folder: Path) -> None:
         self._path, self._mark = folder / 'weights.safetensors', folder / 'ran'
-        size = shipped_weights(SINUSOID)
-        self._sound = [size, size.with_name(DEFAULT_WEIGHTS)]
-        self._states = [safetensors.numpy.load_file(path) for path in self._sound]
+        self._sound = shipped_weights(SINUSOID)
+        self._state = safetensors.numpy.load_file(self._sound)
         samples = calibration_motion(SINUSOID).samples
         wave = 1.0 + np.sin(np.arange(samples)[:, None] * 1e-3 + np.arange(WIRES))
         self._tension = 5.0 * wave
-        self._answers = []
-        for path in self._sound:
-            shutil.copy(path, self._path)
-            shutil.copy(path.with_suffix('.json'), self._path.with_suffix('.json'))
-            self._answers.append(self._answer())
+        shutil.copy(self._sound, self._path)
+        shutil.copy(self._sound.with_suffix('.json'), self._path.with_suffix('.json'))
+        self._sound_answer = self._answer()
 
     def spoil(self, rng: Generator) -> None:
         """Write a case."""
-        self._which = int(rng.integers(2))
-        sound = self._sound[self._which]
+        sound = self._sound
         data, described = sound.read_bytes(), sound.with_suffix('.json').read_bytes()
         way = rng.integers(7)
         self._told = way < 3
@@ -63,7 +58,7 @@ class WeightsCase:
         elif way == 2:
             described = spoiled_yaml(described.decode(), rng)
         elif way == 3:
-            data = safetensors.numpy.save(_other_state(dict(self._states[self._which]), rng))
+            data = safetensors.numpy.save(_other_state(dict(self._state), rng))
         elif way == 4:
             data = _other_header(data, rng)
         elif way == 5:
@@ -78,7 +73,7 @@ class WeightsCase:
     def read(self) -> bool:
         """Load it; nothing in it may have run, and what was only damaged answers as before."""
         answer = self._answer()
-        told = not self._told or answer == self._answers[self._which]
+        told = not self._told or answer == self._sound_answer
         return told and not self._mark.exists()
 
     def _answer(self) -> str:

@@ -6,8 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_benchmarks.trials.unusual_recordings import UNUSUAL
-from endoscope_core.classifier.classification import ClassificationResult, UnseenTensionError
-from endoscope_core.classifier.size_classifier import SizeClassifier
+from endoscope_core.classifier.classification import (
+    ClassificationResult,
+    Classifier,
+    UnseenTensionError,
+)
 from endoscope_core.dataset import random_instrument, record_calibration
 from endoscope_core.dataset.rig_variation import (
     GREATEST_UNEVENNESS,
@@ -45,7 +48,7 @@ def random_tube(generator: np.random.Generator) -> PlantDescription:
     return in_tube(instrument, generator.uniform(*BENDS), unevenness)
 
 
-def judge_unseen_tubes(classifier: SizeClassifier, seed: int, tubes: int) -> list[SizeTrial]:
+def judge_unseen_tubes(classifier: Classifier, seed: int, tubes: int) -> list[SizeTrial]:
     """Calibrate and judge tubes of any size; the same seed gives the same tubes."""
     motion = calibration_motion(classifier.motion)
     trials = []
@@ -59,7 +62,7 @@ def judge_unseen_tubes(classifier: SizeClassifier, seed: int, tubes: int) -> lis
     return trials
 
 
-def refused_of_kind(classifier: SizeClassifier, kind: str, seed: int, tubes: int) -> list[bool]:
+def refused_of_kind(classifier: Classifier, kind: str, seed: int, tubes: int) -> list[bool]:
     """Whether tensions of one of the `UNUSUAL` kinds are refused, for each of some tubes."""
     motion = calibration_motion(classifier.motion)
     refused = []
@@ -70,9 +73,7 @@ def refused_of_kind(classifier: SizeClassifier, kind: str, seed: int, tubes: int
     return refused
 
 
-def _judged(
-    classifier: SizeClassifier, tension: NDArray[np.float64]
-) -> ClassificationResult | None:
+def _judged(classifier: Classifier, tension: NDArray[np.float64]) -> ClassificationResult | None:
     try:
         return classifier.classify(tension)
     except UnseenTensionError:

@@ -154,7 +154,9 @@ def train_cnn(
     known, strange, held_out = (
         make(seed, count, motion, begin, _counted(report, name)) for name, make, count in sources
     )
-    network, curve = _trained(known, strange, seed, settings, kept, report)
+    network, curve = _trained(
+        known, strange, {'motion': motion, 'seed': seed}, settings, kept, report
+    )
     weights = network.weights() | _white(network, known, seed)
     unlimited = HeldOutCalibration(1.0, np.inf)
     raw = CnnClassifier(weights, unlimited, CLASSES_DEG, motion)
@@ -237,11 +239,12 @@ def batch_of(
 def _trained(
     known: TrainingRigs,
     strange: TrainingRigs,
-    seed: int,
+    source: dict[str, Any],
     settings: CnnTraining,
     kept: Path | None,
     report: Report,
 ) -> tuple[TensionCnn, list[tuple[int, float]]]:
+    seed = source['seed']
     torch.manual_seed(seed)
     network = TensionCnn(len(CLASSES_DEG) + OWN_OUTPUTS)
     some = read(known.tension[:_STANDARD], np.random.default_rng([seed, 4]))
@@ -252,7 +255,7 @@ def _trained(
     )
     begin, curve = 0, []
     parts = {'network': network, 'optimiser': optimiser, 'schedule': schedule}
-    made = {'seed': seed, **asdict(settings)}
+    made = source | asdict(settings)
     if kept is not None and kept.is_file():
         state = torch.load(kept, weights_only=True)
         if state['made'] == made:
@@ -280,11 +283,11 @@ def _trained(
         losses.append(loss.item())
         if (step + 1) % KEPT_EVERY == 0 or step + 1 == settings.steps:
             curve.append((step + 1, float(np.mean(losses))))
-            report(f'step {step + 1} of {settings.steps}: loss {curve[-1][1]:.3f}')
             losses = []
             if kept is not None:
                 state = {name: part.state_dict() for name, part in parts.items()}
                 torch.save(state | {'step': step + 1, 'curve': curve, 'made': made}, kept)
+            report(f'step {step + 1} of {settings.steps}: loss {curve[-1][1]:.3f}')
     network.eval()
     return network, curve
 

@@ -1,0 +1,130 @@
+"""How a classifier does on instruments never seen, whose load cells are as cells are."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.classifier.classification import ClassificationResult
+from endoscope_core.classifier.cnn_classifier import (
+    CnnClassifier,
+    first,
+    logarithm,
+    stretched,
+)
+from endoscope_core.classifier.disturbance import STRANGE, drifting, exchanged_across_joints, read
+from endoscope_core.dataset import CLASSES_DEG, configuration_of_size, random_instrument
+from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS, calibration_command
+from endoscope_core.physics import simulate
+from endoscope_core.signals import calibration_motion
+
+Single = NDArray[np.float32]
+Generator = np.random.Generator
+Spoil = Callable[[Single, Generator], Single]
+
+SIZE_SPREAD_DEG = 1.0
+DRIFT_N = 1.5
+_NEVER_SEEN = 848_484
+_PART = 64
+
+FAULTS: dict[str, Spoil] = {
+    **STRANGE,
+    'drifting by 1.5 N in a calibration': lambda x, g: drifting(x, g, DRIFT_N / (len(x) * 1e-3)),
+    'exchanged across joints': exchanged_across_joints,
+}
+"""What is done to one recording (N, 4), to be refused or harmless."""
+
+
+@dataclass(frozen=True)
+class Tubes:
+    """R tubes of known size and their tensions without noise.
+
+    Parameters
+    ----------
+    size : ndarray, shape (R,)
+        rad.
+    tension : ndarray of float32, shape (R, N, 4)
+        N at 1 kHz, what the classifier reads of the record.
+    """
+
+    size: NDArray[np.float64]
+    tension: Single
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a classifier says of R tubes.
+
+    Parameters
+    ----------
+    right, wrong, refused : float
+        Shares; right and wrong by the class nearest to the true size.
+    rmse : float
+        Error of the size in rad of what was not refused.
+    holds : float
+        Share of sizes in their 90 % interval, of what was not refused.
+    """
+
+    right: float
+    wrong: float
+    refused: float
+    rmse: float
+    holds: float
+
+
+def tubes_of_sizes(seed: int, sizes_deg: tuple[float, ...], each: int, motion: str) -> Tubes:
+    """Random instruments in tubes that give them a size to 1 deg, none of which trained anything."""
+    recorded = calibration_motion(motion)
+    sizes, tensions = [], []
+    for size_deg in sizes_deg:
+        for number in range(each):
+            generator = np.random.default_rng([_NEVER_SEEN, seed, round(10 * size_deg), number])
+            size = np.deg2rad(size_deg + SIZE_SPREAD_DEG * generator.uniform(-1.0, 1.0))
+            found = None
+            while found is None:
+                unevenness = generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS)
+                found = configuration_of_size(random_instrument(generator), size, unevenness)
+            trajectory = simulate(found.plant, calibration_command(found.plant, recorded))
+            wires = trajectory.tension.reshape(len(trajectory.time), -1)
+            sizes.append(found.backlash_size)
+            tensions.append(wires[first(motion) :].astype(np.float32))
+    return Tubes(np.array(sizes), np.stack(tensions))
+
+
+def outcome(
+    classifier: CnnClassifier,
+    tubes: Tubes,
+    seed: int,
+    *,
+    period: int = 1,
+    zero: float = 0.0,
+    gain: float = 0.0,
+    fault: str = '',
+) -> Outcome:
+    """Judge tubes as cells read them; `zero`, `gain` and `period` as `read` takes them."""
+    generator = np.random.default_rng([_NEVER_SEEN, seed, period])
+    results: list[ClassificationResult] = []
+    refused: list[bool] = []
+    for rows in np.array_split(np.arange(len(tubes.size)), max(1, len(tubes.size) // _PART)):
+        tension = tubes.tension[rows]
+        if fault:
+            tension = np.stack([FAULTS[fault](each, generator) for each in tension])
+        courses = logarithm(stretched(read(tension, generator, period, zero, gain)))
+        judgement = classifier.judged(courses)
+        results += classifier.results(judgement)
+        refused += [bool(reason) for reason in classifier.reasons_to_refuse(judgement)]
+    nearest = np.array(CLASSES_DEG)[
+        np.argmin(np.abs(np.rad2deg(tubes.size)[:, None] - CLASSES_DEG), axis=1)
+    ]
+    known = ~np.array(refused)
+    right = np.array([r.class_deg for r in results]) == nearest
+    errors = np.array([r.expected_size for r in results]) - tubes.size
+    holds = np.array([r.holds(x) for r, x in zip(results, tubes.size.tolist(), strict=True)])
+    return Outcome(
+        float(np.mean(right & known)),
+        float(np.mean(~right & known)),
+        float(np.mean(~known)),
+        float(np.sqrt(np.mean(errors[known] ** 2))) if known.any() else float('nan'),
+        float(np.mean(holds[known])) if known.any() else float('nan'),
+    )
