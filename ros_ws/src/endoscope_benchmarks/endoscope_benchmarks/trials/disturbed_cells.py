@@ -74,7 +74,7 @@ class Outcome:
 
 
 def tubes_of_sizes(seed: int, sizes_deg: tuple[float, ...], each: int, motion: str) -> Tubes:
-    """Random instruments in tubes that give them a size to 1 deg, none of which trained anything."""
+    """Random instruments, which trained nothing, in tubes that give them a size to 1 deg."""
     recorded = calibration_motion(motion)
     sizes, tensions = [], []
     for size_deg in sizes_deg:

@@ -154,9 +154,8 @@ def train_cnn(
     known, strange, held_out = (
         make(seed, count, motion, begin, _counted(report, name)) for name, make, count in sources
     )
-    network, curve = _trained(
-        known, strange, {'motion': motion, 'seed': seed}, settings, kept, report
-    )
+    source = {'motion': motion, 'seed': seed}
+    network, curve = _trained(known, strange, source, settings, kept, report)
     weights = network.weights() | _white(network, known, seed)
     unlimited = HeldOutCalibration(1.0, np.inf)
     raw = CnnClassifier(weights, unlimited, CLASSES_DEG, motion)
@@ -254,7 +253,7 @@ def _trained(
         optimiser, settings.learning_rate, total_steps=settings.steps
     )
     begin, curve = 0, []
-    parts = {'network': network, 'optimiser': optimiser, 'schedule': schedule}
+    parts: dict[str, Any] = {'network': network, 'optimiser': optimiser, 'schedule': schedule}
     made = source | asdict(settings)
     if kept is not None and kept.is_file():
         state = torch.load(kept, weights_only=True)
