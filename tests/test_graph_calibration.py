@@ -74,7 +74,7 @@ def test_a_brief_calibration_takes_less_than_five_seconds_to_compensated_motion(
         assert status.level == b'\x00', status.message
         values = {v.key: v.value for v in status.values}
         assert values['class_deg'] == '70'
-        assert values['backlash_size_from'] == 'classifier'
+        assert values['backlash_size_from'] == 'cnn'
         assert float(values['backlash_size_deg']) == pytest.approx(70.0, abs=3.0)
         assert graph.nodes['compensator'].findings.class_deg == 70
 

@@ -74,7 +74,7 @@ def test_calibrate_shows_progress_and_ends_with_class_size_and_reach(graph):
     assert status == 0, errors
     lines = out.splitlines()
     assert re.fullmatch(r'class \d+ deg with probability 0\.\d+|class .* 1\.000', lines[0])
-    assert re.fullmatch(r'backlash \d+\.\d deg by the classifier', lines[1])
+    assert re.fullmatch(r'backlash \d+\.\d deg by the cnn', lines[1])
     size = re.fullmatch(
         r'size (\S+) deg by the tensions, with 90 % between (\S+) and (\S+) deg', lines[2]
     )

@@ -53,7 +53,7 @@ def successful_result(
     values |= {
         'backlash_size': size,
         'backlash_size_deg': math.degrees(size),
-        'backlash_size_from': 'classifier' if backlash is None else 'tracker',
+        'backlash_size_from': 'cnn' if backlash is None else 'tracker',
     }
     if verdict.size is not None and verdict.interval is not None:
         values |= {

@@ -195,7 +195,7 @@ class CalibrationParameters:
 
     weights: str = parameter(
         '',
-        'classifier weights as `endoscope train` writes them; empty for those that come with '
+        'weights of the CNN as `endoscope train` writes them; empty for those that come with '
         'the project',
     )
     motion: str = parameter(
