@@ -226,7 +226,8 @@ TOPICS = (
         'once a calibration, latched',
         'status `calibration: hysteresis class`: `class_deg`, `probability`, `probability_40_deg` '
         'to `probability_100_deg`, `backlash_size` in rad, `backlash_size_deg`, '
-        '`backlash_size_from` `tracker` or `cnn`, `regressed_size` by the CNN from tensions alone in rad and its 90 % interval '
+        '`backlash_size_from` `tracker` or `cnn`, `regressed_size` by the CNN from tensions alone '
+        'in rad and its 90 % interval '
         '`regressed_size_low` to `regressed_size_high`, `duration` in s, and unless '
         '`identify_plant` is false the plant of each joint as `bend_x.capstan_exponent` and so on, '
         'and how far the tube lets it bend as `reach.bend_x.low` and `reach.bend_x.high` in rad. '

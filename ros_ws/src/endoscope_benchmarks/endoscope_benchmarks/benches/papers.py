@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         return 2
     if 'classifiers' in args.only and args.plot is None:
         # Says now rather than after the other tables what it needs.
-        importlib.import_module('endoscope_core.classifier.training')
+        importlib.import_module('endoscope_benchmarks.networks.papers_recipe')
     if args.plot is not None:
         from endoscope_benchmarks.benches.papers_plot import tracking_plot
         from endoscope_core.atomic_output import write_text

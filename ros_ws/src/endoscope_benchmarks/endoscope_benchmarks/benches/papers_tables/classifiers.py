@@ -9,8 +9,8 @@ from endoscope_benchmarks.benches.inference_time import inference_time
 from endoscope_benchmarks.benches.papers_tables.row import PapersBench, Row
 
 if TYPE_CHECKING:
+    from endoscope_benchmarks.networks.grouped_folds import CrossValidation
     from endoscope_core.classifier.classification import Classifier
-    from endoscope_core.classifier.grouped_folds import CrossValidation
     from endoscope_core.dataset import CalibrationDataset
 
 TITLE = 'First paper, table 3: class and backlash size from wire tensions'
@@ -34,7 +34,7 @@ _INFERENCE_LIMIT_S = 0.010
 
 def rows(settings: PapersBench) -> list[Row]:
     """Train the paper's networks on folds of a data set; judge it by the shipped classifier."""
-    from endoscope_core.classifier.training import NETWORKS, cross_validate, use_one_thread
+    from endoscope_benchmarks.networks.papers_recipe import NETWORKS, cross_validate, use_one_thread
     from endoscope_core.dataset import make_dataset
     from endoscope_core.signals import BRIEF
 

@@ -17,10 +17,10 @@ except ModuleNotFoundError as error:
         'which says how large it is'
     ) from error
 
-from endoscope_core.classifier.grouped_folds import CrossValidation, grouped_folds
-from endoscope_core.classifier.recurrence_plot_cnn import RecurrencePlotCnn
+from endoscope_benchmarks.networks.grouped_folds import CrossValidation, grouped_folds
+from endoscope_benchmarks.networks.recurrence_plot_cnn import RecurrencePlotCnn
+from endoscope_benchmarks.networks.tension_mlp import TensionMlp
 from endoscope_core.classifier.tension_cnn import TensionCnn
-from endoscope_core.classifier.tension_mlp import TensionMlp
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 
 Progress = Callable[[str], None]
