@@ -28,7 +28,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; return 0."""
-    from endoscope_benchmarks.trials.disturbed_cells import FAULTS, outcome, tubes_of_sizes
+    from endoscope_benchmarks.trials.disturbed_cells import (
+        FAULTS,
+        outcome,
+        tubes_of_sizes,
+        tubes_outside,
+    )
     from endoscope_core.classifier.shipped import load_classifier
     from endoscope_core.dataset import CLASSES_DEG
 
@@ -52,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     for name, case in cases.items():
         _print(name, outcome(classifier, tubes, args.seed, **case))
     for size in _OUTSIDE_DEG:
-        outside = tubes_of_sizes(args.seed, (size,), 5 * args.tubes, args.motion)
+        outside = tubes_outside(args.seed, size, 5 * args.tubes, args.motion)
         _print(f'good, tubes of {size:.0f} deg', outcome(classifier, outside, args.seed))
     return 0
 

@@ -16,6 +16,7 @@ from endoscope_core.classifier.cnn_classifier import (
 from endoscope_core.classifier.disturbance import STRANGE, drifting, exchanged_across_joints, read
 from endoscope_core.dataset import CLASSES_DEG, configuration_of_size, random_instrument
 from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS, calibration_command
+from endoscope_core.dataset.training_rigs import training_rigs
 from endoscope_core.physics import simulate
 from endoscope_core.signals import calibration_motion
 
@@ -90,6 +91,13 @@ def tubes_of_sizes(seed: int, sizes_deg: tuple[float, ...], each: int, motion: s
             sizes.append(found.backlash_size)
             tensions.append(wires[first(motion) :].astype(np.float32))
     return Tubes(np.array(sizes), np.stack(tensions))
+
+
+def tubes_outside(seed: int, size_deg: float, count: int, motion: str) -> Tubes:
+    """Rigs of wide spreads with a size to 2 deg that those of the project hardly have."""
+    ends = (float(np.deg2rad(size_deg - 2.0)), float(np.deg2rad(size_deg + 2.0)))
+    rigs = training_rigs(_NEVER_SEEN + seed, count, motion, first(motion), sizes=ends)
+    return Tubes(rigs.size, rigs.tension)
 
 
 def outcome(

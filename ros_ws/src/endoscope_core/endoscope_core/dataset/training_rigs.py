@@ -48,9 +48,14 @@ class TrainingRigs:
 
 
 def training_rigs(
-    seed: int, count: int, motion: str, begin: int, progress: Progress | None = None
+    seed: int,
+    count: int,
+    motion: str,
+    begin: int,
+    progress: Progress | None = None,
+    sizes: tuple[float, float] = (LEAST_SIZE, GREATEST_SIZE),
 ) -> TrainingRigs:
-    """Rigs of wide spreads with tubes of any size from 24 to 128 deg, from sample `begin` on.
+    """Rigs of wide spreads with tubes of any of the sizes in rad, from sample `begin` on.
 
     One of five is nearly straight and slippery, one of five very bent and rough; all begin from
     the end of a random earlier motion.
@@ -65,7 +70,7 @@ def training_rigs(
             plant = _rubbed(_tube(generator, (_BENT, MOST_BENT), WIDENING), generator, _ROUGH)
         return plant
 
-    return _simulated([seed, 1], count, motion, begin, draw, (LEAST_SIZE, GREATEST_SIZE), progress)
+    return _simulated([seed, 1], count, motion, begin, draw, sizes, progress)
 
 
 def held_out_rigs(
