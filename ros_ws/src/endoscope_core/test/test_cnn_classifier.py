@@ -15,7 +15,8 @@ from endoscope_core.classifier.cnn_classifier import (
     course,
 )
 from endoscope_core.classifier.shipped import load_classifier
-from endoscope_core.dataset import CLASSES_DEG
+from endoscope_core.dataset import CLASSES_DEG, random_instrument, record_calibration
+from endoscope_core.dataset.rig_variation import in_tube
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 
 
@@ -24,14 +25,14 @@ def shipped(request):
     return load_classifier(motion=request.param)
 
 
-def judgement(size_deg, none=0.0, distance=0.0):
+def judgement(size_deg, none=0.0, distance=0.0, gap=0.0):
     sizes = np.deg2rad(np.atleast_1d(size_deg).astype(float))
     one = np.ones_like(sizes)
-    return Judgement(sizes, 0.01 * one, none * one, distance * one)
+    return Judgement(sizes, 0.01 * one, none * one, distance * one, gap * one)
 
 
 def strict():
-    return CnnClassifier({}, HeldOutCalibration(1.0, 9.0), CLASSES_DEG, 'sinusoid')
+    return CnnClassifier({}, HeldOutCalibration(1.0, 9.0, 0.5), CLASSES_DEG, 'sinusoid')
 
 
 def test_the_tensions_of_standing_motors_are_refused(shipped):
@@ -53,6 +54,17 @@ def test_sizes_beyond_the_classes_are_refused():
 def test_what_is_none_or_far_from_the_training_is_refused():
     assert 'disturbed cells' in strict().reasons_to_refuse(judgement(70.0, none=0.6))[0]
     assert 'too far' in strict().reasons_to_refuse(judgement(70.0, distance=9.1))[0]
+    assert '0.4 N another' in strict().reasons_to_refuse(judgement(70.0, gap=0.42))[0]
+
+
+def test_a_cell_that_drifts_is_refused_since_no_loop_closes(shipped):
+    motion = calibration_motion(shipped.motion)
+    plant = in_tube(random_instrument(np.random.default_rng(0)), 1.5)
+    tension = record_calibration(plant, 0, motion).tension
+    assert shipped.judged(course(tension, motion.name)[None]).gap < 0.15
+    tension[:, 2] += np.linspace(0.0, 1.5, motion.samples)
+    with pytest.raises(UnseenTensionError, match='drifts, or the motion was another'):
+        shipped.classify(tension)
 
 
 def test_the_class_is_the_nearest_and_its_probability_what_lies_between_its_borders():
@@ -90,9 +102,9 @@ def test_eight_strides_of_three_leave_one_feature_vector():
     weights = {k: np.zeros(s, np.float32) for k, s in cnn_shapes(7).items()}
     weights['scale'] += 1.0
     weights['bias'] += np.float32(0.5)
-    found = CnnClassifier(weights, HeldOutCalibration(1.0, 1.0), CLASSES_DEG, 'sinusoid').judged(
-        np.ones((2, INPUT, 4), np.float32)
-    )
+    found = CnnClassifier(
+        weights, HeldOutCalibration(1.0, 1.0, 0.5), CLASSES_DEG, 'sinusoid'
+    ).judged(np.ones((2, INPUT, 4), np.float32))
     np.testing.assert_allclose(np.rad2deg(found.size), 80.0, rtol=1e-6)
     np.testing.assert_allclose(found.none, 1.0 / (1.0 + np.exp(-0.5)))
 
@@ -101,9 +113,16 @@ def test_intervals_hold_the_share_that_they_promise_and_known_tubes_pass():
     generator = np.random.default_rng(0)
     true, deviation = generator.random(4000), 0.1 + generator.random(4000)
     error = 3.0 * deviation * generator.standard_normal(4000)
-    columns = true + error, deviation, np.zeros(4000), generator.random(4000)
-    calibration = calibration_of(Judgement(*(x[:2000] for x in columns)), true[:2000])
+    columns = true + error, deviation, generator.random(4000), generator.random(4000), 0.0 * true
+    first, rest = (Judgement(*(x[k : k + 2000] for x in columns)) for k in (0, 2000))
+    calibration = calibration_of(first, true[:2000], first)
     assert calibration.inflation == pytest.approx(3.0 * 1.645, rel=0.08)
     covered = np.abs(error[2000:]) <= calibration.inflation * deviation[2000:]
     assert 0.87 < np.mean(covered) < 0.93
-    assert calibration.ceiling == pytest.approx(0.995, abs=0.005)
+    classifier = CnnClassifier({}, calibration, CLASSES_DEG, 'sinusoid')
+    unlike = [
+        reason
+        for reason in classifier.reasons_to_refuse(rest)
+        if reason and 'outside the' not in reason
+    ]
+    assert 0.001 < len(unlike) / 2000 < 0.01

@@ -157,6 +157,7 @@ def test_judging_needs_no_pytorch():
         {'inflation': float('nan')},
         {'ceiling': [1.0]},
         {'ceiling': -1.0},
+        {'doubt': 0.0},
     ],
 )
 def test_descriptions_that_do_not_fit_are_refused(path, change):

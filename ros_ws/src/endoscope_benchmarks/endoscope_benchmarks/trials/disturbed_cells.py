@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +26,16 @@ Generator = np.random.Generator
 Spoil = Callable[[Single, Generator], Single]
 
 SIZE_SPREAD_DEG = 1.0
-DRIFT_N = 1.5
+DRIFTS_N = (0.2, 0.5, 1.5)
 _NEVER_SEEN = 848_484
 _PART = 64
 
 FAULTS: dict[str, Spoil] = {
     **STRANGE,
-    'drifting by 1.5 N in a calibration': lambda x, g: drifting(x, g, DRIFT_N / (len(x) * 1e-3)),
+    **{
+        f'drifting by {drift} N in a calibration': partial(drifting, drift=drift)
+        for drift in DRIFTS_N
+    },
     'exchanged across joints': exchanged_across_joints,
 }
 """What is done to one recording (N, 4), to be refused or harmless."""

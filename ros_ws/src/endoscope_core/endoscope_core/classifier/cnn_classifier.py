@@ -31,11 +31,19 @@ SLACK = 0.5
 MIDDLE, UNIT = math.radians(70.0), math.radians(20.0)
 """The size is an output in these units."""
 LEAST_DEVIATION = math.radians(0.1)
+LARGEST_GAP = 0.3
+"""In N: three standard deviations of the zero errors that the training has at most."""
+KNOWN = 0.995
+"""Share of known tubes that are not to be refused."""
 OWN_OUTPUTS = 3
 """After the classes: size, logarithm of its deviation, and logit of 'none of these'."""
 HALF_CLASS = math.radians(5.0)
 _NORMAL = NormalDist()
 
+_OPEN = (
+    'a tension is {:.1f} N another at the end of a whole period than at its start: a load cell '
+    'drifts, or the motion was another'
+)
 _NONE = 'the tensions are what disturbed cells or another motion give'
 _FAR = 'the tensions are too far from those of all known tubes'
 
@@ -48,12 +56,14 @@ class HeldOutCalibration:
     ----------
     inflation : float
         Half the width of an interval, in the network's standard deviations.
-    ceiling : float
-        Distance of the features from which on tensions are unlike any known.
+    ceiling, doubt : float
+        Distance of the features, and probability of 'none of these', up to which tensions are
+        those of known tubes.
     """
 
     inflation: float
     ceiling: float
+    doubt: float
 
 
 @dataclass(frozen=True)
@@ -69,12 +79,15 @@ class Judgement:
         Probability that the tensions are of no tube but of disturbed cells or another motion.
     distance : ndarray, shape (R,)
         Of the features from those of the training (Mahalanobis).
+    gap : ndarray, shape (R,)
+        By which the loop of a wire fails to close, N: the greatest of the wires.
     """
 
     size: Array
     deviation: Array
     none: Array
     distance: Array
+    gap: Array
 
 
 def course(tension: ArrayLike, motion: str) -> Single:
@@ -166,7 +179,10 @@ class CnnClassifier:
         self.calibration = calibration
         self.classes_deg = classes_deg
         self.motion = motion
-        self._samples = calibration_motion(motion).samples
+        recorded = calibration_motion(motion)
+        self._samples = recorded.samples
+        period = recorded.samples - recorded.settled
+        self._period = min(INPUT - 1, period if recorded.samples > INPUT else INPUT)
 
     def classify(self, tension: ArrayLike) -> ClassificationResult:
         """Class, backlash size and interval of one calibration.
@@ -201,16 +217,23 @@ class CnnClassifier:
                 LEAST_DEVIATION + UNIT * np.exp(logarithm_of),
                 1.0 / (1.0 + np.exp(-none)),
                 np.sqrt(np.sum(np.square(white), axis=1)),
+                self._gap(courses),
             )
 
     def reasons_to_refuse(self, judgement: Judgement) -> list[str]:
         """Why each of R recordings is none of the classes; empty where it may be one."""
         smallest, greatest = self._range
         found = []
-        for none, distance, (low, high) in zip(
-            judgement.none, judgement.distance, self._intervals(judgement), strict=True
+        for none, distance, gap, (low, high) in zip(
+            judgement.none,
+            judgement.distance,
+            judgement.gap,
+            self._intervals(judgement),
+            strict=True,
         ):
-            if none > 0.5:
+            if gap > LARGEST_GAP:
+                found.append(_OPEN.format(gap))
+            elif none > self.calibration.doubt:
                 found.append(_NONE)
             elif distance > self.calibration.ceiling:
                 found.append(_FAR)
@@ -241,6 +264,12 @@ class CnnClassifier:
             )
         return found
 
+    def _gap(self, courses: Single) -> Array:
+        """By how much wires' tensions differ from those a whole period later, N."""
+        after = np.exp(courses[:, self._period :]).mean(axis=1)
+        before = np.exp(courses[:, : INPUT - self._period]).mean(axis=1)
+        return np.abs(after - before).max(axis=1).astype(np.float64)
+
     @property
     def _range(self) -> tuple[float, float]:
         ends = np.deg2rad([self.classes_deg[0], self.classes_deg[-1]])
@@ -255,21 +284,18 @@ class CnnClassifier:
         return judgement.deviation * self.calibration.inflation
 
 
-def calibration_of(held_out: Judgement, true: Array) -> HeldOutCalibration:
-    """Calibration on R recordings of rigs held out, whose true sizes (R,) in rad are known.
+def calibration_of(held_out: Judgement, true: Array, of_all_kinds: Judgement) -> HeldOutCalibration:
+    """Calibration on recordings of rigs held out, whose true sizes in rad are known.
 
     Intervals: split conformal prediction with errors in units of the network's own deviation
-    (Lei et al., J. Am. Stat. Assoc. 113(523), 2018, sections 2.2 and 5.2). Ceiling: 99.5 % of
-    known tubes are not refused, neither for their distance nor as none of the classes.
+    (Lei et al., J. Am. Stat. Assoc. 113(523), 2018, sections 2.2 and 5.2). Refusals: of known
+    tubes as cells of every quality read them, half of what may be refused for either reason.
     """
     scores = np.sort(np.abs(held_out.size - true) / held_out.deviation)
     rank = min(len(scores), math.ceil((len(scores) + 1) * LEVEL))
-    far = np.where(held_out.none > 0.5, np.inf, held_out.distance)
-    finite = np.max(held_out.distance)
-    return HeldOutCalibration(
-        float(scores[rank - 1]), float(min(np.quantile(far, KNOWN, method='lower'), finite))
+    passed = 0.5 * (1.0 + KNOWN)
+    ceiling, doubt = (
+        float(np.quantile(column, passed, method='higher'))
+        for column in (of_all_kinds.distance, of_all_kinds.none)
     )
-
-
-KNOWN = 0.995
-"""Share of known tubes that are not to be refused."""
+    return HeldOutCalibration(float(scores[rank - 1]), ceiling, doubt)

@@ -34,7 +34,13 @@ from endoscope_core.classifier.cnn_classifier import (
     logarithm,
     stretched,
 )
-from endoscope_core.classifier.disturbance import READING_PERIODS, STRANGE, read, read_of_all_kinds
+from endoscope_core.classifier.disturbance import (
+    READING_PERIODS,
+    STRANGE,
+    SUBTLE,
+    read,
+    read_of_all_kinds,
+)
 from endoscope_core.classifier.tension_cnn import TensionCnn
 from endoscope_core.dataset import CLASSES_DEG
 from endoscope_core.dataset.training_rigs import (
@@ -157,7 +163,7 @@ def train_cnn(
     source = {'motion': motion, 'seed': seed}
     network, curve = _trained(known, strange, source, settings, kept, report)
     weights = network.weights() | _white(network, known, seed)
-    unlimited = HeldOutCalibration(1.0, np.inf)
+    unlimited = HeldOutCalibration(1.0, np.inf, np.inf)
     raw = CnnClassifier(weights, unlimited, CLASSES_DEG, motion)
     judgements = {
         period: _judged(
@@ -165,12 +171,15 @@ def train_cnn(
         )
         for period in READING_PERIODS
     }
-    half = len(held_out.size) // 2
-    calibration = _calibration(judgements, held_out.size, slice(None))
-    judge = CnnClassifier(
-        weights, _calibration(judgements, held_out.size, slice(half)), CLASSES_DEG, motion
+    of_all_kinds = _judged(
+        raw, read_of_all_kinds(held_out.tension, np.random.default_rng([seed, 8]))
     )
-    rest = slice(half, None)
+    calibration, halved = (
+        _calibration(judgements, held_out.size, of_all_kinds, rows)
+        for rows in (slice(None), slice(0, None, 2))
+    )
+    judge = CnnClassifier(weights, halved, CLASSES_DEG, motion)
+    rest = slice(1, None, 2)
     told = {
         f'{1000 // period} Hz': _figures(judge, _rows(j, rest), held_out.size[rest])
         for period, j in judgements.items()
@@ -203,7 +212,7 @@ def loss_of(outputs: Tensor, size: Tensor, smoothing: float, warm: bool) -> Tens
     none = torch.isnan(size)
     loss = nn.functional.binary_cross_entropy_with_logits(outputs[:, -1], none.float())
     told, true = outputs[~none], size[~none]
-    centres = torch.deg2rad(torch.tensor(CLASSES_DEG, dtype=true.dtype))
+    centres = torch.deg2rad(torch.tensor(CLASSES_DEG, dtype=true.dtype, device=true.device))
     nearest = torch.argmin((true[:, None] - centres).abs(), dim=1)
     loss = loss + nn.functional.cross_entropy(told[:, :classes], nearest, label_smoothing=smoothing)
     error = told[:, classes] - (true - MIDDLE) / UNIT
@@ -220,19 +229,23 @@ def batch_of(
     generator: np.random.Generator,
 ) -> tuple[Single, Array]:
     """Courses (B, 6561, 4) and sizes (B,) of one batch."""
-    spoilt = round(settings.batch * settings.spoilt)
     rows = generator.integers(len(known.size), size=settings.batch)
     tension, size = known.tension[rows], known.size[rows]
-    kinds = list(STRANGE.values())
-    for row in range(spoilt):
-        if row % 3 == 0:
-            tension[row] = strange.tension[generator.integers(len(strange.tension))]
-        else:
-            tension[row] = kinds[generator.integers(len(kinds))](tension[row], generator)
-        size[row] = np.nan
-    order = generator.permutation(settings.batch)
-    readings = read_of_all_kinds(tension[order], generator)
-    return logarithm(stretched(readings)), size[order]
+    kinds = [*STRANGE.values(), *SUBTLE]
+    spoilt = generator.permutation(settings.batch)[: round(settings.batch * settings.spoilt)]
+    size[spoilt] = np.nan
+    strangers = spoilt[: len(spoilt) // 3]
+    tension[strangers] = strange.tension[
+        generator.integers(len(strange.tension), size=len(strangers))
+    ]
+    # Before a cell's noise or after it: an amplifier clips the one, a converter the other.
+    early, late = np.array_split(spoilt[len(strangers) :], 2)
+    for row in early:
+        tension[row] = kinds[generator.integers(len(kinds))](tension[row], generator)
+    readings = read_of_all_kinds(tension, generator)
+    for row in late:
+        readings[row] = kinds[generator.integers(len(kinds))](readings[row], generator)
+    return logarithm(stretched(readings)), size
 
 
 def _trained(
@@ -245,9 +258,11 @@ def _trained(
 ) -> tuple[TensionCnn, list[tuple[int, float]]]:
     seed = source['seed']
     torch.manual_seed(seed)
+    device = 'cuda' if torch.cuda.is_available() else 'cpu'
     network = TensionCnn(len(CLASSES_DEG) + OWN_OUTPUTS)
     some = read(known.tension[:_STANDARD], np.random.default_rng([seed, 4]))
     network.standardise_by(_as_input(logarithm(stretched(some))))
+    network.to(device)
     optimiser = torch.optim.AdamW(network.parameters(), lr=settings.learning_rate)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, settings.learning_rate, total_steps=settings.steps
@@ -256,7 +271,7 @@ def _trained(
     parts: dict[str, Any] = {'network': network, 'optimiser': optimiser, 'schedule': schedule}
     made = source | asdict(settings)
     if kept is not None and kept.is_file():
-        state = torch.load(kept, weights_only=True)
+        state = torch.load(kept, weights_only=True, map_location=device)
         if state['made'] == made:
             for name, part in parts.items():
                 part.load_state_dict(state[name])
@@ -270,8 +285,8 @@ def _trained(
         optimiser.zero_grad()
         warm = step < settings.warm_up
         loss = loss_of(
-            network(_as_input(courses)),
-            torch.from_numpy(size.astype(np.float32)),
+            network(_as_input(courses).to(device)),
+            torch.from_numpy(size.astype(np.float32)).to(device),
             settings.smoothing,
             warm,
         )
@@ -287,7 +302,7 @@ def _trained(
                 state = {name: part.state_dict() for name, part in parts.items()}
                 torch.save(state | {'step': step + 1, 'curve': curve, 'made': made}, kept)
             report(f'step {step + 1} of {settings.steps}: loss {curve[-1][1]:.3f}')
-    network.eval()
+    network.eval().cpu()
     return network, curve
 
 
@@ -326,12 +341,16 @@ def _rows(judgement: Judgement, rows: slice) -> Judgement:
 
 
 def _columns(judgement: Judgement) -> tuple[Array, ...]:
-    return judgement.size, judgement.deviation, judgement.none, judgement.distance
+    return tuple(vars(judgement).values())
 
 
-def _calibration(judgements: dict[int, Judgement], size: Array, rows: slice) -> HeldOutCalibration:
+def _calibration(
+    judgements: dict[int, Judgement], size: Array, of_all_kinds: Judgement, rows: slice
+) -> HeldOutCalibration:
     parts = [_rows(judgement, rows) for judgement in judgements.values()]
-    return calibration_of(_joined(parts), np.tile(size[rows], len(parts)))
+    return calibration_of(
+        _joined(parts), np.tile(size[rows], len(parts)), _rows(of_all_kinds, rows)
+    )
 
 
 def _figures(judge: CnnClassifier, judgement: Judgement, size: Array) -> dict[str, float]:

@@ -98,12 +98,11 @@ def clipped(tension: Single, generator: Generator) -> Single:
     return found
 
 
-def drifting(tension: Single, generator: Generator, rate: float | None = None) -> Single:
-    """One cell drifts by 0.1 to 0.4 N/s either way, or at the given rate in N/s."""
+def drifting(tension: Single, generator: Generator, drift: float) -> Single:
+    """One cell drifts evenly by so many N over the recording, either way."""
     found, wire = tension.copy(), _wire(tension, generator)
-    speed = generator.uniform(0.1, 0.4) if rate is None else rate
     sign = generator.choice((-1.0, 1.0))
-    found[:, wire] += np.float32(sign * speed * 1e-3) * np.arange(len(found), dtype=np.float32)
+    found[:, wire] += np.linspace(0.0, sign * drift, len(found), dtype=np.float32)
     return found
 
 
@@ -136,12 +135,14 @@ STRANGE: dict[str, Callable[[Single, Generator], Single]] = {
     'unplugged': unplugged,
     'stuck': stuck,
     'clipped at 60 to 90 %': clipped,
-    'drifting': drifting,
     'slow': slow,
     'slack': slack,
 }
 """What makes tensions (N, 4) in N those of no tube. Cells exchanged across joints are none of it:
-the joints of an instrument are made alike, and the size hardly changes."""
+the joints of an instrument are made alike, and the size hardly changes. Nor is drift, which a loop
+that does not close shows by itself."""
+SUBTLE = (clipped, slow)
+"""Of those, what leaves most of a recording as it was; a training needs it more often."""
 
 
 def _wire(tension: Single, generator: Generator) -> int:

@@ -44,11 +44,11 @@ def load_classifier(weights: str | Path | None = None, motion: str = SINUSOID) -
     try:
         classes = classes_of(description)
         calibration = HeldOutCalibration(
-            float(description['inflation']), float(description['ceiling'])
+            *(float(description[key]) for key in ('inflation', 'ceiling', 'doubt'))
         )
-        numbers = (calibration.inflation, calibration.ceiling)
+        numbers = tuple(vars(calibration).values())
         if not all(math.isfinite(x) and x > 0.0 for x in numbers):
-            raise ValueError(f'inflation and ceiling are {numbers}')
+            raise ValueError(f'inflation, ceiling and doubt are {numbers}')
         if description['motion'] != motion:
             raise ClassifierError(
                 f'{path} was trained on the {description["motion"]} calibration, not the '

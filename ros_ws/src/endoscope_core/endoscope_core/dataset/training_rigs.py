@@ -1,11 +1,13 @@
 """Rigs without end for the training of the classifier: drawn from a seed, simulated, never kept."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.dataset.calibration_dataset import CLASSES_DEG
 from endoscope_core.dataset.rig_variation import (
     GREATEST_UNEVENNESS,
     calibration_command,
@@ -70,17 +72,30 @@ def training_rigs(
             plant = _rubbed(_tube(generator, (_BENT, MOST_BENT), WIDENING), generator, _ROUGH)
         return plant
 
-    return _simulated([seed, 1], count, motion, begin, draw, sizes, progress)
+    def wanted(size: float) -> bool:
+        return sizes[0] <= size <= sizes[1]
+
+    return _simulated([seed, 1], count, motion, begin, draw, wanted, progress)
 
 
 def held_out_rigs(
     seed: int, count: int, motion: str, begin: int, progress: Progress | None = None
 ) -> TrainingRigs:
-    """Rigs as data sets hold them, of any size that the classes span, none of them trained on."""
-    ends = (np.deg2rad(35.0), np.deg2rad(105.0))
-    return _simulated(
-        [seed, 2], count, motion, begin, lambda g: _tube(g, (0.0, MOST_BENT)), ends, progress
-    )
+    """Rigs as data sets hold them, as many nearest to each class, none of them trained on."""
+    left = dict.fromkeys(CLASSES_DEG, math.ceil(count / len(CLASSES_DEG)))
+
+    def draw(generator: np.random.Generator) -> PlantDescription:
+        # Small sizes, which are rare, are those of nearly straight tubes.
+        return _tube(generator, (0.0, MOST_BENT * generator.random()))
+
+    def wanted(size: float) -> bool:
+        nearest = 10 * round(math.degrees(size) / 10.0)
+        if not left.get(nearest):
+            return False
+        left[nearest] -= 1
+        return True
+
+    return _simulated([seed, 2], count, motion, begin, draw, wanted, progress)
 
 
 def strange_rigs(
@@ -119,7 +134,7 @@ def _simulated(
     motion: str,
     begin: int,
     draw: Callable[[np.random.Generator], PlantDescription],
-    sizes: tuple[float, float],
+    wanted: Callable[[float], bool],
     progress: Progress | None,
 ) -> TrainingRigs:
     recorded, sinusoid = calibration_motion(motion), calibration_motion()
@@ -138,7 +153,7 @@ def _simulated(
         earlier = _earlier_motion(generator, command.shape[1])
         whole = simulate(plant, np.concatenate([earlier, command]))
         size = _size(plant, sinusoid, whole if motion == sinusoid.name else None)
-        if not sizes[0] <= size <= sizes[1]:
+        if not wanted(size):
             continue
         wires = whole.tension.reshape(len(whole.time), -1)[_EARLIER + begin :]
         tensions.append(wires.astype(np.float32))
