@@ -97,6 +97,22 @@ def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_pa
         assert graph.states[-1] == 'ENABLED'
 
 
+def test_a_zero_that_is_off_is_told_with_the_class_or_the_refusal(tmp_path):
+    bias = EffectSpec('load_cell_bias', 'bend_x', {'bias_n': 0.6, 'wire': 1.0})
+    overrides = slave_of(PlantDescription(effects=(bias,)), tmp_path / 'bias.yaml')
+    overrides['calibration'] = {'motion': 'brief'}
+    with SimulatedGraph(overrides=overrides) as graph:
+        graph.enable()
+        assert graph.call_calibration().success
+        graph.advance(5.0)
+        status = graph.results[-1].status[0]
+        values = {v.key: v.value for v in status.values}
+        assert float(values['zero_error.wire_x_neg']) == pytest.approx(0.6, abs=0.05)
+        assert abs(float(values['zero_error.wire_x_pos'])) < 0.05
+        assert 'zero of a load cell is off: wire_x_neg by +0.6' in status.message
+        assert 'wire_y' not in status.message
+
+
 def test_refused_unless_enabled():
     with SimulatedGraph() as graph:
         graph.advance(0.1)

@@ -17,6 +17,7 @@ from endoscope_core.calibration import (
     CalibrationRun,
     CalibrationStep,
     TensionGapError,
+    zero_errors,
 )
 from endoscope_core.classifier.classification import (
     ClassificationResult,
@@ -35,6 +36,7 @@ from endoscope_nodes.calibration_result import (
     numbers_of,
     refused_result,
     successful_result,
+    with_zeros,
 )
 from endoscope_nodes.diagnostics import OK, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
@@ -105,6 +107,7 @@ class CalibrationNode(EndoscopeNode):
         self._began_ns = 0
         self._bending = BendingRecord(len(JOINTS))
         self._judging: Future[_Judgement] | None = None
+        self._zeros = np.zeros(len(WIRES))
         self._runs = 0
         self._aborts = 0
         self._refused = 0
@@ -269,6 +272,7 @@ class CalibrationNode(EndoscopeNode):
         except TensionGapError as error:
             self._abort(str(error), TENSION_GAP)
             return
+        self._zeros = zero_errors(tension)
         if self.ticker.paced or not self.ticker.simulated:
             self._judging = self._thread.submit(self._judgement, self._classifier, tension)
             return
@@ -310,12 +314,11 @@ class CalibrationNode(EndoscopeNode):
         if run.record is not None and self._motion.name == SINUSOID:
             backlash = self._bending.backlash_size(run.record.start_ns)
         now = self.ticker.now_ns()
-        self._publish(
-            successful_result(now, verdict, backlash, (now - self._began_ns) * 1e-9, plants)
-        )
+        duration = (now - self._began_ns) * 1e-9
+        self._publish(successful_result(now, verdict, backlash, duration, plants, self._zeros))
         self._run = None
         self._runs += 1
-        self._tell(f'class {verdict.class_deg} deg')
+        self._tell(with_zeros(f'class {verdict.class_deg} deg', self._zeros))
         self.get_logger().info(f'{self._last}, probability {verdict.probability:.3f}')
 
     def _finish_homing(self) -> None:
@@ -334,10 +337,11 @@ class CalibrationNode(EndoscopeNode):
     def _refuse(self, reason: str) -> None:
         self._run = None
         self._refused += 1
-        self._tell(reason, UNKNOWN_TUBE)
-        self.get_logger().error(f'{reason}; the motion is not compensated')
+        self._tell(with_zeros(reason, self._zeros), UNKNOWN_TUBE)
+        self.get_logger().error(f'{self._last}; the motion is not compensated')
         now = self.ticker.now_ns()
-        self._publish(refused_result(now, reason, (now - self._began_ns) * 1e-9))
+        duration = (now - self._began_ns) * 1e-9
+        self._publish(refused_result(now, reason, duration, self._zeros))
 
     def _publish(self, result: DiagnosticArray) -> None:
         result.header.frame_id = self._commands.session

@@ -11,13 +11,17 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
+from endoscope_core.calibration import words_of
 from endoscope_core.control import PhysicalParameters, Reach, reach
 from endoscope_core.control.physical_parameters import PROFILE
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_nodes.diagnostics import ERROR, OK, status
-from endoscope_nodes.names import JOINTS
+from endoscope_nodes.names import JOINTS, WIRES
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from endoscope_core.classifier.classification import ClassificationResult
 
 NAME = 'calibration: hysteresis class'
@@ -31,6 +35,7 @@ def successful_result(
     backlash: float | None,
     duration: float,
     plants: Sequence[PhysicalParameters] = (),
+    zeros: 'NDArray[np.float64] | None' = None,
 ) -> DiagnosticArray:
     """Say which class was found.
 
@@ -46,6 +51,8 @@ def successful_result(
         Of the whole calibration, in s.
     plants
         Identified parameters of each joint; empty where they were not asked for.
+    zeros
+        What the zero of each load cell is off by, in N.
     """
     values: dict[str, object] = {'class_deg': verdict.class_deg, 'probability': verdict.probability}
     values |= {f'probability_{size}_deg': p for size, p in verdict.probabilities.items()}
@@ -62,13 +69,14 @@ def successful_result(
             'regressed_size_high': verdict.interval[1],
         }
     values['duration'] = duration
+    values |= _zero_values(zeros)
     if plants:
         values |= plant_values(plants)
         for joint, plant in zip(JOINTS, plants, strict=True):
             tube = reach(plant.joint)
             values |= {f'{REACH}{joint}.low': tube.low, f'{REACH}{joint}.high': tube.high}
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
-    return _array(stamp_ns, OK, message, values)
+    return _array(stamp_ns, OK, with_zeros(message, zeros), values)
 
 
 def aborted_result(stamp_ns: int, reason: str, step: str, duration: float) -> DiagnosticArray:
@@ -81,15 +89,30 @@ def aborted_result(stamp_ns: int, reason: str, step: str, duration: float) -> Di
     )
 
 
-def refused_result(stamp_ns: int, reason: str, duration: float) -> DiagnosticArray:
+def refused_result(
+    stamp_ns: int, reason: str, duration: float, zeros: 'NDArray[np.float64] | None' = None
+) -> DiagnosticArray:
     """Say that the tube is of no class that is known, and why; ``duration`` in s."""
-    values = {
+    values: dict[str, object] = {
         'class_deg': NONE_OF_THEM,
         'reason': reason,
         'step': 'judging',
         'duration': duration,
+        **_zero_values(zeros),
     }
-    return _array(stamp_ns, ERROR, reason, values)
+    return _array(stamp_ns, ERROR, with_zeros(reason, zeros), values)
+
+
+def with_zeros(message: str, zeros: 'NDArray[np.float64] | None') -> str:
+    """A message, and what zeros in N of load cells are off by where that is much."""
+    words = '' if zeros is None else words_of(zeros, WIRES)
+    return f'{message}; {words}' if words else message
+
+
+def _zero_values(zeros: 'NDArray[np.float64] | None') -> dict[str, object]:
+    if zeros is None:
+        return {}
+    return {f'zero_error.{wire}': x for wire, x in zip(WIRES, zeros.tolist(), strict=True)}
 
 
 def numbers_of(result: DiagnosticArray) -> JointState:

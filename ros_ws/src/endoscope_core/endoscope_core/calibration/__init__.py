@@ -7,6 +7,7 @@ from endoscope_core.calibration.calibration_run import (
     CalibrationStep,
 )
 from endoscope_core.calibration.tension_record import TensionGapError, TensionRecord
+from endoscope_core.calibration.zero_error import words_of, zero_errors
 
 __all__ = [
     'BendingRecord',
@@ -15,4 +16,6 @@ __all__ = [
     'CalibrationStep',
     'TensionGapError',
     'TensionRecord',
+    'words_of',
+    'zero_errors',
 ]

@@ -15,7 +15,7 @@ from endoscope_core.dataset.rig_variation import (
     random_instrument,
 )
 from endoscope_core.metrics import NoLoopError, width_at_mid_height
-from endoscope_core.physics import EffectSpec, PlantDescription, simulate
+from endoscope_core.physics import EffectSpec, PlantDescription, PlantTrajectory, simulate
 from endoscope_core.physics.family import MOST_BENT
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
 
@@ -149,12 +149,15 @@ def _simulated(
         except ValueError:
             # Widened spreads leave what a plant may be, now and then.
             continue
-        command = calibration_command(plant, recorded)
-        earlier = _earlier_motion(generator, command.shape[1])
-        whole = simulate(plant, np.concatenate([earlier, command]))
-        size = _size(plant, sinusoid, whole if motion == sinusoid.name else None)
+        earlier = _earlier_motion(generator, len(plant.joints))
+        moved = np.concatenate([earlier, calibration_command(plant, sinusoid)])
+        whole = simulate(plant, moved)
+        size = _size(whole, sinusoid)
         if not wanted(size):
             continue
+        if recorded.name != sinusoid.name:
+            moved = np.concatenate([earlier, calibration_command(plant, recorded)])
+            whole = simulate(plant, moved)
         wires = whole.tension.reshape(len(whole.time), -1)[_EARLIER + begin :]
         tensions.append(wires.astype(np.float32))
         found.append(size)
@@ -163,13 +166,9 @@ def _simulated(
     return TrainingRigs(np.stack(tensions), np.array(found))
 
 
-def _size(plant: PlantDescription, sinusoid: CalibrationMotion, whole: object) -> float:
+def _size(whole: PlantTrajectory, sinusoid: CalibrationMotion) -> float:
     """Mean backlash size in rad; zero where there is no loop."""
-    if whole is None:
-        bending = simulate(plant, calibration_command(plant, sinusoid)).bending_true
-    else:
-        bending = whole.bending_true[_EARLIER:]  # type: ignore[attr-defined]
-    settled = bending[sinusoid.settled :]
+    settled = whole.bending_true[_EARLIER + sinusoid.settled :]
     time = np.arange(sinusoid.settled, sinusoid.samples) / CALIBRATION_RATE
     desired, _ = sinusoid.signal(time)
     try:
