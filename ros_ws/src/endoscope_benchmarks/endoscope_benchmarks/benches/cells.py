@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     for name, case in cases.items():
         _print(name, outcome(classifier, tubes, args.seed, **case))
     for size in _OUTSIDE_DEG:
-        outside = tubes_outside(args.seed, size, 5 * args.tubes, args.motion)
+        outside = tubes_outside(args.seed, size, args.tubes, args.motion)
         _print(f'good, tubes of {size:.0f} deg', outcome(classifier, outside, args.seed))
     return 0
 
