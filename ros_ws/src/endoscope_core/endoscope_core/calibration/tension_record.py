@@ -13,9 +13,8 @@ LONGEST_GAP_NS = 40_000_000
 """Longest time between readings that a straight line may bridge.
 
 A reply that is lost leaves up to this between the readings on either side, at a time-out of 20 ms
-and with the fence that follows.  Where the tension bends most such a gap costs the sinusoid nothing
-that can be measured and the brief motion 0.14 deg of backlash size; one of 60 ms costs it 0.6 deg
-(`endoscope bench calibration_rate`).
+and with the fence that follows.  What it costs where the tension bends most, `endoscope bench
+calibration_rate` measures.
 """
 
 LONGEST_INTERVAL_NS = 12_500_000
