@@ -16,7 +16,8 @@ from endoscope_core.classifier.cnn_classifier import (
 )
 from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.dataset import CLASSES_DEG, random_instrument, record_calibration
-from endoscope_core.dataset.rig_variation import in_tube
+from endoscope_core.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
+from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 
 
@@ -40,6 +41,14 @@ def test_the_tensions_of_standing_motors_are_refused(shipped):
     still = np.random.default_rng(0).normal(5.0, 0.02, (samples, 4))
     with pytest.raises(UnseenTensionError, match='none of the classes: '):
         shipped.classify(still)
+
+
+def test_the_slave_that_is_simulated_by_default_is_known(shipped):
+    plant, motion = PlantDescription(), calibration_motion(shipped.motion)
+    tension = simulate(plant, calibration_command(plant, motion)).tension.reshape(-1, 4)
+    noise = np.random.default_rng(0).normal(0.0, 0.02, tension.shape)
+    result = shipped.classify(tension + noise)
+    assert result.holds(float(np.mean(backlash_sizes(plant))))
 
 
 def test_sizes_beyond_the_classes_are_refused():
