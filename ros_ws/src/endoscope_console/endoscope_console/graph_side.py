@@ -15,20 +15,27 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 from rclpy.time import Time
 
+from endoscope_console.explanations import NOMINAL
 from endoscope_console.pictures import Pictures
-from endoscope_core.choices import PLAYS
+from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_CLASS, BY_PLANT, PHYSICAL, PLAYS
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.rig import load_rig
+from endoscope_nodes.calibration_result import REACH
 from endoscope_nodes.diagnostics import OK, WARN, status
 from endoscope_nodes.graph_client import GraphClient
-from endoscope_nodes.graph_listener import CONSOLE, GraphRefusedError
+from endoscope_nodes.graph_listener import CONSOLE, GraphRefusedError, Health
+from endoscope_nodes.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.handle_sender import handle_senders
 from endoscope_nodes.joined_graph import joined_node
 from endoscope_nodes.names import CONSOLE_LOG, FINISHED
 from endoscope_nodes.qos import EVENT
 
 NODE = 'console_web'
+PATIENCE_S = 10.0
 
 _ASKED = ('source', 'scale')
 _POLL_S = 0.01
+_LISTED_S = 2.0
 _SETTINGS_NS = 1_000_000_000
 _SERVED_UNTIL_S = 5.0
 
@@ -49,6 +56,11 @@ class _Client(GraphClient):
         """Take all that has come, in the one thread that may."""
         if threading.get_ident() == self._reader:
             super().hear()
+
+
+def identified(calibration: Health | None) -> bool:
+    """Whether a calibration has found the plant of each joint, and so how far it can be bent."""
+    return calibration is not None and any(key.startswith(REACH) for key in calibration.values)
 
 
 @dataclass(frozen=True)
@@ -147,6 +159,24 @@ class GraphSide:
         Another server of a page has the same name.
         """
         return handle_senders(self.client.node)
+
+    def plant(self) -> str:
+        """File of the plant that the graph simulates; a name of the shipped one, or empty."""
+        try:
+            file, rig = (
+                read_parameter(self.client, f'motor_driver.{name}', _LISTED_S).value
+                for name in ('plant_file', 'rig_file')
+            )
+            return str(file or load_rig(rig or None).simulation.plant or NOMINAL)
+        except EndoscopeError:
+            return ''
+
+    def compensate(self, mode: str) -> None:
+        """Set the compensator's mode; the physical ones know the tube itself where it was found."""
+        physical = mode in (PHYSICAL, ADAPTIVE_PHYSICAL)
+        by_plant = physical and identified(self.client.calibration)
+        values = {'mode': mode, 'selected_by': BY_PLANT if by_plant else BY_CLASS}
+        set_parameters(self.client, 'compensator', values, PATIENCE_S)
 
     def log(self, order: str, operator: str, address: str, ok: bool, why: str) -> None:
         """Say in the graph what was asked for and what became of it."""

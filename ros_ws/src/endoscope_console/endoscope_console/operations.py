@@ -1,4 +1,4 @@
-"""What is done for the operator: the lease, the handle's place in the graph, and every order."""
+"""What is done for the operator: the lease and every order."""
 
 import asyncio
 import time
@@ -13,8 +13,9 @@ from endoscope_console.access import OPERATOR
 from endoscope_console.alarms import Alarms
 from endoscope_console.beat import Beat, Situation
 from endoscope_console.clients import Client, Clients
-from endoscope_console.explanations import NOMINAL, Explanations
-from endoscope_console.graph_side import GraphSide, Settings
+from endoscope_console.explanations import Explanations
+from endoscope_console.graph_side import PATIENCE_S, GraphSide, Settings, identified
+from endoscope_console.handle_place import HandlePlace
 from endoscope_console.orders import (
     HALTS,
     Acknowledge,
@@ -24,6 +25,7 @@ from endoscope_console.orders import (
     Claim,
     Explain,
     Order,
+    OrderRefusedError,
     Play,
     Record,
     Release,
@@ -32,45 +34,22 @@ from endoscope_console.orders import (
     in_words,
 )
 from endoscope_core.choices import (
-    ADAPTIVE_PHYSICAL,
-    BY_CLASS,
-    BY_PLANT,
     FOLLOW_THE_HANDLE,
     PHYSICAL,
-    PLAYS,
 )
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.rig import load_rig
 from endoscope_core.teleop.frames import InputFrame
 from endoscope_core.teleop.lease import Lease
 from endoscope_core.teleop.operator import DeadManState, Reason
-from endoscope_nodes.calibration_result import REACH
-from endoscope_nodes.graph_listener import CONSOLE, GraphRefusedError, Health
-from endoscope_nodes.graph_parameters import read_parameter, set_parameters
+from endoscope_nodes.graph_listener import CONSOLE, GraphRefusedError
 from endoscope_nodes.names import FINISHED, RECORDER_START, RECORDER_STOP
 from endoscope_nodes.node_parameters import CompensatorParameters
 
-_PATIENCE_S = 10.0
-_PLACE_S = 5.0
-_LISTED_S = 2.0
-_LOOK_S = 0.05
-# Until all nodes know that a sender of the handle has gone.
-_SETTLED_S = 0.2
-_SILENCED_S = 2.0
 _WAITING_ORDERS = 16
 # The console tells once a second how far it is; a word from before it was asked means nothing.
 _NEXT_WORD_NS = 1_500_000_000
 _EXPERIMENT = 'an experiment'
 _NO_LEASE = (Claim, Release, Bags, Explain, Cancel, Acknowledge)
-
-
-class OrderRefusedError(EndoscopeError):
-    """What was asked for is not done; the message says why."""
-
-
-def _identified(calibration: Health | None) -> bool:
-    """Whether a calibration has found the plant of each joint, and so how far it can be bent."""
-    return calibration is not None and any(key.startswith(REACH) for key in calibration.values)
 
 
 @dataclass
@@ -118,9 +97,7 @@ class Operations:
 
     def __post_init__(self) -> None:
         self._pool = ThreadPoolExecutor(_WAITING_ORDERS, thread_name_prefix='order')
-        self._place = asyncio.Lock()
-        self._speaks = False
-        self._given_back: str | None = None
+        self._place = HandlePlace(self.graph, self.beat, self._ask)
         self._played: _Played | None = None
         self._holder = _Holder()
         self._halts = 0
@@ -177,11 +154,11 @@ class Operations:
         graph, pictures = self.graph, self.graph.pictures
         self.beat.situation = Situation(
             holder=self.lease.holder,
-            speaks=self._speaks and bool(self.lease.holder),
+            speaks=self._place.speaks and bool(self.lease.holder),
             state_enabled=graph.client.state == 'ENABLED' and graph.ended is None,
             state_ns=graph.heard_ns,
             calibrating=graph.client.underway is not None,
-            source=graph.settings.source if self._speaks else '',
+            source=graph.settings.source if self._place.speaks else '',
             pictures=pictures.made,
             playing=self._played is not None,
             session=graph.client.session,
@@ -236,15 +213,15 @@ class Operations:
                 return await self._set(order)
             case Record():
                 service = RECORDER_START if order.on else RECORDER_STOP
-                return await self._ask(partial(self.graph.client.trigger, service, _PATIENCE_S))
+                return await self._ask(partial(self.graph.client.trigger, service, PATIENCE_S))
             case Acknowledge():
                 self.alarms.acknowledge(order.alarm)
                 return ''
             case Bags():
-                own = await self._ask(self._plant_of_the_graph)
+                own = await self._ask(self.graph.plant)
                 return await self._ask(self.explanations.listing) | {'own_plant': own}
             case Explain():
-                own = '' if order.plant else await self._ask(self._plant_of_the_graph)
+                own = '' if order.plant else await self._ask(self.graph.plant)
                 return await self.explanations.begin(
                     order.bag, order.plant, order.baseline, order.validate, own
                 )
@@ -256,18 +233,6 @@ class Operations:
     async def _ask[T](self, ask: Callable[[], T]) -> T:
         """Wait for the graph in a thread of the pool: the sockets go on meanwhile."""
         return await asyncio.get_running_loop().run_in_executor(self._pool, ask)
-
-    def _plant_of_the_graph(self) -> str:
-        """File of the plant that the graph simulates; a name of the shipped one, or empty."""
-        client = self.graph.client
-        try:
-            file, rig = (
-                read_parameter(client, f'motor_driver.{name}', _LISTED_S).value
-                for name in ('plant_file', 'rig_file')
-            )
-            return str(file or load_rig(rig or None).simulation.plant or NOMINAL)
-        except EndoscopeError:
-            return ''
 
     async def claim(self, client: Client, take: bool) -> str:
         """Make a client the operator; what became of it.
@@ -289,10 +254,10 @@ class Operations:
         if self._holder.client is not client:
             self._holder = _Holder(client)
         self._tell_beat()
-        async with self._place:
+        async with self._place.lock:
             try:
-                if not self._speaks:
-                    await self._take_the_place(take)
+                if not self._place.speaks:
+                    await self._place.take(take)
             except BaseException:
                 if self.lease.holder == client.id:
                     self.lease.release(client.id)
@@ -343,73 +308,14 @@ class Operations:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _take_the_place(self, take: bool) -> None:
-        """Become the one who speaks for the handle, and have the console follow it."""
-        graph = self.graph
-        settings = graph.settings = await self._ask(self._read_settings)
-        if graph.plays and not take:
-            raise OrderRefusedError(
-                f'the console plays (its source is {settings.source}): taking the controls would '
-                'end that'
-            )
-        own = ('console',) if settings.source in PLAYS else ()
-        others = [name for name in graph.others_at_the_handle() if name not in own]
-        if others:
-            raise OrderRefusedError(
-                f'{" and ".join(others)} speaks for the handle already; two of them would be a '
-                'fault: end it first'
-            )
-        if settings.source != FOLLOW_THE_HANDLE:
-            await self._ask(partial(self._set_console, source=FOLLOW_THE_HANDLE))
-            end = time.monotonic() + _PLACE_S
-            while graph.others_at_the_handle() and time.monotonic() < end:
-                await asyncio.sleep(_LOOK_S)
-            others = graph.others_at_the_handle()
-            if others:
-                await self._set_source_back(settings.source)
-                raise OrderRefusedError(f'{" and ".join(others)} goes on speaking for the handle')
-            # A session that begins while a node still knows of the old sender ends as a fault.
-            await asyncio.sleep(_SETTLED_S)
-        self._given_back = settings.source
-        graph.settings = Settings(FOLLOW_THE_HANDLE, settings.scale)
-        self._speaks = True
-
-    def _read_settings(self) -> Settings:
-        return Settings(**self._read_console('source', 'scale'))
-
-    def _read_console(self, *names: str) -> dict[str, Any]:
-        client = self.graph.client
-        return {
-            name: read_parameter(client, f'console.{name}', _PATIENCE_S).value for name in names
-        }
-
-    def _set_console(self, **values: Any) -> None:
-        set_parameters(self.graph.client, 'console', values, _PATIENCE_S)
-
     async def _give_back(self) -> None:
-        """Leave the handle to others, and the console as it was found."""
-        async with self._place:
-            if self.lease.holder or not self._speaks:
+        """Leave the handle to others, unless somebody has taken the controls meanwhile."""
+        async with self._place.lock:
+            if self.lease.holder or not self._place.speaks:
                 return
-            self._speaks = False
+            self._place.speaks = False
             self._tell_beat()
-            end = time.monotonic() + _SILENCED_S
-            while self.beat.said.speaks and time.monotonic() < end:
-                await asyncio.sleep(_LOOK_S)
-            await asyncio.sleep(_SETTLED_S)
-            source, self._given_back = self._given_back or FOLLOW_THE_HANDLE, None
-            try:
-                await self._set_source_back(source)
-            except GraphRefusedError as error:
-                self.graph.log(f'console.source {source}', '', '', False, str(error))
-            self.graph.ask_for_settings(time.monotonic_ns())
-
-    async def _set_source_back(self, source: str) -> None:
-        """Have the console follow what it did before, which begins no motion by itself."""
-        if source in PLAYS and self.graph.client.state == 'ENABLED':
-            await self._ask(partial(self.graph.client.ask, 'pause', _PATIENCE_S))
-        if source != FOLLOW_THE_HANDLE:
-            await self._ask(partial(self._set_console, source=source))
+            await self._place.give_back()
 
     async def _state(self, command: str) -> str:
         graph = self.graph.client
@@ -417,11 +323,11 @@ class Operations:
             # At once: no thread has to be free for it, and what was asked for before is over.
             self._halts += 1
             graph.order(command)
-            return await self._ask(partial(graph.ask, command, _PATIENCE_S))
+            return await self._ask(partial(graph.ask, command, PATIENCE_S))
         withdrawn = self._withdrawn()
         if command == 'home':
-            return await self._moving(command, partial(graph.home, _PATIENCE_S, withdrawn))
-        return await self._ask(partial(graph.ask_and_see, command, _PATIENCE_S, withdrawn))
+            return await self._moving(command, partial(graph.home, PATIENCE_S, withdrawn))
+        return await self._ask(partial(graph.ask_and_see, command, PATIENCE_S, withdrawn))
 
     def _withdrawn(self) -> Callable[[], bool]:
         """Whether something has ended motion since now."""
@@ -449,21 +355,14 @@ class Operations:
             raise OrderRefusedError('calibration was withdrawn before it began')
         client = self.graph.client
         first = client.calibration is None or client.calibration.level != 0
-        found = client.calibrate(patience_s=_PATIENCE_S)
+        found = client.calibrate(patience_s=PATIENCE_S)
         wanted = '' if client.compensator is None else client.compensator.values.get('wanted_mode')
         # What somebody has chosen stays; and nothing changes under a hand, or after a halt.
         at_rest = not withdrawn() and self.beat.said.state is not DeadManState.ENGAGED
-        if first and at_rest and wanted == CompensatorParameters.mode and _identified(found):
-            self._compensate(PHYSICAL)
+        if first and at_rest and wanted == CompensatorParameters.mode and identified(found):
+            self.graph.compensate(PHYSICAL)
             return f'{found.message}; the compensator is {PHYSICAL} now, and was {wanted}'
         return found.message
-
-    def _compensate(self, mode: str) -> None:
-        """Set the compensator's mode; the physical ones know the tube itself where it was found."""
-        physical = mode in (PHYSICAL, ADAPTIVE_PHYSICAL)
-        by_plant = physical and _identified(self.graph.client.calibration)
-        values = {'mode': mode, 'selected_by': BY_PLANT if by_plant else BY_CLASS}
-        set_parameters(self.graph.client, 'compensator', values, _PATIENCE_S)
 
     async def _play(self, client: Client, explanation: str) -> str:
         """Have the console play an experiment for as long as the operator holds on."""
@@ -473,8 +372,9 @@ class Operations:
         if self.graph.client.state != 'ENABLED':
             raise OrderRefusedError(f'the slave is {self.graph.client.state}: enable it first')
         values = {'command_file': str(file), 'hold_to_play': True, 'source': 'file'}
-        async with self._place:
-            before = await self._ask(partial(self._read_console, 'command_file', 'hold_to_play'))
+        async with self._place.lock:
+            changed = 'command_file', 'hold_to_play'
+            before = await self._ask(partial(self._place.read_console, *changed))
             if self.lease.holder != client.id or self._holder.moves:
                 raise OrderRefusedError('the controls were lost or taken to something else')
             # Said before it is so: whoever loses the controls meanwhile leaves nothing behind.
@@ -482,7 +382,7 @@ class Operations:
             holder.moves, holder.waits = _EXPERIMENT, True
             played = self._played = _Played(time.monotonic_ns(), before)
             try:
-                await self._ask(partial(self._set_console, **values))
+                await self._ask(partial(self._place.set_console, **values))
             except BaseException:
                 # It may have been set all the same, and only not answered.
                 self.soon(self._end_of_play())
@@ -493,14 +393,15 @@ class Operations:
 
     async def _end_of_play(self) -> None:
         """Have the console follow the handle again."""
-        async with self._place:
+        async with self._place.lock:
             if self._played is None:
                 return
-            before, self._played = self._played.before, None
+            before, self._played = dict(self._played.before), None
             if self._holder.moves == _EXPERIMENT:
                 self._holder.moves = ''
             try:
-                await self._ask(partial(self._set_console, source=FOLLOW_THE_HANDLE, **before))
+                before = before | {'source': FOLLOW_THE_HANDLE}
+                await self._ask(partial(self._place.set_console, **before))
             except GraphRefusedError as error:
                 self.graph.log(f'console.source {FOLLOW_THE_HANDLE}', '', '', False, str(error))
             self.graph.ask_for_settings(time.monotonic_ns())
@@ -509,10 +410,10 @@ class Operations:
         if order.scale is not None:
             if self.beat.said.state is DeadManState.ENGAGED:
                 raise OrderRefusedError('the scale changes only while nothing is held')
-            await self._ask(partial(self._set_console, scale=order.scale))
+            await self._ask(partial(self._place.set_console, scale=order.scale))
             self.graph.settings = Settings(self.graph.settings.source, order.scale)
         elif order.compensator is not None:
-            await self._ask(partial(self._compensate, order.compensator))
+            await self._ask(partial(self.graph.compensate, order.compensator))
         return ''
 
     async def close(self) -> None:

@@ -1,0 +1,109 @@
+"""The handle's place in the graph, which has room for one, and the console that follows it."""
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import Any, Protocol
+
+from endoscope_console.beat import Beat
+from endoscope_console.graph_side import PATIENCE_S, GraphSide, Settings
+from endoscope_console.orders import OrderRefusedError
+from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
+from endoscope_nodes.graph_listener import GraphRefusedError
+from endoscope_nodes.graph_parameters import read_parameter, set_parameters
+
+_PLACE_S = 5.0
+_LOOK_S = 0.05
+# Until all nodes know that a sender of the handle has gone.
+_SETTLED_S = 0.2
+_SILENCED_S = 2.0
+
+
+class Ask(Protocol):
+    """Waits for the graph in another thread."""
+
+    def __call__[T](self, ask: Callable[[], T]) -> Awaitable[T]:
+        """Return what asking gives."""
+        ...
+
+
+class HandlePlace:
+    """Lives in the thread of the sockets; `ask` waits for the graph in another.
+
+    Attributes
+    ----------
+    lock
+        Of whoever changes what the console follows.
+    speaks
+        Whether the server is the one who speaks for the handle.
+    """
+
+    def __init__(self, graph: GraphSide, beat: Beat, ask: Ask) -> None:
+        self.lock = asyncio.Lock()
+        self.speaks = False
+        self._graph, self._beat, self._ask = graph, beat, ask
+        self._found = FOLLOW_THE_HANDLE
+
+    async def take(self, take: bool) -> None:
+        """Become the one who speaks for the handle, and have the console follow it."""
+        graph = self._graph
+        settings = graph.settings = await self._ask(self._read_settings)
+        if graph.plays and not take:
+            raise OrderRefusedError(
+                f'the console plays (its source is {settings.source}): taking the controls would '
+                'end that'
+            )
+        own = ('console',) if settings.source in PLAYS else ()
+        others = [name for name in graph.others_at_the_handle() if name not in own]
+        if others:
+            raise OrderRefusedError(
+                f'{" and ".join(others)} speaks for the handle already; two of them would be a '
+                'fault: end it first'
+            )
+        if settings.source != FOLLOW_THE_HANDLE:
+            await self._ask(partial(self.set_console, source=FOLLOW_THE_HANDLE))
+            end = time.monotonic() + _PLACE_S
+            while graph.others_at_the_handle() and time.monotonic() < end:
+                await asyncio.sleep(_LOOK_S)
+            others = graph.others_at_the_handle()
+            if others:
+                await self._set_source_back(settings.source)
+                raise OrderRefusedError(f'{" and ".join(others)} goes on speaking for the handle')
+            # A session that begins while a node still knows of the old sender ends as a fault.
+            await asyncio.sleep(_SETTLED_S)
+        self._found = settings.source
+        graph.settings = Settings(FOLLOW_THE_HANDLE, settings.scale)
+        self.speaks = True
+
+    def _read_settings(self) -> Settings:
+        return Settings(**self.read_console('source', 'scale'))
+
+    def read_console(self, *names: str) -> dict[str, Any]:
+        """Values of the console node's parameters."""
+        client = self._graph.client
+        return {name: read_parameter(client, f'console.{name}', PATIENCE_S).value for name in names}
+
+    def set_console(self, **values: Any) -> None:
+        """Set parameters of the console node."""
+        set_parameters(self._graph.client, 'console', values, PATIENCE_S)
+
+    async def give_back(self) -> None:
+        """Leave the handle to others, and the console as it was found."""
+        end = time.monotonic() + _SILENCED_S
+        while self._beat.said.speaks and time.monotonic() < end:
+            await asyncio.sleep(_LOOK_S)
+        await asyncio.sleep(_SETTLED_S)
+        source, self._found = self._found, FOLLOW_THE_HANDLE
+        try:
+            await self._set_source_back(source)
+        except GraphRefusedError as error:
+            self._graph.log(f'console.source {source}', '', '', False, str(error))
+        self._graph.ask_for_settings(time.monotonic_ns())
+
+    async def _set_source_back(self, source: str) -> None:
+        """Have the console follow what it did before, which begins no motion by itself."""
+        if source in PLAYS and self._graph.client.state == 'ENABLED':
+            await self._ask(partial(self._graph.client.ask, 'pause', PATIENCE_S))
+        if source != FOLLOW_THE_HANDLE:
+            await self._ask(partial(self.set_console, source=source))
