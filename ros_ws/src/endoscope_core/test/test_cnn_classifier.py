@@ -1,5 +1,7 @@
 """The classifier that comes with the package, which judges without PyTorch."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,10 +12,10 @@ from endoscope_core.classifier.cnn_classifier import (
     CnnClassifier,
     HeldOutCalibration,
     Judgement,
-    calibration_of,
     cnn_shapes,
     course,
 )
+from endoscope_core.classifier.held_out_calibration import calibration_of, widest
 from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.dataset import CLASSES_DEG, random_instrument, record_calibration
 from endoscope_core.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
@@ -128,6 +130,8 @@ def test_intervals_hold_the_share_that_they_promise_and_known_tubes_pass():
     assert calibration.inflation == pytest.approx(3.0 * 1.645, rel=0.08)
     covered = np.abs(error[2000:]) <= calibration.inflation * deviation[2000:]
     assert 0.87 < np.mean(covered) < 0.93
+    smaller = HeldOutCalibration(0.5 * calibration.inflation, 2.0, 0.0)
+    assert widest([calibration, smaller]) == replace(calibration, ceiling=2.0)
     classifier = CnnClassifier({}, calibration, CLASSES_DEG, 'sinusoid')
     unlike = [
         reason

@@ -282,20 +282,3 @@ class CnnClassifier:
 
     def _half_width(self, judgement: Judgement) -> Array:
         return judgement.deviation * self.calibration.inflation
-
-
-def calibration_of(held_out: Judgement, true: Array, of_all_kinds: Judgement) -> HeldOutCalibration:
-    """Calibration on recordings of rigs held out, whose true sizes in rad are known.
-
-    Intervals: split conformal prediction with errors in units of the network's own deviation
-    (Lei et al., J. Am. Stat. Assoc. 113(523), 2018, sections 2.2 and 5.2). Refusals: of known
-    tubes as cells of every quality read them, half of what may be refused for either reason.
-    """
-    scores = np.sort(np.abs(held_out.size - true) / held_out.deviation)
-    rank = min(len(scores), math.ceil((len(scores) + 1) * LEVEL))
-    passed = 0.5 * (1.0 + KNOWN)
-    ceiling, doubt = (
-        float(np.quantile(column, passed, method='higher'))
-        for column in (of_all_kinds.distance, of_all_kinds.none)
-    )
-    return HeldOutCalibration(float(scores[rank - 1]), ceiling, doubt)

@@ -1,6 +1,5 @@
 """Trains the classifier on simulated rigs and measures, on others, how far it is to be trusted."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,33 +25,28 @@ from endoscope_core.classifier.cnn_classifier import (
     OWN_OUTPUTS,
     UNIT,
     CnnClassifier,
-    HeldOutCalibration,
-    Judgement,
-    calibration_of,
     evaluated,
     first,
     logarithm,
     stretched,
 )
 from endoscope_core.classifier.disturbance import (
-    READING_PERIODS,
     STRANGE,
     SUBTLE,
     read,
     read_of_all_kinds,
 )
+from endoscope_core.classifier.held_out_calibration import Report, calibrated, counted
 from endoscope_core.classifier.tension_cnn import TensionCnn
 from endoscope_core.dataset import CLASSES_DEG
 from endoscope_core.dataset.training_rigs import (
     TrainingRigs,
-    held_out_rigs,
     strange_rigs,
     training_rigs,
 )
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
-Report = Callable[[str], None]
 
 KEPT_EVERY = 500
 """Steps after which the training is kept, to be resumed."""
@@ -114,17 +108,17 @@ class TrainedCnn:
     Parameters
     ----------
     classifier : CnnClassifier
+    held_out : dict
+        What the rigs held out say for each instrument and reading rate: share of right classes,
+        rms error of the size in deg, share of sizes in their interval, and of rigs refused. Half of
+        the rigs calibrate the intervals that the other half is judged by.
     curve : list of tuple of (int, float)
         Steps and mean loss since the entry before.
-    held_out : dict
-        What the rigs held out say for each reading rate: share of right classes, rms error of the
-        size in deg, share of sizes in their interval, and of rigs refused. Half of the rigs
-        calibrate the intervals that the other half is judged by.
     """
 
     classifier: CnnClassifier
+    held_out: dict[str, dict[str, float]]
     curve: list[tuple[int, float]]
-    held_out: dict[str, Any]
 
 
 def train_cnn(
@@ -155,36 +149,14 @@ def train_cnn(
     sources = (
         ('rigs to train with', training_rigs, settings.rigs),
         ('strange recordings', strange_rigs, settings.strange),
-        ('rigs held out', held_out_rigs, settings.held_out),
     )
-    known, strange, held_out = (
-        make(seed, count, motion, begin, _counted(report, name)) for name, make, count in sources
+    known, strange = (
+        make(seed, count, motion, begin, counted(report, name)) for name, make, count in sources
     )
     source = {'motion': motion, 'seed': seed}
     network, curve = _trained(known, strange, source, settings, kept, report)
     weights = network.weights() | _white(network, known, seed)
-    unlimited = HeldOutCalibration(1.0, np.inf, np.inf)
-    raw = CnnClassifier(weights, unlimited, CLASSES_DEG, motion)
-    judgements = {
-        period: _judged(
-            raw, read(held_out.tension, np.random.default_rng([seed, 6, period]), period)
-        )
-        for period in READING_PERIODS
-    }
-    of_all_kinds = _judged(
-        raw, read_of_all_kinds(held_out.tension, np.random.default_rng([seed, 8]))
-    )
-    calibration, halved = (
-        _calibration(judgements, held_out.size, of_all_kinds, rows)
-        for rows in (slice(None), slice(0, None, 2))
-    )
-    judge = CnnClassifier(weights, halved, CLASSES_DEG, motion)
-    rest = slice(1, None, 2)
-    told = {
-        f'{1000 // period} Hz': _figures(judge, _rows(j, rest), held_out.size[rest])
-        for period, j in judgements.items()
-    }
-    return TrainedCnn(CnnClassifier(weights, calibration, CLASSES_DEG, motion), curve, told)
+    return TrainedCnn(*calibrated(weights, motion, seed, settings.held_out, report), curve)
 
 
 def description_of(trained: TrainedCnn, settings: CnnTraining, seed: int, command: str) -> dict:
@@ -322,59 +294,6 @@ def _white(network: TensionCnn, known: TrainingRigs, seed: int) -> dict[str, Sin
         'centre': features.mean(axis=0).astype(np.float32),
         'whitening': np.ascontiguousarray(whitening, dtype=np.float32),
     }
-
-
-def _judged(classifier: CnnClassifier, readings: Single) -> Judgement:
-    parts = [
-        classifier.judged(logarithm(stretched(part)))
-        for part in np.array_split(readings, max(1, len(readings) // 64))
-    ]
-    return _joined(parts)
-
-
-def _joined(parts: list[Judgement]) -> Judgement:
-    return Judgement(*(np.concatenate(each) for each in zip(*map(_columns, parts), strict=True)))
-
-
-def _rows(judgement: Judgement, rows: slice) -> Judgement:
-    return Judgement(*(column[rows] for column in _columns(judgement)))
-
-
-def _columns(judgement: Judgement) -> tuple[Array, ...]:
-    return tuple(vars(judgement).values())
-
-
-def _calibration(
-    judgements: dict[int, Judgement], size: Array, of_all_kinds: Judgement, rows: slice
-) -> HeldOutCalibration:
-    parts = [_rows(judgement, rows) for judgement in judgements.values()]
-    return calibration_of(
-        _joined(parts), np.tile(size[rows], len(parts)), _rows(of_all_kinds, rows)
-    )
-
-
-def _figures(judge: CnnClassifier, judgement: Judgement, size: Array) -> dict[str, float]:
-    results = judge.results(judgement)
-    refused = [bool(reason) for reason in judge.reasons_to_refuse(judgement)]
-    nearest = [min(CLASSES_DEG, key=lambda c: abs(np.deg2rad(c) - true)) for true in size]
-    right = [result.class_deg == each for result, each in zip(results, nearest, strict=True)]
-    holds = [result.holds(true) for result, true in zip(results, size.tolist(), strict=True)]
-    return {
-        'nearest_class_right': round(float(np.mean(right)), 4),
-        'size_rmse_deg': round(
-            float(np.rad2deg(np.sqrt(np.mean((judgement.size - size) ** 2)))), 3
-        ),
-        'intervals_hold': round(float(np.mean(holds)), 4),
-        'refused': round(float(np.mean(refused)), 4),
-    }
-
-
-def _counted(report: Report, name: str) -> Callable[[int, int], None]:
-    def count(done: int, total: int) -> None:
-        if done % 500 == 0 or done == total:
-            report(f'{name}: {done} of {total}')
-
-    return count
 
 
 def _as_input(courses: Single) -> Tensor:

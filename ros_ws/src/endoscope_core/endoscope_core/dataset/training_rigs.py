@@ -42,6 +42,8 @@ FADING = ('joint_rest_angle', 'joint_presliding_spread')
 _EXTREME = 0.2
 _STRAIGHT, _BENT = np.deg2rad([60.0, 240.0])
 _SLIPPERY, _ROUGH = (0.1, 0.8), (1.0, 1.5)
+_DRAWS = 10
+"""For each rig held out, at most."""
 _EARLIER = 1000
 """Samples of the motion before the calibration."""
 
@@ -93,14 +95,23 @@ def training_rigs(
 
 
 def held_out_rigs(
-    seed: int, count: int, motion: str, begin: int, progress: Progress | None = None
+    seed: int,
+    count: int,
+    motion: str,
+    begin: int,
+    progress: Progress | None = None,
+    share: float = 0.0,
 ) -> TrainingRigs:
-    """Rigs as data sets hold them, as many nearest to each class, none of them trained on."""
+    """Rigs as data sets hold them, none of them trained on, as many nearest to each class.
+
+    They are off from the recorded instrument, or for a `share` of one from the nominal slave.
+    Fewer are found where an instrument hardly has a class, as the nominal slave has 40 deg.
+    """
     left = dict.fromkeys(CLASSES_DEG, math.ceil(count / len(CLASSES_DEG)))
 
     def draw(generator: np.random.Generator) -> PlantDescription:
         # Small sizes, which are rare, are those of nearly straight tubes.
-        return _tube(generator, (0.0, MOST_BENT * generator.random()))
+        return _tube(generator, (0.0, MOST_BENT * generator.random()), share=share)
 
     def wanted(size: float) -> bool:
         nearest = 10 * round(math.degrees(size) / 10.0)
@@ -109,7 +120,9 @@ def held_out_rigs(
         left[nearest] -= 1
         return True
 
-    return _simulated([seed, 2], count, motion, begin, draw, wanted, progress)
+    return _simulated(
+        [seed, 2, round(share)], count, motion, begin, draw, wanted, progress, _DRAWS * count
+    )
 
 
 def strange_rigs(
@@ -150,12 +163,13 @@ def _simulated(
     draw: Callable[[np.random.Generator], PlantDescription],
     wanted: Callable[[float], bool],
     progress: Progress | None,
+    most: float = math.inf,
 ) -> TrainingRigs:
     recorded, sinusoid = calibration_motion(motion), calibration_motion()
     tensions: list[NDArray[np.float32]] = []
     found: list[float] = []
     number = 0
-    while len(found) < count:
+    while len(found) < count and number < most:
         generator = np.random.default_rng([*seed, number])
         number += 1
         try:
@@ -192,13 +206,18 @@ def _size(whole: PlantTrajectory, sinusoid: CalibrationMotion) -> float:
 
 
 def _tube(
-    generator: np.random.Generator, bends: tuple[float, float], widening: float = 1.0
+    generator: np.random.Generator,
+    bends: tuple[float, float],
+    widening: float = 1.0,
+    share: float | None = None,
 ) -> PlantDescription:
     instrument = random_instrument(generator, widening)
     unevenness = widening * generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS)
     plant = in_tube(instrument, generator.uniform(*bends), unevenness)
-    beyond = 0.5 * (widening - 1.0)
-    return towards_nominal(plant, generator.uniform(-beyond, 1.0 + beyond))
+    if share is None:
+        beyond = 0.5 * (widening - 1.0)
+        share = generator.uniform(-beyond, 1.0 + beyond)
+    return towards_nominal(plant, share)
 
 
 def towards_nominal(plant: PlantDescription, share: float) -> PlantDescription:
