@@ -107,9 +107,11 @@ def test_a_zero_that_is_off_is_told_with_the_class_or_the_refusal(tmp_path):
         graph.advance(5.0)
         status = graph.results[-1].status[0]
         values = {v.key: v.value for v in status.values}
-        assert float(values['zero_error.wire_x_neg']) == pytest.approx(0.6, abs=0.05)
+        found = float(values['zero_error.wire_x_neg'])
+        assert found == pytest.approx(0.6, abs=0.05)
         assert abs(float(values['zero_error.wire_x_pos'])) < 0.05
-        assert 'zero of a load cell is off: wire_x_neg by +0.6' in status.message
+        told = f'zero of a load cell is off: wire_x_neg by +{found:.2g} N'
+        assert told in status.message
         assert 'wire_y' not in status.message
 
 

@@ -67,8 +67,6 @@ def _print(name: str, found: object) -> None:
 
     shares = [100.0 * getattr(found, key) for key in ('right', 'wrong', 'refused')]
     rmse, holds = np.rad2deg(found.rmse), 100.0 * found.holds  # type: ignore[attr-defined]
-    print(
-        f'{name:36s} {shares[0]:5.1f} % {shares[1]:5.1f} % {shares[2]:6.1f} %  {rmse:6.2f} deg  '
-        f'{holds:6.1f} %',
-        flush=True,
-    )
+    line = f'{name:36s} {shares[0]:5.1f} % {shares[1]:5.1f} % {shares[2]:6.1f} %  '
+    told = '     -           -' if np.isnan(rmse) else f'{rmse:6.2f} deg  {holds:6.1f} %'
+    print(line + told, flush=True)
