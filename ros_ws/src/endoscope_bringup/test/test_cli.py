@@ -112,7 +112,6 @@ def test_a_defect_is_one_line_that_says_where_and_keeps_its_traceback_for_debug(
     [
         ('expain', "unknown 'expain': did you mean explain?"),
         ('operate statu', "unknown 'statu': did you mean status?"),
-        ('train --model sise', "unknown 'sise': did you mean size?"),
         ('explain bag --plnat p.yaml', 'unknown option --plnat: did you mean --plant?'),
         ('record --topcs a', 'unknown option --topcs: did you mean --topics?'),
         ('--log-levle debug demo', 'unknown option --log-levle: did you mean --log-level?'),

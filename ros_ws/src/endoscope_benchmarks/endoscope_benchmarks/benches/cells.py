@@ -3,6 +3,7 @@
 import argparse
 
 from endoscope_bringup.seed_argument import seed
+from endoscope_core.errors import EndoscopeError
 
 _PERIODS_MS = (1, 5, 10)
 _ZEROS_N = (0.0, 0.02, 0.05, 0.1, 0.2, 0.5)
@@ -38,8 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.dataset import CLASSES_DEG
 
     if args.tubes < 1:
-        print('endoscope bench cells: --tubes: give at least 1')
-        return 2
+        raise EndoscopeError(f'--tubes {args.tubes}: give at least 1')
     classifier = load_classifier(motion=args.motion)
     tubes = tubes_of_sizes(args.seed, CLASSES_DEG, args.tubes, args.motion)
     print(f'{args.motion}, seed {args.seed}, {len(tubes.size)} tubes')
