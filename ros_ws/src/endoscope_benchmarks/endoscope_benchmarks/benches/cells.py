@@ -3,7 +3,7 @@
 import argparse
 
 from endoscope_bringup.seed_argument import seed
-from endoscope_core.errors import EndoscopeError
+from endoscope_bringup.subcommands import COUNT
 
 _PERIODS_MS = (1, 5, 10)
 _ZEROS_N = (0.0, 0.02, 0.05, 0.1, 0.2, 0.5)
@@ -21,7 +21,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'are slow, exchanged or unplugged, and in tubes of 30 and 120 deg: right, wrong, refused.',
     )
     parser.add_argument('--seed', type=seed, default=1, help='chooses rigs, tubes and noise (1)')
-    parser.add_argument('--tubes', type=int, default=20, metavar='N', help='tubes a class (20)')
+    parser.add_argument('--tubes', type=COUNT, default=20, metavar='N', help='tubes a class (20)')
     parser.add_argument(
         '--motion', default='sinusoid', help='calibration motion: sinusoid or brief (sinusoid)'
     )
@@ -38,8 +38,6 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.classifier.shipped import load_classifier
     from endoscope_core.dataset import CLASSES_DEG
 
-    if args.tubes < 1:
-        raise EndoscopeError(f'--tubes {args.tubes}: give at least 1')
     classifier = load_classifier(motion=args.motion)
     tubes = tubes_of_sizes(args.seed, CLASSES_DEG, args.tubes, args.motion)
     print(f'{args.motion}, seed {args.seed}, {len(tubes.size)} tubes')
