@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from endoscope_bringup.seed_argument import seed
+from endoscope_bringup.subcommands import COUNT
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -30,10 +31,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     parser.add_argument('--seed', type=seed, default=0, help='of rigs, weights and batches (0)')
     parser.add_argument(
-        '--n', type=int, default=5000, metavar='N', help='rigs to train with (5000)'
+        '--n', type=COUNT, default=5000, metavar='N', help='rigs to train with (5000)'
     )
     parser.add_argument(
-        '--steps', type=int, default=6000, metavar='N', help='steps of 64 recordings (6000)'
+        '--steps', type=COUNT, default=6000, metavar='N', help='steps of 64 recordings (6000)'
     )
     parser.add_argument(
         '--plots', type=Path, metavar='DIR', help='new folder for an SVG plot of the training curve'
