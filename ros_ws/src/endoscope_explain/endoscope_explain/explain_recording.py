@@ -22,10 +22,10 @@ from endoscope_explain.fit.baseline import against_baseline
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.intervals import nominal_estimates
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.fit.nominal import all_anchors, anchored, simulated_bending
+from endoscope_explain.fit.nominal import Anchors, all_anchors, anchored, beside
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.held_noise import with_held_noise
-from endoscope_explain.observe.observation import JointObservation, couple, observe
+from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.recording import Recording
 from endoscope_explain.search.levels import MOST_EFFECTS, JointSearch, search
 from endoscope_explain.search.refit import Composition
@@ -37,6 +37,12 @@ LEAST_MOTION_RAD = 0.01
 """Of the shaft."""
 SAME_RIG = 0.03
 """Relative tolerance of a nominal parameter from one recording of a rig to the next."""
+ROUNDS = 3
+"""In which both joints are explained beside each other, if they still change: the second one sees
+what the first one made of the other, and the third tells that it stands."""
+
+Explained = tuple[JointSearch, Decision]
+Variant = tuple[str, tuple[float, ...]]
 
 
 def explain_recording(
@@ -90,25 +96,13 @@ def explain_recording(
         band = SAME_RIG
     observations, anchors = anchored(recording, observations, well, band, jobs)
 
-    def explained(index: int) -> tuple[JointSearch, Decision]:
-        joint = observations[index].joint
+    def explained(pair: Anchors) -> Explained:
         if given is not None:
-            return explained_by(anchors[index], given[joint], jobs)
-        tried = search(anchors[index], jobs, most_effects, left_out)
+            return explained_by(pair, given[pair[0].model.observation.joint], jobs)
+        tried = search(pair, jobs, most_effects, left_out)
         return tried, decide(tried, jobs)
 
-    searches, decisions = [], []
-    for index, observation in enumerate(observations):
-        tell(f'searching what {observation.joint} lacks')
-        tried, decision = explained(index)
-        searches.append(tried)
-        decisions.append(decision)
-    for joint in _misled_by_the_other(decisions):
-        tell(
-            f'searching what {observations[joint].joint} lacks beside the other joint as explained'
-        )
-        couple(observations, tuple(simulated_bending(d.chosen.fit) for d in decisions))
-        searches[joint], decisions[joint] = explained(joint)
+    searches, decisions = _explained_together(anchors, explained, tell)
     tell('judging on held-out blocks')
     effects = named(observations, decisions)
     return Explanation(
@@ -158,14 +152,32 @@ def _healthy(
     return seen, plant_of(plant, healthy)
 
 
-def _misled_by_the_other(decisions: list[Decision]) -> list[int]:
-    """Joints not explained while the other one, which may move them, was taken for nominal."""
-    return [
-        i
-        for i, decision in enumerate(decisions)
-        if not decision.adequate
-        and any(other.chosen.terms for other in decisions if other is not decision)
-    ]
+def _explained_together(
+    anchors: list[Anchors], explained: Callable[[Anchors], Explained], tell: Progress
+) -> tuple[list[JointSearch], list[Decision]]:
+    """Explain each joint beside the other as that is explained, until neither changes.
+
+    Where the nominal plant leaves no more than noise, nothing that the other joint does is missing.
+    """
+    found = []
+    for pair in anchors:
+        tell(f'searching what {pair[0].model.observation.joint} lacks')
+        found.append(explained(pair))
+    # What each joint was explained beside: the other one without any term, at first.
+    seen: list[tuple[Variant, ...]] = [() for _ in anchors]
+    for index in [0, 1] * ROUNDS if len(anchors) == 2 else []:
+        (_, of_other), (_, own) = found[1 - index], found[index]
+        if (not own.chosen.terms and own.adequate) or seen[index] == _variants(of_other):
+            continue
+        joint = anchors[index][0].model.observation.joint
+        tell(f'searching what {joint} lacks beside the other joint as explained')
+        seen[index] = _variants(of_other)
+        found[index] = explained(beside(anchors[index], of_other.chosen.fit))
+    return [tried for tried, _ in found], [decision for _, decision in found]
+
+
+def _variants(decision: Decision) -> tuple[Variant, ...]:
+    return tuple(term.variant for term in decision.chosen.terms)
 
 
 def _is_enough(observations: tuple[JointObservation, ...]) -> bool:

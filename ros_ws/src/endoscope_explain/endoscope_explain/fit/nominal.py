@@ -17,11 +17,13 @@ from endoscope_explain.fit.isolated_samples import without_isolated
 from endoscope_explain.fit.model import Fit, JointModel, fit, jacobian
 from endoscope_explain.fit.simulated_joint import packed_joint, simulate_joint
 from endoscope_explain.fit.whiteness import is_noise
-from endoscope_explain.observe.observation import JointObservation, couple
+from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
+Anchors = tuple[Fit, Fit]
+"""A joint's nominal plant refitted, and as described."""
 Flags = NDArray[np.bool_]
 
 FINISHED = 20
@@ -40,7 +42,7 @@ def anchored(
     plant: PlantDescription,
     band: float,
     jobs: int,
-) -> tuple[tuple[JointObservation, ...], list[tuple[Fit, Fit]]]:
+) -> tuple[tuple[JointObservation, ...], list[Anchors]]:
     """Fit the nominal plant, and once more where that shows isolated wrong samples.
 
     Parameters
@@ -60,8 +62,8 @@ def anchored(
     -------
     observations : tuple of JointObservation
         Without the samples that stick out.
-    anchors : list of (Fit, Fit)
-        Of each joint, refitted and as described.
+    anchors : list of Anchors
+        Of each joint, beside the other as refitted.
     """
     packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
     anchors = all_anchors(observations, packed, jobs, band)
@@ -76,11 +78,29 @@ def all_anchors(
     packed: dict[str, tuple[Array, Flags]],
     jobs: int,
     band: float = BAND,
-) -> list[tuple[Fit, Fit]]:
-    """Refit the nominal plant of every joint, and let the joints see each other's angle."""
+) -> list[Anchors]:
+    """The nominal plant of every joint, each beside the other as refitted."""
     anchors = parallel_map(lambda o: nominal_anchors(o, *packed[o.joint], band), observations, jobs)
-    couple(observations, tuple(simulated_bending(fitted) for fitted, _ in anchors))
-    return anchors
+    if len(anchors) != 2:
+        return anchors
+    return [beside(pair, other) for pair, (other, _) in zip(anchors, anchors[::-1], strict=True)]
+
+
+def beside(anchors: Anchors, other: Fit) -> Anchors:
+    """A joint's anchors where the other joint moves as it does in a fit of its own."""
+    angle = simulated_bending(other)
+    fitted, described = (_seen_with(one, angle) for one in anchors)
+    return fitted, described
+
+
+def _seen_with(one: Fit, angle: Array) -> Fit:
+    model = replace(one.model, observation=one.model.observation.beside(angle))
+    residuals = model.residuals(one.theta)
+    if np.array_equal(residuals, one.residuals):
+        # Nothing that the plant has depends on the other joint.
+        return replace(one, model=model)
+    slopes = jacobian(model, one.theta)
+    return Fit(model, one.theta, residuals, slopes, model.cost(residuals, one.theta))
 
 
 def simulated_bending(fitted: Fit) -> Array:
@@ -94,7 +114,7 @@ def nominal_anchors(
     base: Array,
     flags: Flags,
     band: float = BAND,
-) -> tuple[Fit, Fit]:
+) -> Anchors:
     """The nominal plant refitted, and as described, each with its derivative.
 
     Parameters

@@ -113,17 +113,16 @@ class JointObservation:
         channels = tuple(replace(c, stamps=c.stamps.coarser(factor)) for c in self.channels)
         return replace(self, inputs=inputs, channels=channels, tick=factor * self.tick)
 
+    def beside(self, other: Array) -> 'JointObservation':
+        """The same readings with the other joint's bending angle (N,) in rad on ticks."""
+        inputs = self.inputs.copy()
+        inputs[0, :, IN_OTHER_JOINT] = other
+        return replace(self, inputs=inputs)
+
     def slices(self) -> tuple[slice, ...]:
         """Place of each channel in a residual vector of all channels."""
         ends = np.cumsum([0, *(len(channel.time) for channel in self.channels)])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-
-
-def couple(observations: tuple[JointObservation, ...], bending: tuple[Array, ...]) -> None:
-    """Enter each joint's simulated bending angle (N,) as the other joint's input, in place."""
-    if len(observations) == 2:
-        for observation, other in zip(observations, reversed(bending), strict=True):
-            observation.inputs[0, :, IN_OTHER_JOINT] = other
 
 
 def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObservation, ...]:

@@ -10,7 +10,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.fit.evidence import log_evidence, weights
 from endoscope_explain.fit.intervals import intervals, may_be_absent
 from endoscope_explain.fit.model import fit, jacobian
-from endoscope_explain.fit.nominal import nominal_anchors
+from endoscope_explain.fit.nominal import beside, nominal_anchors
 from endoscope_explain.fit.other_forms import other_forms
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.fit.valleys import out_of_valleys
@@ -26,6 +26,21 @@ def anchors(one_joint, *effects, band=0.15):
     true = one_joint.rig(*(EffectSpec(name, 'bend_x', values) for name, values in effects))
     (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
     return nominal_anchors(observation, *packed_joint(plant, 'bend_x'), band)
+
+
+def test_beside_another_joint_a_fit_is_another_one_and_the_old_one_stays(one_joint):
+    coupled = EffectSpec('cross_coupling', 'bend_x', {'moment_per_rad': 0.0015})
+    for effects, moved in (((), False), ((coupled,), True)):
+        plant = one_joint.rig(*effects)
+        (observation,) = observe(one_joint.record(plant, one_joint.motion()), plant)
+        pair = nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+        before = pair[0].model.residuals(pair[0].theta)
+        seen, described = beside(pair, pair[0])
+        np.testing.assert_array_equal(pair[0].model.residuals(pair[0].theta), before)
+        np.testing.assert_array_equal(seen.model.residuals(seen.theta), seen.residuals)
+        assert np.array_equal(seen.residuals, before) is not moved
+        assert np.array_equal(seen.jacobian, pair[0].jacobian) is not moved
+        assert np.array_equal(described.residuals, pair[1].residuals) is not moved
 
 
 def evenly(found):
