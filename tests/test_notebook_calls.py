@@ -4,6 +4,7 @@ import inspect
 import pydoc
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import endoscope_explain
 from endoscope_bringup.cli import main
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import EffectSpec, PlantDescription, load_plant, save_plant
+from endoscope_core.rig import shipped_rig
 
 TIME = np.arange(0.0, 1.0, 1e-3)
 
@@ -219,6 +221,22 @@ def test_arrays_command_joints_or_shafts(tmp_path):
     [axis] = figure.axes
     assert len(axis.lines) == 2
     assert axis.lines[0].get_ydata() == pytest.approx(np.degrees(of_joint[name].values))
+
+
+@pytest.mark.timeout(900)
+def test_desired_angles_are_times_the_gear_of_the_rig_that_was_recorded(tmp_path):
+    rig = replace(shipped_rig(), joints=replace(shipped_rig().joints, gear=0.6, drive=2.5))
+    time = np.arange(0.0, 6.0, 1e-3)
+    commands = {'time': time, 'bend_x': 1.2 * np.sin(2.2 * time)}
+    bag = endoscope_explain.simulate(PLANT, commands, noise=5, out=tmp_path / 'bag', rig=rig)
+    told = []
+    found, mistaken = (
+        endoscope_explain.explain(bag, one_joint(), quick=True, rig=each, progress=told.append)
+        for each in (None, shipped_rig())
+    )
+    assert found.verdict == 'consistent'
+    assert any('times the gear, 0.6,' in each for each in told)
+    assert mistaken.verdict != 'consistent'
 
 
 @pytest.mark.parametrize(

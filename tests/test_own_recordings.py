@@ -1,5 +1,7 @@
 """Recordings of the simulated slave through the live graph, explained with its own plant."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from private_domain import private_domain
@@ -7,6 +9,7 @@ from private_domain import private_domain
 from endoscope_bags.cutting import cut
 from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
 from endoscope_core.physics import PlantDescription
+from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.many_bags import explained_case
@@ -52,8 +55,41 @@ def stretch(request, recorded, tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope='module')
+def of_another_rig(tmp_path_factory):
+    """Motions of a rig with another gear, slower motors and less patience, with a pause in one."""
+    shipped = shipped_rig()
+    rig = replace(
+        shipped,
+        joints=replace(shipped.joints, gear=0.6, drive=2.5),
+        motors=replace(shipped.motors, speed=2.5, acceleration=150.0),
+        timeouts=replace(shipped.timeouts, command=0.04),
+    )
+    bag = tmp_path_factory.mktemp('other') / 'bag'
+    with LiveGraph(bag, private_domain(), lock_step=True, overrides={}, rig=rig) as graph:
+        graph.client.ask('enable')
+        graph.set('console', source='motion', motion='periodic')
+        graph.advance(2.2)
+        graph.set('console', source='none')
+        graph.advance(1.0)
+        graph.set('console', source='motion', motion='non_periodic')
+        graph.advance(2.0)
+        graph.stop()
+    return bag, rig
+
+
+def test_limits_and_gear_are_those_of_the_rig_that_was_recorded(of_another_rig):
+    bag, rig = of_another_rig
+    assert recording_from_bag(bag, PLANT).rig == rig
+    assert_as_described(bag)
+
+
 def test_what_is_simulated_is_what_was_in_force(stretch):
-    recording = recording_from_bag(stretch, PLANT)
+    assert_as_described(stretch)
+
+
+def assert_as_described(bag):
+    recording = recording_from_bag(bag, PLANT)
     assert any('in its motion sessions is simulated' in note for note in recording.notes)
     audit = audit_recording(recording, PLANT)
     assert audit.faults() == ()

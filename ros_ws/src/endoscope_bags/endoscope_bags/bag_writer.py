@@ -52,6 +52,9 @@ class BagWriter:
         A chunk is closed when it spans this time or exceeds this size, whatever comes first.
     threaded
         Compress and write chunks in a thread, for callers that must not stall.
+    records
+        Metadata records by name, which stand before all messages: a recording that is cut off has
+        them.
 
     Attributes
     ----------
@@ -75,6 +78,7 @@ class BagWriter:
         chunk_seconds: float = CHUNK_SECONDS,
         chunk_bytes: int = CHUNK_BYTES,
         threaded: bool = False,
+        records: Mapping[str, dict[str, str]] | None = None,
     ) -> None:
         self.path = Path(path)
         if self.path.exists() or self.path.is_symlink():
@@ -94,7 +98,7 @@ class BagWriter:
         self._home = self._make_home(atomic)
         file_path = self._home if self._bare else self._home / self._file_name
         try:
-            self._sink = ChunkSink(file_path, threaded=threaded)
+            self._sink = ChunkSink(file_path, records or {}, threaded=threaded)
         except BagWriteError:
             self._remove_home()
             raise

@@ -45,6 +45,8 @@ class ChunkSink:
     ----------
     path
         The file to make.
+    records
+        Metadata records that stand first.
     threaded
         Encode and write in a thread; errors then come with a later call.
 
@@ -61,7 +63,9 @@ class ChunkSink:
         There is no room for the beginning.
     """
 
-    def __init__(self, path: Path, *, threaded: bool) -> None:
+    def __init__(
+        self, path: Path, records: Mapping[str, dict[str, str]], *, threaded: bool
+    ) -> None:
         self.lost_counts: Counter[int] = Counter()
         self.start_ns = 0
         self.end_ns = 0
@@ -76,6 +80,8 @@ class ChunkSink:
         try:
             self._require_room(0)
             self._mcap = McapFile(self._file, LIBRARY)
+            for name, content in records.items():
+                self._mcap.add_metadata(name, content)
         except (BagWriteError, OSError):
             self.abandon()
             raise

@@ -8,6 +8,7 @@ from endoscope_bags.errors import BagError
 from endoscope_bags.information import LOST_PREFIX, losses_told
 from endoscope_bags.message_types import MessageType
 from endoscope_bags.recording import open_bag
+from endoscope_bags.rig_record import copied_rig_record
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_bags.topic import RawMessage
 from endoscope_core.errors import printable
@@ -79,7 +80,7 @@ def cut(source: str | Path, target: str | Path, begin: float, end: float | None)
         if topic.qos and all(q.durability == 'transient_local' for q in topic.qos)
     }
     in_force: dict[str, RawMessage] = {}
-    with BagWriter(target) as writer:
+    with BagWriter(target, records=copied_rig_record(recording)) as writer:
         for topic in recording.topics.values():
             kind = MessageType(topic.type, topic.definition, topic.type_hash)
             writer.add_topic(topic.name, kind, topic.qos)

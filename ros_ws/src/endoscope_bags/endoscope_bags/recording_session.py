@@ -9,8 +9,10 @@ from endoscope_bags.bag_writer import CHUNK_SECONDS, BagWriter
 from endoscope_bags.errors import BagWriteError
 from endoscope_bags.information import LOST_PREFIX
 from endoscope_bags.qos_profile import QosProfile
+from endoscope_bags.rig_record import rig_record
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_core.atomic_output import with_final_names
+from endoscope_core.rig import Rig
 
 _STALE_CHUNK_NS = round(1.25e9 * CHUNK_SECONDS)
 
@@ -107,6 +109,8 @@ class RecordingSession:
     ----------
     path
         Folder or ``.mcap`` to write; what is there when the process is killed can be recovered.
+    rig
+        What is recorded; None where it is not known.
     threaded
         Compress and write in a thread.
 
@@ -118,8 +122,9 @@ class RecordingSession:
         There is no room even for the beginning.
     """
 
-    def __init__(self, path: str | Path, *, threaded: bool = True) -> None:
-        self._writer = BagWriter(path, atomic=False, threaded=threaded)
+    def __init__(self, path: str | Path, *, rig: Rig | None = None, threaded: bool = True) -> None:
+        records = {} if rig is None else rig_record(rig)
+        self._writer = BagWriter(path, atomic=False, threaded=threaded, records=records)
         self._sources: list[_Source] = []
         self._full = ''
         self._ended = 'on request'

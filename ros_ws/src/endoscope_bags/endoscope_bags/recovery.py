@@ -6,6 +6,7 @@ from pathlib import Path
 from endoscope_bags.bag_writer import BagWriter
 from endoscope_bags.message_types import MessageType
 from endoscope_bags.recording import Recording, open_bag
+from endoscope_bags.rig_record import copied_rig_record
 from endoscope_core.errors import printable
 
 
@@ -56,7 +57,7 @@ def recover(source: str | Path, target: str | Path) -> RecoveryReport:
         is full. Nothing is left at `target` then.
     """
     recording = open_bag(source, salvage=True)
-    with BagWriter(target) as writer:
+    with BagWriter(target, records=copied_rig_record(recording)) as writer:
         _copy(recording, writer)
         writer.close({'recovered_from': Path(source).name, **_numbered(recording.damage)})
         counts = writer.counts

@@ -9,7 +9,7 @@ from endoscope_benchmarks.real.takes import KGF, Take, between_cycles, read, req
 from endoscope_benchmarks.trials.real_recordings import recordings_folder
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics.simulator import simulate
-from endoscope_explain.recording.signals import gear
+from endoscope_core.rig import shipped_rig
 
 FOLDER = recordings_folder()
 recorded = pytest.mark.skipif(
@@ -23,7 +23,7 @@ def simulated():
     """A take of the described plant itself."""
     time = np.arange(12_000) * 1e-3
     command = np.sin(2.0 * np.pi / 5.0 * time)
-    answer = simulate(PLANT, gear() * command[:, None])
+    answer = simulate(PLANT, shipped_rig().joints.gear * command[:, None])
     seen = slice(None, None, 25)
     return Take(
         'simulated',

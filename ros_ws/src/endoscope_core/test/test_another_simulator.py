@@ -52,7 +52,8 @@ def rmse_of_methods(seed, size_deg):
     # Both joints are alike here: one is simulated, each of the four cells has its own noise.
     read = SensorModel(tube.plant.sensors, seed).tension(np.hstack([tension, tension]))
     verdict = load_classifier().classify(read)
-    plants = plants_of_calibration(motion.signal(TICK * np.arange(len(read)))[0], read)
+    asked, _ = motion.signal(TICK * np.arange(len(read)))
+    plants = plants_of_calibration(asked, read, shipped_limits().gear)
     findings = CalibrationFindings(verdict.class_deg, verdict.expected_size, plants)
 
     reached = reach(joint)

@@ -31,19 +31,31 @@ def tip_missed(fit, bending):
 def test_three_seconds_of_two_tensions_show_plant_and_tip(seed, bend, unevenness):
     plant = in_tube(random_instrument(np.random.default_rng(seed)), bend, unevenness)
     truth, tension, bending = recorded(plant, seed)
-    fit = fit_plant(COMMAND, tension)
+    fit = fit_plant(COMMAND, tension, gear=GEAR)
     assert fit.tension_rmse == pytest.approx(0.02, abs=0.004)
     assert fit.parameters.joint.capstan_exponent == pytest.approx(truth.capstan_exponent, rel=0.04)
     assert tip_missed(fit, bending) < np.deg2rad(1.0)
-    again = fit_plant(COMMAND, tension, bending)
+    again = fit_plant(COMMAND, tension, bending, gear=GEAR)
     assert again.bending_rmse < np.deg2rad(0.2)
-    assert fit_plant(COMMAND, tension) == fit
+    assert fit_plant(COMMAND, tension, gear=GEAR) == fit
+
+
+def test_the_gear_is_that_of_the_rig():
+    plant = PlantDescription(joints={'bend_x': JointParameters()})
+    made = simulate(plant, 0.6 * COMMAND[:, None])
+    wires = SensorModel(plant.sensors, 4).tension(made.tension.reshape(TIME.size, -1))
+    right, wrong = (
+        fit_plant(COMMAND, wires, gear=gear).parameters.joint.wire_stiffness for gear in (0.6, GEAR)
+    )
+    # Tensions alone take a shaft that turns less for a stiffer rig.
+    assert right == pytest.approx(JointParameters().wire_stiffness, rel=0.05)
+    assert wrong > 1.1 * JointParameters().wire_stiffness
 
 
 def test_the_nominal_rig_is_known_though_no_tube_of_the_family_is_like_it():
     joint = replace(JointParameters(), capstan_exponent=1.2)
     truth, tension, bending = recorded(PlantDescription(joints={'bend_x': joint}), 3)
-    fit = fit_plant(COMMAND, tension)
+    fit = fit_plant(COMMAND, tension, gear=GEAR)
     assert fit.parameters.joint.capstan_exponent == pytest.approx(truth.capstan_exponent, rel=0.02)
     assert tip_missed(fit, bending) < np.deg2rad(1.0)
 
@@ -51,7 +63,7 @@ def test_the_nominal_rig_is_known_though_no_tube_of_the_family_is_like_it():
 def test_parameters_stay_in_their_bounds_whatever_is_recorded():
     wild = np.random.default_rng(0).uniform(-50.0, 50.0, (TIME.size, 2))
     start = shipped_family().joint(CENTRE)
-    found = fit_plant(COMMAND, wild, start=start).parameters.joint
+    found = fit_plant(COMMAND, wild, start=start, gear=GEAR).parameters.joint
     assert 0.02 <= found.capstan_exponent <= 4.51
     for name, spread in list(FITTED.items())[1:]:
         ratio = getattr(found, name) / getattr(start, name)
@@ -69,4 +81,4 @@ def test_parameters_stay_in_their_bounds_whatever_is_recorded():
 )
 def test_what_shows_nothing_is_refused(command, tension, complaint):
     with pytest.raises(PlantFitError, match=complaint):
-        fit_plant(command, tension)
+        fit_plant(command, tension, gear=GEAR)

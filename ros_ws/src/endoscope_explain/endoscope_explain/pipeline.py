@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_bags.errors import BagError
 from endoscope_core.physics.description import PlantDescription
+from endoscope_core.rig import Rig
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import ChainCut, ExplainedCase, NextExperiment, Place
 from endoscope_explain.compare.ladder import ladders
@@ -62,6 +63,8 @@ class Sources:
         The physics of each joint, if it is not to be searched.
     namespace : str or None
         Of the rig's topics, where a bag has several rigs.
+    rig : Rig or None
+        What was recorded, where that is not what the bag says.
     plant_file : Path or None
         Where the plant was read from.
     command : str
@@ -78,6 +81,7 @@ class Sources:
     most_effects: int = MOST_EFFECTS
     given: GivenJoints | None = None
     namespace: str | None = None
+    rig: Rig | None = None
     plant_file: Path | None = None
     command: str = ''
 
@@ -136,7 +140,9 @@ def read_inputs(sources: Sources) -> Inputs:
     """
 
     def read(path: Path, plant: PlantDescription) -> Recording:
-        return recording_from_bag(path, plant, without=sources.without, namespace=sources.namespace)
+        return recording_from_bag(
+            path, plant, without=sources.without, namespace=sources.namespace, rig=sources.rig
+        )
 
     raw = read(sources.bag, sources.plant)
     plant = sources.plant.of_joints(raw.joints)

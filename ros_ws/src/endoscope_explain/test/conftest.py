@@ -10,6 +10,7 @@ import pytest
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import simulate
+from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import (
     Estimate,
@@ -22,7 +23,6 @@ from endoscope_explain.explanation import (
 from endoscope_explain.observe.predicted_signals import rung, view
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.signals import gear
 
 # Tests import each other's recordings by name.
 sys.path.insert(0, str(Path(__file__).parent))
@@ -46,7 +46,7 @@ def make_recording(
     stepped = np.where((time % 3.0) < 1.5, 0.5, -0.4)
     if command is None:
         command = np.stack([swept if k == 0 else stepped for k in range(len(joints))], axis=1)
-        command *= gear()
+        command *= shipped_rig().joints.gear
     truth = simulate(plant, command)
     sensors = SensorModel(plant.sensors, seed)
     tracker = slice(None, None, TRACKER_EVERY)

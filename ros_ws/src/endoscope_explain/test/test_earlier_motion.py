@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import PlantDescription
+from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.observe.predicted_signals import view
-from endoscope_explain.recording.signals import gear
 
 PLANT = PlantDescription()
 TIME = np.arange(0.0, 14.0, 1e-3)
@@ -34,7 +34,7 @@ def worst(recording):
 
 
 def moved(record, angle):
-    command = gear() * np.stack([angle, -0.7 * angle], axis=1)
+    command = shipped_rig().joints.gear * np.stack([angle, -0.7 * angle], axis=1)
     return record(duration=len(command) * 1e-3, command=command)
 
 
@@ -79,7 +79,7 @@ def test_a_past_that_no_reversals_explain_is_left_out_though_little_is_left(reco
     # How fast the rig came is not estimated: the joint's damping keeps it from where it rests.
     angle = 0.6 * np.sin(9.0 * np.minimum(TIME, 3.1))
     angle = np.where(TIME < 6.0, angle, angle + 0.7 * np.sin(1.5 * (TIME - 6.0)))[:9400]
-    command = gear() * np.stack([angle, angle], axis=1)
+    command = shipped_rig().joints.gear * np.stack([angle, angle], axis=1)
     recording = since(record(duration=9.4, command=command), 4.0)
     audit = audit_recording(recording, PLANT)
     assert {f.remedy for f in audit.findings} == {'what is before 4.94 s is not judged'}

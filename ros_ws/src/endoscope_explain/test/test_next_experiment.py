@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.rig import shipped_rig
 from endoscope_explain.design.distance import distance
 from endoscope_explain.design.imagined import imagine, is_safe
 from endoscope_explain.design.proposal import propose
@@ -37,21 +38,21 @@ def test_every_motion_starts_and_ends_at_rest_and_within_reach(motions):
 
 
 def test_a_plant_is_no_distance_from_itself(motions):
-    truth = imagine(PLANT, motions['fast and slow'])
+    truth = imagine(PLANT, motions['fast and slow'], shipped_rig())
     assert distance(truth, PLANT, 'bend_x') < 0.05
 
 
 def test_delay_and_lag_part_in_quick_moves_and_not_in_slow_ones(motions):
     late, lagging = with_effect('transport_delay', delay_s=0.03), with_effect('actuator_lag')
     apart = {
-        name: distance(imagine(late, motions[name]), lagging, 'bend_x')
+        name: distance(imagine(late, motions[name], shipped_rig()), lagging, 'bend_x')
         for name in ('steps with holds', 'slow ramps')
     }
     assert apart['steps with holds'] > 3.0 * apart['slow ramps']
 
 
 def test_a_motion_beyond_what_the_rig_has_been_through_is_not_safe(motions):
-    answer = imagine(PLANT, motions['slow ramps'])
+    answer = imagine(PLANT, motions['slow ramps'], shipped_rig())
     most, widest = answer.tension.values.max(), np.abs(answer.bending.values).max()
     assert is_safe(answer, most, widest)
     assert not is_safe(answer, 0.99 * most, widest)

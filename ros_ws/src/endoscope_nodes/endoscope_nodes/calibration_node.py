@@ -289,7 +289,7 @@ class CalibrationNode(EndoscopeNode):
             return verdict, ()
         time = np.arange(len(tension)) * TICK_NS * 1e-9
         command, _ = self._motion.signal(time)
-        return verdict, plants_of_calibration(command, tension)
+        return verdict, plants_of_calibration(command, tension, self.rig.joints.gear)
 
     def _finish(self, run: CalibrationRun) -> None:
         if self._homing:

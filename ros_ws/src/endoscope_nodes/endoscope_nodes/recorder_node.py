@@ -137,7 +137,7 @@ class RecorderNode(EndoscopeNode):
             there = with_final_names(str(self._session.path))
             raise BagError(f'already recording to {there}; stop that first')
         path = Path(new_bag() if self._unasked else self._bag or new_bag())
-        self._session = RecordingSession(path)
+        self._session = RecordingSession(path, rig=self.rig)
         self._said_loss = 0
         self._untyped = list(self._topics)
         self._said_untyped_s = time.monotonic() + _UNTYPED_S

@@ -17,7 +17,6 @@ from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import motion_by_name
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
-from endoscope_explain.recording.signals import gear
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator
@@ -93,7 +92,7 @@ def draw_motion(rng: Generator, joints: Sequence[str]) -> tuple[Array, Array]:
         if kind == 'calibration':
             # Moved alike, two joints could not be told apart.
             angle[:, 1] = 0.7 * np.interp(np.maximum(at - 2.0, 0.0), at, angle[:, 0])
-    return at, angle[:, : len(joints)] * gear()
+    return at, angle[:, : len(joints)] * shipped_rig().joints.gear
 
 
 def read(

@@ -10,6 +10,7 @@ from rclpy.task import Future
 
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.rig import Rig
 from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
@@ -41,6 +42,8 @@ class LiveGraph(ClosedOnExit):
         Parameter values by node name.
     rate
         Beats a second; by default that of `RATE`.
+    rig
+        What stands on the table; as shipped if not given.
     """
 
     def __init__(
@@ -51,6 +54,7 @@ class LiveGraph(ClosedOnExit):
         lock_step: bool,
         overrides: dict[str, dict[str, object]],
         rate: int = 0,
+        rig: Rig | None = None,
     ) -> None:
         given = dict(overrides)
         if bag is not None:
@@ -61,7 +65,7 @@ class LiveGraph(ClosedOnExit):
         arguments = ['--ros-args', '--log-level', 'fatal']
         arguments += ['-p', f'use_sim_time:={str(lock_step).lower()}']
         arguments += ['-p', f'tick_rate:={rate or RATE[lock_step]}']
-        self._runtime = Runtime(arguments, Context(), domain, given)
+        self._runtime = Runtime(arguments, Context(), domain, given, rig=rig)
         try:
             for factory in (*SLAVE_NODES, *CONTROL_NODES):
                 self._runtime.add(factory)

@@ -16,11 +16,11 @@ from endoscope_benchmarks.trials.real_recordings import without_repeats
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.tube_files import DESIRED, PHASE
 from endoscope_core.physics.description import JointParameters, PlantDescription, SensorParameters
+from endoscope_core.rig import shipped_rig
 from endoscope_explain.observe.held_noise import with_held_noise
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.series import BENDING, COMMAND, WIRES
-from endoscope_explain.recording.signals import gear
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ class Take:
             self.name,
             0.0,
             (JOINT,),
-            Series.of(COMMAND, self.time, gear() * self.command[:, None]),
+            Series.of(COMMAND, self.time, shipped_rig().joints.gear * self.command[:, None]),
             Series.of(WIRES, self.seen - self.latency_s, tension[:, None, :]),
             Series.of(BENDING, self.seen, self.angle[:, None]),
         )

@@ -16,6 +16,7 @@ from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.identification.plant_fit import plants_of_calibration
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics import PlantDescription
+from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import Signal
 
 SHARE_OF_REACH = 0.8
@@ -75,7 +76,8 @@ def calibrate(tube: NeverSeenTube, classifier: Classifier) -> CalibrationFinding
     Neither class nor size is found where the classifier has never seen the like.
     """
     recording = record_calibration(tube.plant, tube.noise)
-    plants = plants_of_calibration(recording.desired_angle, recording.tension)
+    gear = shipped_rig().joints.gear
+    plants = plants_of_calibration(recording.desired_angle, recording.tension, gear)
     try:
         verdict = classifier.classify(recording.tension)
     except UnseenTensionError:

@@ -36,6 +36,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='the simulation that is to be compared',
     )
     parser.add_argument(
+        '--rig',
+        type=Path,
+        metavar='rig.yaml',
+        help='the rig that was recorded, where the bag does not say it (default: as shipped)',
+    )
+    parser.add_argument(
         '--out', type=Path, required=True, metavar='DIR', help='a new or empty folder'
     )
     parser.add_argument(
@@ -102,10 +108,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     """Explain and write; return 0."""
     from endoscope_core.physics import load_plant
+    from endoscope_core.rig import load_rig
     from endoscope_explain.many_bags import explain_bags, summary
     from endoscope_explain.pipeline import Sources
 
     plant = load_plant(args.plant)
+    rig = None if args.rig is None else load_rig(args.rig)
     sources = [
         Sources(
             bag,
@@ -117,6 +125,7 @@ def run(args: argparse.Namespace) -> int:
             args.band,
             args.effects,
             namespace=args.namespace,
+            rig=rig,
             plant_file=args.plant,
             command=args.command_line,
         )

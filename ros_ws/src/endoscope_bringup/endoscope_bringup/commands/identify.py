@@ -12,6 +12,7 @@ from endoscope_bringup.seed_argument import seed
 from endoscope_bringup.subcommands import COUNT, within
 
 if TYPE_CHECKING:
+    from endoscope_bags import Recording as Bag
     from endoscope_core.hysteresis.inverse import HysteresisParameters
     from endoscope_core.identification import Recording
 
@@ -63,8 +64,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--gear',
         type=within(1e-3, 1e3, float),
-        default=0.5,
-        help='motor shaft angle for one radian at the joint (0.5)',
+        help='motor shaft angle for one radian at the joint (that of the rig in BAG)',
     )
     parser.add_argument(
         '--per-class',
@@ -145,7 +145,6 @@ def _of_dataset(args: argparse.Namespace) -> dict[str, object]:
 
 
 def _of_bag(args: argparse.Namespace) -> dict[str, object]:
-    from endoscope_bags import open_bag
     from endoscope_bringup.learning.hysteresis_of_bag import hysteresis_of_bag
     from endoscope_core.control import FeedforwardSettings
     from endoscope_core.identification import Servo, fit_feedforward, fit_model
@@ -154,7 +153,7 @@ def _of_bag(args: argparse.Namespace) -> dict[str, object]:
         return _plant_of_bag(args)
     lead = FeedforwardSettings().lead
     joints: dict[str, object] = {}
-    for joint, recording in hysteresis_of_bag(open_bag(args.source), args.gear).items():
+    for joint, recording in hysteresis_of_bag(*_bag_and_gear(args)).items():
         model = fit_model([recording], args.seed, args.model)
         feedforward = fit_feedforward(model.parameters, Servo(), lead, args.seed)
         _report(f'{joint}: {model}')
@@ -168,14 +167,22 @@ def _of_bag(args: argparse.Namespace) -> dict[str, object]:
     return {'schema': 1, 'model': args.model, 'lead': lead, 'seed': args.seed, 'joints': joints}
 
 
-def _plant_of_bag(args: argparse.Namespace) -> dict[str, object]:
+def _bag_and_gear(args: argparse.Namespace) -> tuple['Bag', float]:
     from endoscope_bags import open_bag
+    from endoscope_bags.rig_record import rig_of_bag
+
+    bag = open_bag(args.source)
+    return bag, rig_of_bag(bag).joints.gear if args.gear is None else args.gear
+
+
+def _plant_of_bag(args: argparse.Namespace) -> dict[str, object]:
     from endoscope_bringup.learning.plant_of_bag import plant_recordings_of_bag
     from endoscope_core.identification import fit_plant
 
     joints: dict[str, object] = {}
-    for joint, recording in plant_recordings_of_bag(open_bag(args.source), args.gear).items():
-        fit = fit_plant(recording.command, recording.tension, recording.bending)
+    bag, gear = _bag_and_gear(args)
+    for joint, recording in plant_recordings_of_bag(bag, gear).items():
+        fit = fit_plant(recording.command, recording.tension, recording.bending, gear=gear)
         _report(
             f'{joint}: capstan exponent {fit.parameters.joint.capstan_exponent:.3f}, '
             f'{fit.tension_rmse:.3f} N rms'

@@ -36,6 +36,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='where to write: a bare file if it ends in .mcap, else a folder',
     )
     parser.add_argument(
+        '--rig',
+        type=Path,
+        metavar='rig.yaml',
+        help='the rig, where the bag does not say it (default: as shipped)',
+    )
+    parser.add_argument(
         '--noise',
         type=seed,
         metavar='SEED',
@@ -48,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_bags import open_bag
     from endoscope_core.physics import load_plant
     from endoscope_core.physics.functions.term import tabulated
+    from endoscope_core.rig import load_rig
     from endoscope_explain.simulation.answer_bag import write_answer
 
     plant = load_plant(args.plant)
@@ -59,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
                 f'up to {100.0 * lost:.0f} % of what it spans; a narrower range is finer',
                 file=sys.stderr,
             )
-    count = write_answer(plant, open_bag(args.commands), args.out, args.noise)
+    rig = None if args.rig is None else load_rig(args.rig)
+    count = write_answer(plant, open_bag(args.commands), args.out, args.noise, rig)
     print(f'{args.out}: {count} messages')
     return 0

@@ -27,6 +27,7 @@ from endoscope_core.identification.updated_table import (
     parameters_to_dict,
     shipped_table_path,
 )
+from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import CALIBRATION_RATE
 
 _SAMPLE_STEP = 10
@@ -131,8 +132,9 @@ def _plant_of_class(
     dataset: CalibrationDataset, class_deg: int, chosen: NDArray[np.intp]
 ) -> tuple[ClassIdentification, str]:
     """Geometric mean of the plants of a class's recordings, each fitted to its tensions."""
+    gear = shipped_rig().joints.gear
     fits = [
-        fit_plant(dataset.desired_angle, dataset.tension[k, :, 2 * j : 2 * j + 2])
+        fit_plant(dataset.desired_angle, dataset.tension[k, :, 2 * j : 2 * j + 2], gear=gear)
         for k in chosen.tolist()
         for j in range(dataset.tension.shape[2] // 2)
     ]

@@ -15,7 +15,6 @@ from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import JointParameters, PlantDescription, simulate
 from endoscope_core.physics.family import CENTRE, MOST_BENT, shipped_family
-from endoscope_core.rig import shipped_rig
 
 Array = NDArray[np.float64]
 
@@ -77,6 +76,8 @@ def fit_plant(
     tension: ArrayLike,
     bending: ArrayLike | None = None,
     start: JointParameters | None = None,
+    *,
+    gear: float,
 ) -> PlantFit:
     """Fit the nominal plant of one joint to a motion from rest, sampled at 1 kHz.
 
@@ -101,6 +102,8 @@ def fit_plant(
     start : JointParameters, optional
         Where the search begins and what the priors are about; the family and the nominal rig if
         not given.
+    gear : float
+        Shaft angle for one radian at the joint.
 
     Raises
     ------
@@ -110,9 +113,10 @@ def fit_plant(
     """
     u, wires, angle = _checked(command, tension, bending)
     if start is not None:
-        return _fit_about(_whatever_the_bend(start), u, wires, angle)
+        return _fit_about(_whatever_the_bend(start), gear * u, wires, angle)
     rigs = shipped_family().joint, _whatever_the_bend(JointParameters())
-    return min((_fit_about(rig, u, wires, angle) for rig in rigs), key=lambda fit: fit.tension_rmse)
+    fits = (_fit_about(rig, gear * u, wires, angle) for rig in rigs)
+    return min(fits, key=lambda fit: fit.tension_rmse)
 
 
 def _whatever_the_bend(joint: JointParameters) -> Callable[[float], JointParameters]:
@@ -120,13 +124,12 @@ def _whatever_the_bend(joint: JointParameters) -> Callable[[float], JointParamet
 
 
 def _fit_about(
-    in_tube: Callable[[float], JointParameters], u: Array, wires: Array, angle: Array
+    in_tube: Callable[[float], JointParameters], shaft: Array, wires: Array, angle: Array
 ) -> PlantFit:
     names = tuple(FITTED)
     first = in_tube(CENTRE)
-    gear = shipped_rig().joints.gear
-    ticks = len(u) // _SAMPLES_A_TICK
-    held = gear * u[: ticks * _SAMPLES_A_TICK].reshape(ticks, -1).mean(axis=1)
+    ticks = len(shaft) // _SAMPLES_A_TICK
+    held = shaft[: ticks * _SAMPLES_A_TICK].reshape(ticks, -1).mean(axis=1)
     scored = slice(None, None, _SCORED_EVERY)
     rows = slice(None, ticks * _SAMPLES_A_TICK, _SAMPLES_A_TICK * _SCORED_EVERY)
     seen = np.isfinite(angle[rows])
@@ -183,7 +186,9 @@ def _fit_about(
     )
 
 
-def plants_of_calibration(command: ArrayLike, tension: ArrayLike) -> tuple[PhysicalParameters, ...]:
+def plants_of_calibration(
+    command: ArrayLike, tension: ArrayLike, gear: float
+) -> tuple[PhysicalParameters, ...]:
     """Plants of all joints from a calibration, the joints side by side.
 
     Where friction lets the joint go to one side only a little, the way to the other shows where it
@@ -195,6 +200,8 @@ def plants_of_calibration(command: ArrayLike, tension: ArrayLike) -> tuple[Physi
         Joint-equivalent motor command of every joint at 1 kHz, rad.
     tension : array_like, shape (N, 2 J)
         Positive and negative wire of each joint in turn, N.
+    gear : float
+        Shaft angle for one radian at the joint.
 
     Raises
     ------
@@ -206,7 +213,7 @@ def plants_of_calibration(command: ArrayLike, tension: ArrayLike) -> tuple[Physi
     pairs = [wires[:, j : j + 2] for j in range(0, wires.shape[1], 2)]
     # The simulation lets go of the interpreter: two joints take two cores.
     with ThreadPoolExecutor(len(pairs)) as pool:
-        fits = list(pool.map(lambda pair: fit_plant(u, pair), pairs))
+        fits = list(pool.map(lambda pair: fit_plant(u, pair, gear=gear), pairs))
     return tuple(fit.parameters for fit in fits)
 
 

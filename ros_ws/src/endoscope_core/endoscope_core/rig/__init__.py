@@ -13,6 +13,8 @@ from endoscope_core.rig.facts import (
     SimulationFacts,
     Timeouts,
     load_rig,
+    rig_as_text,
+    rig_from_text,
     shipped_rig,
 )
 
@@ -31,5 +33,7 @@ __all__ = [
     'SimulationFacts',
     'Timeouts',
     'load_rig',
+    'rig_as_text',
+    'rig_from_text',
     'shipped_rig',
 ]

@@ -2,14 +2,16 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from endoscope_core.choices import LOAD_CELL_DEVICES, MOTOR_DEVICES, TRACKER_DEVICES
 from endoscope_core.errors import EndoscopeError, nearest
-from endoscope_core.strict_yaml import YamlError, load_yaml
+from endoscope_core.strict_yaml import YamlError, load_yaml, parse_yaml
 
 SHIPPED = Path(__file__).with_name('rig.yaml')
 
@@ -289,21 +291,38 @@ def load_rig(path: str | Path | None = None) -> Rig:
     RigFileError
         It cannot be read, has an unknown key, or a value out of range.
     """
-    own = {} if path is None or not str(path) else _content(Path(path))
-    shipped = _content(SHIPPED)
-    parts = {f.name: f.type for f in fields(Rig)}
-    _check_keys(own, parts, f'rig file {path}')
-    made = {
-        name: _part(kind, shipped[name], own.get(name), f'rig file {path}: {name}')
-        for name, kind in parts.items()
-    }
-    if path is not None and made['simulation'].plant:
-        plant = Path(path).parent / made['simulation'].plant
-        made['simulation'] = replace(made['simulation'], plant=str(plant))
+    if path is None or not str(path):
+        return _rig({}, 'the shipped rig')
+    rig = _rig(_content(Path(path)), f'rig file {path}')
+    if not rig.simulation.plant:
+        return rig
+    plant = Path(path).parent / rig.simulation.plant
+    return replace(rig, simulation=replace(rig.simulation, plant=str(plant)))
+
+
+def rig_as_text(rig: Rig) -> str:
+    """All facts of a rig as YAML, for a recording of it."""
+    return yaml.safe_dump(asdict(rig), sort_keys=False)
+
+
+def rig_from_text(text: str, name: str) -> Rig:
+    """Read what `rig_as_text` wrote.
+
+    Parameters
+    ----------
+    text
+    name
+        Where it stands, for messages.
+
+    Raises
+    ------
+    RigFileError
+        It has an unknown key, or a value out of range.
+    """
     try:
-        return Rig(**made)
-    except ValueError as error:
-        raise RigFileError(f'rig file {path}: {error}') from error
+        return _rig(_mapping(parse_yaml(text, name), name), name)
+    except YamlError as error:
+        raise RigFileError(str(error)) from error
 
 
 @cache
@@ -314,12 +333,29 @@ def shipped_rig() -> Rig:
 
 def _content(path: Path) -> Mapping[str, Any]:
     try:
-        content = load_yaml(path)
+        return _mapping(load_yaml(path), f'rig file {path}')
     except YamlError as error:
         raise RigFileError(str(error)) from error
+
+
+def _mapping(content: Any, where: str) -> Mapping[str, Any]:
     if not isinstance(content, Mapping):
-        raise RigFileError(f'rig file {path} has to be a mapping')
+        raise RigFileError(f'{where} has to be a mapping')
     return content
+
+
+def _rig(own: Mapping[str, Any], where: str) -> Rig:
+    shipped = _content(SHIPPED)
+    parts = {f.name: f.type for f in fields(Rig)}
+    _check_keys(own, parts, where)
+    made = {
+        name: _part(kind, shipped[name], own.get(name), f'{where}: {name}')
+        for name, kind in parts.items()
+    }
+    try:
+        return Rig(**made)
+    except ValueError as error:
+        raise RigFileError(f'{where}: {error}') from error
 
 
 def _part(kind: Any, shipped: Mapping[str, Any], own: Any, where: str) -> Any:

@@ -35,7 +35,7 @@ from endoscope_explain.audit.standing_still import (
 from endoscope_explain.audit.time_unit import in_seconds, stamp_unit_findings
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.series import WIRES
-from endoscope_explain.recording.signals import gear, signal_name
+from endoscope_explain.recording.signals import signal_name
 
 LEAST_DURATION_S = 2.0
 """Length of a recording from which on it can be compared with the plant."""
@@ -271,7 +271,8 @@ def _audited_bending(
         repeated, _ = held(values, plant.sensors.tracker_noise, 0.0, interval)
         repeated &= noisy
         findings += held_findings(joint, signal, series.time, repeated)
-        travel = motor_travel(series.time, motor.time, motor.values[:, j] / gear(), 3.0 * interval)
+        slack = 3.0 * interval
+        travel = motor_travel(series.time, motor.time, motor.values[:, j] / recording.gear, slack)
         spikes = find_outliers(values, plant.sensors.tracker_noise, travel)
         wrong[:, j] = repeated
         isolated[:, j] = spikes

@@ -19,7 +19,6 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.kernel import run_joints
 from endoscope_core.physics.layout import MOTOR_BANDWIDTH, OUTPUTS
 from endoscope_core.physics.packing import rest_state
-from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.audit.standing_still import MOVES_RAD
 from endoscope_explain.observe.observation import ANALYSIS_PERIOD, JointObservation, observe
@@ -62,13 +61,14 @@ def with_state_at_start(
     observations = observe(recording, plant)
     parameters, flags = packed_rig(observations, plant)
     begin = float(recording.command.time[0])
+    reach = recording.rig.motors.reach
     starts, left_out = [], []
     for j, observation in enumerate(observations):
         way, unjudged = observation.start, 0.0
         if observation.channels:
             shaft = recording.shaft_position
             seen = observation.start if shaft is None else shaft.values[:1, j]
-            past = _Past(observation, parameters[j], flags[j], float(seen[0]))
+            past = _Past(observation, parameters[j], flags[j], float(seen[0]), reach)
             way, unjudged, estimated = past.here, begin + past.turns_until, past.estimated()
             if estimated is not None:
                 way, end = estimated, begin + past.shows_until
@@ -96,10 +96,10 @@ class _Past:
     """What one joint's past does to its readings, by the plant as described."""
 
     def __init__(
-        self, observation: JointObservation, packed: Array, on: Flags, seen: float
+        self, observation: JointObservation, packed: Array, on: Flags, seen: float, reach: float
     ) -> None:
         self._observation, self._packed, self._on = observation, packed, on
-        reach = shipped_rig().motors.reach
+        self._reach = reach
         self._times = times = np.concatenate([c.time for c in observation.channels])
         shaft = np.concatenate(
             [np.full(len(c.time), c.quantity == 'shaft_position') for c in observation.channels]
@@ -170,7 +170,7 @@ class _Past:
         if not count:
             return None
         here = float(self.here[0])
-        reach = shipped_rig().motors.reach
+        reach = self._reach
 
         def way(reversals: Array) -> Array:
             return np.append(np.clip(reversals, -reach, reach), here)

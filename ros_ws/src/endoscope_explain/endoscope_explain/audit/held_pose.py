@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from endoscope_core.physics.description import SensorParameters
-from endoscope_core.rig import shipped_rig
+from endoscope_core.rig import Rig
 from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.audit.stamps import find_gaps, usual_interval
@@ -46,7 +46,7 @@ def with_held_poses(
     found = []
     for begin, end in find_gaps(command, float(command.time[0]), recording.duration):
         last = command.values[np.searchsorted(command.time, begin)]
-        pose = _held_pose(shaft, begin, end, last, count)
+        pose = _held_pose(shaft, begin, end, last, count, recording.rig)
         if pose is not None:
             found.append(pose)
     if not found:
@@ -66,18 +66,19 @@ def with_held_poses(
         )
     )
     beat = usual_interval(shaft.time)
-    return replace(recording, command=_with_ways(command, [_way(command, *p, beat) for p in found]))
+    ways = [_way(command, *p, beat, recording.rig) for p in found]
+    return replace(recording, command=_with_ways(command, ways))
 
 
 def _held_pose(
-    shaft: Series, begin: float, end: float, last: Array, count: float
+    shaft: Series, begin: float, end: float, last: Array, count: float, rig: Rig
 ) -> tuple[float, Array] | None:
     """When the shafts were told to hold, and where; None if they went to the last command.
 
     A pose is held if the shafts end at it although they were sent on, and if they came by it no
     later than the driver gives a stream up: as a rule at that very moment.
     """
-    given_up = begin + shipped_rig().timeouts.command
+    given_up = begin + rig.timeouts.command
     if end <= given_up:
         return None
     inside = (shaft.time >= begin) & (shaft.time < end) & shaft.valid.all(axis=1)
@@ -96,9 +97,9 @@ def _held_pose(
     return (given_up if (there & (time >= given_up - 2.0 * beat)).any() else by), rest
 
 
-def _way(command: Series, at: float, pose: Array, beat: float) -> tuple[Array, Array]:
+def _way(command: Series, at: float, pose: Array, beat: float, rig: Rig) -> tuple[Array, Array]:
     """Goals on the way from the last command to a pose, at each beat of the driver."""
-    motors = shipped_rig().motors
+    motors = rig.motors
     last = command.values[np.searchsorted(command.time, at) - 1]
     reach = max(motors.reach, float(np.abs([last, pose]).max()))
     limits = (reach, motors.speed, motors.acceleration, motors.step)

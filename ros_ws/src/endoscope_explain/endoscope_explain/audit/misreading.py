@@ -10,7 +10,7 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.recording import Recording
 from endoscope_explain.recording.series import DESIRED
-from endoscope_explain.recording.signals import QUANTITY_UNITS, gear, motor_name, signal_name
+from endoscope_explain.recording.signals import QUANTITY_UNITS, motor_name, signal_name
 
 LARGE = 5.0
 """Factor that no gear of this rig has, nor a servo that misses its command."""
@@ -67,7 +67,7 @@ class Misreading:
         )
 
 
-def known_units(quantity: str, plant: PlantDescription) -> dict[str, float]:
+def known_units(quantity: str, plant: PlantDescription, gear: float) -> dict[str, float]:
     """Return what people give in place of SI, and the reading of one SI unit in each."""
     degrees = 1.0 / UNITS['deg']
     radius = next(iter(plant.joints.values())).pulley_radius
@@ -77,8 +77,8 @@ def known_units(quantity: str, plant: PlantDescription) -> dict[str, float]:
         'turns': 1.0 / UNITS['turn'],
         COUNTS: plant.sensors.encoder_counts / (2.0 * pi),
         'rad, converted from degrees twice': UNITS['deg'],
-        GEAR: 1.0 / gear(),
-        'radians of the shaft, divided by the gear once more': gear(),
+        GEAR: 1.0 / gear,
+        'radians of the shaft, divided by the gear once more': gear,
         'mm of wire': 1e3 * radius,
     }
     return {
@@ -96,7 +96,9 @@ def known_units(quantity: str, plant: PlantDescription) -> dict[str, float]:
     }[quantity]
 
 
-def misreadings(quantity: str, plant: PlantDescription, columns: int) -> Iterator[Misreading]:
+def misreadings(
+    quantity: str, plant: PlantDescription, gear: float, columns: int
+) -> Iterator[Misreading]:
     """Ways to read the columns of a quantity, the right one first.
 
     Parameters
@@ -104,12 +106,14 @@ def misreadings(quantity: str, plant: PlantDescription, columns: int) -> Iterato
     quantity : str
         Series of a `Recording`, or `command`.
     plant : PlantDescription
+    gear : float
+        Shaft angle for one radian at the joint.
     columns : int
         One for each joint, or for each wire.
     """
     whole = tuple(range(columns))
     yield Misreading(quantity, 'right', 0.0, whole, (1.0,) * columns)
-    units = known_units(quantity, plant)
+    units = known_units(quantity, plant, gear)
     for part, parts in _parts(columns, len(plant.joints)):
         for unit, factor in units.items():
             if len(part) * len(plant.joints) >= columns:

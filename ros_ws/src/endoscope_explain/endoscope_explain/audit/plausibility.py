@@ -16,7 +16,6 @@ import numpy as np
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.on_stamps import hold_on_ticks
 from endoscope_core.physics.simulator import LARGEST_COMMAND, TICK, simulate
-from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit.criteria import DERIVED
 from endoscope_explain.audit.misfit import LONGEST_S, PERIOD_S, Bounds, Criteria, Moments
 from endoscope_explain.audit.misreading import (
@@ -80,7 +79,7 @@ class Comparison:
         leave_out: Collection[str] = (),
         criteria: Criteria = DERIVED,
     ) -> None:
-        self._plant = plant
+        self._plant, self._rig = plant, recording.rig
         self._criteria = criteria
         begin, end = _span(recording)
         self.grid = np.arange(begin, end, PERIOD_S)
@@ -98,7 +97,7 @@ class Comparison:
             quantity: _scatter(recording.measured()[quantity]) for quantity in self.measured
         }
         self._readings = {
-            quantity: tuple(misreadings(quantity, plant, values.shape[1]))
+            quantity: tuple(self._misreadings(quantity, values.shape[1]))
             for quantity, values in self.measured.items()
         }
         self._answers: dict[Misreading, dict[str, Array]] = {}
@@ -122,7 +121,7 @@ class Comparison:
             return ()
         least = as_read
         best: tuple[Misreading, ...] = ()
-        for drive in misreadings('command', self._plant, self._held.shape[1]):
+        for drive in self._misreadings('command', self._held.shape[1]):
             if drive.price and not self._may_be_meant(drive):
                 continue
             against, said = 0.0, [drive] if drive.price else []
@@ -139,14 +138,17 @@ class Comparison:
                 least, best = against, tuple(said)
         return best
 
+    def _misreadings(self, quantity: str, columns: int) -> Iterator[Misreading]:
+        return misreadings(quantity, self._plant, self._rig.joints.gear, columns)
+
     def _right(self) -> Misreading:
-        return next(misreadings('command', self._plant, self._held.shape[1]))
+        return next(self._misreadings('command', self._held.shape[1]))
 
     def _may_be_meant(self, drive: Misreading) -> bool:
         """Whether it moves, and either cannot be what was given or the shafts follow it."""
         if np.ptp(self._shaft(drive)[:, list(drive.touched)], axis=0).max() < MOVES:
             return False
-        if np.abs(self._held).max() > shipped_rig().motors.reach:
+        if np.abs(self._held).max() > self._rig.motors.reach:
             return True
         # Bending and tension of half the motion may be those of another rig.
         if 'shaft_position' not in self.measured:

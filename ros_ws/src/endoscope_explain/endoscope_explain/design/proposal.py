@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.decide.conclusions import spec_of
@@ -25,7 +24,6 @@ from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording
-from endoscope_explain.recording.signals import gear
 from endoscope_explain.search.candidate import Candidate, starting_points
 from endoscope_explain.search.screen import background, directions, promises
 
@@ -58,7 +56,7 @@ def propose(
         return None
 
     def smallest(waveform: Waveform) -> float:
-        imagined = {name: imagine(p, waveform) for name, p in plants.items()}
+        imagined = {name: imagine(p, waveform, recording.rig) for name, p in plants.items()}
         if recording.tension is None:
             imagined = {name: replace(r, tension=None) for name, r in imagined.items()}
         return min(
@@ -112,8 +110,8 @@ def safe_family(
 ) -> list[Waveform]:
     """List motions that keep every rival within what the rig has been through."""
     j = recording.joints.index(joint)
-    reach = float(np.abs(recording.command.values[:, j]).max()) / gear()
-    tension = shipped_rig().tension.calibration_ceiling
+    reach = float(np.abs(recording.command.values[:, j]).max()) / recording.gear
+    tension = recording.rig.tension.calibration_ceiling
     if recording.tension is not None:
         tension = MARGIN * float(recording.tension.values[recording.tension.valid].max())
     bending = MARGIN * float(np.abs(recording.bending.values[recording.bending.valid]).max())
@@ -122,7 +120,7 @@ def safe_family(
     for full in family(joint, others, reach):
         for share in (1.0, 0.75, 0.5, 0.3):
             waveform = replace(full, angle=share * full.angle)
-            if all(is_safe(imagine(p, waveform), tension, bending) for p in plants):
+            if all(is_safe(imagine(p, waveform, recording.rig), tension, bending) for p in plants):
                 safe.append(waveform)
                 break
     return safe

@@ -5,7 +5,6 @@ from numpy.typing import NDArray
 
 from endoscope_explain.locate.time_windows import WINDOW_S
 from endoscope_explain.recording import Recording
-from endoscope_explain.recording.signals import gear
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -98,7 +97,7 @@ def drive(recording: Recording, j: int, end: float) -> Array:
 
 def _motor(recording: Recording, j: int, grid: Array) -> Array:
     source = recording.shaft_position or recording.command
-    return np.interp(grid, source.time, source.values[:, j]) / gear()
+    return np.interp(grid, source.time, source.values[:, j]) / recording.gear
 
 
 def _speed(angle: Array) -> Array:

@@ -13,6 +13,7 @@ from endoscope_core.choices import WAIVABLE
 from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_core.physics import PlantDescription, PlantFileError, load_plant, recording_faults
 from endoscope_core.physics.packing import pack
+from endoscope_core.rig import Rig, load_rig
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.many_bags import explained_cases
 from endoscope_explain.notebook.arrays import commands_from
@@ -38,6 +39,7 @@ def simulate(
     *,
     noise: int | None = None,
     out: str | Path | None = None,
+    rig: str | Path | Rig | None = None,
 ) -> Signals:
     """Simulate the plant's answer to commands.
 
@@ -52,6 +54,8 @@ def simulate(
         Seed of the sensors' noise; without it there is none.
     out : str or Path, optional
         Where to write the answer as a bag; without it, it is kept as long as the result is.
+    rig : str, Path or Rig, optional
+        A rig.yaml, or what it describes; what the bag says of its rig by default, or as shipped.
 
     Returns
     -------
@@ -67,7 +71,7 @@ def simulate(
     if isinstance(commands, Mapping) and not isinstance(commands, Signals):
         commands = commands_from(commands)
     target = Path(scratch.name) / 'simulated.mcap' if out is None else Path(out)
-    write_answer(_plant(plant), open_bag(_path(commands)), target, noise)
+    write_answer(_plant(plant), open_bag(_path(commands)), target, noise, _rig(rig))
     return replace(read(target), _kept=scratch)
 
 
@@ -86,6 +90,7 @@ def explain(  # type: ignore[misc]
     validate: Bag | Sequence[Bag | None] | None = None,
     without: Collection[str] = (),
     namespace: str | None = None,
+    rig: str | Path | Rig | None = None,
     band: float = BAND,
     effects: int = MOST_EFFECTS,
     same_physics: bool = False,
@@ -109,6 +114,8 @@ def explain(  # type: ignore[misc]
         Topics that may be missing: `motor/measured_js`.
     namespace : str, optional
         Of the rig's topics, where a bag has several rigs.
+    rig : str, Path or Rig, optional
+        A rig.yaml, or what it describes; what the bag says of its rig by default.
     band : float
         By which share the plant's parameters may differ from the rig's.
     effects : int
@@ -147,7 +154,7 @@ def explain(  # type: ignore[misc]
             f'{len(bags)} recordings with {len(seconds)} in validate: give one or more, and as '
             'many in validate'
         )
-    described = _plant(plant)
+    described, described_rig = _plant(plant), _rig(rig)
     sources = [
         Sources(
             _path(one),
@@ -159,6 +166,7 @@ def explain(  # type: ignore[misc]
             band,
             effects,
             namespace=namespace,
+            rig=described_rig,
             plant_file=None if isinstance(plant, PlantDescription) else Path(plant),
         )
         for one, second in zip(bags, seconds, strict=True)
@@ -178,6 +186,10 @@ def _plant(plant: Plant) -> PlantDescription:
     except ValueError as error:
         raise PlantFileError(f'the plant: {error}') from error
     return plant
+
+
+def _rig(rig: str | Path | Rig | None) -> Rig | None:
+    return load_rig(rig) if isinstance(rig, str | Path) else rig
 
 
 def _path(bag: Bag) -> Path:

@@ -11,9 +11,11 @@ from endoscope_bags.information import losses_told
 from endoscope_bags.joint_state_series import JointStateSeries
 from endoscope_bags.recording import Recording as Bag
 from endoscope_bags.recording import open_bag
+from endoscope_bags.rig_record import rig_of_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_core.choices import WAIVABLE
 from endoscope_core.physics.description import PlantDescription
+from endoscope_core.rig import Rig
 from endoscope_explain.recording.in_force import goals_in_force
 from endoscope_explain.recording.series import (
     BENDING,
@@ -24,7 +26,7 @@ from endoscope_explain.recording.series import (
     Recording,
     Series,
 )
-from endoscope_explain.recording.signals import gear, motor_name, wire_names
+from endoscope_explain.recording.signals import motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_common_time, without_stray
 
 OPTIONAL = (WIRES,)
@@ -41,6 +43,7 @@ def recording_from_bag(
     *,
     without: Collection[str] = (),
     namespace: str | None = None,
+    rig: Rig | None = None,
 ) -> Recording:
     """Read what analysis needs from a bag, in the order in which it was recorded.
 
@@ -54,6 +57,8 @@ def recording_from_bag(
         Topics of `WAIVABLE` that may be missing.
     namespace : str, optional
         Where several rigs are in one bag.
+    rig : Rig, optional
+        What was recorded; that which the bag carries by default, or as shipped.
 
     Returns
     -------
@@ -65,8 +70,11 @@ def recording_from_bag(
     BagError
         Any of endoscope_bags: the bag is cut, empty, lacks a topic or every joint, holds NaN ...
         Also if its stamps cannot be used.
+    RigFileError
+        The rig that the bag carries cannot be read.
     """
     bag = open_bag(path)
+    rig = rig or rig_of_bag(bag)
     lacking = [t for t in (WIRES, BENDING, MOTOR) if not bag.has(t, namespace)]
     lacking += [] if bag.has(COMMAND, namespace) or bag.has(DESIRED, namespace) else [COMMAND]
     fatal = [t for t in lacking if t not in without and t not in OPTIONAL]
@@ -89,7 +97,10 @@ def recording_from_bag(
     else:
         command = read(DESIRED, 'position')
         command_names = {j: j for j in plant.joints}
-        notes.append(f'{COMMAND} was not recorded: {DESIRED} times the gear is taken for it')
+        notes.append(
+            f'{COMMAND} was not recorded: {DESIRED} times the gear, {rig.joints.gear:g}, is taken '
+            'for it'
+        )
     bending = read(BENDING, 'position')
     wires = None if WIRES in lacking else read(WIRES, 'effort')
     motor = None if MOTOR in lacking else read(MOTOR, 'position')
@@ -117,7 +128,7 @@ def recording_from_bag(
     require_common_time(path, every)
     timing = 0.0
     if motor is not None and bag.has(COMMAND, namespace):
-        in_force = goals_in_force(bag, command, motor, namespace)
+        in_force = goals_in_force(bag, command, motor, namespace, rig)
         if in_force is not None:
             command, timing, told = in_force
             notes.append(told)
@@ -140,7 +151,7 @@ def recording_from_bag(
 
     shaft = series(command.topic, command, [command_names[j] for j in joints], 'position')
     if not bag.has(COMMAND, namespace):
-        shaft = Series.of(DESIRED, shaft.time, shaft.values * gear(), shaft.received)
+        shaft = Series.of(DESIRED, shaft.time, shaft.values * rig.joints.gear, shaft.received)
     else:
         shaft = replace(shaft, topic=COMMAND)
     motors = dict.fromkeys(('position', 'velocity', 'effort'))
@@ -164,6 +175,7 @@ def recording_from_bag(
         shaft_effort=motors['effort'],
         notes=tuple(notes),
         timing=timing,
+        rig=rig,
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from endoscope_bags.joint_state_series import JointStateSeries
 from endoscope_bags.recording import Recording as Bag
-from endoscope_core.rig import shipped_rig
+from endoscope_core.rig import Rig
 from endoscope_core.safety import (
     CommandLimits,
     MotionLimits,
@@ -31,7 +31,7 @@ Goals = NDArray[np.float64]
 
 
 def goals_in_force(
-    bag: Bag, command: JointStateSeries, motor: JointStateSeries, namespace: str | None
+    bag: Bag, command: JointStateSeries, motor: JointStateSeries, namespace: str | None, rig: Rig
 ) -> tuple[JointStateSeries, float, str] | None:
     """Goals of the shafts at every tick of the motor driver, each in force from its stamp.
 
@@ -45,6 +45,7 @@ def goals_in_force(
         Readings of the motors, one for each tick of the driver.
     namespace : str or None
         Of the rig's topics, where a bag has several rigs.
+    rig : Rig
 
     Returns
     -------
@@ -63,7 +64,7 @@ def goals_in_force(
         return None
     if np.any(np.diff(motor.stamp_ns) <= 0) or np.any(np.diff(motor.log_ns) < 0):
         return None
-    driver = _Driver(len(command.names))
+    driver = _Driver(len(command.names), rig)
     asked, read = command.require('position'), motor.select(command.names).require('position')
     sessions = [(m.log_ns, o.frame_id) for m, o in bag.decoded(bag.find(SESSION, namespace))]
     states = [(m.log_ns, o.data) for m, o in bag.decoded(bag.find(STATE, namespace))]
@@ -73,8 +74,7 @@ def goals_in_force(
     events += [(log, _COMMAND, k) for k, log in enumerate(command.log_ns.tolist())]
     events.sort()
     driver.join(states[0][1], sessions[0][1], events[0][0])
-    limit_ns = shipped_rig().timeouts.command_ns
-    if command.log_ns[0] - motor.log_ns[0] <= limit_ns and sessions[0][1]:
+    if command.log_ns[0] - motor.log_ns[0] <= rig.timeouts.command_ns and sessions[0][1]:
         driver.take_over(asked[0])
     stamps = motor.stamp_ns.tolist()
     goals = np.empty(read.shape)
@@ -116,8 +116,7 @@ def _in_words(topic: str, held: list[float]) -> str:
 class _Driver:
     """The motor driver's part in what the shafts do."""
 
-    def __init__(self, joints: int) -> None:
-        rig = shipped_rig()
+    def __init__(self, joints: int, rig: Rig) -> None:
         motors = rig.motors
         limits = (motors.reach, motors.speed, motors.acceleration, motors.step)
         self.motion = ShaftMotion(

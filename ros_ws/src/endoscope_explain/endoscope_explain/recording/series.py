@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.rig import Rig, shipped_rig
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -98,6 +100,8 @@ class Recording:
         began; the first command alone where None.
     timing : float
         By how much (rms, s) it is unknown when what was commanded took effect.
+    rig : Rig
+        Gear, limits and time-outs of what was recorded.
     """
 
     name: str
@@ -112,6 +116,7 @@ class Recording:
     notes: tuple[str, ...] = field(default=())
     start: Array | None = None
     timing: float = 0.0
+    rig: Rig = field(default_factory=shipped_rig)
 
     def measured(self) -> dict[str, Series]:
         """Return the recorded measured series by their name in this class."""
@@ -122,6 +127,11 @@ class Recording:
         """Return the same recording with some series, by name, replaced."""
         fields: dict[str, Any] = dict(changed)
         return replace(self, **fields)
+
+    @property
+    def gear(self) -> float:
+        """Angle of a motor's shaft for one radian of desired bending."""
+        return self.rig.joints.gear
 
     @property
     def duration(self) -> float:

@@ -1,6 +1,5 @@
 """Names of signals as the report writes them."""
 
-from endoscope_core.rig import shipped_rig
 from endoscope_explain.recording.series import BENDING, MOTOR, WIRES
 
 QUANTITY_TOPICS = {
@@ -19,11 +18,6 @@ QUANTITY_UNITS = {
     'tension': 'N',
     'bending': 'rad',
 }
-
-
-def gear() -> float:
-    """Angle of a motor's shaft for one radian of desired bending, of the rig as shipped."""
-    return shipped_rig().joints.gear
 
 
 def axis(joint: str) -> str:

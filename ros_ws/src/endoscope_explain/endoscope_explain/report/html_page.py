@@ -13,7 +13,6 @@ from endoscope_explain.fit.tolerance import tolerance
 from endoscope_explain.fit.whiteness import slips
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.predicted_signals import RecordedView, view
-from endoscope_explain.recording.signals import gear
 from endoscope_explain.report.figures.experiment import experiment_figure, unknown_figure
 from endoscope_explain.report.figures.ladder import ladder_figure
 from endoscope_explain.report.figures.loops import (
@@ -148,7 +147,8 @@ def _drawings(
     # Where a sensor repeats one reading, none of its samples is judged.
     if any(v.quantity == 'bending' for v in recorded.of_joint(joint)):
         j = case.recording.joints.index(joint)
-        command = (case.recording.command.time, case.recording.command.values[:, j] / gear())
+        asked = case.recording.command
+        command = (asked.time, asked.values[:, j] / case.recording.gear)
         # What is drawn of a recording that cannot be used is what was meant, and shows nothing.
         shaded = () if case.audit.unusable else case.places
         drawn['timeline'] = timeline_figure(recorded, command, joint, shaded)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from endoscope_bags import BagWriter, JointStateSeries, MessageStream, Recording
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
+from endoscope_bags.rig_record import rig_of_bag, rig_record
 from endoscope_core.physics import PlantDescription, SensorModel
 from endoscope_core.physics.on_stamps import (
     NANOSECONDS,
@@ -20,6 +21,7 @@ from endoscope_core.physics.on_stamps import (
 from endoscope_core.physics.recording import recording_faults
 from endoscope_core.physics.samples import TOPICS
 from endoscope_core.physics.simulator import TICK
+from endoscope_core.rig import Rig
 from endoscope_explain.recording.series import BENDING, COMMAND, DESIRED, MOTOR, WIRES
 from endoscope_explain.recording.signals import motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_running_stamps
@@ -54,7 +56,11 @@ class _Times:
 
 
 def write_answer(
-    plant: PlantDescription, recording: Recording, out: Path, noise_seed: int | None = None
+    plant: PlantDescription,
+    recording: Recording,
+    out: Path,
+    noise_seed: int | None = None,
+    rig: Rig | None = None,
 ) -> int:
     """Write the answer of a plant to the commands of a recording.
 
@@ -73,6 +79,8 @@ def write_answer(
         A folder, or a file that ends in ``.mcap``; must not exist.
     noise_seed : int, optional
         Seed of the sensors' noise; without it there is neither noise nor quantisation.
+    rig : Rig, optional
+        Whose gear desired angles are times; that which the recording carries by default.
 
     Returns
     -------
@@ -83,10 +91,13 @@ def write_answer(
     ------
     NoCommandsError, BagError
         If the recording has no usable commands, or `out` exists.
+    RigFileError
+        If the rig that the recording carries cannot be read.
     """
-    commands = commands_of_bag(recording, plant)
+    rig = rig or rig_of_bag(recording)
+    commands = commands_of_bag(recording, plant, rig)
     driven = plant.of_joints(commands.joints)
-    with BagWriter(out) as writer:
+    with BagWriter(out, records=rig_record(rig)) as writer:
         rates = {
             MOTOR: plant.sensors.load_cell_rate,
             WIRES: plant.sensors.load_cell_rate,

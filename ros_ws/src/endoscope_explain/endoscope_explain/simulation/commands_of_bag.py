@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from endoscope_bags import Recording
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
+from endoscope_core.rig import Rig
 from endoscope_explain.recording.series import COMMAND, DESIRED
-from endoscope_explain.recording.signals import gear, motor_name
+from endoscope_explain.recording.signals import motor_name
 from endoscope_explain.recording.usable_stamps import require_running_stamps
 
 
@@ -39,8 +40,8 @@ class BagCommands:
     shaft: NDArray[np.float64]
 
 
-def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommands:
-    """Shaft commands of a recording; desired angles times the gear where it has none.
+def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
+    """Shaft commands of a recording; desired angles times the rig's gear where it has none.
 
     Raises
     ------
@@ -65,5 +66,5 @@ def commands_of_bag(recording: Recording, plant: PlantDescription) -> BagCommand
             f'the plant has {", ".join(names.values())}'
         )
     chosen = series.select([names[joint] for joint in joints])
-    scale = 1.0 if recording.has(COMMAND) else gear()
+    scale = 1.0 if recording.has(COMMAND) else rig.joints.gear
     return BagCommands(series.topic, joints, chosen.stamp_ns, scale * chosen.require('position'))

@@ -8,9 +8,9 @@ import pytest
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import simulate
+from endoscope_core.rig import shipped_rig
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
-from endoscope_explain.recording.signals import gear
 
 
 def short_motion(duration: float = 12.0) -> np.ndarray:
@@ -25,7 +25,7 @@ def short_motion(duration: float = 12.0) -> np.ndarray:
 def record(plant: PlantDescription, command: np.ndarray, seed: int = 1) -> Recording:
     """What a rig's sensors read that is asked to bend: (N,), or (N, joints)."""
     joints = plant.joint_names()
-    shaft = command.reshape(len(command), len(joints)) * gear()
+    shaft = command.reshape(len(command), len(joints)) * shipped_rig().joints.gear
     answer = simulate(plant, shaft)
     sensors = SensorModel(plant.sensors, seed)
     slow = slice(None, None, 25)

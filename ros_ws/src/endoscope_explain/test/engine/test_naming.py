@@ -6,9 +6,9 @@ import pytest
 from endoscope_core.physics.description import EffectSpec, TermSpec
 from endoscope_core.physics.functions.expression import evaluate
 from endoscope_core.physics.simulator import simulate
+from endoscope_core.rig import shipped_rig
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.recording.signals import gear
 
 OTHER = {'wire_stiffness': 3300.0, 'capstan_exponent': 0.83, 'joint_friction': 8.2e-4}
 
@@ -79,7 +79,7 @@ def test_a_law_of_no_known_form_is_a_function_at_its_place(one_joint):
     expected = evaluate(law, unknown.there.argument.symbol, unknown.nodes[inner])
     assert np.corrcoef(unknown.values[inner], expected)[0, 1] > 0.95
     time = 1e-3 * np.arange(6000)
-    other = gear() * (0.9 * np.sin(1.7 * time) + 0.3 * np.sin(4.1 * time))
+    other = shipped_rig().joints.gear * (0.9 * np.sin(1.7 * time) + 0.3 * np.sin(4.1 * time))
     plants = (true, explanation.augmented, explanation.refitted)
     answers = [simulate(each, other[:, None]).bending for each in plants]
     with_term, without = (np.sqrt(np.mean((answers[0] - a) ** 2)) for a in answers[1:])

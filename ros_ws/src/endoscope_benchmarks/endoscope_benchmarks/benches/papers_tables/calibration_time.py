@@ -20,9 +20,10 @@ def rows(settings: PapersBench) -> list[Row]:
     from endoscope_core.classifier.shipped import load_classifier
     from endoscope_core.dataset import record_calibration
     from endoscope_core.identification.plant_fit import plants_of_calibration
+    from endoscope_core.rig import shipped_rig
     from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 
-    rest = 0.5
+    rest, gear = 0.5, shipped_rig().joints.gear
     found = []
     for name in CALIBRATION_MOTIONS:
         motion = calibration_motion(name)
@@ -39,7 +40,7 @@ def rows(settings: PapersBench) -> list[Row]:
                 settings.report(f'{name}, tube {number + 1}: {error}')
             judging.append(time.perf_counter() - begin)
             begin = time.perf_counter()
-            plants_of_calibration(recording.desired_angle, recording.tension)
+            plants_of_calibration(recording.desired_angle, recording.tension, gear)
             fitting.append(time.perf_counter() - begin)
         brief = name != CALIBRATION_MOTIONS[0]
         found += [

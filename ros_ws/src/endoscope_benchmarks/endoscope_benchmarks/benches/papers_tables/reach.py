@@ -15,13 +15,16 @@ def rows(settings: PapersBench) -> list[Row]:
     from endoscope_core.control import reach
     from endoscope_core.dataset import record_calibration
     from endoscope_core.identification.plant_fit import plants_of_calibration
+    from endoscope_core.rig import shipped_rig
 
     errors = []
     for number in range(_TUBES):
         generator = np.random.default_rng([settings.seed, number])
         plant = random_tube(generator)
         recording = record_calibration(plant, int(generator.integers(2**31)))
-        found = plants_of_calibration(recording.desired_angle, recording.tension)
+        found = plants_of_calibration(
+            recording.desired_angle, recording.tension, shipped_rig().joints.gear
+        )
         for joint, told in zip(plant.joints.values(), found, strict=True):
             true, guess = reach(joint), reach(told.joint)
             errors.append(100.0 * abs((guess.high - guess.low) / (true.high - true.low) - 1.0))

@@ -12,7 +12,6 @@ from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording
-from endoscope_explain.recording.signals import gear
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -102,7 +101,7 @@ def _judged(
 def _features(recording: Recording, recorded: RecordedView, joint: str, at: Array) -> Array:
     order = [joint, *(o for o in recorded.joints if o != joint)]
     columns = [recording.joints.index(name) for name in order]
-    angle = recording.command.values[:, columns] / gear()
+    angle = recording.command.values[:, columns] / recording.gear
     return motion_features(recording.command.time, angle, at)
 
 
