@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
 
 from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.errors import EndoscopeError
@@ -211,8 +212,9 @@ def plants_of_calibration(
     u = np.asarray(command, dtype=float)
     wires = np.asarray(tension, dtype=float)
     pairs = [wires[:, j : j + 2] for j in range(0, wires.shape[1], 2)]
-    # The simulation lets go of the interpreter: two joints take two cores.
-    with ThreadPoolExecutor(len(pairs)) as pool:
+    # The simulation lets go of the interpreter: two joints take two cores, unless the threads of
+    # small matrices are in the way.
+    with threadpool_limits(1, 'blas'), ThreadPoolExecutor(len(pairs)) as pool:
         fits = list(pool.map(lambda pair: fit_plant(u, pair, gear=gear), pairs))
     return tuple(fit.parameters for fit in fits)
 
