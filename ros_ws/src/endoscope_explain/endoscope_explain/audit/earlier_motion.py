@@ -13,7 +13,6 @@ from math import log
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import chi2
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.kernel import run_joints
@@ -31,8 +30,6 @@ LEAST_S = 2.0
 MOST_REVERSALS = 5
 SCALES = 8
 """How often the motors' reach is halved for the angles that are tried for each reversal."""
-RARE = 1e-3
-"""Noise alone makes a misfit as large as this seldom."""
 STEPS = 40
 """Of the search that goes on from the best of them, for each reversal."""
 
@@ -159,7 +156,7 @@ class _Past:
         early, later = left[self._early], left[self._times >= self.shows_until]
         if not len(later):
             return False
-        return bool(chi2.sf(early.sum(), len(early)) < RARE <= chi2.sf(later.sum(), len(later)))
+        return _is_more_than_noise(early) and not _is_more_than_noise(later)
 
     def _misfit(self, way: Array) -> float:
         return float(np.sum(self._left(way, self._cut)[self._early] ** 2))
@@ -193,6 +190,12 @@ class _Past:
                 break
             best, least = found.x, found.fun
         return way(best) if len(best) else None
+
+
+def _is_more_than_noise(squares: Array) -> bool:
+    """Whether squares (N,) in noise units are worth a variance of their own (Schwarz)."""
+    mean = float(np.mean(squares))
+    return mean > 1.0 and len(squares) * (mean - 1.0 - log(mean)) > log(len(squares))
 
 
 def _is_enough(recording: Recording, joint: int, since: float) -> bool:
