@@ -50,7 +50,11 @@ def test_too_few_tubes_are_refused(capsys):
 def test_without_pytorch_one_line_says_how_to_get_it(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, 'torch', None)
-    monkeypatch.delitem(sys.modules, 'endoscope_benchmarks.networks.papers_recipe', raising=False)
+    for name in (
+        'endoscope_benchmarks.networks.papers_recipe',
+        'endoscope_core.classifier.pytorch',
+    ):
+        monkeypatch.delitem(sys.modules, name, raising=False)
     assert main(command) == 2
     assert capsys.readouterr().err == (
         'endoscope: training the networks of the first paper needs PyTorch: run '

@@ -109,7 +109,8 @@ def test_a_data_set_without_room_on_the_disk_is_named(tmp_path):
 def test_without_pytorch_one_line_says_how_to_get_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, 'torch', None)
-    monkeypatch.delitem(sys.modules, 'endoscope_core.classifier.cnn_training', raising=False)
+    for name in ('endoscope_core.classifier.cnn_training', 'endoscope_core.classifier.pytorch'):
+        monkeypatch.delitem(sys.modules, name, raising=False)
     assert main(['train', '--out', 'weights.safetensors']) == 2
     assert capsys.readouterr().err == (
         'endoscope: training the networks of the first paper needs PyTorch: run '

@@ -27,6 +27,7 @@ from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.held_noise import with_held_noise
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.recording import Recording
+from endoscope_explain.search.candidate import Variant
 from endoscope_explain.search.levels import MOST_EFFECTS, JointSearch, search
 from endoscope_explain.search.refit import Composition
 
@@ -42,7 +43,6 @@ ROUNDS = 3
 what the first one made of the other, and the third tells that it stands."""
 
 Explained = tuple[JointSearch, Decision]
-Variant = tuple[str, tuple[float, ...]]
 
 
 def explain_recording(

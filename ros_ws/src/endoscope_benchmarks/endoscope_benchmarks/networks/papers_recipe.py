@@ -6,20 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.errors import EndoscopeError
-
-try:
-    import torch
-    from torch import Tensor, nn
-except ModuleNotFoundError as error:
-    raise EndoscopeError(
-        'training the networks of the first paper needs PyTorch: run `make -C ros_ws train`, '
-        'which says how large it is'
-    ) from error
-
 from endoscope_benchmarks.networks.grouped_folds import CrossValidation, grouped_folds
 from endoscope_benchmarks.networks.recurrence_plot_cnn import RecurrencePlotCnn
 from endoscope_benchmarks.networks.tension_mlp import TensionMlp
+from endoscope_core.classifier.pytorch import Tensor, nn, torch
 from endoscope_core.classifier.tension_cnn import TensionCnn
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 

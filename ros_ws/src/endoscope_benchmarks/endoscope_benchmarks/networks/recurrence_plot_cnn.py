@@ -1,10 +1,7 @@
 """The recurrence plot + CNN that the first paper compares its 1D-CNN with (Table 3)."""
 
-import torch
-from torch import Tensor, nn
-from torch.nn import functional
-
 from endoscope_core.classifier.classification import WIRES
+from endoscope_core.classifier.pytorch import Tensor, nn, torch
 from endoscope_core.signals import CALIBRATION_SAMPLES
 
 PIXELS = 60
@@ -64,5 +61,5 @@ def recurrence_plots(tension: Tensor) -> Tensor:
 
     Eckmann, Kamphorst, Ruelle, Europhys. Lett. 4(9), 1987, without the threshold.
     """
-    states = functional.avg_pool1d(tension, CALIBRATION_SAMPLES // PIXELS)
+    states = nn.functional.avg_pool1d(tension, CALIBRATION_SAMPLES // PIXELS)
     return (states[..., :, None] - states[..., None, :]).abs()

@@ -1,9 +1,7 @@
 """The multilayer perceptron that the first paper compares its 1D-CNN with (Table 3)."""
 
-from torch import Tensor, nn
-from torch.nn import functional
-
 from endoscope_core.classifier.classification import WIRES
+from endoscope_core.classifier.pytorch import Tensor, nn
 from endoscope_core.classifier.standardised_tension import StandardisedTension
 from endoscope_core.signals import CALIBRATION_SAMPLES
 
@@ -35,6 +33,6 @@ class TensionMlp(StandardisedTension):
 
     def forward(self, tension: Tensor) -> Tensor:
         """Logits (R, classes) of tensions (R, 4, 9000) in N."""
-        means = functional.avg_pool1d(self.unitless(tension), DECIMATION)
+        means = nn.functional.avg_pool1d(self.unitless(tension), DECIMATION)
         logits: Tensor = self.layers(means.flatten(1))
         return logits

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.classifier.classification import ClassificationResult
+from endoscope_core.classifier.classification import ClassificationResult, nearest_class
 from endoscope_core.classifier.cnn_classifier import (
     CnnClassifier,
     first,
@@ -126,9 +126,7 @@ def outcome(
         judgement = classifier.judged(courses)
         results += classifier.results(judgement)
         refused += [bool(reason) for reason in classifier.reasons_to_refuse(judgement)]
-    nearest = np.array(CLASSES_DEG)[
-        np.argmin(np.abs(np.rad2deg(tubes.size)[:, None] - CLASSES_DEG), axis=1)
-    ]
+    nearest = np.array([nearest_class(size, CLASSES_DEG) for size in tubes.size.tolist()])
     known = ~np.array(refused)
     right = np.array([r.class_deg for r in results]) == nearest
     errors = np.array([r.expected_size for r in results]) - tubes.size

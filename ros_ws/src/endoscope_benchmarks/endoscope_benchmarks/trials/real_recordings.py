@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_benchmarks.trials.tension_loop import tension_loop_width
-from endoscope_core.classifier.cnn_classifier import CnnClassifier, course
 from endoscope_core.hysteresis.inverse import HysteresisParameters
 from endoscope_core.identification import (
     ModelFit,
@@ -34,7 +33,6 @@ from endoscope_core.identification.tube_files import (
     POSITIVE,
 )
 from endoscope_core.metrics import width_at_mid_height
-from endoscope_core.signals import CALIBRATION_RATE, calibration_motion
 
 Array = NDArray[np.float64]
 
@@ -110,25 +108,6 @@ def real_recordings(folder: Path | None = None) -> list[RealRecording]:
             )
         )
     return sorted(found, key=lambda recording: recording.bend)
-
-
-def judged_by_the_network(recording: RealRecording, classifier: CnnClassifier) -> tuple[float, str]:
-    """Size in rad that the project's network reads from one tube, and why it refuses it, or empty.
-
-    The settled cycle takes the place of the calibration's, phase by phase; its one joint is both.
-    """
-    motion = calibration_motion(classifier.motion)
-    signal, _ = motion.signal(np.arange(motion.samples) / CALIBRATION_RATE)
-    period = motion.samples - motion.settled
-    crest = motion.settled + int(np.argmax(signal[motion.settled :]))
-    phase = 0.5 * np.pi + 2.0 * np.pi * (np.arange(motion.samples) - crest) / period
-    loop = recording.within(*_SETTLED)
-    wires = [
-        np.interp(phase, recording.phase[loop], column, period=2.0 * np.pi)
-        for column in recording.tension[loop].T
-    ]
-    judgement = classifier.judged(course(np.stack(wires * 2, axis=1), classifier.motion)[None])
-    return float(judgement.size[0]), classifier.reasons_to_refuse(judgement)[0]
 
 
 def without_repeats(table: Array) -> Array:

@@ -1,5 +1,7 @@
 """What a classifier says of one calibration, and how it refuses."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -93,3 +95,8 @@ def checked_tension(
     if not np.all(np.isfinite(array)):
         raise ClassifierError('the tensions hold values that are not finite')
     return array
+
+
+def nearest_class(size: float, classes_deg: Sequence[int]) -> int:
+    """Class in deg that is nearest to a backlash size in rad."""
+    return min(classes_deg, key=lambda each: abs(math.radians(each) - size))

@@ -14,6 +14,7 @@ from endoscope_core.classifier.classification import (
     ClassificationResult,
     UnseenTensionError,
     checked_tension,
+    nearest_class,
 )
 from endoscope_core.signals import calibration_motion
 
@@ -258,7 +259,7 @@ class CnnClassifier:
             below = [_NORMAL.cdf((border - size) / deviation) for border in borders.tolist()]
             weights = np.diff([0.0, *below, 1.0]).tolist()
             probabilities = dict(zip(self.classes_deg, weights, strict=True))
-            nearest = min(self.classes_deg, key=lambda each: abs(math.radians(each) - size))
+            nearest = nearest_class(size, self.classes_deg)
             found.append(
                 ClassificationResult(nearest, probabilities[nearest], probabilities, size, interval)
             )

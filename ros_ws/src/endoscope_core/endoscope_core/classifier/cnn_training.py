@@ -8,17 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.errors import EndoscopeError
-
-try:
-    import torch
-    from torch import Tensor, nn
-except ModuleNotFoundError as error:
-    raise EndoscopeError(
-        'training the networks of the first paper needs PyTorch: run `make -C ros_ws train`, '
-        'which says how large it is'
-    ) from error
-
 from endoscope_core.classifier.cnn_classifier import (
     LEAST_DEVIATION,
     MIDDLE,
@@ -37,6 +26,7 @@ from endoscope_core.classifier.disturbance import (
     read_of_all_kinds,
 )
 from endoscope_core.classifier.held_out_calibration import Report, calibrated, counted
+from endoscope_core.classifier.pytorch import Tensor, nn, torch
 from endoscope_core.classifier.tension_cnn import TensionCnn
 from endoscope_core.dataset import CLASSES_DEG
 from endoscope_core.dataset.training_rigs import (
@@ -44,6 +34,7 @@ from endoscope_core.dataset.training_rigs import (
     strange_rigs,
     training_rigs,
 )
+from endoscope_core.errors import EndoscopeError
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.classifier.classification import LEVEL
+from endoscope_core.classifier.classification import LEVEL, nearest_class
 from endoscope_core.classifier.cnn_classifier import (
     KNOWN,
     CnnClassifier,
@@ -136,7 +136,7 @@ def _calibration(
 def _figures(judge: CnnClassifier, judgement: Judgement, size: Array) -> dict[str, float]:
     results = judge.results(judgement)
     refused = [bool(reason) for reason in judge.reasons_to_refuse(judgement)]
-    nearest = [min(CLASSES_DEG, key=lambda c: abs(np.deg2rad(c) - true)) for true in size]
+    nearest = [nearest_class(true, CLASSES_DEG) for true in size.tolist()]
     right = [result.class_deg == each for result, each in zip(results, nearest, strict=True)]
     holds = [result.holds(true) for result, true in zip(results, size.tolist(), strict=True)]
     return {

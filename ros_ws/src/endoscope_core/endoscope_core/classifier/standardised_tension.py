@@ -1,9 +1,7 @@
 """The unit in which a network of the first paper sees tensions."""
 
-import torch
-from torch import Tensor, nn
-
 from endoscope_core.classifier.classification import WIRES
+from endoscope_core.classifier.pytorch import Tensor, nn, torch
 
 
 class StandardisedTension(nn.Module):

@@ -3,10 +3,10 @@
 from itertools import pairwise
 
 import numpy as np
-from torch import Tensor, nn
 
 from endoscope_core.classifier.classification import WIRES
 from endoscope_core.classifier.cnn_classifier import CHANNELS, STRIDE
+from endoscope_core.classifier.pytorch import Tensor, nn
 from endoscope_core.classifier.standardised_tension import StandardisedTension
 
 

@@ -271,8 +271,8 @@ def _audited_bending(
         repeated, _ = held(values, plant.sensors.tracker_noise, 0.0, interval)
         repeated &= noisy
         findings += held_findings(joint, signal, series.time, repeated)
-        slack = 3.0 * interval
-        travel = motor_travel(series.time, motor.time, motor.values[:, j] / recording.gear, slack)
+        asked = motor.values[:, j] / recording.gear
+        travel = motor_travel(series.time, motor.time, asked, 3.0 * interval)
         spikes = find_outliers(values, plant.sensors.tracker_noise, travel)
         wrong[:, j] = repeated
         isolated[:, j] = spikes

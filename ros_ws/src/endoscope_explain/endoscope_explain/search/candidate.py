@@ -28,6 +28,9 @@ from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.periods import likely_periods, period_bounds
 from endoscope_explain.search.repeated_motion import motion_repeats
 
+Variant = tuple[str, tuple[float, ...]]
+"""A term, and what it acts on or which of its forms it has, which no shape of a tube changes."""
+
 LAGS = 3
 """Time constants at which arguments that lag are tried."""
 
@@ -56,7 +59,7 @@ class Candidate:
         return self.term.id
 
     @property
-    def variant(self) -> tuple[str, tuple[float, ...]]:
+    def variant(self) -> Variant:
         """Its id, and what it acts on or which of its forms it has."""
         if self.multiplies:
             return self.id, (float(MULTIPLIES),)

@@ -18,7 +18,7 @@ from endoscope_explain.fit.nominal import leans, with_any_numbers
 from endoscope_explain.fit.other_forms import with_form
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.candidate import Candidate, effects, functions
+from endoscope_explain.search.candidate import Candidate, Variant, effects, functions
 from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, null_of
 from endoscope_explain.search.refit import (
     Composition,
@@ -218,7 +218,7 @@ def _level(
     found = [each for _, _, compositions in grown for each in compositions]
     if not first.terms and leans(first.fit):
         found.append(until_it_stands(composition((), with_any_numbers(first.fit))))
-    best: dict[frozenset[tuple[str, tuple[float, ...]]], Composition] = {}
+    best: dict[frozenset[Variant], Composition] = {}
     for each in sorted(found, key=lambda c: -c.evidence):
         best.setdefault(frozenset(term.variant for term in each.terms), each)
     ranked = tuple(best.values())
@@ -308,7 +308,7 @@ def _with_their_formulas(
         return polish(begun_beside(function.fit, parent.fit, own, behind.offset), parent)
 
     more = parallel_map(fitted, tasks, jobs)
-    best: dict[tuple[str, tuple[float, ...]], Composition] = {}
+    best: dict[Variant, Composition] = {}
     for each in sorted([*grown, *more], key=lambda c: -c.evidence):
         best.setdefault(each.terms[-1].variant, each)
     return list(best.values())
@@ -320,7 +320,7 @@ def _most_promising(ranked: list[Promised]) -> list[Candidate]:
     A formula that is far from linear promises little at a start that is far from the truth; the
     function at its place is not misled by that.
     """
-    starts: dict[tuple[str, tuple[float, ...]], list[Candidate]] = {}
+    starts: dict[Variant, list[Candidate]] = {}
     for promised in ranked:
         starts.setdefault(promised.candidate.variant, []).append(promised.candidate)
     variants = list(starts.values())
@@ -337,7 +337,7 @@ def _most_promising(ranked: list[Promised]) -> list[Candidate]:
 
 def _worth_a_fit(looks: list[Look]) -> list[Look]:
     """The best after a first fit, and all that are at the place of the best one."""
-    best: dict[tuple[str, tuple[float, ...]], Look] = {}
+    best: dict[Variant, Look] = {}
     for seen in sorted(looks, key=lambda seen: seen.cost):
         best.setdefault(seen.candidate.variant, seen)
     ranked = list(best.values())

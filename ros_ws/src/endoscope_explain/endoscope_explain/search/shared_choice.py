@@ -15,7 +15,7 @@ from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.candidate import Candidate, effects
+from endoscope_explain.search.candidate import Candidate, Variant, effects
 from endoscope_explain.search.levels import LOOKED_AT, STARTS
 from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, shown
 from endoscope_explain.search.refit import Look, composition, look, polish
@@ -26,8 +26,6 @@ Array = NDArray[np.float64]
 Anchors = tuple[Fit, ...]
 Begun = tuple[list[JointModel], list[Array]]
 """Models of all recordings, and the coordinates at which their fit begins."""
-Variant = tuple[str, tuple[float, ...]]
-"""An effect, and what it acts on or which of its forms it has, which no shape of a tube changes."""
 
 POLISHED_FIRST, POLISHED = 6, 3
 """Effects that are fitted to all recordings, beside no other one and beside others."""

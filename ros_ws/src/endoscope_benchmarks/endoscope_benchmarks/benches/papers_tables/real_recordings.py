@@ -11,12 +11,10 @@ def rows(settings: PapersBench) -> list[Row]:
     import numpy as np
 
     from endoscope_benchmarks.trials.real_recordings import (
-        judged_by_the_network,
         left_one_out,
         models_on_real_recordings,
         real_recordings,
     )
-    from endoscope_core.classifier.shipped import load_classifier
     from endoscope_core.hysteresis.inverse import MODELS
 
     recordings = real_recordings()
@@ -50,15 +48,4 @@ def rows(settings: PapersBench) -> list[Row]:
         refused = [str(outcome.bend) for outcome in outcomes if outcome.left is None]
         if refused:
             settings.report(f'{model} table refuses the tubes of {", ".join(refused)} deg')
-    classifier = load_classifier()
-    for recording in recordings:
-        size, why = judged_by_the_network(recording, classifier)
-        true = np.rad2deg(recording.backlash_size)
-        found.append(
-            Row(
-                f'size by the network, deg; {recording.bend} deg tube of {true:.1f} deg, '
-                f'{"refused" if why else "not refused"}',
-                [float(np.rad2deg(size))],
-            )
-        )
     return found
