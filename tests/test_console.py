@@ -157,6 +157,7 @@ def test_silence_of_the_page_ends_the_grip_and_then_the_lease(rig):
         ended(rig, page, lambda: setattr(page, 'sends', False), 'silent', 'stalled')
         rig.until(lambda: page.lost, 'the end of the lease')
         assert 'silent' in page.lost[0]['why']
+        rig.until(lambda: page.state['lease']['holder'] == '', 'a state without a lease')
         # A page that wakes up has to ask anew.
         page.sends = True
         rig.passes(0.3)
