@@ -1,6 +1,7 @@
 """`endoscope bench cells`: how a calibration fares with load cells as they are."""
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from endoscope_bringup.seed_argument import seed
@@ -29,6 +30,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--motion', default='sinusoid', help='calibration motion: sinusoid or brief (sinusoid)'
     )
+    parser.add_argument(
+        '--weights', type=Path, metavar='FILE', help='from `endoscope train` (those of the product)'
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -42,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.classifier.shipped import load_classifier
     from endoscope_core.dataset import CLASSES_DEG
 
-    classifier = load_classifier(motion=args.motion)
+    classifier = load_classifier(args.weights, args.motion)
     tubes = tubes_of_sizes(args.seed, CLASSES_DEG, args.tubes, args.motion)
     print(f'{args.motion}, seed {args.seed}, {len(tubes.size)} tubes')
     print('cells                                 right   wrong  refused  size: rms    90 % holds')
