@@ -15,6 +15,7 @@ tensions are those of the first and the last spring, with the whole exponent bet
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,6 +48,31 @@ MOST_SWEEPS = 200_000
 SETTLED = 1e-11  # N
 ANGLE_SETTLED = 1e-11  # rad
 BALANCED = 1e-12  # N m
+
+
+@dataclass(frozen=True)
+class Acting:
+    """What acts on wires and joint beside what `NOMINAL` has.
+
+    Attributes
+    ----------
+    rubbing : array (N,)
+        Factor on the exponent of all nodes before each row.
+    moment : array (N,)
+        On the joint from outside before each row, N m.
+    weight_nm, weight_rad : float
+        Moment -weight_nm sin(angle + weight_rad).
+    stop_rad, stop_stiffness : float
+        Contact of two round bodies beyond an angle on either side (Hertz 1882): its moment is
+        stop_stiffness (|angle| - stop_rad)^1.5, N m/rad^1.5.
+    """
+
+    rubbing: Array
+    moment: Array
+    weight_nm: float = 0.0
+    weight_rad: float = 0.0
+    stop_rad: float = math.inf
+    stop_stiffness: float = 0.0
 
 
 def simulate(
@@ -89,12 +115,16 @@ def motor_angle(plant: Plant, shaft_command: ArrayLike, tick: float) -> Array:
     return np.array(angle)
 
 
-def follow(plant: Plant, shaft: ArrayLike, tick: float, cells: int) -> tuple[Array, Array, Array]:
+def follow(
+    plant: Plant, shaft: ArrayLike, tick: float, cells: int, acting: Acting | None = None
+) -> tuple[Array, Array, Array]:
     """`at_motor, at_joint, angle` as `simulate` gives them, for a shaft whose angle is known."""
     spread = float(plant['joint_presliding_spread'])
     elements = np.exp(spread * np.array([-1.0, 0.0, 1.0])) if spread else np.ones(1)
     grip, springs, tension = _wire(plant, cells)
     shaft = np.asarray(shaft, dtype=float)
+    acting = acting or Acting(np.ones(len(shaft)), np.zeros(len(shaft)))
+    load = (acting.weight_nm, acting.weight_rad, acting.stop_rad, acting.stop_stiffness)
     ends, angle = np.empty((2, len(shaft), 2)), np.empty(len(shaft))
     names = (
         'pulley_radius',
@@ -109,6 +139,10 @@ def follow(plant: Plant, shaft: ArrayLike, tick: float, cells: int) -> tuple[Arr
         tick,
         np.array([plant[name] for name in names], dtype=float),
         float(plant['joint_presliding']) * elements,
+        np.array(load),
+        acting.rubbing,
+        acting.moment,
+        np.log(grip),
         grip,
         springs,
         np.stack([tension, tension]),
@@ -239,6 +273,8 @@ def _imbalance(
     tick: float,
     p: Array,
     presliding: Array,
+    load: Array,
+    moment: float,
     grip: Array,
     springs: Array,
     before: Array,
@@ -254,6 +290,10 @@ def _imbalance(
     """
     pulley, radius, stiffness, rest, friction, damping = p
     left_over = damping * step / tick + stiffness * (angle + step - rest)
+    left_over += load[0] * math.sin(angle + step + load[1]) - moment
+    beyond = abs(angle + step) - load[2]
+    if beyond > 0.0:
+        left_over += math.copysign(load[3] * beyond**1.5, angle + step)
     for i in range(len(presliding)):
         left_over += friction * _rubbed(deflection[i], step, presliding[i]) / len(presliding)
     for wire in range(2):
@@ -286,6 +326,10 @@ def _follow(
     tick: float,
     p: Array,
     presliding: Array,
+    load: Array,
+    rubbing: Array,
+    moment: Array,
+    exponent: Array,
     grip: Array,
     springs: Array,
     before: Array,
@@ -305,7 +349,21 @@ def _follow(
         if k + 1 == len(shaft):
             break
         turn = shaft[k + 1] - shaft[k]
-        wires = (p, presliding, grip, springs, before, tension, slip, extension, deflection)
+        for j in range(len(grip)):
+            grip[j] = math.exp(rubbing[k + 1] * exponent[j])
+        wires = (
+            p,
+            presliding,
+            load,
+            moment[k + 1],
+            grip,
+            springs,
+            before,
+            tension,
+            slip,
+            extension,
+            deflection,
+        )
         # Brackets the step around the last one.
         width = max(0.1 * abs(step), 1e-6)
         low, high = step - width, step + width

@@ -1,15 +1,16 @@
-"""What compensation leaves where the tube is not simulated by the equations that it inverts.
+"""The plant beside a simulator that shares no code with it, and what compensation leaves there.
 
-The slave is the sliding-node model: wires as rows of springs in place of fronts that run along
-them, and a joint whose pre-sliding is spread twice as wide as the family's, which no calibration
-fits.
+Sliding nodes: wires as rows of springs in place of fronts that run along them. For compensation
+the joint's pre-sliding is spread twice as wide as the family's, which no calibration fits.
 """
 
 from dataclasses import asdict, replace
 
 import numpy as np
-import sliding_nodes
+import pytest
+from numpy.testing import assert_allclose
 
+from endoscope_benchmarks.proof import sliding_nodes
 from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.control import DesiredMotion, Feedforward, FeedforwardLaw, reach, shipped_limits
 from endoscope_core.dataset import configuration_of_size, random_instrument
@@ -17,10 +18,39 @@ from endoscope_core.dataset.rig_variation import calibration_command
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 from endoscope_core.identification.plant_fit import plants_of_calibration
 from endoscope_core.metrics import tracking_rmse
-from endoscope_core.physics import SensorModel
+from endoscope_core.physics import JointParameters, PlantDescription, SensorModel, simulate
 from endoscope_core.signals import calibration_motion, periodic_signal
 
 TICK, NODES, SPREAD = 1e-3, 12, 0.7
+
+
+@pytest.mark.parametrize(
+    'numbers',
+    [
+        {},
+        {'capstan_exponent': 2.2, 'pretension': 3.0},
+        {
+            'friction_profile': (0.4, -0.3),
+            'joint_presliding_spread': 0.7,
+            'pretension_profile': 0.3,
+        },
+        {'pretension': 1.0, 'capstan_exponent': 0.4},
+    ],
+    ids=['nominal', 'tight', 'of another form', 'loose'],
+)
+def test_the_plant_agrees_with_sliding_nodes(numbers):
+    joint, time = JointParameters(**numbers), np.arange(0.0, 3.0, TICK)
+    command = np.deg2rad(40.0 * np.sin(3.0 * time) + 7.5 * np.sin(11.0 * time))
+    made = simulate(PlantDescription(joints={'bend_x': joint}), command[:, None], TICK)
+    shaft, at_motor, _, angle = sliding_nodes.simulate(asdict(joint), command, TICK, 50)
+    assert np.ptp(angle) > np.deg2rad(8.0)
+    assert_allclose(made.shaft_position[:, 0], shaft, atol=1e-9)
+    assert np.std(made.bending_true[:, 0] - angle) < np.deg2rad(0.02)
+    assert_allclose(made.bending_true[:, 0], angle, atol=np.deg2rad(0.06))
+    # The nodes' end spring follows a chord of the true curve just after a turn.
+    coarse = 0.5 * joint.capstan_exponent / 50 * at_motor.max()
+    assert np.std(made.tension[:, 0] - at_motor) < 0.5 * coarse
+    assert_allclose(made.tension[:, 0], at_motor, atol=1.5 * coarse)
 
 
 def answer(joint, shaft):

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
-from sliding_nodes import NOMINAL, follow, motor_angle, move_wire, simulate
+
+from endoscope_benchmarks.proof.sliding_nodes import (
+    NOMINAL,
+    follow,
+    motor_angle,
+    move_wire,
+    simulate,
+)
 
 SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))
 REFERENCE = SHARED / 'cases' / 'sheath' / 'reference'

@@ -1,0 +1,1 @@
+"""Conceals something in rigs, explains their recordings, and opens what was sealed."""
