@@ -19,5 +19,10 @@ setup(
     maintainer_email='founders@endoscope.invalid',
     description='Measures the figures of the documentation: endoscope bench.',
     license='Apache-2.0',
-    entry_points={'endoscope.commands': ['bench = endoscope_benchmarks.commands']},
+    entry_points={
+        'endoscope.commands': [
+            'bench = endoscope_benchmarks.commands',
+            'prove = endoscope_benchmarks.prove_command',
+        ]
+    },
 )

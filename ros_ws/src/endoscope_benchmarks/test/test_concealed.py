@@ -66,23 +66,23 @@ def test_strength_reaches_its_share_of_the_signal(effect, aim, rig):
     _, true, command = rig
     formula = drawn_formula(np.random.default_rng(SEED), effect, 'bend_x', 30.0)
 
-    def plant_of(strength):
-        return dataclasses.replace(true, effects=(formula(strength),))
+    def seen(strength):
+        return read(dataclasses.replace(true, effects=(formula(strength),)), command)
 
-    plant, share = scaled_to(aim, plant_of, command)
+    strength, share = scaled_to(aim, seen)
     assert share == pytest.approx(aim, rel=0.05)
-    assert moved(read(true, command), read(plant, command)) == share
+    assert moved(read(true, command), seen(strength)) == share
 
 
 def test_a_share_that_no_strength_reaches_is_said(rig):
     _, true, command = rig
 
-    def plant_of(strength):
+    def seen(strength):
         bias = EffectSpec('tracker_bias', 'bend_x', {'bias_rad': strength})
-        return dataclasses.replace(true, effects=(bias,))
+        return read(dataclasses.replace(true, effects=(bias,)), command)
 
     with pytest.raises(OutOfReachError):
-        scaled_to(100.0, plant_of, command)
+        scaled_to(100.0, seen)
 
 
 @pytest.mark.parametrize('place', PLACES)

@@ -118,23 +118,37 @@ def record(
     plant: PlantDescription, command: Array, seed: int, noise: Noise | None = None
 ) -> Recording:
     """What a rig's sensors read with their noise, as `read`."""
-    noise = noise or Noise()
-    clean, own = read(plant, command), plant.sensors
+    return as_sensed(read(plant, command), plant.joint_names(), plant.sensors, seed, noise)
+
+
+def as_sensed(
+    clean: Readings,
+    joints: tuple[str, ...],
+    described: SensorParameters,
+    seed: int,
+    noise: Noise | None = None,
+) -> Recording:
+    """Readings with the noise and the steps of the sensors that are described."""
+    noise, own = noise or Noise(), described
     if math.isfinite(noise.freedom):
         own = replace(own, load_cell_noise=0.0, tracker_noise=0.0, load_cell_resolution=0.0)
     sensors = SensorModel(own, seed)
     draw = np.random.default_rng([seed, 1])
-    tension = sensors.tension(clean.tension + _added(draw, clean.tension, 1e-3, noise, plant, True))
+
+    def added(like: Array, period: float, rms: float) -> Array:
+        return _added(draw, like, period, noise, rms)
+
+    tension = sensors.tension(clean.tension + added(clean.tension, 1e-3, described.load_cell_noise))
     tracker_s = 1e-3 * TRACKER_TICKS
     bending = sensors.bending(
-        clean.bending + _added(draw, clean.bending, tracker_s, noise, plant, False)
+        clean.bending + added(clean.bending, tracker_s, described.tracker_noise)
     )
     return Recording(
         'concealed',
         0.0,
-        plant.joint_names(),
-        Series.of(COMMAND, clean.time, command),
-        Series.of(WIRES, clean.time, quantise(tension, plant.sensors.load_cell_resolution)),
+        joints,
+        Series.of(COMMAND, clean.time, clean.command),
+        Series.of(WIRES, clean.time, quantise(tension, described.load_cell_resolution)),
         Series.of(BENDING, clean.tracker_time, bending),
         Series.of(MOTOR, clean.time, sensors.shaft_position(clean.shaft_position)),
         Series.of(MOTOR, clean.time, sensors.shaft_velocity(clean.shaft_velocity)),
@@ -186,10 +200,8 @@ def _added(
     like: Array,
     period: float,
     noise: Noise,
-    plant: PlantDescription,
-    of_cells: bool,
+    rms: float,
 ) -> Array:
-    rms = plant.sensors.load_cell_noise if of_cells else plant.sensors.tracker_noise
     added = np.zeros_like(like)
     if math.isfinite(noise.freedom):
         spread = math.sqrt(noise.freedom / (noise.freedom - 2.0))

@@ -17,7 +17,7 @@ from endoscope_benchmarks.concealed.case import (
 )
 from endoscope_benchmarks.concealed.forms import drawn_form, visited
 from endoscope_benchmarks.concealed.formulas import DRAWN, OF_THE_OTHER, drawn_formula
-from endoscope_benchmarks.concealed.readings import Noise, record
+from endoscope_benchmarks.concealed.readings import Noise, Readings, read, record
 from endoscope_benchmarks.concealed.rigs import (
     coarse_sensors,
     described_rig,
@@ -292,10 +292,15 @@ def _concealed(
         added, begin = drawn()
         aim = float(np.exp(generator.uniform(*np.log(aims))))
         try:
-            return scaled_to(aim, partial(added, rig.true), rig.command, begin)
+            strength, share = scaled_to(aim, partial(_with_law, rig, added), begin)
         except OutOfReachError:
             continue
+        return added(rig.true, strength), share
     raise RuntimeError(f'no law of {_TRIES} moves {100.0 * aims[0]:.0f} % of a signal')
+
+
+def _with_law(rig: _Rig, added: Added, strength: float) -> Readings:
+    return read(added(rig.true, strength), rig.command)
 
 
 def _finished(

@@ -42,47 +42,41 @@ def moved(bare: Readings, other: Readings) -> float:
 
 
 def scaled_to(
-    aim: float,
-    plant_of: Callable[[float], PlantDescription],
-    command: Array,
-    start: float = 1.0,
-) -> tuple[PlantDescription, float]:
+    aim: float, seen: Callable[[float], Readings], start: float = 1.0
+) -> tuple[float, float]:
     """Find the strength at which a law moves what is measured by `aim`.
 
     Parameters
     ----------
     aim : float
         Share, see `moved`.
-    plant_of : callable
-        The rig by the law's strength, without the law at zero; raises ValueError where the law
+    seen : callable
+        What is read by the law's strength, without the law at zero; raises ValueError where the law
         cannot be as strong.
-    command : array (N, J)
     start : float
         Strength where to begin.
 
     Returns
     -------
-    PlantDescription
-        The rig with the law at that strength.
-    float
-        Share that is reached.
+    strength : float
+    share : float
+        That is reached.
 
     Raises
     ------
     OutOfReachError
         If no strength reaches the share.
     """
-    bare = read(plant_of(0.0), command)
+    bare = seen(0.0)
     strength, below, above = start, 0.0, math.inf
     for _ in range(_TRIES):
         try:
-            plant = plant_of(strength)
-            share = moved(bare, read(plant, command))
+            share = moved(bare, seen(strength))
         except ValueError:
             share = math.inf
         else:
             if abs(share - aim) <= CLOSE * aim:
-                return plant, share
+                return strength, share
         if share < aim:
             below = strength
         else:

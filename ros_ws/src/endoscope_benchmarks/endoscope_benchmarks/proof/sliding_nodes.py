@@ -14,8 +14,9 @@ tensions are those of the first and the last spring, with the whole exponent bet
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +25,8 @@ from scipy.linalg import expm
 from endoscope_core.compiled import compiled
 
 Array = NDArray[np.float64]
-Plant = Mapping[str, float | Sequence[float]]
+Plant = Mapping[str, Any]
+"""Numbers, and the harmonics of the friction profile, by the keys of `NOMINAL`."""
 
 NOMINAL: Plant = {
     'pretension': 5.0,

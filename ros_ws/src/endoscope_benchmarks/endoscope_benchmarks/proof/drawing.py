@@ -1,0 +1,133 @@
+"""Rigs for the proof, each with something concealed in it, or with nothing."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_benchmarks.concealed import motions
+from endoscope_benchmarks.concealed.case import Case, Law, law_of_effect
+from endoscope_benchmarks.concealed.formulas import DRAWN
+from endoscope_benchmarks.concealed.readings import Readings, as_sensed
+from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
+from endoscope_benchmarks.concealed.strata import AIM, as_strong, drawn_case
+from endoscope_benchmarks.concealed.strength import OutOfReachError, scaled_to
+from endoscope_benchmarks.proof.another_rig import (
+    FEW_NODES,
+    FORMS,
+    Laws,
+    drawn_laws,
+    read,
+)
+from endoscope_core.errors import EndoscopeError, nearest
+from endoscope_core.physics import JointParameters
+from endoscope_core.physics.plant_file import plant_to_mapping
+
+Array = NDArray[np.float64]
+Generator = np.random.Generator
+
+OWN, OTHER = 'own', 'other'
+SIMULATORS = (OWN, OTHER)
+"""Whose laws are concealed: those of the kernel, or those of a simulator that shares nothing."""
+NOTHING, UNKNOWN = 1.0 / 6.0, 1.0 / 6.0
+"""Shares of the rigs in which nothing is concealed, and a law that no catalogue has."""
+_TRIES = 30
+
+
+class NoSuchEffectError(EndoscopeError, ValueError):
+    """An effect that cannot be concealed."""
+
+
+def require_drawn(effect: str, form: str) -> None:
+    """Refuse an effect that is not drawn.
+
+    Raises
+    ------
+    NoSuchEffectError
+    """
+    known = FORMS if form == OTHER else DRAWN
+    if effect not in known:
+        raise NoSuchEffectError(
+            f'--effect {effect}: with --form {form} {nearest(effect, sorted(known))}'
+        )
+
+
+def drawn(form: str, seed: int, number: int, effect: str | None = None) -> tuple[Case, dict]:
+    """Draw a rig.
+
+    Parameters
+    ----------
+    form : str
+        Of `SIMULATORS`.
+    seed, number : int
+        The same rig for the same of both.
+    effect : str, optional
+        What is concealed; drawn if not given.
+
+    Returns
+    -------
+    Case
+    dict
+        The truth as plain data.
+    """
+    generator = np.random.default_rng([seed, number])
+    return _other(generator, effect) if form == OTHER else _own(generator, effect)
+
+
+def _own(generator: Generator, effect: str | None) -> tuple[Case, dict]:
+    case_seed = int(generator.integers(100, 2**31))
+    if effect is not None:
+        case = as_strong(effect, case_seed, float(np.exp(generator.uniform(*np.log(AIM)))))
+    else:
+        kinds, chances = ('nulls', 'mixed_forms', 'catalogue'), [NOTHING, UNKNOWN]
+        chosen = generator.choice(kinds, p=[*chances, 1.0 - sum(chances)])
+        case = drawn_case(str(chosen), case_seed)
+    return case, {'concealed': [law.name for law in case.laws]} | plant_to_mapping(case.true)
+
+
+def _other(generator: Generator, effect: str | None) -> tuple[Case, dict]:
+    described = described_rig(generator, 1)
+    true = true_rig(generator, described)
+    (name, joint), sensors = *true.joints.items(), true.sensors
+    command = motions.commissioning(generator, 1)
+    second = motions.another(generator, 1)
+    laws, share, concealed = Laws(), 0.0, tuple[Law, ...]()
+    if effect is not None or generator.random() >= NOTHING:
+        effect = effect or str(generator.choice(list(FORMS)))
+        laws, share = _as_strong(generator, effect, joint, command)
+        concealed = (law_of_effect(effect, name),)
+    noise = int(generator.integers(2**31))
+    recording, other = (
+        as_sensed(read(joint, laws, each), (name,), sensors, noise + k)
+        for k, each in enumerate((command, second))
+    )
+    case = Case('', 0, described, true, true, concealed, recording, other, moved=share)
+    numbers = {key: value for key, value in asdict(laws).items() if value != getattr(Laws(), key)}
+    words = FORMS[effect].words if effect else ''
+    truth = {'concealed': [law.name for law in concealed], 'words': words, 'laws': numbers}
+    return case, truth | plant_to_mapping(true)
+
+
+def _as_strong(
+    generator: Generator, effect: str, joint: JointParameters, command: Array
+) -> tuple[Laws, float]:
+    """A law that moves a drawn share of the signal, drawn anew where it cannot."""
+    bare = read(joint, Laws(), command, FEW_NODES)
+    reached, duration = float(np.abs(bare.bending).max()), float(bare.time[-1])
+    for _ in range(_TRIES):
+        laws = drawn_laws(generator, effect, duration, reached)
+        aim = float(np.exp(generator.uniform(*np.log(AIM))))
+        try:
+            strength, share = scaled_to(aim, partial(_roughly, joint, laws, command))
+        except OutOfReachError:
+            continue
+        return laws(strength), share
+    raise RuntimeError(f'no {effect} of {_TRIES} moves {100.0 * AIM[0]:.0f} % of a signal')
+
+
+def _roughly(
+    joint: JointParameters, laws: Callable[[float], Laws], command: Array, strength: float
+) -> Readings:
+    return read(joint, laws(strength), command, FEW_NODES)

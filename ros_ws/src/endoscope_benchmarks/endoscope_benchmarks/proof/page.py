@@ -1,0 +1,87 @@
+"""The page that shows truth beside answer."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from endoscope_benchmarks.proof import sentences
+from endoscope_benchmarks.proof.trial import (
+    TRUTH,
+    Outcome,
+    folder_of,
+    report_of,
+    telling,
+)
+from endoscope_core.pages import zoomable
+from endoscope_core.pages.zoomable import Curve, Plot, figure_html
+from endoscope_explain.report.figures.style import TIME, look
+from endoscope_explain.report.numbers import digits
+from endoscope_explain.report.sentences import plain
+
+PLANTS = ('nominal', 'augmented')
+
+
+def page(outcomes: Sequence[Outcome], facts: Mapping[str, str]) -> str:
+    """HTML of the proof: a page that needs no other file, with links to the reports beside it.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+    facts : mapping of str to str
+        How it was made.
+    """
+    environment = Environment(
+        loader=PackageLoader('endoscope_benchmarks', 'proof/templates'),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters['digits'] = digits
+    return environment.get_template('proof.html.j2').render(
+        head=zoomable.head(),
+        scripts=zoomable.scripts(),
+        headline=sentences.headline(outcomes),
+        summary=sentences.summary(outcomes),
+        rigs=[_rig(outcome) for outcome in outcomes],
+        facts=facts,
+    )
+
+
+def _rig(outcome: Outcome) -> dict:
+    number, answer = outcome.rig.number, outcome.answer
+    return {
+        'number': number,
+        'sha256': outcome.rig.sha256,
+        'sealed': f'{folder_of(number)}/{TRUTH}',
+        'report': report_of(number),
+        'concealed': sentences.concealed(outcome),
+        'said': sentences.said(answer.said),
+        'sentence': answer.sentence,
+        'result': sentences.result(outcome),
+        'right': outcome.judgement.exact,
+        'why': sentences.why(outcome),
+        'moved': outcome.rig.moved,
+        'answer': answer,
+        'figure': _figure(outcome),
+    }
+
+
+def _figure(outcome: Outcome) -> str:
+    """The signal that the described plant predicts worst: itself, and what each plant misses."""
+    shown = telling(outcome.answer.passage)
+    factor, unit = (180.0 / np.pi, 'deg') if shown.unit == 'rad' else (1.0, shown.unit)
+    measured = factor * shown.measured
+    predicted = {name: factor * shown.predicted[name] for name in PLANTS}
+    curves = [Curve(x=shown.time, y=measured, width=2.4, **look('measured'))]
+    curves += [Curve(x=shown.time, y=y, width=1.3, **look(n)) for n, y in predicted.items()]
+    missed = [
+        Curve(x=shown.time, y=measured - y, width=1.3, **look(n)) for n, y in predicted.items()
+    ]
+    return figure_html(
+        [
+            Plot(f'{plain(shown.signal)} ({unit})', TIME, tuple(curves), columns=7, height=140),
+            Plot(f'measured - predicted ({unit})', TIME, tuple(missed), columns=5, height=140),
+        ]
+    )

@@ -1,0 +1,209 @@
+"""One rig of the proof: recorded and sealed, explained, and opened."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_benchmarks.concealed.case import Law
+from endoscope_benchmarks.concealed.judge import Judgement, judged, statements
+from endoscope_benchmarks.proof.bag_of_rig import write_bag
+from endoscope_benchmarks.proof.drawing import drawn
+from endoscope_benchmarks.proof.seal import opened, seal
+from endoscope_core.physics import load_plant
+from endoscope_core.physics.plant_file import save_plant
+from endoscope_explain.case import ExplainedCase
+from endoscope_explain.observe.predicted_signals import view
+from endoscope_explain.pipeline import Sources, explain_case, read_inputs
+from endoscope_explain.report.provenance import provenance
+from endoscope_explain.report.sentences import verdict_sentence
+from endoscope_explain.report.writing import REPORT_HTML, write_report
+
+Array = NDArray[np.float64]
+
+TRUTH, PLANT = 'sealed.json', 'described.yaml'
+RECORDING, SECOND = 'recording.mcap', 'second.mcap'
+REPORT = 'report'
+PASSAGE_S = 6.0
+"""Of the second recording that is drawn: the one in which the described plant is furthest off."""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig that was recorded, with what is concealed in it sealed.
+
+    Attributes
+    ----------
+    number : int
+    folder : Path
+        With the recordings, the described plant and the sealed truth.
+    sha256 : str
+        Of the truth.
+    laws : tuple of Law
+        What is concealed; nobody looks at it until the seals are opened.
+    also : frozenset of str
+        Effects and places that are neither right nor false.
+    moved : float
+        Share of the signal that the laws move.
+    """
+
+    number: int
+    folder: Path
+    sha256: str
+    laws: tuple[Law, ...]
+    also: frozenset[str]
+    moved: float
+
+
+@dataclass(frozen=True)
+class Passage:
+    """The signal of the second recording that the described plant predicts worst.
+
+    Attributes
+    ----------
+    signal, unit : str
+    time : array (N,)
+        In s.
+    measured : array (N,)
+    predicted : dict of str to array (N,)
+        By the described and the improved plant.
+    """
+
+    signal: str
+    unit: str
+    time: Array
+    measured: Array
+    predicted: dict[str, Array]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was said of a rig before its seal was opened.
+
+    Attributes
+    ----------
+    number : int
+    sentence : str
+    said : tuple of Statement
+    before, refitted, after : float
+        Misfit of the second recording over its noise, of the worst signal, with the plant as
+        described, refitted and improved.
+    passage : Passage
+    seconds : float
+        That it took.
+    """
+
+    number: int
+    sentence: str
+    said: tuple
+    before: float
+    refitted: float
+    after: float
+    passage: Passage
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Truth beside answer.
+
+    Attributes
+    ----------
+    rig : Rig
+    answer : Answer
+    truth : dict
+        As it was sealed.
+    judgement : Judgement
+    """
+
+    rig: Rig
+    answer: Answer
+    truth: dict
+    judgement: Judgement
+
+
+def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path) -> Rig:
+    """Draw a rig, record it twice, and seal what is concealed in it."""
+    case, truth = drawn(form, seed, number, effect)
+    folder.mkdir()
+    sha256 = seal(folder / TRUTH, {'rig': number, 'form': form, 'seed': seed} | truth)
+    save_plant(case.described, folder / PLANT)
+    write_bag(case.recording, folder / RECORDING)
+    write_bag(case.second, folder / SECOND)
+    return Rig(number, folder, sha256, case.laws, case.also, case.moved)
+
+
+def explained(number: int, folder: Path, command: str) -> Answer:
+    """Explain a rig from its recordings and the described plant, and write the report."""
+    plant = load_plant(folder / PLANT)
+    sources = Sources(
+        folder / RECORDING, plant, validate=folder / SECOND, quick=True, plant_file=folder / PLANT
+    )
+    inputs = read_inputs(sources)
+    case = explain_case(inputs, jobs=1)
+    case = replace(case, provenance=provenance(sources.bag, sources.plant_file, command))
+    (folder / REPORT).mkdir()
+    write_report(case, folder / REPORT)
+    plants = {'nominal': case.explanation.nominal, 'augmented': case.plant}
+    assert inputs.validation is not None
+    seen = view(inputs.validation, plants)
+    worst = max(seen.signals.values(), key=lambda s: _rms(s.residual('nominal')))
+    named = replace(case.explanation, verdict=case.verdict, effects=case.effects)
+    misfit = partial(_misfit, case)
+    return Answer(
+        number,
+        verdict_sentence(case),
+        statements(named),
+        misfit('nominal'),
+        misfit('refitted'),
+        misfit('augmented'),
+        Passage(worst.signal, worst.unit, worst.time, worst.measured, dict(worst.predicted)),
+        case.runtime_s,
+    )
+
+
+def compared(rig: Rig, answer: Answer) -> Outcome:
+    """Open a rig's seal and judge what was said of it.
+
+    Raises
+    ------
+    BrokenSealError
+        The truth was changed after it was sealed.
+    """
+    truth = opened(rig.folder / TRUTH, rig.sha256)
+    return Outcome(rig, answer, truth, judged(rig.laws, answer.said, rig.also))
+
+
+def telling(passage: Passage) -> Passage:
+    """The stretch of a passage in which the described plant is furthest off."""
+    begins = np.arange(0.0, max(passage.time[-1] - PASSAGE_S, 0.0) + 0.25, 0.5)
+    missed = np.r_[0.0, np.cumsum((passage.measured - passage.predicted['nominal']) ** 2)]
+    ends = np.searchsorted(passage.time, begins + PASSAGE_S)
+    begin = begins[np.argmax(missed[ends] - missed[np.searchsorted(passage.time, begins)])]
+    inside = (passage.time >= begin) & (passage.time <= begin + PASSAGE_S)
+    return replace(
+        passage,
+        time=passage.time[inside],
+        measured=passage.measured[inside],
+        predicted={name: values[inside] for name, values in passage.predicted.items()},
+    )
+
+
+def report_of(number: int) -> str:
+    """Path of a rig's report from the page."""
+    return f'{folder_of(number)}/{REPORT}/{REPORT_HTML}'
+
+
+def folder_of(number: int) -> str:
+    """Name of a rig's folder."""
+    return f'rig_{number}'
+
+
+def _misfit(case: ExplainedCase, rung: str) -> float:
+    return max(fit.ratio for fit in case.validation[rung].values())
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
