@@ -17,7 +17,7 @@ setup(
     zip_safe=False,
     maintainer='The endoscope founders',
     maintainer_email='founders@endoscope.invalid',
-    description='Measures the figures of the documentation: endoscope bench.',
+    description='Figures of the documentation, and proofs: endoscope bench, endoscope prove.',
     license='Apache-2.0',
     entry_points={
         'endoscope.commands': [

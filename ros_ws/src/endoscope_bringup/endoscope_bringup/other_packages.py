@@ -6,7 +6,11 @@ import sys
 
 GROUP = 'endoscope.commands'
 """An entry point of it names a module of the same form as those of `endoscope_bringup.commands`."""
-COMES_WITH = {'bench': 'endoscope_benchmarks', 'console': 'endoscope_console'}
+COMES_WITH = {
+    'bench': 'endoscope_benchmarks',
+    'console': 'endoscope_console',
+    'prove': 'endoscope_benchmarks',
+}
 """Packages of this workspace that may be left out, by the command that is missing then."""
 
 _SECTION = re.compile(rf'^\[{re.escape(GROUP)}\]\n((?:[^\[\n].*\n?|\n)*)', re.MULTILINE)

@@ -19,7 +19,7 @@ from endoscope_explain.report.figures.style import TIME, look
 from endoscope_explain.report.numbers import digits
 from endoscope_explain.report.sentences import plain
 
-PLANTS = ('nominal', 'augmented')
+PLANTS = ('nominal', 'refitted', 'augmented')
 
 
 def page(outcomes: Sequence[Outcome], facts: Mapping[str, str]) -> str:
@@ -69,7 +69,7 @@ def _rig(outcome: Outcome) -> dict:
 
 
 def _figure(outcome: Outcome) -> str:
-    """The signal that the described plant predicts worst: itself, and what each plant misses."""
+    """The signal in which the missing physics shows most, and what each plant misses of it."""
     shown = telling(outcome.answer.passage)
     factor, unit = (180.0 / np.pi, 'deg') if shown.unit == 'rad' else (1.0, shown.unit)
     measured = factor * shown.measured

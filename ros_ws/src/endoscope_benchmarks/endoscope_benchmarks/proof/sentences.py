@@ -16,7 +16,7 @@ EXPLAINED = 1.5
 def headline(outcomes: Sequence[Outcome]) -> str:
     """How many were right."""
     right = sum(each.judgement.exact for each in outcomes)
-    return f'{right} of {len(outcomes)} rigs: all that was concealed is named, and nothing else'
+    return f'{right} of {len(outcomes)} right: what was concealed is named, and nothing else'
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:

@@ -27,7 +27,7 @@ TRUTH, PLANT = 'sealed.json', 'described.yaml'
 RECORDING, SECOND = 'recording.mcap', 'second.mcap'
 REPORT = 'report'
 PASSAGE_S = 6.0
-"""Of the second recording that is drawn: the one in which the described plant is furthest off."""
+"""Of the second recording that is drawn."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Rig:
 
 @dataclass(frozen=True)
 class Passage:
-    """The signal of the second recording that the described plant predicts worst.
+    """The signal of the second recording in which most is left when only numbers are refitted.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Passage:
         In s.
     measured : array (N,)
     predicted : dict of str to array (N,)
-        By the described and the improved plant.
+        By the plant as described, refitted and improved.
     """
 
     signal: str
@@ -146,11 +146,16 @@ def explained(number: int, folder: Path, command: str) -> Answer:
     case = replace(case, provenance=provenance(sources.bag, sources.plant_file, command))
     (folder / REPORT).mkdir()
     write_report(case, folder / REPORT)
-    plants = {'nominal': case.explanation.nominal, 'augmented': case.plant}
+    explanation = case.explanation
+    plants = {
+        'nominal': explanation.nominal,
+        'refitted': explanation.refitted,
+        'augmented': case.plant,
+    }
     assert inputs.validation is not None
     seen = view(inputs.validation, plants)
-    worst = max(seen.signals.values(), key=lambda s: _rms(s.residual('nominal')))
-    named = replace(case.explanation, verdict=case.verdict, effects=case.effects)
+    worst = max(seen.signals.values(), key=lambda s: _rms(s.residual('refitted')))
+    named = replace(explanation, verdict=case.verdict, effects=case.effects)
     misfit = partial(_misfit, case)
     return Answer(
         number,
@@ -177,9 +182,9 @@ def compared(rig: Rig, answer: Answer) -> Outcome:
 
 
 def telling(passage: Passage) -> Passage:
-    """The stretch of a passage in which the described plant is furthest off."""
+    """The stretch of a passage in which the refitted plant is furthest off."""
     begins = np.arange(0.0, max(passage.time[-1] - PASSAGE_S, 0.0) + 0.25, 0.5)
-    missed = np.r_[0.0, np.cumsum((passage.measured - passage.predicted['nominal']) ** 2)]
+    missed = np.r_[0.0, np.cumsum((passage.measured - passage.predicted['refitted']) ** 2)]
     ends = np.searchsorted(passage.time, begins + PASSAGE_S)
     begin = begins[np.argmax(missed[ends] - missed[np.searchsorted(passage.time, begins)])]
     inside = (passage.time >= begin) & (passage.time <= begin + PASSAGE_S)
