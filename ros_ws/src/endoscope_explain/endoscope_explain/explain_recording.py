@@ -8,6 +8,7 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.decide.conclusions import (
     NOMINAL_UNITS,
     candidates,
+    fitting,
     ladder,
     missing_function,
     named,
@@ -120,6 +121,7 @@ def explain_recording(
         missing_function(decisions),
         all(d.adequate for d in decisions),
         max(d.beyond_form for d in decisions),
+        {o.joint: fitting(d.chosen.fit) for o, d in zip(observations, decisions, strict=True)},
     )
 
 

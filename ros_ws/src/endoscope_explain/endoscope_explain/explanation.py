@@ -128,6 +128,28 @@ class ChannelFit:
 
 
 @dataclass(frozen=True)
+class Fitting:
+    """How the fit of a joint ended.
+
+    Attributes
+    ----------
+    converged : bool
+        Whether further steps would gain nothing.
+    reason : str
+        Why it went no further, in words.
+    steps : int
+        Of the last fit.
+    at_bounds : tuple of str
+        Numbers that lie at an end of what is allowed.
+    """
+
+    converged: bool
+    reason: str
+    steps: int
+    at_bounds: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Candidate:
     """One composition of effects that was tried.
 
@@ -246,6 +268,8 @@ class Explanation:
         Whether the augmented plant leaves nothing but noise and small errors of form.
     beyond_form : float
         What it leaves over what rigs of another form leave, of the worst joint.
+    fitting : mapping of joint name to Fitting
+        How the final fits ended.
     """
 
     verdict: Verdict
@@ -259,6 +283,7 @@ class Explanation:
     unknown: UnknownTerm | None = None
     adequate: bool = True
     beyond_form: float = math.nan
+    fitting: Mapping[str, Fitting] = field(default_factory=dict)
 
     @staticmethod
     def without_fit(verdict: Verdict, plant: PlantDescription) -> 'Explanation':

@@ -15,6 +15,7 @@ from endoscope_explain.case import NextExperiment, Provenance
 from endoscope_explain.explanation import (
     Candidate,
     Estimate,
+    Fitting,
     NamedEffect,
     NominalEstimate,
     Verdict,
@@ -182,6 +183,17 @@ def test_the_numbers_of_the_plant_have_their_tolerance(stribeck_case):
     assert 'joint_rest_angle_deg deg 0 1.1 0.573 … 1.72' in text_of(page)
     assert 'divided, and multiplied, by 1.15' in text_of(page)
     assert tolerance('pretension', 5.0, 3.0) == (1.25, 20.0)
+
+
+def test_how_the_fits_ended_is_said_beside_their_numbers(stribeck_case):
+    fitting = {
+        'bend_x': Fitting(True, 'no step lowers the misfit', 7, ()),
+        'bend_y': Fitting(False, 'its steps were spent', 25, ('motor_bandwidth', 'pretension')),
+    }
+    text = text_of(html_page(with_explanation(stribeck_case, fitting=fitting)))
+    assert 'The fit of bend_x converged (7 steps; no step lowers the misfit).' in text
+    assert 'The fit of bend_y did not converge: its numbers are not final' in text
+    assert 'motor_bandwidth and pretension lie at an end of what is allowed.' in text
 
 
 @pytest.mark.parametrize('verdict', list(Verdict))

@@ -14,6 +14,7 @@ from endoscope_explain.decide.decision import Decision, MissingTerm
 from endoscope_explain.explanation import (
     Candidate,
     ChannelFit,
+    Fitting,
     NamedEffect,
     NominalEstimate,
     UnknownTerm,
@@ -29,6 +30,7 @@ from endoscope_explain.fit.held_out import held_out_fit, held_out_masks, on_samp
 from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.simulated_joint import joint_of
+from endoscope_explain.fit.solver import Ended
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.candidate import Candidate as Term
 from endoscope_explain.search.formula import fitted_function, nearest_formula
@@ -261,6 +263,16 @@ def ladder(
             else {s.signal: rungs['refitted'][s.signal] for s in observation.channels}
         )
     return rungs
+
+
+def fitting(found: Fit) -> Fitting:
+    """How a fit ended."""
+    return Fitting(
+        found.ended in (Ended.CONVERGED, Ended.NO_STEP),
+        str(found.ended or 'nothing was fitted'),
+        found.steps,
+        found.at_bounds(),
+    )
 
 
 def candidates(

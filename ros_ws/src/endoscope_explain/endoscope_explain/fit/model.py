@@ -12,7 +12,7 @@ from endoscope_core.physics.functions.interpolation import HIGH, LAG, NODES, VAL
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
 from endoscope_explain.fit.simulated_joint import residuals, simulate_joint
-from endoscope_explain.fit.solver import STEP, Effort, Renewal, minimise
+from endoscope_explain.fit.solver import STEP, Effort, Ended, Minimum, Renewal, minimise
 from endoscope_explain.observe.observation import JointObservation
 
 Array = NDArray[np.float64]
@@ -24,6 +24,8 @@ COARSE = 5
 WIDE_STEP = 0.1
 """With sticking and slipping, the times of the slips jump with the parameters, and so do the
 residuals: a wide difference looks over the jumps."""
+_AT_BOUND = 1e-6
+"""Share of its range within which a coordinate lies at an end of it: steps are cut there."""
 
 
 @dataclass(frozen=True)
@@ -171,6 +173,10 @@ class Fit:
     beyond_form : float, optional
         What is left of the worst channel over what the worst rig of another form leaves; 0 where
         noise is left.
+    steps : int
+        Of the solver, the last time that the joint was fitted.
+    ended : Ended or None
+        Why it went no further; None where nothing was fitted.
     """
 
     model: JointModel
@@ -180,6 +186,20 @@ class Fit:
     cost: float
     moved_by_form: Array | None = field(default=None, repr=False)
     beyond_form: float | None = None
+    steps: int = 0
+    ended: Ended | None = None
+
+    def at_bounds(self) -> tuple[str, ...]:
+        """Names of the free parameters that were driven to an end of what is allowed."""
+        low, high = self.model.bounds()
+        near = _AT_BOUND * (high - low)
+        at_end = (self.theta <= low + near) | (self.theta >= high - near)
+        return tuple(
+            item.name
+            for item, there, coordinate in zip(self.model.free, at_end, self.theta, strict=True)
+            # What is described to be at the end, such as no spread at all, was not driven there.
+            if there and coordinate != item.mean
+        )
 
 
 def without_effect(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
@@ -265,8 +285,7 @@ def fit(
     Fit
     """
     objective = _OneJoint(model, weight)
-    found = minimise(objective, start, Effort(iterations, tolerance), known_jacobian)
-    return Fit(model, found.theta, found.residuals, found.derivative, found.cost)
+    return _fit_of(model, minimise(objective, start, Effort(iterations, tolerance), known_jacobian))
 
 
 def glance(
@@ -293,8 +312,19 @@ def glance(
     Fit
     """
     effort = Effort(steps, renewal=Renewal.NEVER)
-    found = minimise(_OneJoint(model, weight), start, effort, known_jacobian)
-    return Fit(model, found.theta, found.residuals, found.derivative, found.cost)
+    return _fit_of(model, minimise(_OneJoint(model, weight), start, effort, known_jacobian))
+
+
+def _fit_of(model: JointModel, found: Minimum[Array, Array]) -> Fit:
+    return Fit(
+        model,
+        found.theta,
+        found.residuals,
+        found.derivative,
+        found.cost,
+        steps=found.steps,
+        ended=found.ended,
+    )
 
 
 @dataclass(frozen=True)

@@ -171,7 +171,9 @@ def told_alone(fits: Sequence[Fit]) -> list[Fit]:
         told = replace(model, base=base, free=free)
         theta = found.theta[kept]
         cost = told.cost(found.residuals, theta)
-        alone.append(Fit(told, theta, found.residuals, found.jacobian[:, kept], cost))
+        alone.append(
+            replace(found, model=told, theta=theta, jacobian=found.jacobian[:, kept], cost=cost)
+        )
     return alone
 
 
@@ -294,5 +296,15 @@ def _together(
     ):
         theta = found.theta[columns]
         cost = model.cost(own * residuals, theta)
-        fits.append(Fit(model, theta, residuals, derivative, cost))
+        fits.append(
+            Fit(
+                model,
+                theta,
+                residuals,
+                derivative,
+                cost,
+                steps=found.steps,
+                ended=found.ended,
+            )
+        )
     return fits

@@ -6,7 +6,7 @@ coordinate, Broyden's rank-one update follows the steps (Broyden, Math. Comp. 19
 """
 
 from dataclasses import dataclass
-from enum import Enum, auto
+from enum import Enum, StrEnum, auto
 from typing import Protocol
 
 import numpy as np
@@ -34,6 +34,14 @@ class Renewal(Enum):
     NEVER = auto()
     WHEN_SLOW = auto()
     ALWAYS = auto()
+
+
+class Ended(StrEnum):
+    """Why a fit went no further."""
+
+    CONVERGED = 'a step gained less than it is to'
+    NO_STEP = 'no step lowers the misfit'
+    SPENT = 'as many steps were made as it may take'
 
 
 @dataclass(frozen=True)
@@ -91,12 +99,17 @@ class Minimum[R, D]:
     derivative
         At `theta`; near it where it is never renewed.
     cost : float
+    steps : int
+        That were tried.
+    ended : Ended
     """
 
     theta: Array
     residuals: R
     derivative: D
     cost: float
+    steps: int
+    ended: Ended
 
 
 def minimise[R, D](
@@ -123,7 +136,9 @@ def minimise[R, D](
     exact = known is None
     derivative = objective.derivative(theta, residuals, strides[0]) if known is None else known
     damping = _FIRST_DAMPING
-    for _ in range(effort.iterations):
+    steps, ended = 0, Ended.SPENT
+    while steps < effort.iterations:
+        steps += 1
         damping = min(damping, _LARGEST_AT_FIRST) if exact else damping
         before, accepted = cost, False
         normal, gradient = objective.normal_equations(theta, residuals, derivative)
@@ -147,13 +162,14 @@ def minimise[R, D](
         if exact and (not accepted or gained < effort.tolerance * before):
             strides = strides[1:]
             if not strides:
+                ended = Ended.CONVERGED if accepted else Ended.NO_STEP
                 break
         exact = renewal is Renewal.ALWAYS or gained < SLOW * before
         if exact:
             derivative = objective.derivative(theta, residuals, strides[0])
     if not exact and renewal is not Renewal.NEVER:
         derivative = objective.derivative(theta, residuals, strides[0])
-    return Minimum(theta, residuals, derivative, cost)
+    return Minimum(theta, residuals, derivative, cost, steps, ended)
 
 
 def bounded_step(hessian: Array, gradient: Array, theta: Array, low: Array, high: Array) -> Array:

@@ -95,6 +95,19 @@ def before_and_after(case: ExplainedCase) -> str:
     )
 
 
+def fitting_sentences(case: ExplainedCase) -> list[str]:
+    """Say how each joint's fit ended, and which numbers lie at an end of what is allowed."""
+    said = []
+    for joint, each in case.explanation.fitting.items():
+        how = 'converged' if each.converged else 'did not converge: its numbers are not final'
+        text = f'The fit of {joint} {how} ({each.steps} steps; {each.reason}).'
+        if each.at_bounds:
+            lies = 'lies' if len(each.at_bounds) == 1 else 'lie'
+            text += f' There {_all(each.at_bounds)} {lies} at an end of what is allowed.'
+        said.append(text)
+    return said
+
+
 def plain(signal: str) -> str:
     """A signal's name as a person writes it."""
     return signal.replace('/measured_js', '')

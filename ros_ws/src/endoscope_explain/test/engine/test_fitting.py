@@ -13,6 +13,7 @@ from endoscope_explain.fit.model import fit, jacobian
 from endoscope_explain.fit.nominal import beside, nominal_anchors
 from endoscope_explain.fit.other_forms import other_forms
 from endoscope_explain.fit.simulated_joint import packed_joint
+from endoscope_explain.fit.solver import Ended
 from endoscope_explain.fit.valleys import out_of_valleys
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.candidate import with_effect
@@ -41,6 +42,19 @@ def test_beside_another_joint_a_fit_is_another_one_and_the_old_one_stays(one_joi
         assert np.array_equal(seen.residuals, before) is not moved
         assert np.array_equal(seen.jacobian, pair[0].jacobian) is not moved
         assert np.array_equal(described.residuals, pair[1].residuals) is not moved
+
+
+def test_a_fit_tells_whether_it_converged_and_what_lies_at_a_bound(one_joint):
+    refitted, described = anchors(one_joint)
+    assert described.ended is None
+    assert refitted.ended in (Ended.CONVERGED, Ended.NO_STEP)
+    assert refitted.at_bounds() == ()
+    cut_short = fit(described.model, described.theta, iterations=1)
+    assert (cut_short.ended, cut_short.steps) == (Ended.SPENT, 1)
+    low, _ = described.model.bounds()
+    theta = refitted.theta.copy()
+    theta[1] = low[1]
+    assert replace(refitted, theta=theta).at_bounds() == (refitted.model.free[1].name,)
 
 
 def evenly(found):

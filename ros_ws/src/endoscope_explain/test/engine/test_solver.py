@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from endoscope_explain.fit.solver import Effort, Renewal, minimise
+from endoscope_explain.fit.solver import Effort, Ended, Renewal, minimise
 
 TIME = np.linspace(0.0, 3.0, 60)
 FAR = 10.0
@@ -74,6 +74,17 @@ def test_it_ends_at_a_bound_where_scipy_ends():
     expected = least_squares(decay, [0.5, 0.2, 0.0], bounds=(low, high))
     assert found.theta[0] == 1.5
     assert found.theta == pytest.approx(expected.x, abs=2e-3)
+
+
+def test_why_it_went_no_further_is_told():
+    start = np.array([0.5, 0.2, 0.0])
+    there = minimise(curve(decay, 3), start, Effort(200, 1e-6))
+    assert there.ended in (Ended.CONVERGED, Ended.NO_STEP)
+    assert 1 < there.steps < 200
+    spent = minimise(curve(decay, 3), start, Effort(2, 1e-12))
+    assert (spent.ended, spent.steps) == (Ended.SPENT, 2)
+    still = minimise(curve(decay, 3), np.array([2.0, 1.3, 0.4]), Effort())
+    assert (still.ended, still.steps) == (Ended.NO_STEP, 1)
 
 
 def test_a_known_derivative_and_its_updates_save_derivatives():
