@@ -82,3 +82,10 @@ def test_without_a_rival_there_is_nothing_to_separate(record):
     effect = NamedEffect('transport_delay', 'bend_x', {})
     plant = with_effect('transport_delay')
     assert propose(record(plant, duration=3.0), plant, effect) is None
+
+
+def test_a_rival_that_is_there_besides_is_none(record):
+    late = EffectSpec('transport_delay', 'bend_x', {'delay_s': 0.03})
+    lag = EffectSpec('actuator_lag', 'bend_x', {'time_constant_s': 0.02})
+    plant = dataclasses.replace(PLANT, effects=(late, lag))
+    assert propose(record(plant, duration=8.0), plant, RIVALLED) is None

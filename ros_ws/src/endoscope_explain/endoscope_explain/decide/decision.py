@@ -162,4 +162,9 @@ def _named_as_chosen(
         level = search.levels[position]
         own = [c for c in level.found if c.terms and c.terms[-1].id == term.id]
         named.append(_missing(level, own[0], jobs))
-    return tuple(named)
+    # What is missing besides is no other name of it.
+    names = {term.name for term in named}
+    return tuple(
+        replace(term, alternatives=tuple(a for a in term.alternatives if a not in names))
+        for term in named
+    )

@@ -85,8 +85,8 @@ def propose(
 def rival_plant(
     recording: Recording, plant: PlantDescription, effect: NamedEffect, rival: str
 ) -> PlantDescription | None:
-    """Fit a rival in an effect's place; None where the rival has no simulation."""
-    if rival not in CATALOGUE:
+    """Fit a rival in an effect's place; None where it has no simulation or is there besides."""
+    if rival not in CATALOGUE or (rival, effect.joint) in {(e.id, e.joint) for e in plant.effects}:
         return None
     others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
     families = effect.definition.traits.families

@@ -101,6 +101,7 @@ class Candidate:
 
 def with_effect(model: JointModel, effect: Effect, start: Mapping[str, float]) -> JointModel:
     """The model with one more effect, its parameters at `start` and free."""
+    _require_absent(model, effect)
     base, flags = model.base.copy(), model.flags.copy()
     flags[effect.flag] = True
     for place, parameter in zip(effect.places, effect.parameters, strict=True):
@@ -111,6 +112,7 @@ def with_effect(model: JointModel, effect: Effect, start: Mapping[str, float]) -
 
 
 def _with_function(model: JointModel, family: Family) -> JointModel:
+    _require_absent(model, family.place)
     place, base = family.place, model.base.copy()
     base[place.first_parameter + LOW] = family.low
     base[place.first_parameter + HIGH] = family.high
@@ -122,6 +124,12 @@ def _with_function(model: JointModel, family: Family) -> JointModel:
     if family.band is not None:
         free += (time_scale(place, *family.band),)
     return replace(model, base=base, flags=flags, free=free, families=(*model.families, family))
+
+
+def _require_absent(model: JointModel, term: Effect) -> None:
+    """Refuse a term that is there: a joint holds each once."""
+    if model.flags[term.flag]:
+        raise ValueError(f'{term.id} is there already on {model.observation.joint}')
 
 
 def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Candidate, ...]:
