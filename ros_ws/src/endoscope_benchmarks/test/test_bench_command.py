@@ -9,11 +9,11 @@ from endoscope_bringup.cli import main
 from endoscope_bringup.other_packages import GROUP
 
 
-def test_the_package_brings_the_command():
+def test_the_package_brings_its_commands():
     entries = importlib.metadata.distribution('endoscope_benchmarks').entry_points
-    [command] = entries.select(group=GROUP)
-    assert command.name == 'bench'
-    assert callable(command.load().run)
+    commands = entries.select(group=GROUP)
+    assert {command.name for command in commands} == {'bench', 'prove'}
+    assert all(callable(command.load().run) for command in commands)
 
 
 @pytest.mark.parametrize('words', [[], ['no-such-bench']])
