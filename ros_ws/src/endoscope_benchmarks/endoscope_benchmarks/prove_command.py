@@ -4,10 +4,10 @@ import argparse
 import secrets
 from pathlib import Path
 
+from endoscope_benchmarks.proof import OWN, SIMULATORS
 from endoscope_bringup.seed_argument import seed
 from endoscope_bringup.subcommands import COUNT
 
-SIMULATORS = ('own', 'other')
 PAGE = 'index.html'
 _SEEDS = 1_000_000
 
@@ -32,7 +32,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--form',
         choices=SIMULATORS,
-        default='own',
+        default=OWN,
         help="rigs of the product's own simulator, or of another one that shares no code with it "
         'and has laws of its own forms (own)',
     )

@@ -14,10 +14,10 @@ from endoscope_benchmarks.concealed.readings import as_sensed
 from endoscope_benchmarks.concealed.readings import read as read_of_kernel
 from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
 from endoscope_benchmarks.concealed.strength import moved
-from endoscope_benchmarks.proof import sentences
+from endoscope_benchmarks.proof import SIMULATORS, sentences
 from endoscope_benchmarks.proof.another_rig import FEW_NODES, FORMS, Laws, drawn_laws, read
 from endoscope_benchmarks.proof.bag_of_rig import write_bag
-from endoscope_benchmarks.proof.drawing import SIMULATORS, drawn
+from endoscope_benchmarks.proof.drawing import drawn
 from endoscope_benchmarks.proof.seal import BrokenSealError, opened, seal
 from endoscope_benchmarks.proof.trial import Answer, Outcome, Passage, Rig
 from endoscope_benchmarks.prove_command import SIMULATORS as OFFERED

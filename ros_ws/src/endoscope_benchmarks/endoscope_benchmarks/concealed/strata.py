@@ -24,7 +24,7 @@ from endoscope_benchmarks.concealed.rigs import (
     other_sheath,
     true_rig,
 )
-from endoscope_benchmarks.concealed.strength import OutOfReachError, scaled_to
+from endoscope_benchmarks.concealed.strength import drawn_as_strong
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
@@ -43,7 +43,6 @@ FORM_AIM = (0.02, 0.05)
 """The same of a form of the sheath that is no concealed law."""
 FACTOR = (0.3, 1.0)
 """By how much (rms) a form varies that another one multiplies."""
-_TRIES = 30
 _BEGIN = 0.02
 """Share of what a place takes at which the search for a law's strength begins."""
 
@@ -253,7 +252,7 @@ def _with_effect(
 
         return added, 1.0
 
-    true, share = _concealed(generator, rig, drawn, np.array(aims))
+    true, share = _concealed(generator, rig, drawn, aims)
     return true, law, share
 
 
@@ -280,23 +279,24 @@ def _with_form(
 
         return added, _BEGIN * largest
 
-    true, share = _concealed(generator, rig, drawn, np.array(aim))
+    true, share = _concealed(generator, rig, drawn, aim)
     return true, law_at_place(place, joint), share
 
 
 def _concealed(
-    generator: Generator, rig: _Rig, drawn: Callable[[], tuple[Added, float]], aims: Array
+    generator: Generator,
+    rig: _Rig,
+    drawn: Callable[[], tuple[Added, float]],
+    aims: tuple[float, float],
 ) -> tuple[PlantDescription, float]:
     """The rig with a law that moves a share of the signal, drawn anew where it cannot."""
-    for _ in range(_TRIES):
+
+    def draw() -> tuple[Added, Callable[[float], Readings], float]:
         added, begin = drawn()
-        aim = float(np.exp(generator.uniform(*np.log(aims))))
-        try:
-            strength, share = scaled_to(aim, partial(_with_law, rig, added), begin)
-        except OutOfReachError:
-            continue
-        return added(rig.true, strength), share
-    raise RuntimeError(f'no law of {_TRIES} moves {100.0 * aims[0]:.0f} % of a signal')
+        return added, partial(_with_law, rig, added), begin
+
+    added, strength, share = drawn_as_strong(generator, aims, draw)
+    return added(rig.true, strength), share
 
 
 def _with_law(rig: _Rig, added: Added, strength: float) -> Readings:

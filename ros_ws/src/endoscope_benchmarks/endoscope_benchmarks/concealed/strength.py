@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 CLOSE = 0.05
 """Relative error of the share that is reached."""
-_TRIES = 40
+_TRIES, _LAWS = 40, 30
 _STEP = 8.0
 NUDGE = 0.1
 """Of a difference for a slope, in spreads."""
@@ -90,6 +90,42 @@ def scaled_to(
             break
         strength = guess
     raise OutOfReachError(f'no strength moves what is measured by {100.0 * aim:.0f} %')
+
+
+def drawn_as_strong[L](
+    generator: np.random.Generator,
+    aims: tuple[float, float],
+    draw: Callable[[], tuple[L, Callable[[float], Readings], float]],
+) -> tuple[L, float, float]:
+    """Draw a law, and how much it moves, anew where it cannot move as much.
+
+    Parameters
+    ----------
+    generator : numpy.random.Generator
+    aims : (float, float)
+        Ends of the share of the signal, drawn by its logarithm.
+    draw : callable
+        A law, what is read by its strength, and a strength to begin at; see `scaled_to`.
+
+    Returns
+    -------
+    law
+    strength, share : float
+        At which it is, and that it moves.
+
+    Raises
+    ------
+    RuntimeError
+        If no law of some moves its share.
+    """
+    for _ in range(_LAWS):
+        law, seen, begin = draw()
+        aim = float(np.exp(generator.uniform(*np.log(aims))))
+        try:
+            return law, *scaled_to(aim, seen, begin)
+        except OutOfReachError:
+            continue
+    raise RuntimeError(f'no law of {_LAWS} moves {100.0 * aims[0]:.0f} % of a signal')
 
 
 def left(bare: PlantDescription, true: PlantDescription, command: Array) -> float:

@@ -1,1 +1,5 @@
 """Conceals something in rigs, explains their recordings, and opens what was sealed."""
+
+OWN, OTHER = 'own', 'other'
+SIMULATORS = (OWN, OTHER)
+"""Whose laws are concealed: those of the kernel, or those of a simulator that shares nothing."""

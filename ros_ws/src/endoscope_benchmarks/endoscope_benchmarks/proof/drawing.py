@@ -13,7 +13,8 @@ from endoscope_benchmarks.concealed.formulas import DRAWN
 from endoscope_benchmarks.concealed.readings import Readings, as_sensed
 from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
 from endoscope_benchmarks.concealed.strata import AIM, as_strong, drawn_case
-from endoscope_benchmarks.concealed.strength import OutOfReachError, scaled_to
+from endoscope_benchmarks.concealed.strength import drawn_as_strong
+from endoscope_benchmarks.proof import OTHER
 from endoscope_benchmarks.proof.another_rig import (
     FEW_NODES,
     FORMS,
@@ -28,12 +29,8 @@ from endoscope_core.physics.plant_file import plant_to_mapping
 Array = NDArray[np.float64]
 Generator = np.random.Generator
 
-OWN, OTHER = 'own', 'other'
-SIMULATORS = (OWN, OTHER)
-"""Whose laws are concealed: those of the kernel, or those of a simulator that shares nothing."""
 NOTHING, UNKNOWN = 1.0 / 6.0, 1.0 / 6.0
 """Shares of the rigs in which nothing is concealed, and a law that no catalogue has."""
-_TRIES = 30
 
 
 class NoSuchEffectError(EndoscopeError, ValueError):
@@ -116,15 +113,13 @@ def _as_strong(
     """A law that moves a drawn share of the signal, drawn anew where it cannot."""
     bare = read(joint, Laws(), command, FEW_NODES)
     reached, duration = float(np.abs(bare.bending).max()), float(bare.time[-1])
-    for _ in range(_TRIES):
+
+    def draw() -> tuple[Callable[[float], Laws], Callable[[float], Readings], float]:
         laws = drawn_laws(generator, effect, duration, reached)
-        aim = float(np.exp(generator.uniform(*np.log(AIM))))
-        try:
-            strength, share = scaled_to(aim, partial(_roughly, joint, laws, command))
-        except OutOfReachError:
-            continue
-        return laws(strength), share
-    raise RuntimeError(f'no {effect} of {_TRIES} moves {100.0 * AIM[0]:.0f} % of a signal')
+        return laws, partial(_roughly, joint, laws, command), 1.0
+
+    laws, strength, share = drawn_as_strong(generator, AIM, draw)
+    return laws(strength), share
 
 
 def _roughly(

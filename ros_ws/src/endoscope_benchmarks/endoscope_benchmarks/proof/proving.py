@@ -30,7 +30,7 @@ class Proof:
     count : int
         Rigs.
     form : str
-        Of `drawing.SIMULATORS`.
+        Of `SIMULATORS`.
     seed : int
     effect : str or None
         What is concealed; drawn if None.

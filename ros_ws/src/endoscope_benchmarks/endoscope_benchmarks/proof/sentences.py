@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from statistics import median
 
 from endoscope_benchmarks.concealed.judge import Statement
+from endoscope_benchmarks.concealed.trial import GOOD
 from endoscope_benchmarks.proof.trial import Outcome
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_explain.report.numbers import digits
-
-EXPLAINED = 1.5
-"""Times the noise up to which a second recording counts as predicted."""
 
 
 def headline(outcomes: Sequence[Outcome]) -> str:
@@ -79,7 +77,7 @@ def why(outcome: Outcome) -> str:
             f'Other numbers hide it: they predict the second recording to '
             f'{digits(answer.refitted)} times its noise.'
         )
-    if answer.after <= EXPLAINED:
+    if answer.after <= GOOD:
         return (
             'What is named instead predicts the second recording to '
             f'{digits(answer.after)} times its noise: these motions do not tell it from the truth.'

@@ -154,7 +154,7 @@ def explained(number: int, folder: Path, command: str) -> Answer:
     }
     assert inputs.validation is not None
     seen = view(inputs.validation, plants)
-    worst = max(seen.signals.values(), key=lambda s: _rms(s.residual('refitted')))
+    worst = max(seen.signals.values(), key=lambda s: np.mean(s.residual('refitted') ** 2))
     named = replace(explanation, verdict=case.verdict, effects=case.effects)
     misfit = partial(_misfit, case)
     return Answer(
@@ -208,7 +208,3 @@ def folder_of(number: int) -> str:
 
 def _misfit(case: ExplainedCase, rung: str) -> float:
     return max(fit.ratio for fit in case.validation[rung].values())
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
