@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from private_domain import private_domain
 
+from endoscope_bags import open_bag
 from endoscope_bags.cutting import cut
 from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
 from endoscope_core.physics import PlantDescription
@@ -43,7 +44,7 @@ def recorded(tmp_path_factory):
         graph.advance(0.4)
         graph.client.ask('enable')
         graph.set('console', source='motion', motion='periodic')
-        graph.advance(2.0)
+        graph.advance(1.5)
         graph.stop()
     return bag
 
@@ -73,7 +74,7 @@ def of_another_rig(tmp_path_factory):
         graph.set('console', source='none')
         graph.advance(1.0)
         graph.set('console', source='motion', motion='non_periodic')
-        graph.advance(2.0)
+        graph.advance(1.5)
         graph.stop()
     return bag, rig
 
@@ -109,3 +110,26 @@ def test_a_motion_cut_out_of_a_session_is_consistent(recorded, tmp_path):
     case = explained_case(Sources(tmp_path / 'cut', PLANT, quick=True))
     assert case.verdict is Verdict.CONSISTENT
     assert case.effects == ()
+
+
+def test_a_stop_is_replayed_as_the_driver_made_it(tmp_path):
+    """Silent load cells end the session in the tick of a command, which is obeyed no more."""
+    bag = tmp_path / 'bag'
+    with LiveGraph(bag, private_domain(), lock_step=True, overrides={}) as graph:
+        graph.client.ask('enable')
+        graph.set('console', source='motion', motion='periodic')
+        graph.advance(1.5)
+        graph.set('load_cells', connected=False)
+        graph.client.wait_for(lambda: graph.client.state == 'FAULT', 'FAULT')
+        graph.set('console', source='none')
+        graph.set('load_cells', connected=True)
+        stopped = graph.now()
+        graph.advance(1.5)
+        graph.stop()
+    begin = stopped - open_bag(bag).start_ns * 1e-9
+    recording = audit_recording(recording_from_bag(bag, PLANT), PLANT).recording
+    for name, signal in view(recording, {'described': PLANT}).signals.items():
+        after = signal.residual('described')[signal.time > begin]
+        # An encoder that stands still is off by the same part of a count all the time.
+        if not name.startswith('motor/measured_js') or name.endswith('effort'):
+            assert np.sqrt(np.mean(after**2)) < 1.3, name

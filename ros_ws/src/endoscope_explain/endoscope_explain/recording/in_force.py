@@ -24,8 +24,9 @@ from endoscope_core.safety import (
 SESSION = 'slave/motion_session'
 STATE = 'slave/operating_state'
 _NEVER_NS = 10**18
-# In the order in which the driver's process meets them within one tick.
-_TURN, _COMMAND, _STATE, _SESSION = range(4)
+# In the order in which they count within one tick: commands are judged in the next turn, by the
+# session of then.
+_TURN, _STATE, _SESSION, _COMMAND = range(4)
 
 Goals = NDArray[np.float64]
 
@@ -91,7 +92,7 @@ def goals_in_force(
         elif kind == _SESSION:
             driver.hear_session(sessions[k][1], log_ns)
         else:
-            driver.obey(int(command.stamp_ns[k]), asked[k], log_ns)
+            driver.hear_command(int(command.stamp_ns[k]), asked[k], log_ns)
     # What a turn sets has acted since the one before.
     series = motor.select(command.names).ordered(np.arange(len(goals) - 1))
     series = replace(series, topic=command.topic, position=goals[1:], velocity=None, effort=None)
@@ -131,6 +132,7 @@ class _Driver:
         self._state = ''
         self._torque = True
         self._goal: tuple[float, ...] = ()
+        self._arrived: list[tuple[int, Goals, int]] = []
         self._going_on: Goals | None = None
 
     def join(self, state: str, session: str, now_ns: int) -> None:
@@ -156,14 +158,17 @@ class _Driver:
         if self._state == OperatingState.DISABLED and not self.motion.session.name:
             self._torque = False
 
-    def obey(self, stamp_ns: int, asked: Goals, now_ns: int) -> None:
-        motion = self.motion
-        motion.command(motion.session.name, stamp_ns, asked.tolist(), (), now_ns)
-        self._going_on = None
+    def hear_command(self, stamp_ns: int, asked: Goals, now_ns: int) -> None:
+        self._arrived.append((stamp_ns, asked, now_ns))
 
     def turn(self, now_ns: int, period: float, read: Goals) -> tuple[float, ...]:
-        goal = self.motion.turn(now_ns, period)
-        self.motion.measure((read if self._going_on is None else self._going_on).tolist())
+        motion = self.motion
+        for stamp_ns, asked, received_ns in self._arrived:
+            motion.command(motion.session.name, stamp_ns, asked.tolist(), (), received_ns)
+            self._going_on = None
+        self._arrived.clear()
+        goal = motion.turn(now_ns, period)
+        motion.measure((read if self._going_on is None else self._going_on).tolist())
         if not self._goal or self._torque:
             self._goal = goal or self.motion.goal
         return self._goal
