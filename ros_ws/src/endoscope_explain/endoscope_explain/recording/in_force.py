@@ -69,7 +69,7 @@ def goals_in_force(
     asked, read = command.require('position'), motor.select(command.names).require('position')
     sessions = [(m.log_ns, o.frame_id) for m, o in bag.decoded(bag.find(SESSION, namespace))]
     states = [(m.log_ns, o.data) for m, o in bag.decoded(bag.find(STATE, namespace))]
-    events = [(log, _TURN, k) for k, log in enumerate(motor.log_ns.tolist())]
+    events = [(queued, _TURN, k) for k, queued in enumerate(_queued(motor).tolist())]
     events += [(log, _STATE, k) for k, (log, _) in enumerate(states)]
     events += [(log, _SESSION, k) for k, (log, _) in enumerate(sessions)]
     events += [(log, _COMMAND, k) for k, log in enumerate(command.log_ns.tolist())]
@@ -80,11 +80,12 @@ def goals_in_force(
     stamps = motor.stamp_ns.tolist()
     goals = np.empty(read.shape)
     held: list[float] = []
+    turned = motor.log_ns.tolist()
     for log_ns, kind, k in events:
         if kind == _TURN:
             period = 1e-9 * (stamps[k] - stamps[k - 1]) if k else 1e-3
             before = driver.motion.holding
-            goals[k] = driver.turn(log_ns, period, read[k])
+            goals[k] = driver.turn(turned[k], period, read[k])
             if driver.motion.holding and not before and k:
                 held.append(1e-9 * (stamps[k] - stamps[0]))
         elif kind == _STATE:
@@ -97,6 +98,19 @@ def goals_in_force(
     series = motor.select(command.names).ordered(np.arange(len(goals) - 1))
     series = replace(series, topic=command.topic, position=goals[1:], velocity=None, effort=None)
     return series, _timing(motor), _in_words(command.topic, held)
+
+
+def _queued(motor: JointStateSeries) -> NDArray[np.int64]:
+    """When each turn of the driver came to wait behind what its process had heard by then, in ns.
+
+    A beat is queued when it is due, one period after the last one that was served: what is heard
+    from then on is dealt with after the turn, however late that is served and recorded.
+    """
+    period = np.min(np.diff(motor.stamp_ns))
+    # Of another clock than the recorder's it is only known that the turn came before its reading.
+    ahead = max(0, int(np.min(motor.log_ns - motor.stamp_ns)) - period)
+    due = np.concatenate([motor.stamp_ns[:1], motor.stamp_ns[:-1] + period]) + ahead
+    return np.minimum(due, motor.log_ns)
 
 
 def _timing(motor: JointStateSeries) -> float:
