@@ -16,6 +16,8 @@ NAMES = ('motor_x', 'motor_y')
 MS = 1_000_000
 SPEED = 1e-3
 """Of the commands, rad a millisecond."""
+LAG = 20
+"""Milliseconds by which the motors are behind."""
 
 
 def header(frame_id):
@@ -25,7 +27,7 @@ def header(frame_id):
 
 
 def replayed(path, stamps, logs, commands, sessions):
-    """Goals in force, where motors read their stamps in ms as thousandths of a rad.
+    """Goals in force, where motors follow commands that are their stamps in ms times `SPEED`.
 
     Parameters
     ----------
@@ -49,7 +51,7 @@ def replayed(path, stamps, logs, commands, sessions):
     with BagWriter(path / 'bag') as writer:
         writer.write_streams(
             [
-                joints(f'/{MOTOR}', stamps, logs, SPEED * stamps / MS),
+                joints(f'/{MOTOR}', stamps, logs, SPEED * (stamps / MS - LAG)),
                 joints(f'/{COMMAND}', commands, commands, SPEED * commands / MS),
                 texts(f'/{SESSION}', HEADER, sessions, header),
                 texts(f'/{STATE}', STRING, [(stamps[0], 'ENABLED')], encode_string),
@@ -68,7 +70,7 @@ def test_a_command_of_the_instant_in_which_its_session_ends_is_not_obeyed(tmp_pa
     sessions = [(10 * MS, 'session-1'), (ended, '')]
     goals = replayed(tmp_path / 'own', at, at, at[at <= ended], sessions)
     # The pose of then is held, and the goal brakes from the command of the instant before.
-    assert goals.position[-1] == pytest.approx([SPEED * 200] * 2)
+    assert goals.position[-1] == pytest.approx([SPEED * (200 - LAG)] * 2)
     braking = 1.0 / (2.0 * shipped_rig().motors.acceleration)
     assert goals.position.max() < SPEED * 199 + braking
 
@@ -80,4 +82,4 @@ def test_what_came_once_a_turn_was_due_is_heard_after_it(tmp_path):
     ended = 203 * MS
     sessions = [(10 * MS, 'session-1'), (ended, '')]
     goals = replayed(tmp_path / 'late', stamps, logs, stamps[stamps <= ended], sessions)
-    assert goals.position[-1] == pytest.approx([SPEED * 205] * 2)
+    assert goals.position[-1] == pytest.approx([SPEED * (205 - LAG)] * 2)
