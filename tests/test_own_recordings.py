@@ -17,6 +17,7 @@ from endoscope_explain.many_bags import explained_case
 from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.pipeline import Sources
 from endoscope_explain.recording import recording_from_bag
+from endoscope_explain.recording.series import SETPOINT
 
 PLANT = PlantDescription()
 
@@ -91,7 +92,7 @@ def test_what_is_simulated_is_what_was_in_force(stretch):
 
 def assert_as_described(bag):
     recording = recording_from_bag(bag, PLANT)
-    assert any('in its motion sessions is simulated' in note for note in recording.notes)
+    assert recording.command.topic == SETPOINT
     audit = audit_recording(recording, PLANT)
     assert audit.faults() == ()
     seen = view(audit.recording, {'described': PLANT})

@@ -27,6 +27,8 @@ class SimulatedSlave:
         wire of each joint in turn.
     bending
         Noise-free bending angles in rad as the tracker would read them, shape (J,).
+    goal
+        Where the servos go or stand, rad, shape (J,).
     """
 
     def __init__(self, plant: PlantDescription, names: Sequence[str], seed: int) -> None:
@@ -37,14 +39,14 @@ class SimulatedSlave:
         self._simulator = PlantSimulator(plant)
         self._sensors = SensorModel(plant.sensors, seed)
         self._torque = False
-        self._goal: Numbers = (0.0,) * len(self.names)
+        self.goal: Numbers = (0.0,) * len(self.names)
         self._started = False
         self.tension: Numbers = ()
         self.bending: Numbers = ()
 
     def open(self) -> None:
         """Nothing to connect; the plant is compiled here rather than in the first tick."""
-        PlantSimulator(self._plant).advance(self._goal)
+        PlantSimulator(self._plant).advance(self.goal)
         self._take(self._simulator.sample)
 
     def set_torque(self, on: bool) -> None:
@@ -60,8 +62,8 @@ class SimulatedSlave:
             self._started = True
             return self._take(self._simulator.sample)
         if self._torque:
-            self._goal = tuple(goal)
-        return self._take(self._simulator.advance(self._goal, periods))
+            self.goal = tuple(goal)
+        return self._take(self._simulator.advance(self.goal, periods))
 
     def _take(self, sample: PlantSample) -> MotorReading:
         self.tension = tuple(sample.tension.ravel().tolist())

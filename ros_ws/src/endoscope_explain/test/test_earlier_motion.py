@@ -84,3 +84,15 @@ def test_a_past_that_no_reversals_explain_is_left_out_though_little_is_left(reco
     audit = audit_recording(recording, PLANT)
     assert {f.remedy for f in audit.findings} == {'what is before 4.94 s is not judged'}
     assert worst(audit.recording) < 1.3 < 3.0 < worst(recording)
+
+
+def test_by_how_little_a_servo_overshot_is_part_of_the_past(record):
+    """Millionths of a rad relax the wire at the motor by more than its cell's noise."""
+    angle = np.interp(TIME[:9000], [0.0, 2.0, 2.6, 4.0, 4.6, 7.0], [0.0, 0.0, -0.5, -0.5, 0.0, 0.0])
+    angle[7000:] = 0.2 * np.sin(2.0 * (TIME[7000:9000] - 7.0))
+    recording = since(moved(record, angle), 5.2)
+    audit = audit_recording(recording, PLANT)
+    assert worst(audit.recording) < 1.15 < 5.0 < worst(recording)
+    for told in audit.findings:
+        assert told.remedy == 'the state at the start is estimated, and all is judged from it'
+        assert 0.0 < abs(told.evidence['reversal_2_rad']) < 1e-4

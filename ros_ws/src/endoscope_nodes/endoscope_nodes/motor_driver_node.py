@@ -24,6 +24,7 @@ from endoscope_nodes.names import (
     MOTOR_COMMAND,
     MOTOR_MEASURED,
     MOTOR_REBOOT,
+    MOTOR_SETPOINT,
     MOTORS,
     OPERATING_STATE,
     SIMULATED_BENDING,
@@ -34,8 +35,10 @@ from endoscope_nodes.node_parameters import DynamixelParameters, MotorDriverPara
 from endoscope_nodes.parameters import ParameterError
 from endoscope_nodes.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime import Runtime, run_nodes
-from endoscope_nodes.ticker import TICK_S
+from endoscope_nodes.ticker import TICK_NS, TICK_S
 from endoscope_nodes.watches import CommandReport, SessionWatch
+
+_REPEATED_NS = 50_000_000
 
 
 class MotorDriverNode(EndoscopeNode):
@@ -43,7 +46,8 @@ class MotorDriverNode(EndoscopeNode):
 
     A command is obeyed while it belongs to the motion session that the node takes part in, has one
     sender and passes the gate; what it asks for goes through the motion shaper.  Every tick the
-    shaped goal goes to the device and its reading is published.  Without fresh commands, and
+    shaped goal goes to the device and its reading is published, and the goal where it changes.
+    Without fresh commands, and
     outside of a session, the shafts go to the position measured at that moment and hold it; only
     ``DISABLED`` lets them go.  The simulated slave also publishes the noise-free tensions and
     angles that the simulated load cells and tracker read.
@@ -74,6 +78,10 @@ class MotorDriverNode(EndoscopeNode):
         self._measured = JointPublisher(
             self, MOTOR_MEASURED, MOTORS, ('position', 'velocity', 'effort'), SENSOR_OFFERED
         )
+        self._setpoint = JointPublisher(self, MOTOR_SETPOINT, MOTORS, ('position',), SENSOR_OFFERED)
+        self._told: tuple[float, ...] = ()
+        self._told_ns = 0
+        self._torque = False
         if self._slave is not None:
             self._wires = JointPublisher(self, SIMULATED_WIRES, WIRES, ('effort',), LOCK_STEP)
             self._bending = JointPublisher(
@@ -81,7 +89,7 @@ class MotorDriverNode(EndoscopeNode):
             )
         self._state = ''
         self._session = SessionWatch(
-            self, lambda: self._device.set_torque(True), self._let_go, self.motion.session
+            self, lambda: self._switch_torque(True), self._let_go, self.motion.session
         )
         self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
         self._commands = JointSubscription(
@@ -127,7 +135,11 @@ class MotorDriverNode(EndoscopeNode):
     def _let_go(self) -> None:
         # Switching torque off needs no more than somebody's word, switching it on needs a session.
         if self._state == OperatingState.DISABLED and not self._session.name:
-            self._device.set_torque(False)
+            self._switch_torque(False)
+
+    def _switch_torque(self, on: bool) -> None:
+        self._torque = on
+        self._device.set_torque(on)
 
     def _on_command(self, sample: JointSample) -> None:
         self._arrived.append((sample, self.ticker.monotonic_ns(), self._senders.rivals()))
@@ -152,6 +164,11 @@ class MotorDriverNode(EndoscopeNode):
         goal = self.motion.turn(self.ticker.monotonic_ns(), periods * TICK_S)
         self._session.tell()
         reading = self._device.exchange(goal or (0.0,) * len(MOTORS), periods)
+        if self._slave is not None:
+            # The plant has just gone on under it for these periods.
+            self._tell_setpoint(stamp_ns - periods * TICK_NS, self._slave.goal)
+        elif self._torque:
+            self._tell_setpoint(self.ticker.now_ns(), goal)
         if reading is None:
             return
         self.motion.measure(reading.position)
@@ -161,6 +178,11 @@ class MotorDriverNode(EndoscopeNode):
         if self._slave is not None:
             self._wires.publish(stamp_ns, *self._slave.tension)
             self._bending.publish(stamp_ns, *self._slave.bending)
+
+    def _tell_setpoint(self, since_ns: int, goal: tuple[float, ...]) -> None:
+        if goal and (goal != self._told or since_ns - self._told_ns >= _REPEATED_NS):
+            self._told, self._told_ns = goal, since_ns
+            self._setpoint.publish(since_ns, *goal)
 
     def _notice_trouble(self) -> None:
         """Tell a trouble of the device in the tick in which it comes or goes."""

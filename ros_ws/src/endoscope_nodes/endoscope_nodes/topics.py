@@ -173,6 +173,17 @@ TOPICS = (
         one_sender=True,
     ),
     Topic(
+        names.MOTOR_SETPOINT,
+        _JOINT_STATE,
+        'on change, 1 kHz in motion, and 20 Hz',
+        'what the motor driver made of all commands: `position` in rad to which the shafts '
+        '`motor_x` and `motor_y` are sent from the stamp on',
+        offered=SENSOR_OFFERED,
+        asked=SENSOR_ASKED,
+        said_by=('motor_driver',),
+        one_sender=True,
+    ),
+    Topic(
         names.MOTOR_MEASURED,
         _JOINT_STATE,
         '1 kHz simulated, as the bus carries on hardware',

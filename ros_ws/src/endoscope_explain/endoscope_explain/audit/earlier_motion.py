@@ -1,15 +1,16 @@
 """What the rig had done before the recording began, as far as it still shows.
 
 Friction remembers the last reversals of the motor until greater motion wipes them out (return-point
-memory). Where the readings are not those of a rig that came straight from zero, the reversals that
-explain them best are taken for its past, and what depends on the past is not judged, if enough is
-left without it or if only that part is not as the plant says: how fast the rig came matters too,
-and is not estimated. Nor is what a motor does that was turning already, until its servo has
-forgotten how.
+memory), and of the least one: the tension of a wire that goes back a little falls as the square
+root of how far, so that millionths of a rad by which a servo overshot still show. Where the
+readings are not those of a rig that came straight from zero, the reversals that explain them best
+are taken for its past, and what depends on the past is not judged, if enough is left without it or
+if only that part is not as the plant says. Nor is what a motor does that was turning already, until
+its servo has forgotten how.
 """
 
 from dataclasses import replace
-from math import log
+from math import log, log2
 
 import numpy as np
 from scipy.optimize import minimize
@@ -28,8 +29,8 @@ from endoscope_explain.recording.series import Array, Mask
 LEAST_S = 2.0
 """Length of what has to be left where the time until the past no longer shows is not judged."""
 MOST_REVERSALS = 5
-SCALES = 8
-"""How often the motors' reach is halved for the angles that are tried for each reversal."""
+SHORTEST = 1e-6
+"""Way back in rad, from where the motor stands, of the smallest reversals that are tried."""
 STEPS = 40
 """Of the search that goes on from the best of them, for each reversal."""
 
@@ -166,29 +167,34 @@ class _Past:
         count = int(self._early.sum())
         if not count:
             return None
-        here = float(self.here[0])
-        reach = self._reach
+        here, reach = self.here[0], self._reach
 
-        def way(reversals: Array) -> Array:
-            return np.append(np.clip(reversals, -reach, reach), here)
+        def way(backs: Array) -> Array:
+            return np.append(np.clip(here + backs, -reach, reach), here)
 
-        def misfit(reversals: Array) -> float:
-            return self._misfit(way(reversals))
+        def misfit(backs: Array) -> float:
+            return self._misfit(way(backs))
 
-        # A motor that was held in mid-motion has turned back by little: all scales are tried.
-        scales = reach * 2.0 ** -np.arange(SCALES)
-        levels = here + np.concatenate([-scales, scales])
+        # Way back from each reversal to where the motor stands: on all scales, so by its logarithm.
+        scales = reach * 2.0 ** -np.arange(log2(reach / SHORTEST))
+        levels = np.concatenate([-scales, scales])
         best, least = np.empty(0), misfit(np.empty(0))
         while len(best) < MOST_REVERSALS:
             places = range(len(best) + 1)
             tried = [np.insert(best, place, level) for place in places for level in levels]
-            options = {'maxfev': STEPS * len(tried[0])}
-            found = minimize(misfit, min(tried, key=misfit), method='Nelder-Mead', options=options)
+            begin = min(tried, key=misfit)
+
+            def scaled(logarithms: Array, begin: Array = begin) -> float:
+                return misfit(begin * np.exp(logarithms))
+
+            simplex = np.vstack([np.zeros(len(begin)), 0.5 * np.eye(len(begin))])
+            options = {'maxfev': STEPS * len(begin), 'initial_simplex': simplex}
+            found = minimize(scaled, simplex[0], method='Nelder-Mead', options=options)
             # Each number more has to be worth it (Schwarz), by what is left with it as noise.
             noise = max(1.0, found.fun / count)
             if least - found.fun <= noise * log(count):
                 break
-            best, least = found.x, found.fun
+            best, least = begin * np.exp(found.x), found.fun
         return way(best) if len(best) else None
 
 

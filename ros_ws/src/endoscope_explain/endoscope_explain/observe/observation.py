@@ -194,7 +194,6 @@ def _channels(
                 sqrt(white**2 + (step**2 / 12.0 if dithered else 0.0)),
                 0.0 if dithered else step / sqrt(12.0),
                 quantity == 'tension',
-                recording.timing,
             )
         )
     return tuple(channels)
@@ -220,7 +219,6 @@ def _channel(
     white: float,
     rounding: float,
     may_chatter: bool,
-    timing: float,
 ) -> Channel:
     place = time / TICK
     # Stamps on a tick, to the nanosecond, take the tick's own row.
@@ -239,9 +237,6 @@ def _channel(
         noise = np.sqrt(noise**2 + scatter**2 / count)
     mean_time = np.add.reduceat(time, first) / count
     mean = np.add.reduceat(values, first) / count
-    if timing > 0.0 and len(mean) > 1:
-        # What comes earlier or later than is known differs by as much as it changes meanwhile.
-        noise = np.hypot(noise, timing * np.gradient(mean, mean_time))
     return Channel(
         signal,
         quantity,

@@ -16,7 +16,6 @@ from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_core.choices import WAIVABLE
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
-from endoscope_explain.recording.in_force import goals_in_force
 from endoscope_explain.recording.series import (
     BENDING,
     COMMAND,
@@ -26,6 +25,7 @@ from endoscope_explain.recording.series import (
     Recording,
     Series,
 )
+from endoscope_explain.recording.shaft_input import input_topic
 from endoscope_explain.recording.signals import motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_common_time, without_stray
 
@@ -76,7 +76,8 @@ def recording_from_bag(
     bag = open_bag(path)
     rig = rig or rig_of_bag(bag)
     lacking = [t for t in (WIRES, BENDING, MOTOR) if not bag.has(t, namespace)]
-    lacking += [] if bag.has(COMMAND, namespace) or bag.has(DESIRED, namespace) else [COMMAND]
+    commanded = input_topic(bag, namespace)
+    lacking += [] if commanded else [COMMAND]
     fatal = [t for t in lacking if t not in without and t not in OPTIONAL]
     if fatal:
         raise MissingTopicError(_lacking_message(bag, fatal, namespace))
@@ -91,11 +92,9 @@ def recording_from_bag(
         notes.extend(left_out)
         return series
 
-    if bag.has(COMMAND, namespace):
-        command = read(COMMAND, 'position')
-        command_names = {j: motor_name(j) for j in plant.joints}
-    else:
-        command = read(DESIRED, 'position')
+    command = read(commanded, 'position')
+    command_names = {j: motor_name(j) for j in plant.joints}
+    if commanded == DESIRED:
         command_names = {j: j for j in plant.joints}
         notes.append(
             f'{COMMAND} was not recorded: {DESIRED} times the gear, {rig.joints.gear:g}, is taken '
@@ -126,12 +125,6 @@ def recording_from_bag(
 
     every = [s for s in (command, wires, bending, motor) if s is not None]
     require_common_time(path, every)
-    timing = 0.0
-    if motor is not None and bag.has(COMMAND, namespace):
-        in_force = goals_in_force(bag, command, motor, namespace, rig)
-        if in_force is not None:
-            command, timing, told = in_force
-            notes.append(told)
     counted = losses_told(bag)
     origin_ns = min(int(s.stamp_ns.min()) for s in every)
 
@@ -149,11 +142,9 @@ def recording_from_bag(
         made = Series.of(topic, time, np.ascontiguousarray(values), received)
         return replace(made, lost=lost)
 
-    shaft = series(command.topic, command, [command_names[j] for j in joints], 'position')
-    if not bag.has(COMMAND, namespace):
-        shaft = Series.of(DESIRED, shaft.time, shaft.values * rig.joints.gear, shaft.received)
-    else:
-        shaft = replace(shaft, topic=COMMAND)
+    shaft = series(commanded, command, [command_names[j] for j in joints], 'position')
+    if commanded == DESIRED:
+        shaft = replace(shaft, values=shaft.values * rig.joints.gear)
     motors = dict.fromkeys(('position', 'velocity', 'effort'))
     if motor is not None:
         for key in motors:
@@ -174,7 +165,6 @@ def recording_from_bag(
         shaft_velocity=motors['velocity'],
         shaft_effort=motors['effort'],
         notes=tuple(notes),
-        timing=timing,
         rig=rig,
     )
 

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 COMMAND = 'motor/servo_jp'
+SETPOINT = 'motor/setpoint_js'
 MOTOR = 'motor/measured_js'
 WIRES = 'wires/measured_js'
 BENDING = 'slave/measured_js'
@@ -98,8 +99,6 @@ class Recording:
     start : array (J, K) or None
         Shaft angles in rad to which each motor had gone, one after the other, when the recording
         began; the first command alone where None.
-    timing : float
-        By how much (rms, s) it is unknown when what was commanded took effect.
     rig : Rig
         Gear, limits and time-outs of what was recorded.
     """
@@ -115,7 +114,6 @@ class Recording:
     shaft_effort: Series | None = None
     notes: tuple[str, ...] = field(default=())
     start: Array | None = None
-    timing: float = 0.0
     rig: Rig = field(default_factory=shipped_rig)
 
     def measured(self) -> dict[str, Series]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,8 @@ from endoscope_core.physics.recording import recording_faults
 from endoscope_core.physics.samples import TOPICS
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import Rig
-from endoscope_explain.recording.series import BENDING, COMMAND, DESIRED, MOTOR, WIRES
+from endoscope_explain.recording.series import BENDING, MOTOR, WIRES
+from endoscope_explain.recording.shaft_input import INPUTS
 from endoscope_explain.recording.signals import motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_running_stamps
 from endoscope_explain.simulation.answer_poses import answer_poses
@@ -112,9 +114,7 @@ def write_answer(
         answer = _answer_as_stamped(driven, commands, stamps, _recorded_shaft(recording, commands))
         if noise_seed is not None:
             answer = _noisy(answer, SensorModel(plant.sensors, noise_seed))
-        streams = [
-            _copied(recording, suffix) for suffix in (COMMAND, DESIRED) if recording.has(suffix)
-        ]
+        streams = [_copied(recording, suffix) for suffix in INPUTS if recording.has(suffix)]
         streams += _encoded(answer, times, commands.joints)
         if recording.has(POSE_TOPIC):
             bending_ns = times[BENDING].stamp_ns
@@ -170,7 +170,7 @@ def _times(recording: Recording, commands: BagCommands, suffix: str, rate: float
         series = recording.joint_state(suffix, order='recorded', finite=())
         require_running_stamps(recording.path, series)
         return _Times(series.topic, series.stamp_ns, series.log_ns, series.publish_ns)
-    namespace = commands.topic.removesuffix(COMMAND).removesuffix(DESIRED)
+    namespace = reduce(str.removesuffix, INPUTS, commands.topic)
     first, last = int(commands.stamp_ns[0]), int(commands.stamp_ns[-1])
     stamps = np.arange(first, last + 1, round(1e9 / rate), dtype=np.int64)
     return _Times(namespace + suffix, stamps, stamps, stamps)

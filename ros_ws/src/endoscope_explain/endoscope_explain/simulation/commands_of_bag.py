@@ -10,6 +10,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import Rig
 from endoscope_explain.recording.series import COMMAND, DESIRED
+from endoscope_explain.recording.shaft_input import input_topic
 from endoscope_explain.recording.signals import motor_name
 from endoscope_explain.recording.usable_stamps import require_running_stamps
 
@@ -50,14 +51,12 @@ def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> 
     BagError
         If a command is not finite or does not decode, or all are stamped alike.
     """
-    if recording.has(COMMAND):
-        series = recording.joint_state(COMMAND, finite=('position',))
-        names = {joint: motor_name(joint) for joint in plant.joints}
-    elif recording.has(DESIRED):
-        series = recording.joint_state(DESIRED, finite=('position',))
-        names = {joint: joint for joint in plant.joints}
-    else:
+    topic = input_topic(recording)
+    if not topic:
         raise NoCommandsError(recording.lacking(COMMAND, DESIRED))
+    series = recording.joint_state(topic, finite=('position',))
+    desired = topic == DESIRED
+    names = {joint: joint if desired else motor_name(joint) for joint in plant.joints}
     require_running_stamps(recording.path, series)
     joints = tuple(joint for joint, name in names.items() if name in series.names)
     if not joints:
@@ -66,5 +65,5 @@ def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> 
             f'the plant has {", ".join(names.values())}'
         )
     chosen = series.select([names[joint] for joint in joints])
-    scale = 1.0 if recording.has(COMMAND) else rig.joints.gear
+    scale = rig.joints.gear if desired else 1.0
     return BagCommands(series.topic, joints, chosen.stamp_ns, scale * chosen.require('position'))
