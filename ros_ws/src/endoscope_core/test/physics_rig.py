@@ -97,7 +97,7 @@ def run(command, effects=None, tick=1e-3, *, start=0.0, other=0.0, motor=None, *
         assert len(values) == len(effect.parameters), given
         p[0, effect.first_parameter : effect.first_parameter + len(values)] = list(values.values())
     x = np.zeros((1, L.SLOTS.states))
-    histories = np.zeros((1, 2, L.HISTORY))
+    histories = np.zeros((1, L.HISTORIES, L.HISTORY))
     sheaths = np.zeros((1, L.SHEATH_ROWS, L.CELLS + 1))
     kernel.settle(x[0], histories[0], sheaths[0], p[0], on[0], start, tick)
     inputs = np.zeros((1, len(command), L.INPUTS))

@@ -3,6 +3,10 @@
 import numpy as np
 import pytest
 from physics_rig import hand, run
+from scipy.signal import lsim
+
+from endoscope_core.physics import PlantDescription, PlantSimulator, simulate
+from endoscope_core.physics.description import EffectSpec, JointParameters
 
 TICK = 1e-3
 TIME = TICK * np.arange(3000)
@@ -58,3 +62,31 @@ def test_one_load_cell_reads_wrong(nominal, wire):
 def test_a_cell_clips_last(nominal):
     given = {'load_cell_gain': {'gain': 1.5}, 'load_cell_saturation': {'limit_n': 8.0}}
     np.testing.assert_allclose(run(COMMAND, given).a, np.minimum(1.5 * nominal.a, 8.0), atol=1e-12)
+
+
+@pytest.mark.parametrize('ticks', [40, 12.5])
+def test_load_cell_delay_delays_both_cells_by_its_time(nominal, ticks):
+    late = run(COMMAND, {'load_cell_delay': {'delay_s': ticks * TICK}})
+    now = np.arange(3000.0)
+    np.testing.assert_allclose(late.a, np.interp(now - ticks, now, nominal.a), atol=1e-12)
+    np.testing.assert_allclose(late.b, np.interp(now - ticks, now, nominal.b), atol=1e-12)
+    np.testing.assert_array_equal(late.bending, nominal.bending)
+
+
+def test_load_cell_lag_is_a_low_pass_of_first_order(nominal):
+    lag = 0.05
+    done = run(COMMAND, {'load_cell_lag': {'time_constant_s': lag}})
+    for read, true in ((done.a, nominal.a), (done.b, nominal.b)):
+        _, expected, _ = lsim(([1.0], [lag, 1.0]), true - true[0], TIME)
+        np.testing.assert_allclose(read, true[0] + expected, atol=1e-9)
+    np.testing.assert_array_equal(done.bending, nominal.bending)
+
+
+def test_a_lag_goes_on_once_a_tick_however_often_its_cell_is_read():
+    joint = {'bend_x': JointParameters()}
+    spec = EffectSpec('load_cell_lag', 'bend_x', {'time_constant_s': 0.05})
+    plant = PlantDescription(joint, effects=(spec,))
+    stepped = PlantSimulator(plant)
+    tensions = [stepped.advance([angle]).tension[0] for angle in COMMAND[:500]]
+    whole = simulate(plant, COMMAND[:501, None])
+    np.testing.assert_allclose(tensions, whole.tension[1:, 0], atol=1e-12)

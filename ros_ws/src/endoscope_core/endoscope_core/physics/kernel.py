@@ -60,6 +60,7 @@ from endoscope_core.physics.layout import (
     SLIDING_SPEED,
     SLOTS,
     TENSION_DIFFERENCE,
+    TENSION_HISTORY,
     TICKS,
     TIP,
     TRANSITION,
@@ -138,7 +139,7 @@ def settle(
 
     Parameters
     ----------
-    x, history, sheath : array (states,), array (2, HISTORY), array (SHEATH_ROWS, CELLS + 1)
+    x, history, sheath : array (states,), array (HISTORIES, HISTORY), array (SHEATH_ROWS, CELLS + 1)
         Written.
     p, on : array (parameters,), array (flags,) of bool
     shaft : float
@@ -174,7 +175,7 @@ def turn_to(x: Array, history: Array, sheath: Array, p: Array, on: Flags, shaft:
 
     Parameters
     ----------
-    x, history, sheath : array (states,), array (2, HISTORY), array (SHEATH_ROWS, CELLS + 1)
+    x, history, sheath : array (states,), array (HISTORIES, HISTORY), array (SHEATH_ROWS, CELLS + 1)
         As `settle` leaves them; written.
     p, on : array (parameters,), array (flags,) of bool
     shaft : float
@@ -199,6 +200,8 @@ def turn_to(x: Array, history: Array, sheath: Array, p: Array, on: Flags, shaft:
     x[SLIDING_SPEED] = x[JOINT_STEP] = 0.0
     x[TIP] = x[JOINT]
     history[ANGLE_HISTORY, :] = x[TIP]
+    ta, tb = tensions(x, sheath, MOTOR_END)
+    history[TENSION_HISTORY, :], history[TENSION_HISTORY + 1, :] = ta, tb
 
 
 @compiled
@@ -401,7 +404,7 @@ def advance_tick(
 
     Parameters
     ----------
-    x, history, sheath : array (states,), array (2, HISTORY), array (SHEATH_ROWS, CELLS + 1)
+    x, history, sheath : array (states,), array (HISTORIES, HISTORY), array (SHEATH_ROWS, CELLS + 1)
         Changed in place; from `settle`.
     p, on : array (parameters,), array (flags,) of bool
     inputs : array (INPUTS,)
@@ -468,20 +471,21 @@ def read_sensors(
     x: Array, history: Array, sheath: Array, p: Array, on: Flags, tick: float, out: Array
 ) -> None:
     """Write what the noise-free sensors read now into `out` (OUTPUTS,); once a tick."""
-    time = x[TICKS] * tick
-    history[ANGLE_HISTORY, int(x[TICKS]) % HISTORY] = x[TIP]
+    time, place = x[TICKS] * tick, int(x[TICKS]) % HISTORY
     ta, tb = tensions(x, sheath, MOTOR_END)
+    history[ANGLE_HISTORY, place] = x[TIP]
+    history[TENSION_HISTORY, place], history[TENSION_HISTORY + 1, place] = ta, tb
     out[OUT_MOTOR] = x[MOTOR]
     out[OUT_MOTOR_SPEED] = x[MOTOR_SPEED]
     out[OUT_EFFORT] = effort_reading(on, p, x, p[PULLEY_RADIUS] * (ta - tb), x[MOTOR_SPEED])
-    out[OUT_TENSION_A] = load_cell_reading(on, p, x, ta, 0, tb, time)
-    out[OUT_TENSION_B] = load_cell_reading(on, p, x, tb, 1, ta, time)
+    out[OUT_TENSION_A] = load_cell_reading(on, p, x, ta, 0, tb, history, time, tick)
+    out[OUT_TENSION_B] = load_cell_reading(on, p, x, tb, 1, ta, history, time, tick)
     out[OUT_BENDING] = tracker_reading(on, p, x, x[TIP], history, time, tick)
     if functions_act(on):
         a, b, angle = out[OUT_TENSION_A], out[OUT_TENSION_B], out[OUT_BENDING]
         out[OUT_EFFORT] += effort_functions(on, p, x, out[OUT_EFFORT], x[MOTOR_SPEED])
-        out[OUT_TENSION_A] += load_cell_functions(on, p, x, a, 0, tb, time)
-        out[OUT_TENSION_B] += load_cell_functions(on, p, x, b, 1, ta, time)
+        out[OUT_TENSION_A] += load_cell_functions(on, p, x, a, 0, tb, history, time, tick)
+        out[OUT_TENSION_B] += load_cell_functions(on, p, x, b, 1, ta, history, time, tick)
         out[OUT_BENDING] += tracker_functions(on, p, x, angle, history, time, tick)
     out[OUT_JOINT] = x[TIP]
 

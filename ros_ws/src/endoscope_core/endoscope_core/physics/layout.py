@@ -154,8 +154,10 @@ PLACES, EXPONENTS, WORK = range(TABLE_ROWS, TABLE_ROWS + 3)
 SHEATH_ROWS = TABLE_ROWS + 5
 
 HISTORY = 1024
-"""Ticks of command and of angle that are kept for delays."""
-COMMAND_HISTORY, ANGLE_HISTORY = 0, 1
+"""Ticks that are kept for delays, in each row of a joint's history."""
+COMMAND_HISTORY, ANGLE_HISTORY, TENSION_HISTORY = 0, 1, 2
+"""Rows of the command and of the tip's angle in rad, and the first of both wires' tensions in N."""
+HISTORIES = 4
 
 IN_COMMAND, IN_OTHER_JOINT, IN_MOTOR = range(3)
 INPUTS = 3
