@@ -1,6 +1,7 @@
 """From a plant description to the flat arrays that the compiled physics works on."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,8 +13,8 @@ from endoscope_core.physics.description import (
     PlantDescription,
     TermSpec,
 )
-from endoscope_core.physics.effect import UnknownEffectError
-from endoscope_core.physics.effects import CATALOGUE, describe
+from endoscope_core.physics.effect import NominalPhysics, UnknownEffectError
+from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS, describe
 from endoscope_core.physics.functions import FUNCTIONS, describe_place
 from endoscope_core.physics.functions.acting import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
 from endoscope_core.physics.functions.term import tabulated
@@ -21,11 +22,33 @@ from endoscope_core.physics.kernel import settle, turn_to
 from endoscope_core.physics.layout import (
     CELLS,
     FRICTION_PROFILE,
+    HISTORIES,
     HISTORY,
+    MOTOR_SPEED,
     NOMINAL_KEYS,
     SHEATH_ROWS,
     SLOTS,
 )
+
+
+def with_nominal_in_place(plant: PlantDescription) -> PlantDescription:
+    """The same plant with nominal physics that is among its effects as numbers of its joints.
+
+    Raises
+    ------
+    UnknownEffectError, ValueError
+        As for `pack`.
+    """
+    pack(plant)
+    joints, kept = dict(plant.joints), []
+    for spec in plant.effects:
+        if spec.id in NOMINAL_PHYSICS:
+            names = [parameter.name for parameter in describe(spec.id).parameters]
+            numbers = dict(zip(names, effect_values(spec).tolist(), strict=True))
+            joints[spec.joint] = replace(joints[spec.joint], **numbers)
+        else:
+            kept.append(spec)
+    return replace(plant, joints=joints, effects=tuple(kept))
 
 
 def effect_values(spec: EffectSpec) -> Array:
@@ -95,11 +118,19 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
             )
         j = names.index(spec.joint)
         values = effect_values(spec)
-        definition = CATALOGUE[spec.id]
+        definition = describe(spec.id)
         if flags[j, definition.flag]:
             raise ValueError(f'effect {spec.id} is given twice on joint {spec.joint}')
-        flags[j, definition.flag] = True
         first = definition.first_parameter
+        if isinstance(definition, NominalPhysics) and not definition.is_lacking(
+            parameters[j, first]
+        ):
+            name = definition.parameters[0].name
+            raise ValueError(
+                f'effect {spec.id}: joint {spec.joint} has it already, its {name} is '
+                f'{parameters[j, first]:g}: leave out one of the two'
+            )
+        flags[j, definition.flag] = True
         parameters[j, first : first + len(values)] = values
     if plant.terms:
         flags = flags.astype(FLAGS_OF_FUNCTIONS)
@@ -134,9 +165,13 @@ def _nominal(joint: JointParameters) -> list[float]:
 
 
 def rest_state(
-    parameters: Array, on: Flags, tick: float, shaft: Array | None = None
+    parameters: Array,
+    on: Flags,
+    tick: float,
+    shaft: Array | None = None,
+    speed: Array | None = None,
 ) -> tuple[Array, Array, Array]:
-    """States, histories and sheaths of joints at rest.
+    """States, histories and sheaths of joints at rest, or just set in motion.
 
     Parameters
     ----------
@@ -147,16 +182,18 @@ def rest_state(
     shaft : array (J,) or (J, K), optional
         Shaft angle in rad to which each motor has gone since the wires were tightened at zero, or
         K angles to which it has gone one after the other; zero if not given.
+    speed : array (J,), optional
+        Of each motor, which is on its way to its command, in rad/s; zero if not given.
 
     Returns
     -------
     states : array (J, states)
-    histories : array (J, 2, HISTORY)
+    histories : array (J, HISTORIES, HISTORY)
     sheaths : array (J, SHEATH_ROWS, CELLS + 1)
     """
     joints = len(parameters)
     states = np.zeros((joints, SLOTS.states))
-    histories = np.zeros((joints, 2, HISTORY))
+    histories = np.zeros((joints, HISTORIES, HISTORY))
     sheaths = np.zeros((joints, SHEATH_ROWS, CELLS + 1))
     way = np.zeros((joints, 1)) if shaft is None else np.reshape(shaft, (joints, -1))
     for j in range(joints):
@@ -164,4 +201,6 @@ def rest_state(
         settle(*joint, way[j, 0], tick)
         for angle in way[j, 1:]:
             turn_to(*joint, angle)
+    if speed is not None:
+        states[:, MOTOR_SPEED] = speed
     return states, histories, sheaths

@@ -5,12 +5,13 @@ memory), and of the least one: the tension of a wire that goes back a little fal
 root of how far, so that millionths of a rad by which a servo overshot still show. Where the
 readings are not those of a rig that came straight from zero, the reversals that explain them best
 are taken for its past, and what depends on the past is not judged, if enough is left without it or
-if only that part is not as the plant says. Nor is what a motor does that was turning already, until
-its servo has forgotten how.
+if only that part is not as the plant says. Of a motor that was turning already, angle and speed are
+estimated; what no speed explains is not judged until its servo has forgotten it.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from math import log, log2
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -32,7 +33,10 @@ MOST_REVERSALS = 5
 SHORTEST = 1e-6
 """Way back in rad, from where the motor stands, of the smallest reversals that are tried."""
 STEPS = 40
-"""Of the search that goes on from the best of them, for each reversal."""
+"""Of the search that goes on from the best of them, for each number."""
+SEARCH = 'Nelder-Mead'
+FLIGHT = np.array([1e-3, 0.1])
+"""Angle in rad and speed in rad/s by which that search begins to move a motor that is turning."""
 
 
 def with_state_at_start(
@@ -60,27 +64,30 @@ def with_state_at_start(
     parameters, flags = packed_rig(observations, plant)
     begin = float(recording.command.time[0])
     reach = recording.rig.motors.reach
-    starts, left_out = [], []
+    starts, speeds, left_out = [], [], []
     for j, observation in enumerate(observations):
-        way, unjudged = observation.start, 0.0
+        way, speed, unjudged = observation.start, 0.0, 0.0
         if observation.channels:
             shaft = recording.shaft_position
             seen = observation.start if shaft is None else shaft.values[:1, j]
             past = _Past(observation, parameters[j], flags[j], float(seen[0]), reach)
-            way, unjudged, estimated = past.here, begin + past.turns_until, past.estimated()
-            if estimated is not None:
-                way, end = estimated, begin + past.shows_until
-                if _is_enough(recording, j, end) or past.alone_is_unexplained(way):
+            start, came_straight = past.estimated()
+            way, speed = past.came(start)
+            unjudged = begin + start.turns_until
+            if not came_straight:
+                end = begin + past.shows_until
+                if _is_enough(recording, j, end) or past.alone_is_unexplained(start):
                     unjudged = end
                 findings.append(_finding(observation.joint, begin, end, unjudged, way))
-            elif past.turns_until:
+            elif start.turns_until:
                 findings.append(_finding(observation.joint, begin, unjudged, unjudged, way))
         starts.append(way)
+        speeds.append(speed)
         left_out.append(unjudged)
     longest = max(map(len, starts))
     # To stay where it has come to adds nothing to a way.
     ways = [np.pad(way, (0, longest - len(way)), mode='edge') for way in starts]
-    recording = replace(recording, start=np.stack(ways))
+    recording = replace(recording, start=np.stack(ways), start_speed=np.array(speeds))
     changed = {}
     for name, series in recording.measured().items():
         early = series.time[:, None] < np.array(left_out)[None]
@@ -103,99 +110,165 @@ class _Past:
             [np.full(len(c.time), c.quantity == 'shaft_position') for c in observation.channels]
         )
         asked = float(observation.start[-1])
-        ends = [asked, seen, *self._motion()]
+        first_seen, first_speed = self._motion(seen)
+        ends = [asked, seen, first_seen + first_speed / float(packed[MOTOR_BANDWIDTH])]
+
+        def came(way: list[float]) -> _Start:
+            return _Start(np.array([way[-1], 0.0]), np.array(way[:-1]) - way[-1])
 
         def differ_until(low: list[float], high: list[float], of: Mask | None = None) -> float:
-            apart = np.abs(self._left(np.array(high)) - self._left(np.array(low))) >= 1.0
+            apart = np.abs(self._left(came(high)) - self._left(came(low))) >= 1.0
             last = float(times[apart if of is None else apart & of].max(initial=-1.0))
             return last + observation.tick if last >= 0.0 else 0.0
 
-        self.turns_until = differ_until([min(ends)], [max(ends)], shaft)
-        # A motor that rested, where it was sent or where it was read, leaves no more than noise.
-        first = shaft & (times < self.turns_until)
-        rests = [np.array([asked]), np.array([seen])]
-        left = [
-            float(np.sum(self._left(way)[first] ** 2)) / max(int(first.sum()), 1) for way in rests
-        ]
-        self.here = rests[int(np.argmin(left))]
-        if min(left) <= 1.0:
-            self.turns_until = 0.0
+        turns_until = differ_until([min(ends)], [max(ends)], shaft)
+        first = shaft & (times < turns_until)
+        count = max(int(first.sum()), 1)
+
+        def left(start: _Start) -> float:
+            return float(np.sum(self._left(start)[first] ** 2)) / count
+
+        def judged(start: _Start) -> _Start:
+            """What leaves no more than noise of a motor is judged from the beginning."""
+            return replace(start, turns_until=turns_until if left(start) > 1.0 else 0.0)
+
+        def flying(numbers: Array) -> float:
+            return left(_Start(numbers))
+
+        # A motor that rested where it was sent or where it was read, or one that was turning.
+        rests = [_Start(np.array([angle, 0.0])) for angle in (asked, seen)]
+        self._begins = [judged(min(rests, key=left))]
+        if turns_until:
+            turning = np.array([first_seen, first_speed])
+            options = _around(turning, FLIGHT)
+            found = minimize(flying, turning, method=SEARCH, options=options)
+            self._begins.append(judged(_Start(found.x)))
         # Whatever the rig did before, its state lies between those of its greatest excursions.
         self.shows_until = differ_until([-reach, min(ends)], [reach, max(ends)])
-        self._early = (times >= self.turns_until) & (times < self.shows_until)
         # Samples are means over a period, half of which may come after their time.
         ticks = int(np.ceil((self.shows_until + ANALYSIS_PERIOD) / observation.tick)) + 2
         self._cut = replace(observation, inputs=observation.inputs[:, :ticks])
 
-    def _motion(self) -> list[float]:
-        """Where the motor was at first, and where its speed led while a servo forgets it."""
+    def _motion(self, seen: float) -> tuple[float, float]:
+        """Angle in rad and speed in rad/s of the motor at first, as read."""
         shaft = next(
             (c for c in self._observation.channels if c.quantity == 'shaft_position'), None
         )
         if shaft is None or len(shaft.time) < 2:
-            return []
+            return seen, 0.0
         first, second = shaft.value[:2].tolist()
         speed = (second - first) / float(shaft.time[1] - shaft.time[0])
-        return [first, first + speed / float(self._packed[MOTOR_BANDWIDTH])]
+        return first, speed
 
-    def _left(self, way: Array, observation: JointObservation | None = None) -> Array:
-        """Residuals (size,) in noise units where the motor came by a way (K,)."""
+    def _left(self, start: '_Start', observation: JointObservation | None = None) -> Array:
+        """Residuals (size,) in noise units."""
         seen = observation or self._observation
         packed, on = self._packed[None], self._on[None]
         out = np.empty((1, seen.inputs.shape[1], OUTPUTS))
-        at_rest = rest_state(packed, on, seen.tick, way[None])
-        run_joints(*at_rest, packed, on, seen.inputs, False, seen.tick, out)
+        way, speed = self.came(start)
+        begun = rest_state(packed, on, seen.tick, way[None], np.array([speed]))
+        run_joints(*begun, packed, on, seen.inputs, False, seen.tick, out)
         ends = np.full((1, self._observation.inputs.shape[1] - out.shape[1], OUTPUTS), np.nan)
         outputs = np.concatenate([out, ends], axis=1)[0]
         return np.concatenate(
             [(c.predicted(outputs) - c.value) / c.noise for c in self._observation.channels]
         )
 
-    def alone_is_unexplained(self, way: Array) -> bool:
+    def _early(self, start: '_Start') -> Mask:
+        """Samples that show the past."""
+        return (self._times >= start.turns_until) & (self._times < self.shows_until)
+
+    def alone_is_unexplained(self, start: '_Start') -> bool:
         """Whether the readings differ from the plant's while the past shows, and not after it."""
-        left = self._left(way) ** 2
-        early, later = left[self._early], left[self._times >= self.shows_until]
+        left = self._left(start) ** 2
+        early, later = left[self._early(start)], left[self._times >= self.shows_until]
         if not len(later):
             return False
         return _is_more_than_noise(early) and not _is_more_than_noise(later)
 
-    def _misfit(self, way: Array) -> float:
-        return float(np.sum(self._left(way, self._cut)[self._early] ** 2))
+    def _leaves_more_than_noise(self, start: '_Start') -> bool:
+        squares, early = self._left(start, self._cut) ** 2, self._early(start)
+        parts = [squares[part][early[part]] for part in self._observation.slices()]
+        return any(len(each) and _is_more_than_noise(each) for each in parts)
 
-    def estimated(self) -> Array | None:
-        """Way (K,) that the motor came; None where it may have come straight."""
-        count = int(self._early.sum())
-        if not count:
-            return None
-        here, reach = self.here[0], self._reach
+    def _misfit(self, start: '_Start') -> float:
+        """Mean square of the samples that show the past."""
+        return float(np.mean(self._left(start, self._cut)[self._early(start)] ** 2))
 
-        def way(backs: Array) -> Array:
-            return np.append(np.clip(here + backs, -reach, reach), here)
+    def estimated(self) -> tuple['_Start', bool]:
+        """From where the motor had come, and whether it may have come straight."""
+        tried: list[tuple[_Start, bool]] = []
+        for begun in self._begins:
+            if not self._early(begun).any():
+                return begun, True
+            found = self._searched(begun, turning=bool(tried))
+            tried.append((found, found is begun))
+            if not self._leaves_more_than_noise(found):
+                return tried[-1]
+        return min(tried, key=lambda each: self._misfit(each[0]))
 
-        def misfit(backs: Array) -> float:
-            return self._misfit(way(backs))
-
-        # Way back from each reversal to where the motor stands: on all scales, so by its logarithm.
-        scales = reach * 2.0 ** -np.arange(log2(reach / SHORTEST))
+    def _searched(self, best: '_Start', turning: bool) -> '_Start':
+        """The best start, with one reversal more after the other."""
+        count = int(self._early(best).sum())
+        least = self._misfit(best)
+        # Ways back are of all scales.
+        scales = self._reach * 2.0 ** -np.arange(log2(self._reach / SHORTEST))
         levels = np.concatenate([-scales, scales])
-        best, least = np.empty(0), misfit(np.empty(0))
-        while len(best) < MOST_REVERSALS:
-            places = range(len(best) + 1)
-            tried = [np.insert(best, place, level) for place in places for level in levels]
-            begin = min(tried, key=misfit)
-
-            def scaled(logarithms: Array, begin: Array = begin) -> float:
-                return misfit(begin * np.exp(logarithms))
-
-            simplex = np.vstack([np.zeros(len(begin)), 0.5 * np.eye(len(begin))])
-            options = {'maxfev': STEPS * len(begin), 'initial_simplex': simplex}
-            found = minimize(scaled, simplex[0], method='Nelder-Mead', options=options)
+        while len(best.backs) < MOST_REVERSALS:
+            places = range(len(best.backs) + 1)
+            tried = [
+                replace(best, backs=np.insert(best.backs, place, level))
+                for place in places
+                for level in levels
+            ]
+            found, left = self._refined(min(tried, key=self._misfit), turning)
             # Each number more has to be worth it (Schwarz), by what is left with it as noise.
-            noise = max(1.0, found.fun / count)
-            if least - found.fun <= noise * log(count):
+            if count * (least - left) <= max(1.0, left) * log(count):
                 break
-            best, least = begin * np.exp(found.x), found.fun
-        return way(best) if len(best) else None
+            best, least = found, left
+        return best
+
+    def _refined(self, begun: '_Start', turning: bool) -> tuple['_Start', float]:
+        """The best start near one, and its misfit; ways back move by their logarithms.
+
+        By less than a count of its encoder a motor that is turning is off shows in the wires.
+        """
+        own = 2 if turning else 0
+
+        def start(numbers: Array) -> _Start:
+            moved = np.append(numbers[:own], np.zeros(2 - own))
+            backs = begun.backs * np.exp(numbers[own:])
+            return replace(begun, motor=begun.motor + moved, backs=backs)
+
+        begin = np.zeros(own + len(begun.backs))
+        options = _around(begin, np.append(FLIGHT[:own], np.full(len(begun.backs), 0.5)))
+        found = minimize(lambda n: self._misfit(start(n)), begin, method=SEARCH, options=options)
+        return start(found.x), float(found.fun)
+
+    def came(self, start: '_Start') -> tuple[Array, float]:
+        """Way (K,) in rad and speed in rad/s of a start, within the motors' reach."""
+        here, speed = start.motor
+        way = np.append(np.clip(here + start.backs, -self._reach, self._reach), here)
+        return way, float(speed)
+
+
+@dataclass(frozen=True)
+class _Start:
+    """A motor when its recording begins: angle in rad and speed in rad/s (2,), and ways back (K,).
+
+    A way back leads from a reversal, on the way that the motor came, to where it is. Until
+    `turns_until` s the motor is not as its servo would bring it from there.
+    """
+
+    motor: Array
+    backs: Array = field(default_factory=lambda: np.empty(0))
+    turns_until: float = 0.0
+
+
+def _around(start: Array, size: Array) -> dict[str, Any]:
+    """Options of a search (Nelder, Mead) that begins at `start` (n,) and steps by `size` (n,)."""
+    simplex = np.vstack([start, start + np.diag(size)])
+    return {'maxfev': STEPS * len(start), 'initial_simplex': simplex}
 
 
 def _is_more_than_noise(squares: Array) -> bool:

@@ -42,9 +42,10 @@ def simulate_joint(
     """
     inputs = observation.inputs if inputs is None else inputs
     packed, on = parameters[None], flags[None]
-    at_rest = rest_state(packed, on, observation.tick, observation.start[None])
+    speed = np.array([observation.start_speed])
+    start = rest_state(packed, on, observation.tick, observation.start[None], speed)
     out = np.empty((1, inputs.shape[1], OUTPUTS))
-    run_joints(*at_rest, packed, on, inputs, False, observation.tick, out)
+    run_joints(*start, packed, on, inputs, False, observation.tick, out)
     return out[0]
 
 

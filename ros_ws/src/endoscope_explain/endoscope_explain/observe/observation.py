@@ -80,7 +80,9 @@ class JointObservation:
     inputs : array (1, N, INPUTS)
         Input of the compiled physics on ticks.
     start : array (K,)
-        Shaft angles in rad to which the motor has gone one after the other; it rests at the last.
+        Shaft angles in rad to which the motor has gone one after the other; the last is its own.
+    start_speed : float
+        Of the motor at first, rad/s.
     channels : tuple of Channel
     tick : float
         In s.
@@ -91,6 +93,7 @@ class JointObservation:
     start: Array
     channels: tuple[Channel, ...]
     tick: float = TICK
+    start_speed: float = 0.0
 
     @property
     def size(self) -> int:
@@ -152,7 +155,8 @@ def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObserva
         inputs[0, :, IN_MOTOR] = np.nan
         channels = _channels(recording, j, joint, plant.sensors, begin, ticks)
         start = inputs[0, :1, IN_COMMAND] if recording.start is None else recording.start[j]
-        joints.append(JointObservation(joint, inputs, start, channels))
+        speed = 0.0 if recording.start_speed is None else float(recording.start_speed[j])
+        joints.append(JointObservation(joint, inputs, start, channels, start_speed=speed))
     return tuple(joints)
 
 

@@ -105,9 +105,10 @@ def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescrip
     parameters, flags = packed_rig(observations, plant)
     inputs = np.concatenate([o.inputs for o in observations])
     start = np.stack([o.start for o in observations])
-    at_rest = rest_state(parameters, flags, TICK, start)
+    speed = np.array([o.start_speed for o in observations])
+    begun = rest_state(parameters, flags, TICK, start, speed)
     out = np.empty((len(observations), inputs.shape[1], OUTPUTS))
-    run_joints(*at_rest, parameters, flags, inputs, len(observations) > 1, TICK, out)
+    run_joints(*begun, parameters, flags, inputs, len(observations) > 1, TICK, out)
     return out
 
 

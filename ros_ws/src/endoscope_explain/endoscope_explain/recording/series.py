@@ -99,6 +99,8 @@ class Recording:
     start : array (J, K) or None
         Shaft angles in rad to which each motor had gone, one after the other, when the recording
         began; the first command alone where None.
+    start_speed : array (J,) or None
+        Speed of each motor then, rad/s; they stood where None.
     rig : Rig
         Gear, limits and time-outs of what was recorded.
     """
@@ -114,6 +116,7 @@ class Recording:
     shaft_effort: Series | None = None
     notes: tuple[str, ...] = field(default=())
     start: Array | None = None
+    start_speed: Array | None = None
     rig: Rig = field(default_factory=shipped_rig)
 
     def measured(self) -> dict[str, Series]:
