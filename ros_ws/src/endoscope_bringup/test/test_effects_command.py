@@ -4,7 +4,7 @@ import json
 
 from endoscope_bringup.cli import main
 from endoscope_core.physics import PlantDescription, load_plant
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.nominal_plant_file import MEANING
 from endoscope_core.physics.plant_file import REACH, plant_from_mapping
@@ -13,7 +13,9 @@ from endoscope_core.physics.plant_file import REACH, plant_from_mapping
 def test_lists_every_effect(capsys):
     assert main(['effects']) == 0
     effects, heading, places = capsys.readouterr().out.partition('\nPlaces for an unknown_term')
+    effects, _, nominal = effects.partition('\nOf the nominal plant')
     assert [line.split()[0] for line in effects.splitlines()] == list(CATALOGUE)
+    assert [line.split()[0] for line in nominal.splitlines()[1:]] == list(NOMINAL_PHYSICS)
     assert heading
     assert [line.split()[0] for line in places.splitlines()[1:]] == list(FUNCTIONS)
 
@@ -68,7 +70,7 @@ def test_a_complete_plant_is_printed_that_is_the_nominal_one(tmp_path, capsys):
 def test_the_catalogue_as_json(capsys):
     assert main(['effects', '--json']) == 0
     effects = json.loads(capsys.readouterr().out)
-    assert [effect['id'] for effect in effects] == list(CATALOGUE)
+    assert [effect['id'] for effect in effects] == [*CATALOGUE, *NOMINAL_PHYSICS]
     gravity = next(effect for effect in effects if effect['id'] == 'gravity')
     [moment] = [p for p in gravity['parameters'] if p['name'] == 'moment_nm']
     assert (moment['unit'], moment['high']) == ('N m', 0.1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription, TermSpec
 from endoscope_core.physics.effect import Effect
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effects import describe
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.place import Place
 
@@ -91,7 +91,7 @@ class NamedEffect:
     @property
     def definition(self) -> Effect:
         """The catalogue's effect: its physics, equation, source and parameters."""
-        return CATALOGUE[self.id]
+        return describe(self.id)
 
     @property
     def stage(self) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effects import describe
 from endoscope_explain.decide.given_physics import GivenJoints, GivenPhysics, without_recording
 from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.fit.pooled import told_alone
@@ -21,6 +21,7 @@ from endoscope_explain.pipeline import (
     read_inputs,
     require_as_named,
 )
+from endoscope_explain.search.candidate import lacking_physics
 from endoscope_explain.search.levels import FALSE_ALARMS
 from endoscope_explain.search.shared_choice import (
     Anchors,
@@ -100,7 +101,7 @@ def shared_effects(
         chosen, _ = searched(nominal, most_effects, jobs, tell)
         alone = told_alone([anchors[0] for anchors in chosen.recordings])
         for physics, found in zip(given, alone, strict=True):
-            own = tuple(e for e in chosen.effects if found.model.flags[CATALOGUE[e].flag])
+            own = tuple(e for e in chosen.effects if found.model.flags[describe(e).flag])
             physics[joint] = without_recording(own, found)
     return list(given)
 
@@ -118,6 +119,7 @@ def searched(
         The best one with an effect more, if another form may gain as much.
     """
     best, beam = nominal, [nominal]
+    most_effects += lacking_physics(nominal.recordings[0][0].model)
     while len(best.effects) < most_effects:
         if best.leaves_noise():
             tell(f'{nominal.joint}: only noise is left beside {_listed(best)}')

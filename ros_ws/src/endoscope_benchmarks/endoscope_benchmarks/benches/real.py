@@ -23,6 +23,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--out', type=Path, default=Path(PAGE), metavar='FILE', help=f'page to write ({PAGE})'
     )
+    parser.add_argument(
+        '--taken-out',
+        action='store_true',
+        help='take each piece of the nominal physics out of each tube in turn instead, and look '
+        'for it; prints a table',
+    )
     add_jobs(parser)
 
 
@@ -37,6 +43,7 @@ def run(args: argparse.Namespace) -> int:
         unknown_tubes,
     )
     from endoscope_benchmarks.real.tables import as_text, page, sections
+    from endoscope_benchmarks.real.taken_out import as_table, taken_out
     from endoscope_benchmarks.real.takes import require_recordings
     from endoscope_benchmarks.trials.real_recordings import (
         models_on_real_recordings,
@@ -49,6 +56,10 @@ def run(args: argparse.Namespace) -> int:
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
+    if args.taken_out:
+        with threadpool_limits(1, 'blas'):
+            print(as_table(taken_out(args.folder, args.jobs, tell)))
+        return 0
     # A fit's matrices are tall and narrow: threads would only wait for each other.
     with threadpool_limits(1, 'blas'):
         tubes = explained_tubes(args.folder, args.jobs, tell)

@@ -32,7 +32,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the catalogue, or the effects asked for; return 0."""
     from endoscope_core.errors import EndoscopeError
-    from endoscope_core.physics.effects import CATALOGUE, UnknownEffectError, describe
+    from endoscope_core.physics.effects import (
+        CATALOGUE,
+        NOMINAL_PHYSICS,
+        UnknownEffectError,
+        describe,
+    )
     from endoscope_core.physics.functions import FUNCTIONS
 
     if args.plant:
@@ -47,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
         print_json(
             [
                 _place_as_json(FUNCTIONS[each.id]) if each.id in FUNCTIONS else _as_json(each)
-                for each in chosen or CATALOGUE.values()
+                for each in chosen or (*CATALOGUE.values(), *NOMINAL_PHYSICS.values())
             ]
         )
         return 0
@@ -59,6 +64,9 @@ def run(args: argparse.Namespace) -> int:
         print('\n\n'.join(told))
         return 0
     for definition in CATALOGUE.values():
+        print(f'{definition.id:22} {definition.stage:13} {definition.physics}')
+    print('\nOf the nominal plant, which a plant file may lack:')
+    for definition in NOMINAL_PHYSICS.values():
         print(f'{definition.id:22} {definition.stage:13} {definition.physics}')
     print('\nPlaces for an unknown_term, a formula or values of one state:')
     for place in FUNCTIONS.values():

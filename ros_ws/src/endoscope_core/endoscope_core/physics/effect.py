@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from endoscope_core.physics.layout import SLOTS
+from endoscope_core.physics.layout import NOMINAL_KEYS, SLOTS
 
 
 class UnknownEffectError(ValueError):
@@ -181,14 +181,32 @@ class Effect:
     def __post_init__(self) -> None:
         if self.id in _DEFINED:
             raise ValueError(f'effect {self.id} is defined twice')
-        first = SLOTS.parameter_block(len(self.parameters))
-        object.__setattr__(self, 'first_parameter', first)
+        object.__setattr__(self, 'first_parameter', self._block())
         _DEFINED[self.id] = self
+
+    def _block(self) -> int:
+        return SLOTS.parameter_block(len(self.parameters))
 
     @property
     def places(self) -> range:
         """Indices of its parameters in the compiled physics' parameter array."""
         return range(self.first_parameter, self.first_parameter + len(self.parameters))
+
+
+@dataclass(frozen=True)
+class NominalPhysics(Effect):
+    """Physics of the nominal plant that a simulation may lack, as one of a rigid wire does.
+
+    Its parameters are nominal ones, under their own names and next to each other in the order of
+    `NOMINAL_KEYS`; a joint lacks it where the first of them is `off`.
+    """
+
+    def _block(self) -> int:
+        return NOMINAL_KEYS.index(self.parameters[0].name)
+
+    def is_lacking(self, first: float) -> bool:
+        """Whether a joint whose first parameter of these is `first` lacks it."""
+        return first == self.parameters[0].off
 
 
 _DEFINED: dict[str, Effect] = {}

@@ -19,7 +19,7 @@ from endoscope_core.physics.description import (
 )
 from endoscope_core.physics.functions import FUNCTIONS, describe_place
 from endoscope_core.physics.layout import PROFILE_TERMS
-from endoscope_core.physics.packing import pack
+from endoscope_core.physics.packing import with_nominal_in_place
 from endoscope_core.physics.recording import recording_faults
 from endoscope_core.strict_yaml import YamlError, load_yaml
 
@@ -61,6 +61,9 @@ friction of 1 over one and a half turns and passes 1/22000 of the tension. Joint
 bounded by a finger's moment (10 N m) and by servos between 0.02 Hz and 1.6 kHz; a sensor's
 resolution by what it measures at most.
 """
+
+ENDLESS = ('wire_stiffness', 'motor_bandwidth')
+"""Keys that a plant file may have as `.inf`, for a rigid wire and a servo without lag."""
 
 
 class PlantFileError(EndoscopeError, ValueError):
@@ -135,7 +138,7 @@ def plant_from_mapping(content: Any) -> PlantDescription:
         tuple(entry for entry in entries if isinstance(entry, EffectSpec)),
         tuple(entry for entry in entries if isinstance(entry, TermSpec)),
     )
-    pack(plant)
+    plant = with_nominal_in_place(plant)
     recording_faults(plant)
     return plant
 
@@ -227,6 +230,8 @@ def _value(key: str, value: Any, where: str) -> Any:
 def _within_reach(key: str, value: Any, where: str) -> float:
     number = _number(value, where)
     low, high, unit = REACH[key]
+    if key in ENDLESS and number == math.inf:
+        number = high
     # NaN passes: the parameters themselves refuse it, with a better word.
     if number < low or number > high:
         raise ValueError(f'{where} is {number:g}: give {low:g} to {high:g} {unit}'.rstrip())

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from scipy.stats import norm
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Effect, Stage
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effects import NOMINAL_PHYSICS, describe
 from endoscope_explain.decide.decision import Decision, MissingTerm
 from endoscope_explain.explanation import (
     Candidate,
@@ -92,7 +93,7 @@ def named(
 
 
 def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
-    definition = CATALOGUE[term.name]
+    definition = describe(term.name)
     modelled = term.name in decision.chosen.effects
     fitted = decision.chosen if modelled else term.formula
     return NamedEffect(
@@ -169,6 +170,11 @@ def plant_of(plant: PlantDescription, fits: list[Composition]) -> PlantDescripti
                 continue
             spec = spec_of(term.term, joint, packed)
             specs.append(spec)
+            if term.id in NOMINAL_PHYSICS:
+                # Its numbers stand there.
+                first = term.term.parameters[0]
+                absent: dict[str, Any] = {first.name: first.off}
+                joints[joint] = replace(joints[joint], **absent)
             if term.term.traits.of_device:
                 known = shared.get(term.id, (np.inf, {}))
                 shared[term.id] = min(

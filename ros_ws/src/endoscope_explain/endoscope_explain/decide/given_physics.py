@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effects import describe
 from endoscope_explain.decide.decision import Decision, MissingTerm, decide, share_explained
 from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.free_parameters import FreeParameter
@@ -77,7 +77,7 @@ def explained_by(
     if given.effects:
         model = JointModel(anchors[0].model.observation, given.base, given.flags, given.free)
         found = settled(model, given.theta)
-        terms = tuple(Candidate(CATALOGUE[each]) for each in given.effects)
+        terms = tuple(Candidate(describe(each)) for each in given.effects)
         missing = _needed(composition(terms, found), given.effects, jobs)
     beside = decide(JointSearch(composition((), found), ()), jobs)
     tried: tuple[Level, ...] = ()

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effects import describe
 from endoscope_explain.decide.conclusions import spec_of
 from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
 from endoscope_explain.fit.model import Fit, JointModel, fit
@@ -50,7 +50,7 @@ def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescriptio
     """Put the fitted numbers of one joint back into a plant."""
     packed, _ = found.model.packed(found.theta)
     effects = tuple(
-        spec_of(CATALOGUE[spec.id], joint, packed) if spec.joint == joint else spec
+        spec_of(describe(spec.id), joint, packed) if spec.joint == joint else spec
         for spec in plant.effects
     )
     return replace(plant, joints={**plant.joints, joint: joint_of(packed)}, effects=effects)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS, describe
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.decide.conclusions import spec_of
@@ -86,7 +86,8 @@ def rival_plant(
     recording: Recording, plant: PlantDescription, effect: NamedEffect, rival: str
 ) -> PlantDescription | None:
     """Fit a rival in an effect's place; None where it has no simulation or is there besides."""
-    if rival not in CATALOGUE or (rival, effect.joint) in {(e.id, e.joint) for e in plant.effects}:
+    there = {e.id for e in plant.effects if e.joint == effect.joint}
+    if rival not in {**CATALOGUE, **NOMINAL_PHYSICS} or rival in there:
         return None
     others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
     families = effect.definition.traits.families
@@ -96,12 +97,12 @@ def rival_plant(
     bare = replace(plant, effects=others, terms=functions)
     observation = next(o for o in observe(recording, bare) if o.joint == effect.joint)
     behind = background(refit(bare, observation, 0.2, 2))
-    terms = tuple(Candidate(CATALOGUE[rival], start) for start in starting_points(CATALOGUE[rival]))
+    terms = tuple(Candidate(describe(rival), start) for start in starting_points(describe(rival)))
     ranked = promises(behind, directions(behind, terms, 1))
     if not ranked:
         return None
     packed = ranked[0].candidate.added_to(behind.fit.model).base
-    candidate = replace(bare, effects=(*others, spec_of(CATALOGUE[rival], effect.joint, packed)))
+    candidate = replace(bare, effects=(*others, spec_of(describe(rival), effect.joint, packed)))
     return with_fit(candidate, effect.joint, refit(candidate, observation, 0.2, 6))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effect import Parameter
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effects import NOMINAL_PHYSICS, describe
 from endoscope_core.physics.functions.interpolation import HIGH, LAG
 from endoscope_core.physics.functions.place import Place
 from endoscope_core.physics.layout import (
@@ -121,7 +121,7 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
     Parameters
     ----------
     base : array (parameters,)
-        Packed parameters as described.
+        Packed parameters as described; those of nominal physics that it lacks are not free.
     band : float
         Relative deviation that the fit may not leave by more than a third.
 
@@ -130,11 +130,17 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
     tuple of FreeParameter
     """
     free = []
+    lacking = {
+        place
+        for each in NOMINAL_PHYSICS.values()
+        if each.is_lacking(float(base[each.first_parameter]))
+        for place in each.places
+    }
     for key in SCALED_NOMINAL:
         index = NOMINAL_KEYS.index(key)
-        centre = float(base[index])
-        if centre <= 0.0:
+        if index in lacking:
             continue
+        centre = float(base[index])
         reach = 1.0 + band * 4.0 / 3.0
         free.append(
             FreeParameter(
@@ -177,7 +183,7 @@ def with_free_reference(
 
     Whether a described value holds before or after a run-in is a matter of definition.
     """
-    rescales = CATALOGUE[effect_id].traits.rescales
+    rescales = describe(effect_id).traits.rescales
     if rescales is None:
         return free
     name, reach = rescales
@@ -189,7 +195,7 @@ def with_free_reference(
 
 def effect_parameters(effect_id: str) -> tuple[FreeParameter, ...]:
     """The continuous parameters of an effect of the catalogue."""
-    definition = CATALOGUE[effect_id]
+    definition = describe(effect_id)
     return tuple(
         _of_effect(definition.first_parameter + i, parameter)
         for i, parameter in enumerate(definition.parameters)
@@ -199,6 +205,7 @@ def effect_parameters(effect_id: str) -> tuple[FreeParameter, ...]:
 
 def _of_effect(index: int, parameter: Parameter) -> FreeParameter:
     positive = parameter.low > 0.0 and not math.isfinite(parameter.off)
+    positive = positive or (parameter.name in SCALED_NOMINAL and parameter.off == parameter.high)
     unit = parameter.scale or abs(parameter.typical) or 0.1 * (parameter.high - parameter.low)
     return FreeParameter(index, parameter.name, positive, unit, parameter.low, parameter.high)
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effect import Symptom
-from endoscope_core.physics.effects import CATALOGUE, showing
+from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS, describe, showing
 from endoscope_core.physics.functions.interpolation import HIGH, LAG, NODES, VALUES
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
@@ -204,10 +204,12 @@ class Fit:
 
 def without_effect(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
     """Model and first coordinates (n,) of a fit that has lost one of its effects."""
-    definition = CATALOGUE[effect_id]
-    flags = found.model.flags.copy()
+    definition = describe(effect_id)
+    base, flags = found.model.base.copy(), found.model.flags.copy()
     flags[definition.flag] = False
-    return replace(found.model, flags=flags).holding(definition.places, found.theta)
+    if effect_id in NOMINAL_PHYSICS:
+        base[definition.first_parameter] = definition.parameters[0].off
+    return replace(found.model, base=base, flags=flags).holding(definition.places, found.theta)
 
 
 def jacobian(model: JointModel, theta: Array, columns: list[int] | None = None) -> Array:

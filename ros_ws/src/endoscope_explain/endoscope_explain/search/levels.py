@@ -18,7 +18,13 @@ from endoscope_explain.fit.nominal import leans, with_any_numbers
 from endoscope_explain.fit.other_forms import with_form
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.candidate import Candidate, Variant, effects, functions
+from endoscope_explain.search.candidate import (
+    Candidate,
+    Variant,
+    effects,
+    functions,
+    lacking_physics,
+)
 from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, null_of
 from endoscope_explain.search.refit import (
     Composition,
@@ -180,7 +186,7 @@ def search(
     jobs : int
         Tasks side by side.
     depth : int
-        Largest number of terms.
+        Largest number of terms, beside the nominal physics that the plant lacks.
     left_out : tuple of str
         Effects whose formulas are not tried.
 
@@ -189,6 +195,7 @@ def search(
     JointSearch
     """
     nominal = composition((), anchors[0])
+    depth += lacking_physics(anchors[0].model)
     if not is_noise(nominal.fit):
         # What only the numbers are still worth is no gain of a term.
         nominal = until_it_stands(until_it_stands(nominal))

@@ -8,26 +8,35 @@ import importlib
 import pkgutil
 
 from endoscope_core.errors import nearest
-from endoscope_core.physics.effect import Effect, Symptom, UnknownEffectError, in_order_of_chain
+from endoscope_core.physics.effect import (
+    Effect,
+    NominalPhysics,
+    Symptom,
+    UnknownEffectError,
+    in_order_of_chain,
+)
 
 for _module in sorted(module.name for module in pkgutil.iter_modules(__path__)):
     importlib.import_module(f'{__name__}.{_module}')
 
 CATALOGUE: dict[str, Effect] = in_order_of_chain(Effect)
 """All effects by their ids, in the order of the chain."""
+NOMINAL_PHYSICS: dict[str, NominalPhysics] = in_order_of_chain(NominalPhysics)
+"""What the nominal plant is made of, by its ids, in the order of the chain."""
 
 
 def describe(effect_id: str) -> Effect:
-    """The catalogue's effect of that id.
+    """The catalogue's effect, or the nominal physics, of that id.
 
     Raises
     ------
     UnknownEffectError
         If the catalogue has no such id; the message names the nearest.
     """
-    if effect_id not in CATALOGUE:
-        raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, CATALOGUE)}')
-    return CATALOGUE[effect_id]
+    known = {**CATALOGUE, **NOMINAL_PHYSICS}
+    if effect_id not in known:
+        raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, known)}')
+    return known[effect_id]
 
 
 def showing(symptom: Symptom) -> Effect:
