@@ -30,6 +30,7 @@ from endoscope_explain.report.sentences import (
     before_and_after,
     next_step,
     physics_of,
+    reservations,
     verdict_sentence,
 )
 from endoscope_explain.report.terminal import told
@@ -194,6 +195,29 @@ def test_how_the_fits_ended_is_said_beside_their_numbers(stribeck_case):
     assert 'The fit of bend_x converged (7 steps; no step lowers the misfit).' in text
     assert 'The fit of bend_y did not converge: its numbers are not final' in text
     assert 'motor_bandwidth and pretension lie at an end of what is allowed.' in text
+
+
+def test_what_names_leave_over_and_what_differs_besides_is_said_under_the_headline(stribeck_case):
+    assert reservations(stribeck_case) == []
+    signals = stribeck_case.ladder['augmented']
+    first, second, *_ = signals
+    ladder = dict(stribeck_case.ladder)
+    ladder['augmented'] = signals | {
+        first: dataclasses.replace(signals[first], rmse=4.2 * signals[first].noise),
+        second: dataclasses.replace(signals[second], rmse=1.5 * signals[second].noise),
+    }
+    stiff = NominalEstimate(0.006, 0.0055, 0.0065, 'N m/rad', 0.0045, False)
+    inside = NominalEstimate(5.3, 5.2, 5.4, 'N', 5.0, True)
+    parameters = {'bend_x': {'joint_stiffness': stiff, 'pretension': inside}}
+    case = with_explanation(stribeck_case, ladder=ladder, parameters=parameters)
+    stays, besides = reservations(case)
+    assert 'stays off by 4.2 times its noise, and 1 more is off.' in stays
+    assert besides == 'Besides, joint_stiffness of bend_x is 0.006 instead of 0.0045 N m/rad.'
+    assert all(map(is_short, (stays, besides)))
+    text = text_of(html_page(case))
+    assert stays in text
+    assert besides in text
+    assert told(case).splitlines()[1:3] == [stays, besides]
 
 
 @pytest.mark.parametrize('verdict', list(Verdict))

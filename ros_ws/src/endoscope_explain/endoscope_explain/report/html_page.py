@@ -42,6 +42,7 @@ from endoscope_explain.report.sentences import (
     next_step,
     physics_of,
     plain,
+    reservations,
     verdict_sentence,
 )
 from endoscope_explain.search.repeated_motion import motion_repeats
@@ -99,6 +100,7 @@ def html_page(case: ExplainedCase) -> str:
         colour=COLOURS[case.verdict],
         sentence=verdict_sentence(case),
         change=before_and_after(case),
+        reservations=reservations(case),
         chain=CHAIN,
         guilty=_guilty(case),
         cut=_cut(case, joint) if case.places else '',

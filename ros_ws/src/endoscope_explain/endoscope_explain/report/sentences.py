@@ -35,6 +35,9 @@ EVIDENCE = {
 LEAST_SHARE = 0.5
 """A formula that does less of what the function does than this is no help."""
 MOST_NAMED = 2
+STAYS = 1.2
+"""Misfit over noise from which on a signal is said to stay off; of a thousand samples, noise alone
+leaves 1.05 once in a hundred."""
 
 
 def verdict_sentence(case: ExplainedCase) -> str:
@@ -95,6 +98,29 @@ def before_and_after(case: ExplainedCase) -> str:
     )
 
 
+def reservations(case: ExplainedCase) -> list[str]:
+    """Say what the names leave over, and which numbers differ besides; empty where none do."""
+    said: list[str] = []
+    if not case.effects and case.explanation.unknown is None:
+        return said
+    left = judged(case, case.ladder).get('augmented', {})
+    off = {signal: fit.ratio for signal, fit in left.items() if fit.ratio > STAYS}
+    if off:
+        signal, ratio = max(off.items(), key=lambda item: item[1])
+        more = ''
+        if len(off) > 1:
+            more = f', and {len(off) - 1} more {"are" if len(off) > 2 else "is"} off'
+        said.append(
+            f'{_capital(plain(signal))} stays off by {digits(ratio)} times its noise{more}. '
+            'The form differs, or something else is missing too.'
+        )
+    besides = {key: e for key, e in differing(case).items() if not e.in_band}
+    if besides:
+        shown_ones = [_one_differing(*key, e) for key, e in besides.items()]
+        said.append(f'Besides, {_all(shown_ones)}.')
+    return said
+
+
 def fitting_sentences(case: ExplainedCase) -> list[str]:
     """Say how each joint's fit ended, and which numbers lie at an end of what is allowed."""
     said = []
@@ -144,11 +170,15 @@ def _differing(case: ExplainedCase) -> str:
     if not changed:
         return 'Parameters differ within their tolerance.'
     (joint, name), e = next(iter(changed.items()))
-    name, unit, factor = in_degrees(name, e.unit)
     more = f', and {len(changed) - 1} more differ' if len(changed) > 1 else ''
+    return f'{_one_differing(joint, name, e)}{more}.'
+
+
+def _one_differing(joint: str, name: str, e: NominalEstimate) -> str:
+    name, unit, factor = in_degrees(name, e.unit)
     return (
         f'{name} of {joint} is {digits(factor * e.value)} instead of {digits(factor * e.nominal)}'
-        f'{f" {unit}" if unit else ""}{more}.'
+        f'{f" {unit}" if unit else ""}'
     )
 
 

@@ -9,6 +9,7 @@ from endoscope_explain.report.sentences import (
     next_step,
     physics_of,
     plain,
+    reservations,
     verdict_sentence,
     where,
 )
@@ -16,7 +17,7 @@ from endoscope_explain.report.sentences import (
 
 def told(case: ExplainedCase) -> str:
     """Say what was found, in lines of which the first one is the verdict's sentence."""
-    lines = [verdict_sentence(case)]
+    lines = [verdict_sentence(case), *reservations(case)]
     for effect in case.effects:
         lines.append(f'  {effect.id}: {physics_of(effect)}')
         lines += [f'    {one}' for one in numbers_of(effect)]

@@ -72,6 +72,11 @@ class Candidate:
         return self.family is not None
 
     @property
+    def is_nominal(self) -> bool:
+        """Whether it is a piece of the nominal physics, which every rig has."""
+        return isinstance(self.term, NominalPhysics)
+
+    @property
     def multiplies(self) -> bool:
         """Whether it makes another function one of two states."""
         return self.family is not None and self.family.multiplies

@@ -95,11 +95,16 @@ class Level:
     def best(self) -> Composition:
         """The composition to go on with.
 
-        Other numbers, and then a formula, stand where they lose no more than form is worth.
+        Other numbers, then what every rig has, and then a formula stand where they lose no more
+        than form is worth.
         """
         top = self.found[0]
         for each in self.found:
             if not each.terms and top.evidence - each.evidence <= self.form_is_worth():
+                return each
+        for each in self.found:
+            lost = top.evidence - each.evidence
+            if each.terms and each.terms[-1].is_nominal and lost <= self.form_is_worth():
                 return each
         if top.terms and top.terms[-1].is_function:
             for each in self.at_the_place_of(top):
@@ -130,8 +135,14 @@ class Level:
 
     @property
     def is_found(self) -> bool:
-        """Whether something is missing, and found."""
-        return self.p_value <= FALSE_ALARMS and self.predicts
+        """Whether something is missing, and found.
+
+        Nominal physics needs no more than to be worth its numbers: that a rig has none is no
+        hypothesis.
+        """
+        nominal = self.found and self.best.terms and self.best.terms[-1].is_nominal
+        worth = self.gain(self.best) > 0.0 if nominal else self.p_value <= FALSE_ALARMS
+        return worth and self.predicts
 
     def variants(self) -> tuple[Composition, ...]:
         """The best composition's effects acting on something else: beside another they may win."""
@@ -325,7 +336,7 @@ def _most_promising(ranked: list[Promised]) -> list[Candidate]:
     """The best terms, starts of each, and the formulas at the places of the best functions.
 
     A formula that is far from linear promises little at a start that is far from the truth; the
-    function at its place is not misled by that.
+    function at its place is not misled by that. Nominal physics is fitted in any case.
     """
     starts: dict[Variant, list[Candidate]] = {}
     for promised in ranked:
@@ -339,16 +350,19 @@ def _most_promising(ranked: list[Promised]) -> list[Candidate]:
         for term in terms
         if not term.is_function and any(term.shares_place(each) for each in functions)
     ]
+    chosen += [t for own in starts.values() for t in own if t.is_nominal and t not in chosen]
     return chosen
 
 
 def _worth_a_fit(looks: list[Look]) -> list[Look]:
-    """The best after a first fit, and all that are at the place of the best one."""
+    """The best after a first fit, what is nominal, and all that are at the place of the best."""
     best: dict[Variant, Look] = {}
     for seen in sorted(looks, key=lambda seen: seen.cost):
         best.setdefault(seen.candidate.variant, seen)
     ranked = list(best.values())
     chosen = ranked[:POLISHED]
     return chosen + [
-        seen for seen in ranked[POLISHED:] if seen.candidate.shares_place(chosen[0].candidate)
+        seen
+        for seen in ranked[POLISHED:]
+        if seen.candidate.is_nominal or seen.candidate.shares_place(chosen[0].candidate)
     ]

@@ -54,7 +54,11 @@ NominalPhysics(
     physics='The sheath takes tension from a sliding wire, in proportion to it, along its length.',
     equation='T(s) = T(0) exp(-capstan_exponent s), s from 0 to 1 along the sheath',
     source='Kaneko et al., IEEE ICRA 1991',
-    parameters=(Parameter('capstan_exponent', '', 0.0, 6.0, 0.9, off=0.0, starts=(0.3, 0.9, 2.0)),),
+    parameters=(
+        Parameter(
+            'capstan_exponent', '', 0.0, 6.0, 0.9, off=0.0, starts=(0.3, 0.9, 2.0), scale=0.3
+        ),
+    ),
 )
 NominalPhysics(
     'bending_stiffness',
@@ -65,10 +69,11 @@ NominalPhysics(
     source='Webster, Jones, International Journal of Robotics Research 29(13), 2010',
     parameters=(
         Parameter(
-            'joint_stiffness', 'N m/rad', 0.0, 1.0, 0.0045, off=0.0, starts=(0.002, 0.0045, 0.012)
+            'joint_stiffness', 'N m/rad', 0.0, 1.0, 0.0045, off=0.0,
+            starts=(0.002, 0.0045, 0.012), scale=0.0045,
         ),
     ),
-)
+)  # fmt: skip
 NominalPhysics(
     'bending_friction',
     Stage.JOINT,
@@ -77,7 +82,10 @@ NominalPhysics(
     equation='moment = -joint_friction z, dz/dq = (sign(dq) - z) / joint_presliding',
     source='Dahl, Aerospace Corp. TOR-0158(3107-18)-1, 1968',
     parameters=(
-        Parameter('joint_friction', 'N m', 0.0, 0.1, 9e-4, off=0.0, starts=(3e-4, 9e-4, 2.7e-3)),
+        Parameter(
+            'joint_friction', 'N m', 0.0, 0.1, 9e-4, off=0.0,
+            starts=(3e-4, 9e-4, 2.7e-3), scale=9e-4,
+        ),
         Parameter('joint_presliding', 'rad', 1e-3, 1.0, 0.03),
     ),
-)
+)  # fmt: skip
