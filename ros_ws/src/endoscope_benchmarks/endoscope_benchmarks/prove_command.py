@@ -4,7 +4,7 @@ import argparse
 import secrets
 from pathlib import Path
 
-from endoscope_benchmarks.proof import OWN, SIMULATORS
+from endoscope_benchmarks.proof import OWN, SIMULATORS, SLAVE
 from endoscope_bringup.seed_argument import seed
 from endoscope_bringup.subcommands import COUNT
 
@@ -22,7 +22,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'recording from itself and the described plant alone, opens the seals, and writes a page '
         'that shows truth beside answer.',
     )
-    parser.add_argument('--n', type=COUNT, default=6, metavar='N', help='rigs (6)')
+    parser.add_argument('--n', type=COUNT, metavar='N', help='rigs (6; of the slave 2)')
     parser.add_argument(
         '--seed', type=seed, help='draws the same rigs again (by default others every time)'
     )
@@ -35,6 +35,13 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         default=OWN,
         help="rigs of the product's own simulator, or of another one that shares no code with it "
         'and has laws of its own forms (own)',
+    )
+    parser.add_argument(
+        '--rig',
+        choices=('drawn', SLAVE),
+        default='drawn',
+        help='what is recorded: rigs by themselves, or the simulated slave, by the whole running '
+        'graph, which is then moved by the inverse of either plant (drawn)',
     )
     parser.add_argument(
         '--out', type=Path, required=True, metavar='DIR', help='a new or empty folder'
@@ -51,22 +58,27 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_benchmarks.proof.page import page
     from endoscope_benchmarks.proof.proving import Proof, prove
     from endoscope_core.atomic_output import make_parent, require_free_directory, write_text
+    from endoscope_core.errors import EndoscopeError
 
     require_free_directory(args.out)
+    of_slave = args.rig == SLAVE
+    if of_slave and args.form != OWN:
+        raise EndoscopeError(f'--rig {SLAVE} and --form {args.form} are mutually exclusive')
+    form, count = (SLAVE, args.n or 2) if of_slave else (args.form, args.n or 6)
     if args.effect is not None:
-        require_drawn(args.effect, args.form)
+        require_drawn(args.effect, form)
     drawn_by = secrets.randbelow(_SEEDS) if args.seed is None else args.seed
     print(f'seed {drawn_by}: --seed {drawn_by} draws the same rigs again')
     # Not hidden until all is done: who doubts compares the digests meanwhile.
     make_parent(args.out)
     args.out.mkdir(exist_ok=True)
-    proof = Proof(args.n, args.form, drawn_by, args.effect, args.jobs, args.command_line)
+    proof = Proof(count, form, drawn_by, args.effect, args.jobs, args.command_line)
     outcomes = prove(proof, args.out, _say)
     facts = {
         'date': datetime.now(UTC).date().isoformat(),
         'command': args.command_line,
         'seed': str(drawn_by),
-        'simulator': args.form,
+        'simulator': form,
     }
     write_text(args.out / PAGE, page(outcomes, facts))
     _say(f'{sentences.headline(outcomes)}.\n{sentences.summary(outcomes)}')

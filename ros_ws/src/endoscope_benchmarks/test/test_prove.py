@@ -14,14 +14,16 @@ from endoscope_benchmarks.concealed.readings import as_sensed
 from endoscope_benchmarks.concealed.readings import read as read_of_kernel
 from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
 from endoscope_benchmarks.concealed.strength import moved
-from endoscope_benchmarks.proof import SIMULATORS, sentences
+from endoscope_benchmarks.proof import SIMULATORS, SLAVE, sentences
 from endoscope_benchmarks.proof.another_rig import FEW_NODES, FORMS, Laws, drawn_laws, read
 from endoscope_benchmarks.proof.bag_of_rig import write_bag
 from endoscope_benchmarks.proof.drawing import drawn
 from endoscope_benchmarks.proof.seal import BrokenSealError, opened, seal
+from endoscope_benchmarks.proof.slave import tracked
 from endoscope_benchmarks.proof.trial import Answer, Outcome, Passage, Rig
 from endoscope_benchmarks.prove_command import SIMULATORS as OFFERED
 from endoscope_bringup.cli import main
+from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.recording import recording_from_bag
 
@@ -149,3 +151,27 @@ def test_what_cannot_be_concealed_is_named(capsys, tmp_path):
     assert main(command.split()) == 2
     assert '--effect wire_creep: with --form other' in capsys.readouterr().err
     assert not (tmp_path / 'proof').exists()
+
+
+def test_a_slave_has_both_joints_and_nothing_that_spoils_recordings(capsys, tmp_path):
+    for number in range(1, 7):
+        case, truth = drawn(SLAVE, 11, number)
+        assert case.true.joint_names() == case.described.joint_names() == ('bend_x', 'bend_y')
+        assert all(law.stage != 'recording' for law in case.laws)
+        assert list(truth['joints']) == ['bend_x', 'bend_y']
+    command = f'prove --rig slave --effect clock_skew --out {tmp_path / "proof"}'
+    assert main(command.split()) == 2
+    assert '--effect clock_skew: with --form slave' in capsys.readouterr().err
+    command = f'prove --rig slave --form other --out {tmp_path / "proof"}'
+    assert main(command.split()) == 2
+    assert 'mutually exclusive' in capsys.readouterr().err
+
+
+def test_a_slave_follows_the_inverse_of_its_own_plant(tmp_path):
+    plant = PlantDescription()
+    run = tracked(plant, plant, tmp_path / 'tracked', 3)
+    assert np.ptp(run.desired) > 0.8
+    # The noise of the tracker is 0.25 deg.
+    assert np.rad2deg(run.rmse) < 0.6
+    with_tracking = replace(outcome([], []), tracking={'nominal': run, 'augmented': run})
+    assert 'deg rms under the inverse of the described plant' in sentences.tracking(with_tracking)

@@ -1,7 +1,7 @@
 """Rigs for the proof, each with something concealed in it, or with nothing."""
 
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 
 import numpy as np
@@ -14,7 +14,7 @@ from endoscope_benchmarks.concealed.readings import Readings, as_sensed
 from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
 from endoscope_benchmarks.concealed.strata import AIM, as_strong, drawn_case
 from endoscope_benchmarks.concealed.strength import drawn_as_strong
-from endoscope_benchmarks.proof import OTHER
+from endoscope_benchmarks.proof import OTHER, SLAVE
 from endoscope_benchmarks.proof.another_rig import (
     FEW_NODES,
     FORMS,
@@ -23,8 +23,11 @@ from endoscope_benchmarks.proof.another_rig import (
     read,
 )
 from endoscope_core.errors import EndoscopeError, nearest
-from endoscope_core.physics import JointParameters
+from endoscope_core.physics import JointParameters, PlantDescription
+from endoscope_core.physics.effect import Stage
+from endoscope_core.physics.effects import describe
 from endoscope_core.physics.plant_file import plant_to_mapping
+from endoscope_nodes.names import JOINTS
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator
@@ -44,7 +47,9 @@ def require_drawn(effect: str, form: str) -> None:
     ------
     NoSuchEffectError
     """
-    known = FORMS if form == OTHER else DRAWN
+    known = list(FORMS if form == OTHER else DRAWN)
+    if form == SLAVE:
+        known = [each for each in known if describe(each).stage is not Stage.RECORDING]
     if effect not in known:
         raise NoSuchEffectError(
             f'--effect {effect}: with --form {form} {nearest(effect, sorted(known))}'
@@ -57,7 +62,7 @@ def drawn(form: str, seed: int, number: int, effect: str | None = None) -> tuple
     Parameters
     ----------
     form : str
-        Of `SIMULATORS`.
+        Of `SIMULATORS`, or `SLAVE`.
     seed, number : int
         The same rig for the same of both.
     effect : str, optional
@@ -70,7 +75,24 @@ def drawn(form: str, seed: int, number: int, effect: str | None = None) -> tuple
         The truth as plain data.
     """
     generator = np.random.default_rng([seed, number])
-    return _other(generator, effect) if form == OTHER else _own(generator, effect)
+    if form == OTHER:
+        return _other(generator, effect)
+    return _of_slave(generator, effect) if form == SLAVE else _own(generator, effect)
+
+
+def _of_slave(generator: Generator, effect: str | None) -> tuple[Case, dict]:
+    """A rig of both joints, with what a slave that runs can have."""
+    while True:
+        case, truth = _own(generator, effect)
+        if all(law.stage != Stage.RECORDING for law in case.laws):
+            break
+    alike = next(iter(case.described.joints.values()))
+
+    def whole(plant: PlantDescription) -> PlantDescription:
+        return replace(plant, joints={name: plant.joints.get(name, alike) for name in JOINTS})
+
+    case = replace(case, described=whole(case.described), true=whole(case.true))
+    return case, {'concealed': truth['concealed']} | plant_to_mapping(case.true)
 
 
 def _own(generator: Generator, effect: str | None) -> tuple[Case, dict]:

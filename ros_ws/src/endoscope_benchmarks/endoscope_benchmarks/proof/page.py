@@ -1,6 +1,7 @@
 """The page that shows truth beside answer."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -18,6 +19,7 @@ from endoscope_core.pages.zoomable import Curve, Plot, figure_html
 from endoscope_explain.report.figures.style import TIME, look
 from endoscope_explain.report.numbers import digits
 from endoscope_explain.report.sentences import plain
+from endoscope_nodes.names import JOINTS
 
 PLANTS = ('nominal', 'refitted', 'augmented')
 
@@ -65,7 +67,33 @@ def _rig(outcome: Outcome) -> dict:
         'moved': outcome.rig.moved,
         'answer': answer,
         'figure': _figure(outcome),
+        'tracking': sentences.tracking(outcome),
+        'followed': _followed(outcome) if outcome.tracking else '',
     }
+
+
+def _followed(outcome: Outcome) -> str:
+    """Desired and measured angle of the joint on which more is concealed, by either plant."""
+    joints = [law.joint for law in outcome.rig.laws if law.joint] or list(JOINTS)
+    j = JOINTS.index(joints[0])
+    runs = {name: outcome.tracking[name] for name in ('nominal', 'augmented')}
+    first = runs['nominal']
+    wanted = Curve(x=first.time, y=np.degrees(first.desired[:, j]), width=2.4, **look('measured'))
+    curves = [replace(wanted, label='desired')]
+    curves += [
+        Curve(x=run.time, y=np.degrees(run.measured[:, j]), width=1.3, **look(name))
+        for name, run in runs.items()
+    ]
+    errors = [
+        Curve(x=r.time, y=np.degrees(r.measured - r.desired)[:, j], width=1.3, **look(name))
+        for name, r in runs.items()
+    ]
+    return figure_html(
+        [
+            Plot(f'{JOINTS[j]} (deg)', TIME, tuple(curves), columns=7, height=140),
+            Plot('measured - desired (deg)', TIME, tuple(errors), columns=5, height=140),
+        ]
+    )
 
 
 def _figure(outcome: Outcome) -> str:

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from endoscope_benchmarks.proof import sentences
+from endoscope_benchmarks.proof import SLAVE, sentences
 from endoscope_benchmarks.proof.trial import (
     Answer,
     Outcome,
@@ -13,6 +13,7 @@ from endoscope_benchmarks.proof.trial import (
     compared,
     explained,
     folder_of,
+    followed,
     recorded,
 )
 from endoscope_core.worker_pool import worker_pool
@@ -30,7 +31,7 @@ class Proof:
     count : int
         Rigs.
     form : str
-        Of `SIMULATORS`.
+        Of `SIMULATORS`, or `SLAVE`.
     seed : int
     effect : str or None
         What is concealed; drawn if None.
@@ -59,15 +60,32 @@ def prove(proof: Proof, folder: Path, say: Say) -> list[Outcome]:
     with worker_pool(min(proof.jobs, proof.count)) as pool:
         rigs = _recorded(proof, folder, pool, say)
         answers = _explained(proof, rigs, pool, say)
-    say('The seals are opened:')
-    outcomes = [compared(rig, answers[rig.number]) for rig in rigs]
-    for each in outcomes:
-        say(
-            f'rig {each.rig.number}: concealed was {sentences.concealed(each)}: '
-            f'{sentences.result(each)}; second recording {digits(each.answer.before)} > '
-            f'{digits(each.answer.after)} times its noise'
-        )
+        say('The seals are opened:')
+        outcomes = [compared(rig, answers[rig.number]) for rig in rigs]
+        for each in outcomes:
+            say(
+                f'rig {each.rig.number}: concealed was {sentences.concealed(each)}: '
+                f'{sentences.result(each)}; second recording {digits(each.answer.before)} > '
+                f'{digits(each.answer.after)} times its noise'
+            )
+        if proof.form == SLAVE:
+            outcomes = _followed(proof, outcomes, pool, say)
     return outcomes
+
+
+def _followed(
+    proof: Proof, outcomes: list[Outcome], pool: ProcessPoolExecutor, say: Say
+) -> list[Outcome]:
+    say('The slaves are moved by the inverse of either plant:')
+    tasks = [
+        pool.submit(followed, each.rig.number, each.rig.folder, each.truth, proof.seed)
+        for each in outcomes
+    ]
+    moved = []
+    for each, task in zip(outcomes, tasks, strict=True):
+        moved.append(replace(each, tracking=task.result()))
+        say(f'rig {each.rig.number}: {sentences.tracking(moved[-1])}')
+    return moved
 
 
 def _recorded(proof: Proof, folder: Path, pool: ProcessPoolExecutor, say: Say) -> list[Rig]:

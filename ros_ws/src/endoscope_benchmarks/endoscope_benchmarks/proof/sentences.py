@@ -1,5 +1,6 @@
 """What came out of the proof, in sentences."""
 
+import math
 from collections.abc import Sequence
 from statistics import median
 
@@ -64,6 +65,17 @@ def result(outcome: Outcome) -> str:
     if how.stage:
         return 'the right part of the chain, another law'
     return 'missed' if not outcome.answer.said else 'wrong'
+
+
+def tracking(outcome: Outcome) -> str:
+    """How well the slave follows by either plant; empty of a rig that does not run."""
+    if not outcome.tracking:
+        return ''
+    before, after = (math.degrees(outcome.tracking[name].rmse) for name in ('nominal', 'augmented'))
+    return (
+        f'the tip is off by {before:.2f} deg rms under the inverse of the described plant, by '
+        f'{after:.2f} deg under that of the improved one'
+    )
 
 
 def why(outcome: Outcome) -> str:

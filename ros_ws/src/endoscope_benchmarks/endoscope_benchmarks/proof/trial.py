@@ -1,6 +1,6 @@
 """One rig of the proof: recorded and sealed, explained, and opened."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -9,22 +9,25 @@ from numpy.typing import NDArray
 
 from endoscope_benchmarks.concealed.case import Law
 from endoscope_benchmarks.concealed.judge import Judgement, judged, statements
+from endoscope_benchmarks.proof import SLAVE, slave
 from endoscope_benchmarks.proof.bag_of_rig import write_bag
 from endoscope_benchmarks.proof.drawing import drawn
 from endoscope_benchmarks.proof.seal import opened, seal
+from endoscope_benchmarks.proof.slave import Tracking, tracked
 from endoscope_core.physics import load_plant
-from endoscope_core.physics.plant_file import save_plant
+from endoscope_core.physics.plant_file import plant_from_mapping, save_plant
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.pipeline import Sources, explain_case, read_inputs
 from endoscope_explain.report.provenance import provenance
 from endoscope_explain.report.sentences import verdict_sentence
-from endoscope_explain.report.writing import REPORT_HTML, write_report
+from endoscope_explain.report.writing import PLANT_YAML, REPORT_HTML, write_report
 
 Array = NDArray[np.float64]
 
 TRUTH, PLANT = 'sealed.json', 'described.yaml'
 RECORDING, SECOND = 'recording.mcap', 'second.mcap'
+TRACKED = 'tracked'
 REPORT = 'report'
 PASSAGE_S = 6.0
 """Of the second recording that is drawn."""
@@ -116,12 +119,16 @@ class Outcome:
     truth : dict
         As it was sealed.
     judgement : Judgement
+    tracking : dict of str to Tracking
+        How the slave follows a motion that is planned with the plant as described, and as
+        improved; empty of a rig that does not run.
     """
 
     rig: Rig
     answer: Answer
     truth: dict
     judgement: Judgement
+    tracking: dict[str, Tracking] = field(default_factory=dict)
 
 
 def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path) -> Rig:
@@ -130,8 +137,13 @@ def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path
     folder.mkdir()
     sha256 = seal(folder / TRUTH, {'rig': number, 'form': form, 'seed': seed} | truth)
     save_plant(case.described, folder / PLANT)
-    write_bag(case.recording, folder / RECORDING)
-    write_bag(case.second, folder / SECOND)
+    if form == SLAVE:
+        motions = {RECORDING: slave.EXPLAINED, SECOND: slave.JUDGED}
+        for k, (bag, motion) in enumerate(motions.items()):
+            slave.record(case.true, motion, folder / bag, seed + k)
+    else:
+        write_bag(case.recording, folder / RECORDING)
+        write_bag(case.second, folder / SECOND)
     return Rig(number, folder, sha256, case.laws, case.also, case.moved)
 
 
@@ -179,6 +191,18 @@ def compared(rig: Rig, answer: Answer) -> Outcome:
     """
     truth = opened(rig.folder / TRUTH, rig.sha256)
     return Outcome(rig, answer, truth, judged(rig.laws, answer.said, rig.also))
+
+
+def followed(number: int, folder: Path, truth: dict, seed: int) -> dict[str, Tracking]:
+    """Move a slave by the inverse of its plant as described, and as improved."""
+    keys = ('joints', 'sensors', 'effects')
+    true = plant_from_mapping({key: truth[key] for key in keys})
+    (folder / TRACKED).mkdir()
+    plants = {'nominal': folder / PLANT, 'augmented': folder / REPORT / PLANT_YAML}
+    return {
+        name: tracked(true, load_plant(file), folder / TRACKED / name, seed + 2)
+        for name, file in plants.items()
+    }
 
 
 def telling(passage: Passage) -> Passage:

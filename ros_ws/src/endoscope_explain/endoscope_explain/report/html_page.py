@@ -7,6 +7,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from endoscope_core.pages import zoomable
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_core.physics.functions.place import Argument
 from endoscope_explain.case import ExplainedCase, Ladder
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.tolerance import tolerance
@@ -17,8 +19,9 @@ from endoscope_explain.report.figures.experiment import experiment_figure, unkno
 from endoscope_explain.report.figures.ladder import ladder_figure
 from endoscope_explain.report.figures.loops import (
     passage_figure,
-    shown_plants,
+    state_of,
     telling_passage,
+    telling_signals,
 )
 from endoscope_explain.report.figures.timeline import timeline_figure
 from endoscope_explain.report.numbers import (
@@ -110,7 +113,7 @@ def html_page(case: ExplainedCase) -> str:
         meaning=EVIDENCE,
         joint=joint,
         slipping=[o.joint for o in recorded.observations if slips(o)],
-        plants=[PLANTS[name] for name in shown_plants(recorded.of_joint(joint)[0])],
+        plants=[PLANTS[name] for name in recorded.of_joint(joint)[0].predicted],
         unknown=unknown,
         formula=unknown is not None and unknown.formula_share >= LEAST_SHARE,
         drawings=_drawings(case, recorded, joint, ladder),
@@ -157,8 +160,10 @@ def _drawings(
         shaded = () if case.audit.unusable else case.places
         drawn['timeline'] = timeline_figure(recorded, command, joint, shaded)
         if joint in moving_joints(case.recording):
-            passage = drawn['passage'] = telling_passage(recorded, joint)
-            drawn['loops'] = passage_figure(recorded, command, joint, passage)
+            views = telling_signals(recorded, joint)
+            passage = drawn['passage'] = telling_passage(views)
+            over = drawn['over'] = state_of(recorded, joint, command, _argument(case, joint))
+            drawn['loops'] = passage_figure(views, over, passage)
     if case.explanation.unknown is not None:
         drawn['unknown'] = unknown_figure(case.explanation.unknown)
     if ladder:
@@ -166,6 +171,16 @@ def _drawings(
     if case.next_experiment is not None:
         drawn['experiment'] = experiment_figure(case.next_experiment)
     return drawn
+
+
+def _argument(case: ExplainedCase, joint: str) -> Argument | None:
+    """What the first thing that is missing from a joint depends on; None where nothing is."""
+    term = case.explanation.unknown
+    if term is not None and term.helps:
+        return term.there.argument
+    effect = next((e for e in case.effects if e.joint == joint), None)
+    places = () if effect is None else effect.definition.traits.families
+    return FUNCTIONS[places[0]].argument if places else None
 
 
 def _guilty(case: ExplainedCase) -> dict[str, list[str]]:

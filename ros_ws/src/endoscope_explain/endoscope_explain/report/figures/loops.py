@@ -1,28 +1,96 @@
-"""Hysteresis loops and signals in the passage that tells most."""
+"""The signals in which the missing physics shows most, in the passage that tells most."""
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.pages.zoomable import COLUMNS, Curve, Plot, figure_html
+from endoscope_core.physics.functions.place import Argument
+from endoscope_core.physics.layout import OUT_JOINT, OUT_MOTOR_SPEED
+from endoscope_explain.observe.observation import TICK
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
 from endoscope_explain.report.figures.style import TIME, look
 
 Array = NDArray[np.float64]
 
 PASSAGE_S = 8.0
+MOST_SIGNALS = 3
+TITLES = {
+    'bending': ', bending (deg)',
+    'tension': ', tension (N)',
+    'shaft_effort': ' (N m)',
+    'shaft_position': ' (deg)',
+}
+"""Beside the name of a signal, by its quantity, in the order in which they are drawn."""
+STATES = {
+    ('w', 'rad/s'): ('speed of the motor (rad/s)', OUT_MOTOR_SPEED, 1.0),
+    ('v', 'm/s'): ('speed of the motor (rad/s)', OUT_MOTOR_SPEED, 1.0),
+    ('q', 'rad'): ('angle of the joint (deg)', OUT_JOINT, math.degrees(1.0)),
+}
+"""Label, column of the simulated outputs and factor, by an argument's symbol and unit."""
 
 
-def telling_passage(recorded: RecordedView, joint: str) -> tuple[float, float]:
-    """Find begin and end, in s, of the passage in which the nominal prediction is furthest off."""
+@dataclass(frozen=True)
+class State:
+    """What a signal is drawn against.
+
+    Attributes
+    ----------
+    label : str
+        With its unit.
+    time, values : array (N,)
+        In s, and in the unit that the label names.
+    """
+
+    label: str
+    time: Array
+    values: Array
+
+
+def state_of(
+    recorded: RecordedView, joint: str, command: tuple[Array, Array], argument: Argument | None
+) -> State:
+    """The state that what is missing depends on, or the command where it is none of a joint's own.
+
+    The command has stamps (N,) in s and angles (N,) in rad, joint-equivalent.
+    """
+    shown = None if argument is None else STATES.get((argument.symbol, argument.unit))
+    if shown is None:
+        return State('command (deg)', command[0], np.asarray(np.degrees(command[1]), np.float64))
+    label, column, factor = shown
+    values = np.asarray(factor * recorded.outputs[joint][:, column], dtype=np.float64)
+    time = recorded.begin + TICK * np.arange(len(values), dtype=np.float64)
+    return State(label, time, values)
+
+
+def telling_signals(recorded: RecordedView, joint: str) -> tuple[SignalView, ...]:
+    """Signals of a joint in which the best plant gains most on the described one.
+
+    Angle and tensions, where there is nothing to gain.
+    """
     views = recorded.of_joint(joint)
+    described, best = ends_of(views[0])
+    if described == best:
+        chosen = [v for v in views if v.quantity in ('bending', 'tension')]
+    else:
+
+        def gain(one: SignalView) -> float:
+            return float(np.sum(one.residual(described) ** 2 - one.residual(best) ** 2))
+
+        chosen = sorted(views, key=gain, reverse=True)[:MOST_SIGNALS]
+    return tuple(sorted(chosen, key=lambda one: list(TITLES).index(one.quantity)))
+
+
+def telling_passage(views: tuple[SignalView, ...]) -> tuple[float, float]:
+    """Find begin and end, in s, of the passage in which the nominal prediction is furthest off."""
     first, last = float(views[0].time[0]), float(views[0].time[-1])
     if last - first <= PASSAGE_S:
         return first, last
     begins = np.arange(first, last - PASSAGE_S, 0.5)
     weight = np.zeros(len(begins))
     for one in views:
-        if one.quantity not in ('tension', 'bending'):
-            continue
         misses = one.residual('nominal') ** 2
         cumulative = np.r_[0.0, np.cumsum(misses)]
         lower = np.searchsorted(one.time, begins)
@@ -33,29 +101,23 @@ def telling_passage(recorded: RecordedView, joint: str) -> tuple[float, float]:
     return begin, begin + PASSAGE_S
 
 
-def passage_figure(
-    recorded: RecordedView, command: tuple[Array, Array], joint: str, passage: tuple[float, float]
-) -> str:
-    """Plot angle and tensions, measured and predicted: against the command, and over time.
+def passage_figure(views: tuple[SignalView, ...], over: State, passage: tuple[float, float]) -> str:
+    """Plot signals, measured and predicted: against a state, and over time.
 
-    Beside them, what each plant misses. The command has stamps (N,) in s and angles (N,) in rad,
-    joint-equivalent.
+    Beside them, what each plant misses.
     """
-    order = {'bending': 0, 'tension': 1}
-    shown = [v for v in recorded.of_joint(joint) if v.quantity in order]
-    views = sorted(shown, key=lambda v: order[v.quantity])
     loops, signals = [], []
     for one in views:
         inside = (one.time >= passage[0]) & (one.time <= passage[1])
         time = one.time[inside]
-        angle = np.degrees(np.interp(time, *command))
+        state = np.interp(time, over.time, over.values)
         measured, *predicted = _curves(one, inside)
         loops.append(
             Plot(
                 _title(one),
-                'command (deg)',
+                over.label,
                 tuple(
-                    Curve(x=angle, y=values, width=width, time=time, **look(name))
+                    Curve(x=state, y=values, width=width, time=time, **look(name))
                     for name, values, width in (measured, *predicted)
                 ),
                 columns=COLUMNS // len(views),
@@ -88,18 +150,18 @@ def passage_figure(
     return figure_html(loops + signals)
 
 
-def shown_plants(one: SignalView) -> tuple[str, ...]:
-    """The described plant and the best one, once where they are the same."""
-    return tuple(dict.fromkeys((next(iter(one.predicted)), list(one.predicted)[-1])))
+def ends_of(one: SignalView) -> tuple[str, str]:
+    """Names of the described plant and of the best one."""
+    names = list(one.predicted)
+    return names[0], names[-1]
 
 
 def _curves(one: SignalView, inside: NDArray[np.bool_]) -> list[tuple[str, Array, float]]:
-    convert = np.degrees if one.quantity == 'bending' else np.asarray
+    convert = np.degrees if one.unit == 'rad' else np.asarray
     curves = [('measured', convert(one.measured[inside]), 2.4)]
-    curves += [(name, convert(one.predicted[name][inside]), 1.3) for name in shown_plants(one)]
+    curves += [(name, convert(values[inside]), 1.3) for name, values in one.predicted.items()]
     return curves
 
 
 def _title(one: SignalView) -> str:
-    name = one.signal.partition(':')[2]
-    return f'{name}, bending (deg)' if one.quantity == 'bending' else f'{name}, tension (N)'
+    return f'{one.signal.partition(":")[2]}{TITLES[one.quantity]}'
