@@ -45,7 +45,7 @@ def recorded(tmp_path_factory):
         graph.advance(0.4)
         graph.client.ask('enable')
         graph.set('console', source='motion', motion='periodic')
-        graph.advance(1.5)
+        graph.advance(2.0)
         graph.stop()
     return bag
 
@@ -75,7 +75,7 @@ def of_another_rig(tmp_path_factory):
         graph.set('console', source='none')
         graph.advance(1.0)
         graph.set('console', source='motion', motion='non_periodic')
-        graph.advance(1.5)
+        graph.advance(2.0)
         graph.stop()
     return bag, rig
 

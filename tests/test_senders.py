@@ -129,6 +129,7 @@ def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, console, topi
             break
         foreign.advance(0.005)
     assert gate.accepted == obeyed
+    assert gate.refused[Refusal.SENDER] > refused
     foreign.advance(0.1)
     assert foreign.state == 'FAULT'
     assert topic in foreign.cause
