@@ -23,7 +23,7 @@ from endoscope_bags.table_mapping import EXAMPLE
 from endoscope_bringup.cli import build_parser
 from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, SensorParameters
 from endoscope_core.physics.effect import Parameter
-from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS
+from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.plant_file import REACH, plant_to_mapping
 from endoscope_nodes import program
@@ -219,7 +219,7 @@ def _switch(parameter: Parameter) -> str:
 
 def _effects() -> Iterator[str]:
     """The catalogue of effects, and the physics of the nominal plant."""
-    for effect in (*CATALOGUE.values(), *NOMINAL_PHYSICS.values()):
+    for effect in KNOWN.values():
         yield from (
             '',
             f'## {effect.id}',

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.physics.effects import describe
+from endoscope_core.physics.effects import describe, lacking
 from endoscope_explain.decide.given_physics import GivenJoints, GivenPhysics, without_recording
 from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.fit.pooled import told_alone
@@ -21,7 +21,6 @@ from endoscope_explain.pipeline import (
     read_inputs,
     require_as_named,
 )
-from endoscope_explain.search.candidate import lacking_physics
 from endoscope_explain.search.levels import FALSE_ALARMS
 from endoscope_explain.search.shared_choice import (
     Anchors,
@@ -119,7 +118,7 @@ def searched(
         The best one with an effect more, if another form may gain as much.
     """
     best, beam = nominal, [nominal]
-    most_effects += lacking_physics(nominal.recordings[0][0].model)
+    most_effects += len(lacking(nominal.recordings[0][0].model.base))
     while len(best.effects) < most_effects:
         if best.leaves_noise():
             tell(f'{nominal.joint}: only noise is left beside {_listed(best)}')

@@ -47,10 +47,9 @@ class MotorDriverNode(EndoscopeNode):
     A command is obeyed while it belongs to the motion session that the node takes part in, has one
     sender and passes the gate; what it asks for goes through the motion shaper.  Every tick the
     shaped goal goes to the device and its reading is published, and the goal where it changes.
-    Without fresh commands, and
-    outside of a session, the shafts go to the position measured at that moment and hold it; only
-    ``DISABLED`` lets them go.  The simulated slave also publishes the noise-free tensions and
-    angles that the simulated load cells and tracker read.
+    Without fresh commands, and outside of a session, the shafts go to the position measured at that
+    moment and hold it; only ``DISABLED`` lets them go.  The simulated slave also publishes the
+    noise-free tensions and angles that the simulated load cells and tracker read.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -143,24 +142,10 @@ class MotorDriverNode(EndoscopeNode):
 
     def _on_command(self, sample: JointSample) -> None:
         self._arrived.append((sample, self.ticker.monotonic_ns(), self._senders.rivals()))
-        if not self.ticker.simulated:
-            self.latency_ns.append(self.ticker.now_ns() - sample.stamp_ns)
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         self._notice_trouble()
-        # Within a tick the middleware may bring the last command before or after the end of its
-        # session. Judged here, where a goal is given, it is refused either way, and whoever has the
-        # recording knows so.
-        for sample, received_ns, rivals in self._arrived:
-            self.motion.command(
-                sample.session,
-                sample.stamp_ns,
-                sample.position,
-                sample.velocity,
-                received_ns,
-                rivals,
-            )
-        self._arrived.clear()
+        self._judge_what_arrived()
         goal = self.motion.turn(self.ticker.monotonic_ns(), periods * TICK_S)
         self._session.tell()
         reading = self._device.exchange(goal or (0.0,) * len(MOTORS), periods)
@@ -178,6 +163,24 @@ class MotorDriverNode(EndoscopeNode):
         if self._slave is not None:
             self._wires.publish(stamp_ns, *self._slave.tension)
             self._bending.publish(stamp_ns, *self._slave.bending)
+
+    def _judge_what_arrived(self) -> None:
+        """Take commands by the session of the turn that gives the goal.
+
+        Within a tick the middleware may bring the last one before or after the end of its session.
+        """
+        for sample, received_ns, rivals in self._arrived:
+            refusal = self.motion.command(
+                sample.session,
+                sample.stamp_ns,
+                sample.position,
+                sample.velocity,
+                received_ns,
+                rivals,
+            )
+            if refusal is None and not self.ticker.simulated:
+                self.latency_ns.append(received_ns - self.ticker.monotonic_of(sample.stamp_ns))
+        self._arrived.clear()
 
     def _tell_setpoint(self, since_ns: int, goal: tuple[float, ...]) -> None:
         if goal and (goal != self._told or since_ns - self._told_ns >= _REPEATED_NS):

@@ -56,12 +56,11 @@ def run(args: argparse.Namespace) -> int:
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    if args.taken_out:
-        with threadpool_limits(1, 'blas'):
-            print(as_table(taken_out(args.folder, args.jobs, tell)))
-        return 0
     # A fit's matrices are tall and narrow: threads would only wait for each other.
     with threadpool_limits(1, 'blas'):
+        if args.taken_out:
+            print(as_table(taken_out(args.folder, args.jobs, tell)))
+            return 0
         tubes = explained_tubes(args.folder, args.jobs, tell)
         state = explained_state(args.folder, tubes, args.jobs, tell)
         unknown = unknown_tubes(args.folder, tubes, tell)

@@ -1,5 +1,6 @@
 """The whole graph in this process, an operator at its topics, and a hand at its handle."""
 
+import os
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -35,7 +36,7 @@ class LiveGraph(ClosedOnExit):
     bag
         Where the recording goes, which lasts from the beginning to :meth:`stop`; None for none.
     domain
-        ROS domain of the graph.
+        ROS domain of the graph; by default one of this process's own.
     lock_step
         Whether simulated time goes on as the nodes follow, or the wall clock gives the time.
     overrides
@@ -49,7 +50,7 @@ class LiveGraph(ClosedOnExit):
     def __init__(
         self,
         bag: Path | None,
-        domain: int,
+        domain: int | None = None,
         *,
         lock_step: bool,
         overrides: dict[str, dict[str, object]],
@@ -65,6 +66,7 @@ class LiveGraph(ClosedOnExit):
         arguments = ['--ros-args', '--log-level', 'fatal']
         arguments += ['-p', f'use_sim_time:={str(lock_step).lower()}']
         arguments += ['-p', f'tick_rate:={rate or RATE[lock_step]}']
+        domain = 100 + os.getpid() % 130 if domain is None else domain
         self._runtime = Runtime(arguments, Context(), domain, given, rig=rig)
         try:
             for factory in (*SLAVE_NODES, *CONTROL_NODES):

@@ -68,9 +68,7 @@ def recorded_and_explained(seed: int, folder: Path) -> Row:
         'calibration': {'motion': case.calibration},
     }
     ended = ''
-    with LiveGraph(
-        home / 'whole', 100 + os.getpid() % 130, lock_step=case.lock_step, overrides=overrides
-    ) as graph:
+    with LiveGraph(home / 'whole', lock_step=case.lock_step, overrides=overrides) as graph:
         try:
             act(graph, case)
         except EndoscopeError as error:

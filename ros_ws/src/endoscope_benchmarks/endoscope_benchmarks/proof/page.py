@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from numpy.typing import NDArray
 
 from endoscope_benchmarks.proof import sentences
 from endoscope_benchmarks.proof.trial import (
@@ -20,6 +21,8 @@ from endoscope_explain.report.figures.style import TIME, look
 from endoscope_explain.report.numbers import digits
 from endoscope_explain.report.sentences import plain
 from endoscope_nodes.names import JOINTS
+
+Array = NDArray[np.float64]
 
 PLANTS = ('nominal', 'refitted', 'augmented')
 
@@ -76,23 +79,15 @@ def _followed(outcome: Outcome) -> str:
     """Desired and measured angle of the joint on which more is concealed, by either plant."""
     joints = [law.joint for law in outcome.rig.laws if law.joint] or list(JOINTS)
     j = JOINTS.index(joints[0])
-    runs = {name: outcome.tracking[name] for name in ('nominal', 'augmented')}
+    runs = outcome.tracking
     first = runs['nominal']
     wanted = Curve(x=first.time, y=np.degrees(first.desired[:, j]), width=2.4, **look('measured'))
-    curves = [replace(wanted, label='desired')]
-    curves += [
-        Curve(x=run.time, y=np.degrees(run.measured[:, j]), width=1.3, **look(name))
-        for name, run in runs.items()
-    ]
-    errors = [
-        Curve(x=r.time, y=np.degrees(r.measured - r.desired)[:, j], width=1.3, **look(name))
-        for name, r in runs.items()
-    ]
-    return figure_html(
-        [
-            Plot(f'{JOINTS[j]} (deg)', TIME, tuple(curves), columns=7, height=140),
-            Plot('measured - desired (deg)', TIME, tuple(errors), columns=5, height=140),
-        ]
+    return _with_errors(
+        f'{JOINTS[j]} (deg)',
+        replace(wanted, label='desired'),
+        {name: (run.time, np.degrees(run.measured[:, j])) for name, run in runs.items()},
+        'measured - desired (deg)',
+        {name: np.degrees(run.measured - run.desired)[:, j] for name, run in runs.items()},
     )
 
 
@@ -102,14 +97,28 @@ def _figure(outcome: Outcome) -> str:
     factor, unit = (180.0 / np.pi, 'deg') if shown.unit == 'rad' else (1.0, shown.unit)
     measured = factor * shown.measured
     predicted = {name: factor * shown.predicted[name] for name in PLANTS}
-    curves = [Curve(x=shown.time, y=measured, width=2.4, **look('measured'))]
-    curves += [Curve(x=shown.time, y=y, width=1.3, **look(n)) for n, y in predicted.items()]
-    missed = [
-        Curve(x=shown.time, y=measured - y, width=1.3, **look(n)) for n, y in predicted.items()
-    ]
+    return _with_errors(
+        f'{plain(shown.signal)} ({unit})',
+        Curve(x=shown.time, y=measured, width=2.4, **look('measured')),
+        {name: (shown.time, y) for name, y in predicted.items()},
+        f'measured - predicted ({unit})',
+        {name: measured - y for name, y in predicted.items()},
+    )
+
+
+def _with_errors(
+    title: str,
+    reference: Curve,
+    plants: Mapping[str, tuple[Array, Array]],
+    errors_title: str,
+    errors: Mapping[str, Array],
+) -> str:
+    """A reference with the curve of each plant, its times and values, and their errors beside."""
+    curves = [Curve(x=x, y=y, width=1.3, **look(name)) for name, (x, y) in plants.items()]
+    missed = [Curve(x=plants[name][0], y=y, width=1.3, **look(name)) for name, y in errors.items()]
     return figure_html(
         [
-            Plot(f'{plain(shown.signal)} ({unit})', TIME, tuple(curves), columns=7, height=140),
-            Plot(f'measured - predicted ({unit})', TIME, tuple(missed), columns=5, height=140),
+            Plot(title, TIME, (reference, *curves), columns=7, height=140),
+            Plot(errors_title, TIME, tuple(missed), columns=5, height=140),
         ]
     )

@@ -77,10 +77,7 @@ def _followed(
     proof: Proof, outcomes: list[Outcome], pool: ProcessPoolExecutor, say: Say
 ) -> list[Outcome]:
     say('The slaves are moved by the inverse of either plant:')
-    tasks = [
-        pool.submit(followed, each.rig.number, each.rig.folder, each.truth, proof.seed)
-        for each in outcomes
-    ]
+    tasks = [pool.submit(followed, each.rig.folder, each.truth, proof.seed) for each in outcomes]
     moved = []
     for each, task in zip(outcomes, tasks, strict=True):
         moved.append(replace(each, tracking=task.result()))

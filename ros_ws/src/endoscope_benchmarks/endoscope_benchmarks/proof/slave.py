@@ -1,6 +1,5 @@
 """The proof on the running slave: recorded through the whole graph, and compensated afterwards."""
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -144,8 +143,7 @@ def _played(
         overrides: dict[str, dict[str, object]] = {
             'motor_driver': {'seed': seed, 'plant_file': str(file)}
         }
-        domain = 100 + os.getpid() % 130
-        with LiveGraph(bag, domain, lock_step=True, overrides=overrides) as graph:
+        with LiveGraph(bag, lock_step=True, overrides=overrides) as graph:
             graph.client.ask('enable')
             play(graph)
             graph.set('console', source='none')

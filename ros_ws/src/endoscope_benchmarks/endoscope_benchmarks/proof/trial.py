@@ -13,7 +13,6 @@ from endoscope_benchmarks.proof import SLAVE, slave
 from endoscope_benchmarks.proof.bag_of_rig import write_bag
 from endoscope_benchmarks.proof.drawing import drawn
 from endoscope_benchmarks.proof.seal import opened, seal
-from endoscope_benchmarks.proof.slave import Tracking, tracked
 from endoscope_core.physics import load_plant
 from endoscope_core.physics.plant_file import plant_from_mapping, save_plant
 from endoscope_explain.case import ExplainedCase
@@ -27,7 +26,7 @@ Array = NDArray[np.float64]
 
 TRUTH, PLANT = 'sealed.json', 'described.yaml'
 RECORDING, SECOND = 'recording.mcap', 'second.mcap'
-TRACKED = 'tracked'
+FOLLOWED = 'followed'
 REPORT = 'report'
 PASSAGE_S = 6.0
 """Of the second recording that is drawn."""
@@ -128,7 +127,7 @@ class Outcome:
     answer: Answer
     truth: dict
     judgement: Judgement
-    tracking: dict[str, Tracking] = field(default_factory=dict)
+    tracking: dict[str, slave.Tracking] = field(default_factory=dict)
 
 
 def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path) -> Rig:
@@ -193,14 +192,14 @@ def compared(rig: Rig, answer: Answer) -> Outcome:
     return Outcome(rig, answer, truth, judged(rig.laws, answer.said, rig.also))
 
 
-def followed(number: int, folder: Path, truth: dict, seed: int) -> dict[str, Tracking]:
+def followed(folder: Path, truth: dict, seed: int) -> dict[str, slave.Tracking]:
     """Move a slave by the inverse of its plant as described, and as improved."""
     keys = ('joints', 'sensors', 'effects')
     true = plant_from_mapping({key: truth[key] for key in keys})
-    (folder / TRACKED).mkdir()
+    (folder / FOLLOWED).mkdir()
     plants = {'nominal': folder / PLANT, 'augmented': folder / REPORT / PLANT_YAML}
     return {
-        name: tracked(true, load_plant(file), folder / TRACKED / name, seed + 2)
+        name: slave.tracked(true, load_plant(file), folder / FOLLOWED / name, seed + 2)
         for name, file in plants.items()
     }
 

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from endoscope_benchmarks.real.explained import Number, Tell
-from endoscope_benchmarks.real.rig import Plant, Told, as_described, best_refitted, wide
+from endoscope_benchmarks.real.rig import Plant, Told, as_described, wide
 from endoscope_benchmarks.real.takes import TUBES, read
 from endoscope_core.physics.effect import NominalPhysics
 from endoscope_core.physics.effects import NOMINAL_PHYSICS
-from endoscope_explain.decide.decision import Decision, decide
+from endoscope_explain.decide.decision import decide
 from endoscope_explain.fit.evidence import log_evidence
-from endoscope_explain.fit.intervals import intervals
-from endoscope_explain.fit.model import Fit, JointModel
+from endoscope_explain.fit.intervals import effect_estimates
+from endoscope_explain.fit.model import Fit, without_effect
 from endoscope_explain.fit.other_forms import with_form
 from endoscope_explain.search.levels import search
 
@@ -72,11 +72,10 @@ def taken_out(folder: Path, jobs: int, tell: Tell) -> list[TakenOut]:
         take = read(folder / f'{name}.txt')
         cycle = take.until(take.cycle_s).observation()
         model = wide(cycle)
-        whole = with_form(best_refitted([Plant(model, as_described(model))]), jobs)
+        whole = with_form(Plant(model, as_described(model)).refitted(), jobs)
         for piece in NOMINAL_PHYSICS.values():
             tell(f'tube {name} without {piece.id}')
-            begun = _without(whole, piece)
-            without = best_refitted([begun])
+            without = Plant(*without_effect(whole, piece.id)).refitted()
             decision = decide(search((without,), jobs, 0), jobs)
             found = decision.chosen.fit
             seen = take.observation()
@@ -91,8 +90,8 @@ def taken_out(folder: Path, jobs: int, tell: Tell) -> list[TakenOut]:
                     piece.id,
                     log_evidence(whole) - log_evidence(without),
                     tuple(term.name for term in decision.missing),
-                    _number(decision, piece),
-                    _own(whole, piece.first_parameter),
+                    _number(found, piece) if piece.id in decision.chosen.effects else None,
+                    _number(whole, piece),
                     Told(take, take.cycle_s, plants),
                 )
             )
@@ -130,25 +129,8 @@ def _left(row: TakenOut, name: str) -> str:
     return ' / '.join([f'{np.degrees(angle):.2f}', *(f'{t:.2f}' for t in tensions)])
 
 
-def _without(whole: Fit, piece: NominalPhysics) -> Plant:
-    """The whole plant at its fitted numbers, but for the piece."""
-    model = whole.model
-    base = model.base.copy()
-    base[piece.first_parameter] = piece.parameters[0].off
-    kept = [k for k, item in enumerate(model.free) if item.index not in piece.places]
-    free = tuple(model.free[k] for k in kept)
-    return Plant(
-        JointModel(model.observation, base, model.flags, free, coarse=1), whole.theta[kept]
-    )
-
-
-def _number(decision: Decision, piece: NominalPhysics) -> Number | None:
-    if piece.id not in decision.chosen.effects:
-        return None
-    return _own(decision.chosen.fit, piece.first_parameter)
-
-
-def _own(found: Fit, index: int) -> Number:
-    of = intervals(found)
-    k = of.indices.index(index)
-    return float(of.values[k]), float(of.low[k]), float(of.high[k])
+def _number(found: Fit, piece: NominalPhysics) -> Number:
+    """The first number of a piece that a fit has, and its interval."""
+    first = piece.parameters[0]
+    estimate = effect_estimates(found, piece.first_parameter, {first.name: first.unit})[first.name]
+    return estimate.value, estimate.low, estimate.high

@@ -34,6 +34,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.errors import EndoscopeError
     from endoscope_core.physics.effects import (
         CATALOGUE,
+        KNOWN,
         NOMINAL_PHYSICS,
         UnknownEffectError,
         describe,
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         print_json(
             [
                 _place_as_json(FUNCTIONS[each.id]) if each.id in FUNCTIONS else _as_json(each)
-                for each in chosen or (*CATALOGUE.values(), *NOMINAL_PHYSICS.values())
+                for each in chosen or KNOWN.values()
             ]
         )
         return 0

@@ -4,6 +4,9 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
 from endoscope_core.physics.layout import NOMINAL_KEYS, SLOTS
 
 
@@ -204,9 +207,9 @@ class NominalPhysics(Effect):
     def _block(self) -> int:
         return NOMINAL_KEYS.index(self.parameters[0].name)
 
-    def is_lacking(self, first: float) -> bool:
-        """Whether a joint whose first parameter of these is `first` lacks it."""
-        return first == self.parameters[0].off
+    def is_lacking(self, packed: NDArray[np.float64]) -> bool:
+        """Whether a joint of these packed parameters (parameters,) lacks it."""
+        return bool(packed[self.first_parameter] == self.parameters[0].off)
 
 
 _DEFINED: dict[str, Effect] = {}

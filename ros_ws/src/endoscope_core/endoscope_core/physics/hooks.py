@@ -88,7 +88,9 @@ EFFORT = Hook('effort', Fold.THROUGH, 'p, x, effort, speed')
 """Motor's torque as the servo reads it, N m."""
 TRACKER = Hook('tracker', Fold.THROUGH, 'p, x, angle, history, time, tick')
 """Bending angle as the tracker reads it, rad."""
-LOAD_CELL = Hook('load_cell', Fold.THROUGH, 'p, x, reading, cell, neighbour, history, time, tick')
+CELL_INPUT = Hook('cell_input', Fold.THROUGH, 'p, x, tension, cell, history, tick')
+"""Tension that load cell 0 or 1 converts, N."""
+LOAD_CELL = Hook('load_cell', Fold.THROUGH, 'p, x, reading, cell, neighbour, time')
 """Tension as load cell 0 or 1 reads it; `neighbour` is the true tension of the other wire, N."""
 ADVANCE = Hook('advance', Fold.CALLS, 'p, x, load_a, load_b, time, tick')
 """End of a tick: lets states follow; `load_a`, `load_b` are the wires' mean tensions in N."""
@@ -111,6 +113,7 @@ HOOKS = (
     TIP_ANGLE,
     EFFORT,
     TRACKER,
+    CELL_INPUT,
     LOAD_CELL,
     ADVANCE,
 )

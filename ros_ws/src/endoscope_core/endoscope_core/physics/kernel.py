@@ -100,6 +100,7 @@ added_length, length_varies = folded(hooks.LENGTH), acting(hooks.LENGTH)
 tip_angle = folded(hooks.TIP_ANGLE)
 effort_reading = folded(hooks.EFFORT)
 tracker_reading = folded(hooks.TRACKER)
+cell_input = folded(hooks.CELL_INPUT)
 load_cell_reading = folded(hooks.LOAD_CELL)
 advance, something_follows = folded(hooks.ADVANCE), acting(hooks.ADVANCE)
 command_functions = sum_of(hooks.COMMAND)
@@ -478,14 +479,16 @@ def read_sensors(
     out[OUT_MOTOR] = x[MOTOR]
     out[OUT_MOTOR_SPEED] = x[MOTOR_SPEED]
     out[OUT_EFFORT] = effort_reading(on, p, x, p[PULLEY_RADIUS] * (ta - tb), x[MOTOR_SPEED])
-    out[OUT_TENSION_A] = load_cell_reading(on, p, x, ta, 0, tb, history, time, tick)
-    out[OUT_TENSION_B] = load_cell_reading(on, p, x, tb, 1, ta, history, time, tick)
+    converted_a = cell_input(on, p, x, ta, 0, history, tick)
+    converted_b = cell_input(on, p, x, tb, 1, history, tick)
+    out[OUT_TENSION_A] = load_cell_reading(on, p, x, converted_a, 0, tb, time)
+    out[OUT_TENSION_B] = load_cell_reading(on, p, x, converted_b, 1, ta, time)
     out[OUT_BENDING] = tracker_reading(on, p, x, x[TIP], history, time, tick)
     if functions_act(on):
         a, b, angle = out[OUT_TENSION_A], out[OUT_TENSION_B], out[OUT_BENDING]
         out[OUT_EFFORT] += effort_functions(on, p, x, out[OUT_EFFORT], x[MOTOR_SPEED])
-        out[OUT_TENSION_A] += load_cell_functions(on, p, x, a, 0, tb, history, time, tick)
-        out[OUT_TENSION_B] += load_cell_functions(on, p, x, b, 1, ta, history, time, tick)
+        out[OUT_TENSION_A] += load_cell_functions(on, p, x, a, 0, tb, time)
+        out[OUT_TENSION_B] += load_cell_functions(on, p, x, b, 1, ta, time)
         out[OUT_BENDING] += tracker_functions(on, p, x, angle, history, time, tick)
     out[OUT_JOINT] = x[TIP]
 

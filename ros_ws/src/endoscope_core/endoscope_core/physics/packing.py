@@ -122,9 +122,7 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
         if flags[j, definition.flag]:
             raise ValueError(f'effect {spec.id} is given twice on joint {spec.joint}')
         first = definition.first_parameter
-        if isinstance(definition, NominalPhysics) and not definition.is_lacking(
-            parameters[j, first]
-        ):
+        if isinstance(definition, NominalPhysics) and not definition.is_lacking(parameters[j]):
             name = definition.parameters[0].name
             raise ValueError(
                 f'effect {spec.id}: joint {spec.joint} has it already, its {name} is '

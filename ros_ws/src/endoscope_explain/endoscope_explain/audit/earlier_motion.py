@@ -113,20 +113,20 @@ class _Past:
         first_seen, first_speed = self._motion(seen)
         ends = [asked, seen, first_seen + first_speed / float(packed[MOTOR_BANDWIDTH])]
 
-        def came(way: list[float]) -> _Start:
+        def resting(way: list[float]) -> _Start:
             return _Start(np.array([way[-1], 0.0]), np.array(way[:-1]) - way[-1])
 
         def differ_until(low: list[float], high: list[float], of: Mask | None = None) -> float:
-            apart = np.abs(self._left(came(high)) - self._left(came(low))) >= 1.0
+            apart = np.abs(self._left(resting(high)) - self._left(resting(low))) >= 1.0
             last = float(times[apart if of is None else apart & of].max(initial=-1.0))
             return last + observation.tick if last >= 0.0 else 0.0
 
         turns_until = differ_until([min(ends)], [max(ends)], shaft)
         first = shaft & (times < turns_until)
-        count = max(int(first.sum()), 1)
+        count, short = max(int(first.sum()), 1), self._cut_at(turns_until)
 
         def left(start: _Start) -> float:
-            return float(np.sum(self._left(start)[first] ** 2)) / count
+            return float(np.sum(self._left(start, short)[first] ** 2)) / count
 
         def judged(start: _Start) -> _Start:
             """What leaves no more than noise of a motor is judged from the beginning."""
@@ -145,9 +145,13 @@ class _Past:
             self._begins.append(judged(_Start(found.x)))
         # Whatever the rig did before, its state lies between those of its greatest excursions.
         self.shows_until = differ_until([-reach, min(ends)], [reach, max(ends)])
+        self._cut = self._cut_at(self.shows_until)
+
+    def _cut_at(self, end: float) -> JointObservation:
+        """The observation with the inputs that its samples before `end` s need."""
         # Samples are means over a period, half of which may come after their time.
-        ticks = int(np.ceil((self.shows_until + ANALYSIS_PERIOD) / observation.tick)) + 2
-        self._cut = replace(observation, inputs=observation.inputs[:, :ticks])
+        ticks = int(np.ceil((end + ANALYSIS_PERIOD) / self._observation.tick)) + 2
+        return replace(self._observation, inputs=self._observation.inputs[:, :ticks])
 
     def _motion(self, seen: float) -> tuple[float, float]:
         """Angle in rad and speed in rad/s of the motor at first, as read."""

@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Effect, Stage
-from endoscope_core.physics.effects import NOMINAL_PHYSICS, describe
+from endoscope_core.physics.effects import describe
 from endoscope_explain.decide.decision import Decision, MissingTerm
 from endoscope_explain.explanation import (
     Candidate,
@@ -170,7 +170,7 @@ def plant_of(plant: PlantDescription, fits: list[Composition]) -> PlantDescripti
                 continue
             spec = spec_of(term.term, joint, packed)
             specs.append(spec)
-            if term.id in NOMINAL_PHYSICS:
+            if term.is_nominal:
                 # Its numbers stand there.
                 first = term.term.parameters[0]
                 absent: dict[str, Any] = {first.name: first.off}

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS
+from endoscope_core.physics.effects import CATALOGUE, KNOWN
 from endoscope_explain.criteria import BEYOND_FORM
 from endoscope_explain.fit.evidence import misfit
 from endoscope_explain.fit.intervals import may_be_absent
@@ -47,7 +47,7 @@ class MissingTerm:
     @property
     def is_known(self) -> bool:
         """Whether it is an effect of the catalogue."""
-        return self.name in CATALOGUE or self.name in NOMINAL_PHYSICS
+        return self.name in KNOWN
 
 
 @dataclass(frozen=True)

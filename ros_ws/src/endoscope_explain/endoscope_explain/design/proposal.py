@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS, describe
+from endoscope_core.physics.effects import KNOWN, describe
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.decide.conclusions import spec_of
@@ -87,7 +87,7 @@ def rival_plant(
 ) -> PlantDescription | None:
     """Fit a rival in an effect's place; None where it has no simulation or is there besides."""
     there = {e.id for e in plant.effects if e.joint == effect.joint}
-    if rival not in {**CATALOGUE, **NOMINAL_PHYSICS} or rival in there:
+    if rival not in KNOWN or rival in there:
         return None
     others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
     families = effect.definition.traits.families

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effect import Parameter
-from endoscope_core.physics.effects import NOMINAL_PHYSICS, describe
+from endoscope_core.physics.effects import describe, lacking
 from endoscope_core.physics.functions.interpolation import HIGH, LAG
 from endoscope_core.physics.functions.place import Place
 from endoscope_core.physics.layout import (
@@ -130,15 +130,10 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
     tuple of FreeParameter
     """
     free = []
-    lacking = {
-        place
-        for each in NOMINAL_PHYSICS.values()
-        if each.is_lacking(float(base[each.first_parameter]))
-        for place in each.places
-    }
+    absent = {place for each in lacking(base) for place in each.places}
     for key in SCALED_NOMINAL:
         index = NOMINAL_KEYS.index(key)
-        if index in lacking:
+        if index in absent:
             continue
         centre = float(base[index])
         reach = 1.0 + band * 4.0 / 3.0

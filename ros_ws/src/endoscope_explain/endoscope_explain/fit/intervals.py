@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from endoscope_core.physics.effect import Effect
-from endoscope_core.physics.effects import NOMINAL_PHYSICS
+from endoscope_core.physics.effects import lacking
 from endoscope_explain.criteria import REACH
 from endoscope_explain.explanation import Estimate, NominalEstimate
 from endoscope_explain.fit.evidence import weights
@@ -94,12 +94,7 @@ def nominal_estimates(
 ) -> dict[str, NominalEstimate]:
     """Estimates of the nominal parameters of a fit, beside those described (parameters,)."""
     found = intervals(fit)
-    lacking = {
-        place
-        for each in NOMINAL_PHYSICS.values()
-        if each.is_lacking(float(described[each.first_parameter]))
-        for place in each.places
-    }
+    absent = {place for each in lacking(described) for place in each.places}
     return {
         name: NominalEstimate(
             float(value),
@@ -112,7 +107,7 @@ def nominal_estimates(
         for name, index, value, low, high in zip(
             found.names, found.indices, found.values, found.low, found.high, strict=True
         )
-        if name in FITTED_NOMINAL and index not in lacking
+        if name in FITTED_NOMINAL and index not in absent
     }
 
 

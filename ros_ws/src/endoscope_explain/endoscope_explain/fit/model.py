@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.effect import Symptom
-from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS, describe, showing
+from endoscope_core.physics.effect import NominalPhysics, Symptom
+from endoscope_core.physics.effects import CATALOGUE, describe, showing
 from endoscope_core.physics.functions.interpolation import HIGH, LAG, NODES, VALUES
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
@@ -207,7 +207,7 @@ def without_effect(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
     definition = describe(effect_id)
     base, flags = found.model.base.copy(), found.model.flags.copy()
     flags[definition.flag] = False
-    if effect_id in NOMINAL_PHYSICS:
+    if isinstance(definition, NominalPhysics):
         base[definition.first_parameter] = definition.parameters[0].off
     return replace(found.model, base=base, flags=flags).holding(definition.places, found.theta)
 

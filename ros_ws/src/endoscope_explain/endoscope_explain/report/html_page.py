@@ -162,8 +162,13 @@ def _drawings(
         if joint in moving_joints(case.recording):
             views = telling_signals(recorded, joint)
             passage = drawn['passage'] = telling_passage(views)
-            over = drawn['over'] = state_of(recorded, joint, command, _argument(case, joint))
+            over = state_of(recorded, joint, command, _argument(case, joint))
             drawn['loops'] = passage_figure(views, over, passage)
+            drawn['loops_title'] = (
+                f'Hysteresis loops of {joint}'
+                if over.words == 'command'
+                else f'{joint} over the {over.words}'
+            )
     if case.explanation.unknown is not None:
         drawn['unknown'] = unknown_figure(case.explanation.unknown)
     if ladder:
@@ -176,7 +181,7 @@ def _drawings(
 def _argument(case: ExplainedCase, joint: str) -> Argument | None:
     """What the first thing that is missing from a joint depends on; None where nothing is."""
     term = case.explanation.unknown
-    if term is not None and term.helps:
+    if term is not None and term.helps and term.joint == joint:
         return term.there.argument
     effect = next((e for e in case.effects if e.joint == joint), None)
     places = () if effect is None else effect.definition.traits.families

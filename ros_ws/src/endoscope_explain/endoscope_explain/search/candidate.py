@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effect import Effect, NominalPhysics
-from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS
+from endoscope_core.physics.effects import CATALOGUE, KNOWN
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.acting import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
 from endoscope_core.physics.functions.interpolation import HIGH, LAG, LOW
@@ -153,17 +153,9 @@ def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Candidate, ...]
     """
     return tuple(
         Candidate(effect, start)
-        for effect in _absent(found, (*CATALOGUE.values(), *NOMINAL_PHYSICS.values()))
+        for effect in _absent(found, KNOWN.values())
         if not effect.traits.audited and effect.id not in left_out
         for start in starting_points(effect)
-    )
-
-
-def lacking_physics(model: JointModel) -> int:
-    """How many pieces of the nominal physics a plant lacks."""
-    return sum(
-        each.is_lacking(float(model.base[each.first_parameter]))
-        for each in NOMINAL_PHYSICS.values()
     )
 
 
@@ -231,11 +223,10 @@ def _absent[E: Effect](found: Fit, terms: Iterable[E]) -> Iterator[E]:
     flags, repeats = found.model.flags, motion_repeats(found.model.observation)
     there = {place.id for place in FUNCTIONS.values() if flags[place.flag]}
     formulas = {p for e in CATALOGUE.values() if flags[e.flag] for p in e.traits.families}
-    base = found.model.base
     for term in terms:
         present = flags[term.flag] or term.id in formulas or there & {*term.traits.families}
         if isinstance(term, NominalPhysics):
-            present = present or not term.is_lacking(float(base[term.first_parameter]))
+            present = present or not term.is_lacking(found.model.base)
         if not present and (repeats or not term.traits.depends_on_time):
             yield term
 

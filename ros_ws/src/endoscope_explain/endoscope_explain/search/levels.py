@@ -5,11 +5,12 @@ simulator, and the evidence ranks them, functions and formulas alike. Rigs in wh
 missing, run through the same screen, say how much evidence there is then.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from endoscope_core.physics.effects import lacking
 from endoscope_explain.criteria import LEAST_SHARE
 from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.held_out import predicts_better
@@ -23,7 +24,6 @@ from endoscope_explain.search.candidate import (
     Variant,
     effects,
     functions,
-    lacking_physics,
 )
 from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, null_of
 from endoscope_explain.search.refit import (
@@ -101,20 +101,16 @@ class Level:
         Other numbers, then what every rig has, and then a formula stand where they lose no more
         than form is worth.
         """
-        top = self.found[0]
-        for each in self.found:
-            if not each.terms and top.evidence - each.evidence <= self.form_is_worth():
-                return each
-        for each in self.found:
-            lost = top.evidence - each.evidence
-            if each.terms and each.terms[-1].is_nominal and lost <= self.form_is_worth():
-                return each
-        if top.terms and top.terms[-1].is_function:
-            for each in self.at_the_place_of(top):
-                lost = top.evidence - each.evidence
-                if not each.terms[-1].is_function and lost <= self.form_is_worth():
-                    return each
-        return top
+        top, worth = self.found[0], self.form_is_worth()
+
+        def first(compositions: Iterable[Composition]) -> Composition | None:
+            return next((c for c in compositions if top.evidence - c.evidence <= worth), None)
+
+        stands = first(c for c in self.found if not c.terms)
+        stands = stands or first(c for c in self.found if c.adds_nominal)
+        if stands is None and top.terms and top.terms[-1].is_function:
+            stands = first(c for c in self.at_the_place_of(top) if not c.terms[-1].is_function)
+        return stands or top
 
     def form_is_worth(self) -> float:
         """Evidence by which an error of form as large as what is left may mislead."""
@@ -143,9 +139,9 @@ class Level:
         Nominal physics needs no more than to be worth its numbers: that a rig has none is no
         hypothesis.
         """
-        nominal = self.found and self.best.terms and self.best.terms[-1].is_nominal
-        worth = self.gain(self.best) > 0.0 if nominal else self.p_value <= FALSE_ALARMS
-        return worth and self.predicts
+        if self.found and self.best.adds_nominal:
+            return self.gain(self.best) > 0.0 and self.predicts
+        return self.p_value <= FALSE_ALARMS and self.predicts
 
     def variants(self) -> tuple[Composition, ...]:
         """The best composition's effects acting on something else: beside another they may win."""
@@ -209,7 +205,7 @@ def search(
     JointSearch
     """
     nominal = composition((), anchors[0])
-    depth += lacking_physics(anchors[0].model)
+    depth += len(lacking(anchors[0].model.base))
     if not is_noise(nominal.fit):
         # What only the numbers are still worth is no gain of a term.
         nominal = until_it_stands(until_it_stands(nominal))
@@ -221,7 +217,7 @@ def search(
         if not level.is_found or not level.best.terms:
             break
         best = level.best
-        if best.terms[-1].is_nominal:
+        if best.adds_nominal:
             best = _from_afar(best)
         best = replace(best, fit=with_form(best.fit, jobs))
         found = tuple(best if c is level.best else c for c in level.found)

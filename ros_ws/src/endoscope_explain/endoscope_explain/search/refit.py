@@ -52,6 +52,11 @@ class Composition:
         """Ids of those that are effects of the catalogue."""
         return tuple(term.id for term in self.terms if not term.is_function)
 
+    @property
+    def adds_nominal(self) -> bool:
+        """Whether the last term is a piece of the nominal physics, which every rig has."""
+        return bool(self.terms) and self.terms[-1].is_nominal
+
 
 def composition(terms: tuple[Candidate, ...], found: Fit) -> Composition:
     """A fit with its evidence."""

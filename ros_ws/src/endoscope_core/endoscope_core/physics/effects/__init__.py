@@ -7,6 +7,9 @@ needs. Modules without an effect hold laws that several share.
 import importlib
 import pkgutil
 
+import numpy as np
+from numpy.typing import NDArray
+
 from endoscope_core.errors import nearest
 from endoscope_core.physics.effect import (
     Effect,
@@ -23,6 +26,8 @@ CATALOGUE: dict[str, Effect] = in_order_of_chain(Effect)
 """All effects by their ids, in the order of the chain."""
 NOMINAL_PHYSICS: dict[str, NominalPhysics] = in_order_of_chain(NominalPhysics)
 """What the nominal plant is made of, by its ids, in the order of the chain."""
+KNOWN: dict[str, Effect] = {**CATALOGUE, **NOMINAL_PHYSICS}
+"""All physics that a plant may lack, by its ids."""
 
 
 def describe(effect_id: str) -> Effect:
@@ -31,12 +36,16 @@ def describe(effect_id: str) -> Effect:
     Raises
     ------
     UnknownEffectError
-        If the catalogue has no such id; the message names the nearest.
+        If there is no such id; the message names the nearest.
     """
-    known = {**CATALOGUE, **NOMINAL_PHYSICS}
-    if effect_id not in known:
-        raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, known)}')
-    return known[effect_id]
+    if effect_id not in KNOWN:
+        raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, KNOWN)}')
+    return KNOWN[effect_id]
+
+
+def lacking(packed: NDArray[np.float64]) -> tuple[NominalPhysics, ...]:
+    """Nominal physics that a joint of packed parameters (parameters,) lacks."""
+    return tuple(each for each in NOMINAL_PHYSICS.values() if each.is_lacking(packed))
 
 
 def showing(symptom: Symptom) -> Effect:

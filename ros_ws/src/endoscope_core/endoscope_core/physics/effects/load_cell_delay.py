@@ -3,7 +3,7 @@
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
 from endoscope_core.physics.effects.past import value_before
-from endoscope_core.physics.hooks import LOAD_CELL, hook
+from endoscope_core.physics.hooks import CELL_INPUT, hook
 from endoscope_core.physics.layout import TENSION_HISTORY, TICKS
 
 EFFECT = Effect(
@@ -24,17 +24,8 @@ EFFECT = Effect(
 (DELAY,) = EFFECT.places
 
 
-@hook(EFFECT, LOAD_CELL)
+@hook(EFFECT, CELL_INPUT)
 @compiled
-def late(
-    p: Array,
-    x: Array,
-    reading: float,
-    cell: int,
-    neighbour: float,
-    history: Array,
-    time: float,
-    tick: float,
-) -> float:
+def late(p: Array, x: Array, tension: float, cell: int, history: Array, tick: float) -> float:
     """Tension in N of the delay ago; first of the load cells' effects."""
     return value_before(history[TENSION_HISTORY + cell], x[TICKS], p[DELAY], tick)

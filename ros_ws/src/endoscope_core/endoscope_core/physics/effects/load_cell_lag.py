@@ -4,7 +4,7 @@ import math
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
-from endoscope_core.physics.hooks import LOAD_CELL, hook
+from endoscope_core.physics.hooks import CELL_INPUT, hook
 from endoscope_core.physics.layout import SLOTS, TICKS
 
 EFFECT = Effect(
@@ -25,30 +25,21 @@ EFFECT = Effect(
 LAGGED, BEFORE, READ_AT = SLOTS.state_block(2), SLOTS.state_block(2), SLOTS.state_block(2)
 
 
-@hook(EFFECT, LOAD_CELL)
+@hook(EFFECT, CELL_INPUT)
 @compiled
-def lagged(
-    p: Array,
-    x: Array,
-    reading: float,
-    cell: int,
-    neighbour: float,
-    history: Array,
-    time: float,
-    tick: float,
-) -> float:
-    """Tension in N as a cell reads it that went straight from the last tick's tension to `reading`.
+def lagged(p: Array, x: Array, tension: float, cell: int, history: Array, tick: float) -> float:
+    """Tension in N as a cell reads it that went straight from the last tick's to `tension`.
 
     Sensors may be read twice in a tick, and a lag goes on once.
     """
     now = x[TICKS] + 1.0
     if p[TIME_CONSTANT] <= 0.0 or x[READ_AT + cell] == 0.0:
-        x[LAGGED + cell] = reading
+        x[LAGGED + cell] = tension
     elif x[READ_AT + cell] != now:
         ratio = tick / p[TIME_CONSTANT]
         kept = math.exp(-ratio)
         share = -math.expm1(-ratio) / ratio
-        change = (1.0 - share) * reading + (share - kept) * x[BEFORE + cell]
+        change = (1.0 - share) * tension + (share - kept) * x[BEFORE + cell]
         x[LAGGED + cell] = kept * x[LAGGED + cell] + change
-    x[BEFORE + cell], x[READ_AT + cell] = reading, now
+    x[BEFORE + cell], x[READ_AT + cell] = tension, now
     return x[LAGGED + cell]

@@ -25,11 +25,11 @@ TITLES = {
 }
 """Beside the name of a signal, by its quantity, in the order in which they are drawn."""
 STATES = {
-    ('w', 'rad/s'): ('speed of the motor (rad/s)', OUT_MOTOR_SPEED, 1.0),
-    ('v', 'm/s'): ('speed of the motor (rad/s)', OUT_MOTOR_SPEED, 1.0),
-    ('q', 'rad'): ('angle of the joint (deg)', OUT_JOINT, math.degrees(1.0)),
+    ('w', 'rad/s'): ('speed of the motor', 'rad/s', OUT_MOTOR_SPEED, 1.0),
+    ('v', 'm/s'): ('speed of the motor', 'rad/s', OUT_MOTOR_SPEED, 1.0),
+    ('q', 'rad'): ('angle of the joint', 'deg', OUT_JOINT, math.degrees(1.0)),
 }
-"""Label, column of the simulated outputs and factor, by an argument's symbol and unit."""
+"""Words, unit, column of the simulated outputs and factor, by an argument's symbol and unit."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ class State:
 
     Attributes
     ----------
-    label : str
-        With its unit.
+    words, unit : str
     time, values : array (N,)
-        In s, and in the unit that the label names.
+        In s, and in that unit.
     """
 
-    label: str
+    words: str
+    unit: str
     time: Array
     values: Array
 
@@ -58,11 +58,11 @@ def state_of(
     """
     shown = None if argument is None else STATES.get((argument.symbol, argument.unit))
     if shown is None:
-        return State('command (deg)', command[0], np.asarray(np.degrees(command[1]), np.float64))
-    label, column, factor = shown
+        return State('command', 'deg', command[0], np.asarray(np.degrees(command[1]), np.float64))
+    words, unit, column, factor = shown
     values = np.asarray(factor * recorded.outputs[joint][:, column], dtype=np.float64)
     time = recorded.begin + TICK * np.arange(len(values), dtype=np.float64)
-    return State(label, time, values)
+    return State(words, unit, time, values)
 
 
 def telling_signals(recorded: RecordedView, joint: str) -> tuple[SignalView, ...]:
@@ -115,7 +115,7 @@ def passage_figure(views: tuple[SignalView, ...], over: State, passage: tuple[fl
         loops.append(
             Plot(
                 _title(one),
-                over.label,
+                f'{over.words} ({over.unit})',
                 tuple(
                     Curve(x=state, y=values, width=width, time=time, **look(name))
                     for name, values, width in (measured, *predicted)
