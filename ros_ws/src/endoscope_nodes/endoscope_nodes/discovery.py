@@ -48,6 +48,10 @@ def stay_on_this_machine() -> None:
         heeded = _heeded()
         if not any(name in os.environ for name in heeded):
             os.environ[heeded[0]] = str(LOOPBACK)
+            # The profile says where to look for others; for LOCALHOST, ROS 2 would add the shared
+            # memory to its transport.
+            if chosen == 'LOCALHOST':
+                os.environ[RANGE] = 'SYSTEM_DEFAULT'
 
 
 def _heeded() -> tuple[str, ...]:
