@@ -31,6 +31,7 @@ def rig(tmp_path_factory):
         ('motor_driver stalled for 0.2 s', 'FAULT'),
         ('rival on slave/servo_jp', 'FAULT'),
         ('clutch let go and pressed within 0.6 s', None),
+        ('commands 0.12 to 0.5 s late, outside program', 'FAULT'),
     ],
 )
 def test_nothing_moves_but_on_an_enable(rig, name, state):

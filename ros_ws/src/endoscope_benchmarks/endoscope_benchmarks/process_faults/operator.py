@@ -95,10 +95,10 @@ class Operator(ClosedOnExit):
     def _note_bending(self, sample: JointSample) -> None:
         self._bending = sample
 
-    def use(self, source: str) -> None:
-        """Be the sender of what the source needs, and of nothing else."""
+    def use(self, source: str) -> bool:
+        """Be the sender of what the source needs, and of nothing else; whether that is new."""
         if source == self.source:
-            return
+            return False
         if self._handle is not None:
             self._handle.close()
             self.node.destroy_publisher(self._clutch)
@@ -114,6 +114,7 @@ class Operator(ClosedOnExit):
             )
         if source != 'none':
             self._clutch = self.node.create_publisher(Joy, MASTER_CLUTCH, EVENT)
+        return True
 
     def press(self, held: bool) -> None:
         """Press the clutch or let go of it, and say so at once."""

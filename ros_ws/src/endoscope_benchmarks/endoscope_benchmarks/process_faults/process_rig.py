@@ -11,6 +11,7 @@ from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.rig import load_rig
 
 PATIENCE_S = 60.0
+_LET_GO_S = 1.0
 _MOVED_RAD = 0.02
 
 
@@ -51,9 +52,13 @@ class ProcessRig(ClosedOnExit):
             if holder in self.processes.running:
                 self.end(holder)
             self._console = of_console
-        self.operator.use('none' if source == 'motion' else source)
-        self.operator.press(True)
+        changes_hands = self.operator.use('none' if source == 'motion' else source)
+        self.operator.press(not changes_hands)
         self.revive()
+        if changes_hands:
+            # A clutch that another one holds counts as released until it is let go of.
+            self.operator.serve(_LET_GO_S)
+            self.operator.press(True)
 
     def revive(self) -> None:
         """Start what does not run, and wait until every node is heard.
