@@ -30,6 +30,7 @@ from endoscope_nodes.topics import Qos
 _DEEP = profile(Qos(5000))
 _TURN_NS = 4_000_000
 _CLUTCH_TURNS = 25
+_LET_GO_S = 1.0
 # The hand swings at up to 1 rad/s, a shaft at half of that, and steers back to the middle.
 AMPLITUDE, RATE, STEERING = 0.5, 2.0, 0.5
 
@@ -121,6 +122,12 @@ class Operator(ClosedOnExit):
         self.clutch = held
         if self._clutch is not None:
             self._clutch.publish(Joy(buttons=[int(held)]))
+
+    def let_go_and_press(self) -> None:
+        """Have the clutch count again: after another one held it, it does once it was let go of."""
+        self.press(False)
+        self.serve(_LET_GO_S)
+        self.press(True)
 
     def serve(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Move and listen for some time, or until something has come true; whether it has."""

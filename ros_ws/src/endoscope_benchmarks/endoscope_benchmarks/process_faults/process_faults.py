@@ -222,6 +222,8 @@ def _speak(kind: type, topic: str, make: Callable[[ProcessRig], Any], qos: Any) 
         if topic == MOTOR_COMMAND:
             # Those were the rival's.
             rig.operator.goals.clear()
+        if topic == MASTER_CLUTCH:
+            rig.operator.let_go_and_press()
 
     return ProcessFault(inject)
 

@@ -11,7 +11,6 @@ from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.rig import load_rig
 
 PATIENCE_S = 60.0
-_LET_GO_S = 1.0
 _MOVED_RAD = 0.02
 
 
@@ -56,9 +55,7 @@ class ProcessRig(ClosedOnExit):
         self.operator.press(not changes_hands)
         self.revive()
         if changes_hands:
-            # A clutch that another one holds counts as released until it is let go of.
-            self.operator.serve(_LET_GO_S)
-            self.operator.press(True)
+            self.operator.let_go_and_press()
 
     def revive(self) -> None:
         """Start what does not run, and wait until every node is heard.
