@@ -1,7 +1,6 @@
 """A rest within a motion session of the simulated graph, and what becomes of the next motion."""
 
 import math
-import os
 import random
 from dataclasses import dataclass
 
@@ -49,9 +48,8 @@ def rested_and_moved(seed: int, longest_s: float) -> Row:
     draw = random.Random(seed)
     rest_s = math.exp(draw.uniform(0.0, math.log(longest_s)))
     asked = draw.choice(ASKED)
-    domain = 1 + (os.getpid() + seed) % 100
     overrides: dict[str, dict[str, object]] = {'calibration': {'motion': 'brief'}}
-    with LiveGraph(None, domain, lock_step=True, overrides=overrides, rate=RATE) as graph:
+    with LiveGraph(None, lock_step=True, overrides=overrides, rate=RATE) as graph:
         graph.client.ask('enable')
         graph.set('console', source='motion')
         graph.advance(1.5)
