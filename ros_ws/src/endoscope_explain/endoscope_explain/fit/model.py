@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 CLOCK_RATE = showing(Symptom.CLOCK_RATE)
-COARSE = 5
+COARSE = 10
 """Ticks in one of the simulations that only tell in which direction something goes."""
 WIDE_STEP = 0.1
 """With sticking and slipping, the times of the slips jump with the parameters, and so do the

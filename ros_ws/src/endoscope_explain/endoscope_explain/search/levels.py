@@ -25,7 +25,7 @@ from endoscope_explain.search.candidate import (
     effects,
     functions,
 )
-from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, null_of
+from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, null_rigs
 from endoscope_explain.search.refit import (
     Composition,
     Look,
@@ -257,7 +257,10 @@ def _level(
     if not is_noise(ranked[0].fit):
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     behind, ways, _ = grown[0]
-    level = Level(first, ranked, null_of(behind, ways, ranked[0].fit, jobs))
+    rigs = null_rigs(behind, ways, ranked[0].fit, jobs)
+    level = Level(first, ranked, rigs.as_screened() if rigs else NOTHING_SHOWN)
+    if rigs and not level.best.adds_nominal:
+        level = replace(level, null=rigs.beside(level.gain(level.best), FALSE_ALARMS, jobs))
     return replace(level, predicts=predicts_better(level.best.fit, first.fit))
 
 

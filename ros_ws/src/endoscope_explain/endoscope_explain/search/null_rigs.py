@@ -29,6 +29,11 @@ FORMS, WANDERING = 20, 19
 FITTED = 3
 """Terms of the screen that are fitted: in the study the truth was among the first three in 46 cases
 of 48."""
+AT_ONCE = 13
+"""Rigs that are fitted before it is asked whether more would change anything, of 39."""
+CLEAR = 0.5
+"""Share of a gain that those of the most promising rigs stay below if it is clear: in the study the
+truth had at least as much of the best gain in 46 cases of 48."""
 SLOWEST = 0.1
 """Longest correlation time of noise, as a share of the recording: what is slower is a drift."""
 _SEED = 11
@@ -136,30 +141,60 @@ def shown(behind: Background, ways: tuple[Directions, ...], best: Fit | None, jo
     )
 
 
-def null_of(behind: Background, ways: tuple[Directions, ...], best: Fit, jobs: int) -> Null:
-    """Screen rigs in which nothing is missing, and fit to them what promises most.
+@dataclass(frozen=True)
+class NullRigs:
+    """Rigs in which nothing is missing, screened, and what promises most fitted where asked.
 
-    Parameters
+    Attributes
     ----------
-    behind, ways, best, jobs
+    behind, ways
         As for `shown`.
-
-    Returns
-    -------
-    Null
+    screened : Shown
     """
-    if not ways:
-        return NOTHING_SHOWN
-    screened = shown(behind, ways, best, jobs)
-    ranked = np.argsort(screened.drawn, axis=0)[::-1][:FITTED]
-    slopes = {int(i): _slopes(behind, ways[i].candidate) for i in np.unique(ranked)}
 
-    def fitted(rig: int) -> float:
-        off = screened.rigs[:, rig]
-        return max(_gain(behind, ways[i], slopes[int(i)], off) for i in ranked[:, rig])
+    behind: Background
+    ways: tuple[Directions, ...]
+    screened: Shown
 
-    drawn = parallel_map(fitted, range(screened.rigs.shape[1]), jobs)
-    return Null(np.array(drawn), np.max(screened.doubt, axis=0))
+    def as_screened(self) -> Null:
+        """What they show by the screen alone."""
+        return Null(np.max(self.screened.drawn, axis=0), np.max(self.screened.doubt, axis=0))
+
+    def beside(self, gain: float, level: float, jobs: int) -> Null:
+        """What they show, by fits of the most promising rigs until it is clear beside a gain.
+
+        It is once more of them show as much than the `level` of false alarms allows, or once the
+        most promising ones stay far below (sequential Monte Carlo tests: Besag, Clifford,
+        Biometrika 78, 1991).
+        """
+        drawn, doubt = (np.max(each, axis=0) for each in (self.screened.drawn, self.screened.doubt))
+        ranked = np.argsort(self.screened.drawn, axis=0)[::-1][:FITTED]
+        slopes: dict[int, Array] = {}
+
+        def fitted(rig: int) -> float:
+            off = self.screened.rigs[:, rig]
+            return max(
+                _gain(self.behind, self.ways[i], slopes[int(i)], off) for i in ranked[:, rig]
+            )
+
+        order = np.argsort(-drawn)
+        for first in range(0, len(order), AT_ONCE):
+            rigs = order[first : first + AT_ONCE]
+            wanted = [int(i) for i in np.unique(ranked[:, rigs]) if int(i) not in slopes]
+            terms = [self.ways[i].candidate for i in wanted]
+            found = parallel_map(lambda term: _slopes(self.behind, term), terms, jobs)
+            slopes |= dict(zip(wanted, found, strict=True))
+            drawn[rigs] = parallel_map(fitted, [int(rig) for rig in rigs], jobs)
+            if Null(drawn, doubt).p_value(gain) > level or np.max(drawn[rigs]) < CLEAR * gain:
+                break
+        return Null(drawn, doubt)
+
+
+def null_rigs(
+    behind: Background, ways: tuple[Directions, ...], best: Fit, jobs: int
+) -> NullRigs | None:
+    """Screen rigs in which nothing is missing; None where no term moves anything."""
+    return NullRigs(behind, ways, shown(behind, ways, best, jobs)) if ways else None
 
 
 def _slopes(behind: Background, term: Candidate) -> Array:

@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
+from endoscope_core.physics.description import EffectSpec
+from endoscope_explain.fit.nominal import nominal_anchors
+from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.null_rigs import SLOWEST, Null, wandering
+from endoscope_explain.search.candidate import effects
+from endoscope_explain.search.null_rigs import AT_ONCE, SLOWEST, Null, null_rigs, wandering
+from endoscope_explain.search.screen import background, directions
 
 
 def test_sensors_wander_by_as_much_as_their_noise_and_no_slower_than_a_drift(one_joint):
@@ -28,3 +33,26 @@ def test_one_rig_of_forty_that_shows_as_much_is_the_least_chance():
     assert null.p_value(100.0) == pytest.approx(1.0 / 40.0)
     assert null.p_value(38.0) == pytest.approx(2.0 / 40.0)
     assert null.p_value(-1.0) == 1.0
+
+
+def test_rigs_are_fitted_until_it_is_clear_whether_they_show_as_much(one_joint):
+    plant = one_joint.rig()
+    true = one_joint.rig(EffectSpec('gravity', 'bend_x', {'moment_nm': 0.003, 'phase_rad': 0.5}))
+    (observation,) = observe(one_joint.record(true, one_joint.motion(6.0)), plant)
+    nominal, _ = nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+    behind = background(nominal)
+    ways = directions(behind, effects(nominal), 1)
+    rigs = null_rigs(behind, ways, nominal, 1)
+    screened = rigs.as_screened().drawn
+
+    def fitted(null):
+        return np.count_nonzero(null.drawn != screened)
+
+    clear = rigs.beside(1e6, 0.025, 1)
+    assert 0 < fitted(clear) <= AT_ONCE
+    assert clear.p_value(1e6) == pytest.approx(1.0 / 40.0)
+    refused = rigs.beside(0.0, 0.025, 1)
+    assert 0 < fitted(refused) <= AT_ONCE
+    assert refused.p_value(0.0) > 0.025
+    doubtful = rigs.beside(1.5 * clear.drawn.max(), 0.025, 1)
+    assert fitted(doubtful) > AT_ONCE

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lombscargle
 
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.interpolation import NODES
 from endoscope_explain.fit.family import family_at
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.periods import likely_periods, period_bounds
+from endoscope_explain.search.periods import likely_periods, period_bounds, periodogram
 
 
 @pytest.fixture
@@ -55,3 +56,14 @@ def test_a_period_ends_where_it_began_and_is_as_large_in_every_phase():
     assert finer.basis.shape == (NODES, 20)
     assert np.mean(np.sum(finer.basis**2, axis=1)) == pytest.approx(np.mean(size))
     assert replace(family, high=2.0).nodes[-1] == 2.0
+
+
+def test_the_periodogram_is_lomb_and_scargles():
+    generator = np.random.default_rng(5)
+    state = 0.7 * np.sin(np.linspace(0.0, 30.0, 2000)) + 0.05 * generator.normal(size=2000)
+    left = np.cos(2.0 * np.pi * state / 0.05) + generator.normal(size=2000)
+    left -= left.mean()
+    frequencies, shares = periodogram(state, left, 0.01, 0.7)
+    direct = lombscargle(state, left, 2.0 * np.pi * frequencies, normalize=True)
+    assert frequencies[np.argmax(shares)] == pytest.approx(20.0, rel=0.01)
+    assert shares == pytest.approx(direct, abs=0.02)
