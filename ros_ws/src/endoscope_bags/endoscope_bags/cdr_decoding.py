@@ -26,14 +26,9 @@ _MOST_LAYOUTS = 1 << 19
 class Payloads:
     """The bytes of N messages, one after another.
 
-    Attributes
-    ----------
-    data
-        All bytes.
-    start
-        Where each message begins in `data`, shape (N,).
-    size
-        Bytes of each message, shape (N,).
+    `data`: all bytes.
+    `start`: where each message begins in `data`, shape (N,).
+    `size`: bytes of each message, shape (N,).
     """
 
     data: bytes | bytearray
@@ -59,12 +54,8 @@ class Payloads:
 def stamps_of_heads(data: bytes, start: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     """Stamps in ns of messages that begin with a header, shape (N,).
 
-    Parameters
-    ----------
-    data
-        Holds the messages.
-    start
-        Where each begins, shape (N,); at least `HEAD_WITH_STAMP` bytes before the end.
+    `data`: holds the messages.
+    `start`: where each begins, shape (N,); at least `HEAD_WITH_STAMP` bytes before the end.
     """
     bytes_ = np.frombuffer(data, dtype=np.uint8)
     field = bytes_[start[:, None] + np.arange(4, HEAD_WITH_STAMP)]
@@ -76,14 +67,9 @@ def stamps_of_heads(data: bytes, start: npt.NDArray[np.int64]) -> npt.NDArray[np
 class LayoutGroup:
     """Messages of one layout.
 
-    Attributes
-    ----------
-    rows
-        Their indices among all messages, shape (M,), ascending.
-    layout
-        Where their fields lie.
-    matrix
-        Their bytes, shape (M, size).
+    `rows`: their indices among all messages, shape (M,), ascending.
+    `layout`: where their fields lie.
+    `matrix`: their bytes, shape (M, size).
     """
 
     rows: npt.NDArray[np.int64]
@@ -117,17 +103,9 @@ def grouped_by_layout(
 ) -> Iterator[LayoutGroup]:
     """Split messages into groups of equal layout.
 
-    Parameters
-    ----------
-    payloads
-        The messages.
-    find_layout
-        `joint_state_layout` or `pose_layout`.
-
-    Raises
-    ------
-    MalformedMessageError
-        A message does not decode; the message is counted from 1.
+    `payloads`: the messages.
+    `find_layout`: `joint_state_layout` or `pose_layout`.
+    Raises MalformedMessageError: a message does not decode; the message is counted from 1.
     """
     for size in np.unique(payloads.size):
         rows = np.flatnonzero(payloads.size == size)

@@ -31,26 +31,14 @@ def encode_joint_states(
 ) -> list[bytes]:
     """Encode a series of `sensor_msgs/msg/JointState`.
 
-    Parameters
-    ----------
-    names
-        The J joint names, the same in every message.
-    stamp_ns
-        Header stamps in ns since the epoch, shape (N,).
-    position, velocity, effort
-        Shape (N, J) in rad, rad/s, N m (or N for wires); None leaves the field empty.
-    frame_id
-        Frame of the header.
-
-    Returns
-    -------
-    list of bytes
-        N messages.
-
-    Raises
-    ------
-    MalformedMessageError
-        A shape does not fit, or a stamp is outside what `builtin_interfaces/msg/Time` can hold.
+    `names`: the J joint names, the same in every message.
+    `stamp_ns`: header stamps in ns since the epoch, shape (N,).
+    `position`, `velocity`, `effort`: shape (N, J) in rad, rad/s, N m (or N for wires); None leaves
+        the field empty.
+    `frame_id`: frame of the header.
+    Returns: n messages.
+    Raises MalformedMessageError: a shape does not fit, or a stamp is outside what
+        `builtin_interfaces/msg/Time` can hold.
     """
     stamps = _checked_stamps(stamp_ns)
     shape = (len(stamps), len(names))
@@ -102,21 +90,11 @@ def encode_poses(
 ) -> list[bytes]:
     """Encode a series of `geometry_msgs/msg/PoseStamped`.
 
-    Parameters
-    ----------
-    stamp_ns
-        Header stamps in ns since the epoch, shape (N,).
-    position
-        Metres, shape (N, 3).
-    orientation
-        Unit quaternions x, y, z, w, shape (N, 4).
-    frame_id
-        Frame of the header.
-
-    Raises
-    ------
-    MalformedMessageError
-        A shape does not fit, or a stamp is out of range.
+    `stamp_ns`: header stamps in ns since the epoch, shape (N,).
+    `position`: metres, shape (N, 3).
+    `orientation`: unit quaternions x, y, z, w, shape (N, 4).
+    `frame_id`: frame of the header.
+    Raises MalformedMessageError: a shape does not fit, or a stamp is out of range.
     """
     stamps = _checked_stamps(stamp_ns)
     parts = (np.asarray(position, dtype=np.float64), np.asarray(orientation, dtype=np.float64))
@@ -136,10 +114,7 @@ def encode_poses(
 class TransformEncoder:
     """Writes `tf2_msgs/msg/TFMessage` about the same frames again and again.
 
-    Parameters
-    ----------
-    frames
-        Parent and child of each of the N transforms.
+    `frames`: parent and child of each of the N transforms.
     """
 
     def __init__(self, frames: Sequence[tuple[str, str]]) -> None:
@@ -160,13 +135,9 @@ class TransformEncoder:
     ) -> bytes:
         """Write one message.
 
-        Parameters
-        ----------
-        stamp_ns
-            Of all transforms, ns since the epoch.
-        poses
-            Translation in m, shape (3,), and unit quaternion x, y, z, w, shape (4,), of each child
-            in its parent's frame; N of them.
+        `stamp_ns`: of all transforms, ns since the epoch.
+        `poses`: translation in m, shape (3,), and unit quaternion x, y, z, w, shape (4,), of each
+            child in its parent's frame; N of them.
         """
         stamp = divmod(stamp_ns, _NANOSECONDS)
         for (at, values), (translation, rotation) in zip(self._places, poses, strict=True):

@@ -12,19 +12,12 @@ QUANTITIES = ('position', 'velocity', 'effort')
 class Layout:
     """Fields of one message as offsets into its bytes.
 
-    Attributes
-    ----------
-    big_endian
-        Byte order of the encapsulation.
-    frame_id
-        Frame of the header.
-    names
-        Joint names; empty for a pose.
-    columns
-        For each quantity that the message has, the offset of its doubles and their number.
-    fixed
-        Spans ``(start, stop)`` that have to be equal in another message for this layout to hold
-        there too: everything but the stamp, the numbers and the padding.
+    `big_endian`: byte order of the encapsulation.
+    `frame_id`: frame of the header.
+    `names`: joint names; empty for a pose.
+    `columns`: for each quantity that the message has, the offset of its doubles and their number.
+    `fixed`: spans ``(start, stop)`` that have to be equal in another message for this layout to
+        hold there too: everything but the stamp, the numbers and the padding.
     """
 
     big_endian: bool
@@ -76,10 +69,8 @@ class _Cursor:
 def joint_state_layout(data: bytes) -> Layout:
     """Find the fields of a `sensor_msgs/msg/JointState`.
 
-    Raises
-    ------
-    MalformedMessageError
-        The bytes end early, or a quantity has another number of values than there are names.
+    Raises MalformedMessageError: the bytes end early, or a quantity has another number of values
+        than there are names.
     """
     cursor = _Cursor(data)
     cursor.skip(8, 4)
@@ -104,10 +95,7 @@ def joint_state_layout(data: bytes) -> Layout:
 def pose_layout(data: bytes) -> Layout:
     """Find the fields of a `geometry_msgs/msg/PoseStamped`: columns position and orientation.
 
-    Raises
-    ------
-    MalformedMessageError
-        The bytes end early.
+    Raises MalformedMessageError: the bytes end early.
     """
     cursor = _Cursor(data)
     cursor.skip(8, 4)

@@ -41,26 +41,12 @@ class ChunkSink:
     Room for a chunk and for the summary is asked for before the chunk is written, so that a file
     on a full disk can always be finished.
 
-    Parameters
-    ----------
-    path
-        The file to make.
-    records
-        Metadata records that stand first.
-    threaded
-        Encode and write in a thread; errors then come with a later call.
-
-    Attributes
-    ----------
-    lost_counts
-        Messages by topic id of the chunks that found no room.
-    start_ns, end_ns
-        First and last receipt in the file; 0 while it has none.
-
-    Raises
-    ------
-    BagWriteError
-        There is no room for the beginning.
+    `path`: the file to make.
+    `records`: metadata records that stand first.
+    `threaded`: encode and write in a thread; errors then come with a later call.
+    `lost_counts`: messages by topic id of the chunks that found no room.
+    `start_ns`, `end_ns`: first and last receipt in the file; 0 while it has none.
+    Raises BagWriteError: there is no room for the beginning.
     """
 
     def __init__(
@@ -91,19 +77,10 @@ class ChunkSink:
     ) -> None:
         """Write new topics and a chunk of messages.
 
-        Parameters
-        ----------
-        topics
-            Those that are not in the file yet.
-        messages
-            The chunk; may be empty.
-        size
-            Upper bound of its bytes.
-
-        Raises
-        ------
-        BagWriteError
-            There is no room for this chunk, or was not for an earlier one.
+        `topics`: those that are not in the file yet.
+        `messages`: the chunk; may be empty.
+        `size`: upper bound of its bytes.
+        Raises BagWriteError: there is no room for this chunk, or was not for an earlier one.
         """
         if self._worker is None:
             self._write(topics, messages, size)
@@ -182,10 +159,7 @@ class ChunkSink:
     def finish(self, metadata: Mapping[str, dict[str, str]]) -> None:
         """Write metadata records and the summary, hand all to the disk, close.
 
-        Raises
-        ------
-        BagWriteError
-            The room for it was taken by somebody else; the file can be recovered.
+        Raises BagWriteError: the room for it was taken by somebody else; the file can be recovered.
         """
         if self._worker is not None:
             self._worker.shutdown()

@@ -22,14 +22,9 @@ class NoSuchStretchError(BagError, ValueError):
 class CutReport:
     """What `cut` wrote.
 
-    Attributes
-    ----------
-    message_count
-        Messages of the stretch.
-    latched
-        Topics whose last message before the stretch is kept at its beginning.
-    seconds
-        Length of the stretch.
+    `message_count`: messages of the stretch.
+    `latched`: topics whose last message before the stretch is kept at its beginning.
+    `seconds`: length of the stretch.
     """
 
     message_count: int
@@ -49,21 +44,11 @@ def cut(source: str | Path, target: str | Path, begin: float, end: float | None)
     Of latched topics, the last message before the stretch comes first, as a subscriber who joined
     then would have heard it; its receipt is the beginning of the stretch.
 
-    Parameters
-    ----------
-    source
-        rosbag2 folder, ``.mcap`` or ``.db3`` file. It is not changed.
-    target
-        The new recording, a folder or ``.mcap`` file; must not exist.
-    begin, end
-        In s from the first receipt; `end` may be None for all that follows.
-
-    Raises
-    ------
-    NoSuchStretchError
-        The stretch is empty, or not within the recording.
-    BagError
-        `source` cannot be read, or `target` exists or cannot be written.
+    `source`: rosbag2 folder, ``.mcap`` or ``.db3`` file. It is not changed.
+    `target`: the new recording, a folder or ``.mcap`` file; must not exist.
+    `begin`, `end`: in s from the first receipt; `end` may be None for all that follows.
+    Raises NoSuchStretchError: the stretch is empty, or not within the recording.
+    Raises BagError: `source` cannot be read, or `target` exists or cannot be written.
     """
     recording = open_bag(source)
     length = (recording.end_ns - recording.start_ns) * 1e-9

@@ -46,14 +46,9 @@ class TableError(BagError, ValueError):
 class Heading:
     """What stands above a column.
 
-    Attributes
-    ----------
-    title : str
-        As it is in the file; empty where there is none.
-    name : str
-        Without the unit.
-    unit : str or None
-        As `units.UNITS` has it; None where the heading tells none that is known.
+    `title`: as it is in the file; empty where there is none.
+    `name`: without the unit.
+    `unit`: as `units.UNITS` has it; None where the heading tells none that is known.
     """
 
     title: str = ''
@@ -65,19 +60,11 @@ class Heading:
 class DelimitedText:
     """The cells of a table.
 
-    Attributes
-    ----------
-    path : Path
-    separator : str
-        One character, or `WHITESPACE`.
-    decimal_comma : bool
-    headings : tuple of Heading
-        One for each column.
-    rows : sequence of list of str
-        Cut when they are asked for: held as lists of texts, a table takes thirty times its size.
-        Without the lines above the numbers, without empty lines and comments.
-    lines : list of int
-        Number of each row's line in the file, from 1.
+    `separator`: one character, or `WHITESPACE`.
+    `headings`: one for each column.
+    `rows`: cut when they are asked for: held as lists of texts, a table takes thirty times its
+        size. Without the lines above the numbers, without empty lines and comments.
+    `lines`: number of each row's line in the file, from 1.
     """
 
     path: Path
@@ -90,15 +77,8 @@ class DelimitedText:
     def column(self, which: int | str) -> int:
         """Return the index of a column, from 0, that a mapping gives by number or by name.
 
-        Parameters
-        ----------
-        which : int or str
-            From 1; or its title in the file, or its name without the unit, in any case.
-
-        Raises
-        ------
-        TableError
-            There is no such column, or more than one.
+        `which`: from 1; or its title in the file, or its name without the unit, in any case.
+        Raises TableError: there is no such column, or more than one.
         """
         if isinstance(which, int):
             return which - 1
@@ -128,10 +108,7 @@ class DelimitedText:
     def cells(self, index: int) -> list[str]:
         """Return the texts of a column.
 
-        Raises
-        ------
-        TableError
-            A row is too short; names the line.
+        Raises TableError: a row is too short; names the line.
         """
         try:
             return [row[index] for row in self.rows]  # one column at a time
@@ -148,16 +125,9 @@ class DelimitedText:
     def numbers(self, index: int) -> tuple[Array, NDArray[np.bool_]]:
         """Return the numbers of a column.
 
-        Returns
-        -------
-        numbers : ndarray, shape (N,)
-            NaN where the cell is empty.
-        empty : ndarray of bool, shape (N,)
-
-        Raises
-        ------
-        TableError
-            A cell holds something else; names line and column.
+        Returns `numbers` (N,): naN where the cell is empty.
+        Returns `empty` (N,).
+        Raises TableError: a cell holds something else; names line and column.
         """
         cells = self.cells(index)
         empty = np.array([not cell for cell in cells], dtype=np.bool_)
@@ -181,20 +151,10 @@ class DelimitedText:
     def nanoseconds(self, index: int, unit_ns: Decimal) -> NDArray[np.int64]:
         """Return the times of a column of numbers, exactly, however long ago the epoch is.
 
-        Parameters
-        ----------
-        index : int
-        unit_ns : Decimal
-            Nanoseconds in one of its unit.
-
-        Returns
-        -------
-        ndarray of int64, shape (N,)
-
-        Raises
-        ------
-        TableError
-            A cell is no finite number, or beyond what stamps can say; names the line.
+        `unit_ns`: nanoseconds in one of its unit.
+        Returns (N,).
+        Raises TableError: a cell is no finite number, or beyond what stamps can say; names the
+            line.
         """
         times = []
         for line, cell in zip(self.lines, self.cells(index), strict=True):
@@ -218,10 +178,7 @@ class DelimitedText:
 
         A time without a zone is taken as UTC, one without a date as since midnight.
 
-        Raises
-        ------
-        TableError
-            A cell is neither; names the line.
+        Raises TableError: a cell is neither; names the line.
         """
         times = []
         for line, cell in zip(self.lines, self.cells(index), strict=True):
@@ -242,10 +199,7 @@ def _shown(cell: str) -> str:
 def date_ns(text: str) -> int:
     """Return the nanoseconds since the epoch of a date and time (ISO 8601).
 
-    Raises
-    ------
-    ValueError
-        It is none.
+    Raises ValueError: it is none.
     """
     fraction = _FRACTION.fullmatch(text)
     ns = int(fraction['digits'][:9].ljust(9, '0')) if fraction else 0
@@ -290,25 +244,12 @@ def read_table(
 ) -> DelimitedText:
     """Read a text table.
 
-    Parameters
-    ----------
-    path : str or Path
-        UTF-8 with or without a byte order mark, or UTF-16 with one.
-    separator : str, optional
-        One character or `WHITESPACE`; found from the lines if not given.
-    header_lines : int, optional
-        Lines above the numbers, of which the last names the columns; found if not given.
-    decimal_comma : bool, optional
-        Found if not given: never where commas separate.
-
-    Returns
-    -------
-    DelimitedText
-
-    Raises
-    ------
-    TableError
-        It cannot be read or holds no two rows of numbers; names the line.
+    `path`: UTF-8 with or without a byte order mark, or UTF-16 with one.
+    `separator`: one character or `WHITESPACE`; found from the lines if not given.
+    `header_lines`: lines above the numbers, of which the last names the columns; found if not
+        given.
+    `decimal_comma`: found if not given: never where commas separate.
+    Raises TableError: it cannot be read or holds no two rows of numbers; names the line.
     """
     path = Path(path)
     lines = _lines(path)

@@ -29,31 +29,19 @@ _REGULAR = 0.5
 class TopicInformation:
     """One topic of a recording.
 
-    Attributes
-    ----------
-    name, type
-        Full name and message type.
-    message_count
-        Number of messages.
-    rate_hz
-        One over the median interval; over the mean where the topic is not periodic; None for fewer
-        than two messages.
-    duration_s
-        First to last message.
-    pauses
-        Silences longer than 2.5 periods in which nothing was published: the numbers of the messages
-        go on, or the topic is latched and has news now and then. By header stamp (by publication
-        where there is none); 0 for topics that are not periodic.
-    paused_s
-        Total of the pauses, each less one period.
-    gaps
-        Silences in which messages were lost or, where nothing numbers them, may have been.
-    missing_s
-        Total of the gaps, each less one period.
-    longest_silence_s
-        The longest interval; None for fewer than two messages.
-    lost
-        Messages that were published and did not arrive; None where the recorder did not tell.
+    `name`, `type`: full name and message type.
+    `message_count`: number of messages.
+    `rate_hz`: one over the median interval; over the mean where the topic is not periodic; None for
+        fewer than two messages.
+    `duration_s`: first to last message.
+    `pauses`: silences longer than 2.5 periods in which nothing was published: the numbers of the
+        messages go on, or the topic is latched and has news now and then. By header stamp (by
+        publication where there is none); 0 for topics that are not periodic.
+    `paused_s`: total of the pauses, each less one period.
+    `gaps`: silences in which messages were lost or, where nothing numbers them, may have been.
+    `missing_s`: total of the gaps, each less one period.
+    `longest_silence_s`: the longest interval; None for fewer than two messages.
+    `lost`: messages that were published and did not arrive; None where the recorder did not tell.
     """
 
     name: str
@@ -73,18 +61,11 @@ class TopicInformation:
 class BagInformation:
     """A recording at a glance; prints itself as a table.
 
-    Attributes
-    ----------
-    path, library
-        What was opened, and which program wrote it.
-    start_ns, duration_s
-        First receipt (ns since the epoch) and time until the last.
-    topics
-        By name.
-    notes
-        What the recorder wrote about the recording.
-    damage
-        What is wrong with the file; empty for a sound one.
+    `path`, `library`: what was opened, and which program wrote it.
+    `start_ns`, `duration_s`: first receipt (ns since the epoch) and time until the last.
+    `topics`: by name.
+    `notes`: what the recorder wrote about the recording.
+    `damage`: what is wrong with the file; empty for a sound one.
     """
 
     path: str

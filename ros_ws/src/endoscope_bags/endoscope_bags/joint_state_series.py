@@ -166,10 +166,7 @@ def decode_joint_states(
 ) -> JointStateSeries:
     """Decode all messages of a topic; joints may come in another order in every message.
 
-    Raises
-    ------
-    MalformedMessageError
-        A message does not decode.
+    Raises MalformedMessageError: a message does not decode.
     """
     groups = _groups(topic, payloads, joint_state_layout)
     names = tuple(dict.fromkeys(name for group in groups for name in group.layout.names))
@@ -200,10 +197,7 @@ def decode_poses(
 ) -> PoseSeries:
     """Decode all poses of a topic.
 
-    Raises
-    ------
-    MalformedMessageError
-        A message does not decode.
+    Raises MalformedMessageError: a message does not decode.
     """
     n = len(payloads)
     stamp_ns = np.zeros(n, dtype=np.int64)

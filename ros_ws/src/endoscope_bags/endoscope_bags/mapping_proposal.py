@@ -44,22 +44,14 @@ _EPOCH = ((1e17, 'ns'), (1e14, 'us'), (1e11, 'ms'), (1e8, 's'))
 class ColumnGuess:
     """What a column holds and what it is taken for.
 
-    Attributes
-    ----------
-    number : int
-        From 1.
-    title : str
-        As in the table; empty where it has none.
-    low, high, step : float or None
-        Range, and median change from row to row; None for dates and for what is no number.
-    first : str
-        The first cell.
-    role : str or None
-        `time`, or `TOPIC QUANTITY JOINT`; None where nothing fits.
-    unit : str or None
-        None where it is not known.
-    why : str
-        In words.
+    `number`: from 1.
+    `title`: as in the table; empty where it has none.
+    `low`, `high`, `step`: range, and median change from row to row; None for dates and for what is
+        no number.
+    `first`: the first cell.
+    `role`: `time`, or `TOPIC QUANTITY JOINT`; None where nothing fits.
+    `unit`: none where it is not known.
+    `why`: in words.
     """
 
     number: int
@@ -81,15 +73,7 @@ class ColumnGuess:
 class Proposal:
     """Guesses for all columns of a table.
 
-    Attributes
-    ----------
-    table : str
-    rows : int
-    separator : str
-    decimal_comma : bool
-    first_line : int
-        Line of the first row of numbers.
-    columns : tuple of ColumnGuess
+    `first_line`: line of the first row of numbers.
     """
 
     table: str
@@ -169,14 +153,7 @@ class Proposal:
 def propose_mapping(text: DelimitedText) -> Proposal:
     """Guess what the columns of a table are, by their names, ranges and steps.
 
-    Parameters
-    ----------
-    text : DelimitedText
-
-    Returns
-    -------
-    Proposal
-        Nothing is taken for two things, and nothing for what the table does not suggest.
+    Returns: nothing is taken for two things, and nothing for what the table does not suggest.
     """
     width = min(len(row) for row in text.rows)
     columns = [_described(text, index) for index in range(width)]

@@ -44,14 +44,9 @@ def chunk_message(
 class EncodedChunk:
     """A chunk as it goes into the file.
 
-    Attributes
-    ----------
-    chunk, indexes
-        The chunk record, and the message index records that follow it.
-    index
-        Its entry for the summary, with offsets relative to the beginning of the chunk record.
-    counts
-        Messages by channel.
+    `chunk`, `indexes`: the chunk record, and the message index records that follow it.
+    `index`: its entry for the summary, with offsets relative to the beginning of the chunk record.
+    `counts`: messages by channel.
     """
 
     chunk: bytes

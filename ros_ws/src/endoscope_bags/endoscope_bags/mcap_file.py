@@ -29,22 +29,10 @@ _FOOTER_HEAD_AND_OFFSETS = 1 + 8 + 8 + 8
 class McapFile:
     """Writes the records around the chunks, with checksums, and the summary at the end.
 
-    Parameters
-    ----------
-    stream
-        Unbuffered binary file, empty.
-    library
-        Name of the writing program for the header.
-
-    Attributes
-    ----------
-    position
-        Bytes of all records that were written whole.
-
-    Raises
-    ------
-    OSError
-        From the file; so in every method that writes.
+    `stream`: unbuffered binary file, empty.
+    `library`: name of the writing program for the header.
+    `position`: bytes of all records that were written whole.
+    Raises OSError: from the file; so in every method that writes.
     """
 
     def __init__(self, stream: BinaryIO, library: str) -> None:

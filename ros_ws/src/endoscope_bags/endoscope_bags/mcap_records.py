@@ -50,10 +50,7 @@ class Descriptions:
     def add(self, opcode: int, body: bytes) -> None:
         """Take a description, unless it was given before.
 
-        Raises
-        ------
-        ValueError
-            Another one was given for the same id.
+        Raises ValueError: another one was given for the same id.
         """
         key = (opcode, body[:2])
         if self._bodies.get(key) == body:

@@ -75,25 +75,15 @@ class Messages:
 class McapScan:
     """What one pass over a file found.
 
-    Attributes
-    ----------
-    path
-        The file.
-    header
-        Its first record (profile and library).
-    schemas, channels
-        By their ids.
-    messages
-        All messages.
-    blocks
-        Spans ``(start, stop)`` of the file that hold messages: bodies of chunk records, and runs
-        of messages outside chunks (marked by `chunked` false).
-    metadata
-        Metadata records by name; the last one of a name counts.
-    damage
-        What is wrong with the file, one line each; empty for a sound one.
-    truncated
-        Whether the end of the file is missing.
+    `path`: the file.
+    `header`: its first record (profile and library).
+    `schemas`, `channels`: by their ids.
+    `messages`: all messages.
+    `blocks`: spans ``(start, stop)`` of the file that hold messages: bodies of chunk records, and
+        runs of messages outside chunks (marked by `chunked` false).
+    `metadata`: metadata records by name; the last one of a name counts.
+    `damage`: what is wrong with the file, one line each; empty for a sound one.
+    `truncated`: whether the end of the file is missing.
     """
 
     path: Path
@@ -124,24 +114,14 @@ class McapScan:
 def scan_mcap(path: str | Path, *, salvage: bool = False) -> McapScan:
     """Find all messages of an MCAP file.
 
-    Parameters
-    ----------
-    path
-        The file.
-    salvage
-        Keep what is sound of a damaged file, and note the rest in `damage`, instead of raising.
-
-    Raises
-    ------
-    BagNotFoundError
-        There is no such file.
-    NotABagError
-        The file is empty or does not begin as an MCAP file.
-    TruncatedBagError
-        The end is missing.
-    CorruptBagError
-        Something does not agree with its checksum, its length, or what the file says elsewhere, or
-        a chunk holds more than is read (see `endoscope_bags.unpacking`).
+    `path`: the file.
+    `salvage`: keep what is sound of a damaged file, and note the rest in `damage`, instead of
+        raising.
+    Raises BagNotFoundError: there is no such file.
+    Raises NotABagError: the file is empty or does not begin as an MCAP file.
+    Raises TruncatedBagError: the end is missing.
+    Raises CorruptBagError: something does not agree with its checksum, its length, or what the file
+        says elsewhere, or a chunk holds more than is read (see `endoscope_bags.unpacking`).
     """
     path = Path(path)
     if not path.is_file():

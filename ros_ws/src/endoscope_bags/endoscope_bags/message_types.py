@@ -35,14 +35,9 @@ _NAME = re.compile('[A-Za-z][A-Za-z0-9_]{0,99}/msg/[A-Za-z][A-Za-z0-9_]{0,99}')
 class MessageType:
     """A message type as a recording needs it.
 
-    Attributes
-    ----------
-    name
-        For example ``'sensor_msgs/msg/JointState'``.
-    definition
-        `ros2msg` text, complete with the definitions of all types that it contains.
-    type_hash
-        RIHS01 hash by REP-2016, for example ``'RIHS01_a13ee3...'``.
+    `name`: for example ``'sensor_msgs/msg/JointState'``.
+    `definition`: `ros2msg` text, complete with the definitions of all types that it contains.
+    `type_hash`: RIHS01 hash by REP-2016, for example ``'RIHS01_a13ee3...'``.
     """
 
     name: str
@@ -54,10 +49,8 @@ class MessageType:
 def message_type(name: str) -> MessageType:
     """Return definition and hash of a message type.
 
-    Raises
-    ------
-    UnknownTypeError
-        Neither `rosbags` nor an installed ROS package defines the type or one that it contains.
+    Raises UnknownTypeError: neither `rosbags` nor an installed ROS package defines the type or one
+        that it contains.
     """
     store = typestore()
     require_type(store, name)
@@ -84,10 +77,7 @@ def begins_with_header(definition: str) -> bool:
 def require_type(store: Typestore, name: str) -> None:
     """Add a type and all that it contains to `store` from the installed packages where it lacks.
 
-    Raises
-    ------
-    UnknownTypeError
-        No installed ROS package defines the type.
+    Raises UnknownTypeError: no installed ROS package defines the type.
     """
     if name in store.fielddefs:
         return

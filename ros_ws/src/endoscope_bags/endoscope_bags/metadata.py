@@ -26,20 +26,11 @@ _ROOT = 'rosbag2_bagfile_information'
 def bag_files(path: Path) -> list[Path]:
     """Return the ``.mcap`` or ``.db3`` files of a recording in their order.
 
-    Parameters
-    ----------
-    path
-        Such a file, or a rosbag2 folder. A folder without ``metadata.yaml`` (its recorder was
+    `path`: such a file, or a rosbag2 folder. A folder without ``metadata.yaml`` (its recorder was
         killed) is taken with all the ``.mcap``, or else all the ``.db3``, in it.
-
-    Raises
-    ------
-    BagNotFoundError
-        The path, or a file that the metadata lists, does not exist.
-    NotABagError
-        The folder holds no recording, or its metadata are not rosbag2's.
-    UnsupportedBagError
-        The recording is in a storage of its own or compressed as a whole.
+    Raises BagNotFoundError: the path, or a file that the metadata lists, does not exist.
+    Raises NotABagError: the folder holds no recording, or its metadata are not rosbag2's.
+    Raises UnsupportedBagError: the recording is in a storage of its own or compressed as a whole.
     """
     if not path.exists():
         raise BagNotFoundError(f'{path}: no such file or folder')
@@ -108,16 +99,11 @@ def metadata_document(
 ) -> dict[str, Any]:
     """Return the document that `ros2 bag` expects.
 
-    Parameters
-    ----------
-    files
-        Names of the ``.mcap`` files; this project writes one.
-    topics
-        All topics, also those without messages.
-    start_ns, end_ns
-        First and last receipt, ns since the epoch; both 0 for a recording without messages.
-    custom_data
-        Free text by free keys.
+    `files`: names of the ``.mcap`` files; this project writes one.
+    `topics`: all topics, also those without messages.
+    `start_ns`, `end_ns`: first and last receipt, ns since the epoch; both 0 for a recording without
+        messages.
+    `custom_data`: free text by free keys.
     """
     count = sum(topic.message_count for topic in topics)
     start = {'nanoseconds_since_epoch': start_ns}

@@ -15,16 +15,10 @@ _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 class QosProfile:
     """What a publisher offered.
 
-    Attributes
-    ----------
-    reliability
-        ``'reliable'`` or ``'best_effort'``.
-    durability
-        ``'volatile'`` or ``'transient_local'``.
-    depth
-        Length of the history; 0 where the publisher did not say.
-    history
-        ``'keep_last'``, ``'keep_all'`` or ``'unknown'``.
+    `reliability`: ``'reliable'`` or ``'best_effort'``.
+    `durability`: ``'volatile'`` or ``'transient_local'``.
+    `depth`: length of the history; 0 where the publisher did not say.
+    `history`: ``'keep_last'``, ``'keep_all'`` or ``'unknown'``.
     """
 
     reliability: str = 'reliable'
@@ -64,10 +58,7 @@ def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
 
     Before version 9 rosbag2 wrote the policies as the numbers of rmw; both are understood.
 
-    Raises
-    ------
-    YamlError
-        The text is no list of profiles.
+    Raises YamlError: the text is no list of profiles.
     """
     entries = parse_yaml(text, 'the quality of service') if text.strip() else []
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):

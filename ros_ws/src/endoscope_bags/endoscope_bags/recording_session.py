@@ -20,18 +20,11 @@ _STALE_CHUNK_NS = round(1.25e9 * CHUNK_SECONDS)
 class Arrival(NamedTuple):
     """A message that arrived; the order of the fields is the order of recording.
 
-    Attributes
-    ----------
-    received_ns
-        Receipt, ns since the epoch.
-    topic
-        Number that `RecordingSession.add_topic` gave.
-    sequence
-        The publisher's message counter.
-    published_ns
-        Publication, ns since the epoch.
-    data
-        The message in CDR.
+    `received_ns`: receipt, ns since the epoch.
+    `topic`: number that `RecordingSession.add_topic` gave.
+    `sequence`: the publisher's message counter.
+    `published_ns`: publication, ns since the epoch.
+    `data`: the message in CDR.
     """
 
     received_ns: int
@@ -45,18 +38,11 @@ class Arrival(NamedTuple):
 class SessionReport:
     """How a recording went.
 
-    Attributes
-    ----------
-    path
-        The recording.
-    counts
-        Messages recorded, by topic.
-    lost
-        Messages published and not recorded, by topic; topics without loss have 0.
-    full
-        Why recording ended early (the disk was full); empty otherwise.
-    finished
-        Whether the recording is complete with its summary; if not, `recover` completes it.
+    `path`: the recording.
+    `counts`: messages recorded, by topic.
+    `lost`: messages published and not recorded, by topic; topics without loss have 0.
+    `full`: why recording ended early (the disk was full); empty otherwise.
+    `finished`: whether the recording is complete with its summary; if not, `recover` completes it.
     """
 
     path: Path
@@ -105,21 +91,11 @@ class RecordingSession:
     A full disk does not end the session: what was recorded is finished at once, and what still
     arrives is counted as lost.
 
-    Parameters
-    ----------
-    path
-        Folder or ``.mcap`` to write; what is there when the process is killed can be recovered.
-    rig
-        What is recorded; None where it is not known.
-    threaded
-        Compress and write in a thread.
-
-    Raises
-    ------
-    BagExistsError
-        `path` is taken.
-    BagWriteError
-        There is no room even for the beginning.
+    `path`: folder or ``.mcap`` to write; what is there when the process is killed can be recovered.
+    `rig`: what is recorded; None where it is not known.
+    `threaded`: compress and write in a thread.
+    Raises BagExistsError: `path` is taken.
+    Raises BagWriteError: there is no room even for the beginning.
     """
 
     def __init__(self, path: str | Path, *, rig: Rig | None = None, threaded: bool = True) -> None:
@@ -149,14 +125,9 @@ class RecordingSession:
     ) -> int:
         """Announce a topic and return its number.
 
-        Parameters
-        ----------
-        topic, type_name
-            Full name and message type.
-        offered_qos
-            Asked once, when the first message has come: the publishers are known then.
-        count_publishers
-            Asked when a message has an unexpected number.
+        `topic`, `type_name`: full name and message type.
+        `offered_qos`: asked once, when the first message has come: the publishers are known then.
+        `count_publishers`: asked when a message has an unexpected number.
         """
         self._sources.append(
             _Source(topic, type_name, offered_qos, count_publishers, SequenceGaps())
@@ -186,10 +157,7 @@ class RecordingSession:
     def flush_stale(self, now_ns: int) -> None:
         """Hand a chunk to the operating system that no later message has closed.
 
-        Parameters
-        ----------
-        now_ns
-            Time by the clock of the receipts, ns since the epoch.
+        `now_ns`: time by the clock of the receipts, ns since the epoch.
         """
         waiting_since = self._writer.waiting_since_ns
         if self._full or waiting_since is None or now_ns - waiting_since < _STALE_CHUNK_NS:
@@ -232,10 +200,7 @@ class RecordingSession:
     def close(self, ended: str = 'on request') -> SessionReport:
         """Finish the recording and say how it went; again is harmless.
 
-        Parameters
-        ----------
-        ended
-            Why, as it is written into the recording.
+        `ended`: why, as it is written into the recording.
         """
         if not self._writer.closed:
             self._ended = ended
@@ -253,14 +218,9 @@ def simulated_receipt_ns(stamp_ns: int | None, last_tick_ns: int, now_ns: int) -
     tick before, or was sent already in this one by a node that heard the clock earlier. Its stamp
     tells which, so that the same simulation is recorded the same whoever was faster.
 
-    Parameters
-    ----------
-    stamp_ns
-        Header stamp; None for types without one.
-    last_tick_ns
-        The tick before; 0 if this is the first one.
-    now_ns
-        This tick.
+    `stamp_ns`: header stamp; None for types without one.
+    `last_tick_ns`: the tick before; 0 if this is the first one.
+    `now_ns`: this tick.
     """
     if not last_tick_ns:
         return now_ns

@@ -14,16 +14,10 @@ from endoscope_core.errors import printable
 class RecoveryReport:
     """What `recover` did.
 
-    Attributes
-    ----------
-    message_count
-        Messages that were saved.
-    counts
-        The same by topic.
-    start_ns, end_ns
-        First and last receipt of what was saved, ns since the epoch.
-    damage
-        What was wrong, one line each; empty if the recording was sound.
+    `message_count`: messages that were saved.
+    `counts`: the same by topic.
+    `start_ns`, `end_ns`: first and last receipt of what was saved, ns since the epoch.
+    `damage`: what was wrong, one line each; empty if the recording was sound.
     """
 
     message_count: int
@@ -43,18 +37,10 @@ class RecoveryReport:
 def recover(source: str | Path, target: str | Path) -> RecoveryReport:
     """Write all messages of the sound chunks of a recording to a new one.
 
-    Parameters
-    ----------
-    source
-        rosbag2 folder (also without metadata) or ``.mcap`` file. It is not changed.
-    target
-        The new recording, a folder or ``.mcap`` file; must not exist.
-
-    Raises
-    ------
-    BagError
-        `source` is no recording or not a single message of it is sound; `target` exists; the disk
-        is full. Nothing is left at `target` then.
+    `source`: rosbag2 folder (also without metadata) or ``.mcap`` file. It is not changed.
+    `target`: the new recording, a folder or ``.mcap`` file; must not exist.
+    Raises BagError: `source` is no recording or not a single message of it is sound; `target`
+        exists; the disk is full. Nothing is left at `target` then.
     """
     recording = open_bag(source, salvage=True)
     with BagWriter(target, records=copied_rig_record(recording)) as writer:

@@ -20,14 +20,7 @@ def copied_rig_record(recording: Recording) -> dict[str, dict[str, str]]:
 def rig_of_bag(recording: Recording) -> Rig:
     """The rig that a recording carries; as shipped where it carries none.
 
-    Parameters
-    ----------
-    recording
-
-    Raises
-    ------
-    RigFileError
-        It is of no form known here.
+    Raises RigFileError: it is of no form known here.
     """
     text = recording.metadata.get(_NAME, {}).get(_KEY)
     return shipped_rig() if text is None else rig_from_text(text, f'the rig of {recording.path}')

@@ -15,21 +15,11 @@ def require_room(descriptor: int, name: str, n_bytes: int) -> None:
     The room is allocated and given back at once: that alone asks the disk, the quota and the limit
     of file sizes together.
 
-    Parameters
-    ----------
-    descriptor
-        Of a file open for writing, positioned at its end.
-    name
-        For the message.
-    n_bytes
-        How much it shall be able to grow.
-
-    Raises
-    ------
-    BagFullError
-        It cannot grow that much.
-    BagWriteError
-        The disk refuses for another reason.
+    `descriptor`: of a file open for writing, positioned at its end.
+    `name`: for the message.
+    `n_bytes`: how much it shall be able to grow.
+    Raises BagFullError: it cannot grow that much.
+    Raises BagWriteError: the disk refuses for another reason.
     """
     end = os.lseek(descriptor, 0, os.SEEK_CUR)
     try:

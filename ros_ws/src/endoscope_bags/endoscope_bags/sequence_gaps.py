@@ -18,12 +18,8 @@ class SequenceGaps:
     DDS numbers the messages of every publisher from 1. Where several publish on a topic, their
     numbers arrive mixed and unlabelled; each number is taken for the publisher that expects it.
 
-    Attributes
-    ----------
-    received
-        Messages seen.
-    lost
-        Messages that never came, between the first and the last that did; those that came late
+    `received`: messages seen.
+    `lost`: messages that never came, between the first and the last that did; those that came late
         are none.
     """
 
@@ -37,14 +33,10 @@ class SequenceGaps:
     def add(self, sequence: int, count_publishers: Callable[[], int] = one_publisher) -> int:
         """Note a message and return how many were lost directly before it.
 
-        Parameters
-        ----------
-        sequence
-            Number that its publisher gave it.
-        count_publishers
-            Tells how many publish on this topic at the moment; asked in case of doubt only. An
-            unexpected number begins a new publisher as long as fewer were seen, and is a loss
-            after that.
+        `sequence`: number that its publisher gave it.
+        `count_publishers`: tells how many publish on this topic at the moment; asked in case of
+            doubt only. An unexpected number begins a new publisher as long as fewer were seen, and
+            is a loss after that.
         """
         self.received += 1
         last = self._last

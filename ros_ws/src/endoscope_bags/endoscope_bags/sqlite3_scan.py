@@ -46,12 +46,9 @@ _Damage = (sqlite3.Error, UnicodeDecodeError)
 class Sqlite3Scan:
     """What one pass over a file found; attributes as in `McapScan`.
 
-    Attributes
-    ----------
-    path, header, schemas, channels, messages, metadata, damage, truncated
-        See `McapScan`.
-    row_ids
-        Key of each message in the file, in file order, shape (N,).
+    `path`, `header`, `schemas`, `channels`, `messages`, `metadata`, `damage`, `truncated`: see
+        `McapScan`.
+    `row_ids`: key of each message in the file, in file order, shape (N,).
     """
 
     path: Path
@@ -95,24 +92,13 @@ def is_sqlite3(path: Path) -> bool:
 def scan_sqlite3(path: str | Path, *, salvage: bool = False) -> Sqlite3Scan:
     """Find all messages of a rosbag2 file in sqlite3 storage.
 
-    Parameters
-    ----------
-    path
-        The ``.db3`` file.
-    salvage
-        Keep the messages before the first damaged page, and note it in `damage`, instead of
+    `path`: the ``.db3`` file.
+    `salvage`: keep the messages before the first damaged page, and note it in `damage`, instead of
         raising.
-
-    Raises
-    ------
-    BagNotFoundError
-        There is no such file.
-    NotABagError
-        It is no database, or not one of rosbag2.
-    TruncatedBagError
-        The end is missing.
-    CorruptBagError
-        It is damaged, or holds more than its size allows.
+    Raises BagNotFoundError: there is no such file.
+    Raises NotABagError: it is no database, or not one of rosbag2.
+    Raises TruncatedBagError: the end is missing.
+    Raises CorruptBagError: it is damaged, or holds more than its size allows.
     """
     path = Path(path)
     try:

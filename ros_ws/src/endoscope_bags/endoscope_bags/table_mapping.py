@@ -88,14 +88,9 @@ class TableMappingError(BagError, ValueError):
 class Column:
     """One column of the table.
 
-    Attributes
-    ----------
-    source : int or str
-        Its number, from 1, or its name.
-    unit : str or None
-        None for that of the table's heading.
-    scale, offset : float
-        `scale` times the number in the table plus `offset` is the value in the unit.
+    `source`: its number, from 1, or its name.
+    `unit`: none for that of the table's heading.
+    `scale`, `offset`: `scale` times the number in the table plus `offset` is the value in the unit.
     """
 
     source: int | str
@@ -108,25 +103,13 @@ class Column:
 class TableMapping:
     """A whole mapping file.
 
-    Attributes
-    ----------
-    time : Column
-    topics : mapping of topic to mapping of quantity to mapping of name to Column
-    delimiter : str or None
-        One character or `whitespace`; None where it is to be found.
-    decimal_comma : bool or None
-        None where it is to be found.
-    header_lines : int or None
-        None where they are to be found.
-    namespace : str
-    start_s : float
-    drop_repeats : bool
-    sample_and_hold : bool
-        Rows of one time lie evenly between it and the next one, and a topic has a message where one
-        of its columns changes.
-    drop_incomplete : bool
-        Whether a topic has no message, instead of an error, where some of its cells are empty or
-        not finite.
+    `delimiter`: one character or `whitespace`; None where it is to be found.
+    `decimal_comma`: none where it is to be found.
+    `header_lines`: none where they are to be found.
+    `sample_and_hold`: rows of one time lie evenly between it and the next one, and a topic has a
+        message where one of its columns changes.
+    `drop_incomplete`: whether a topic has no message, instead of an error, where some of its cells
+        are empty or not finite.
     """
 
     time: Column
@@ -144,18 +127,8 @@ class TableMapping:
 def load_table_mapping(path: str | Path) -> TableMapping:
     """Read a mapping file.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    TableMapping
-
-    Raises
-    ------
-    TableMappingError
-        If the file cannot be read, or a key is unknown, missing or has a wrong value.
+    Raises TableMappingError: if the file cannot be read, or a key is unknown, missing or has a
+        wrong value.
     """
     try:
         content = load_yaml(path)

@@ -31,18 +31,12 @@ _ROWS_AT_ONCE = 20_000
 class Converted:
     """What was converted.
 
-    Attributes
-    ----------
-    rows : int
-        Rows of the table.
-    repeated : int
-        Those of them that were dropped because their time is that of the row before or, where the
-        table samples and holds, because no topic has a new number in them.
-    messages : int
-    incomplete : dict of str to int
-        Rows by topic that were dropped because a part of its cells is empty or not finite.
-    gaps : dict of str to int
-        Cells that are empty or not finite, by the name of the column.
+    `rows`: rows of the table.
+    `repeated`: those of them that were dropped because their time is that of the row before or,
+        where the table samples and holds, because no topic has a new number in them.
+    `incomplete`: rows by topic that were dropped because a part of its cells is empty or not
+        finite.
+    `gaps`: cells that are empty or not finite, by the name of the column.
     """
 
     rows: int
@@ -60,28 +54,13 @@ def convert_table(
 ) -> Converted:
     """Convert a text table to a bag.
 
-    Parameters
-    ----------
-    table : str or Path
-    mapping : TableMapping
-        What its columns are.
-    out : str or Path
-        rosbag2 folder, or `.mcap`; must not exist.
-    progress : callable
-        Called with what is done and the share that is done already.
-
-    Returns
-    -------
-    Converted
-
-    Raises
-    ------
-    TableError
-        If the table cannot be read, lacks a column, or its time runs backwards; names the line.
-    NonFiniteError
-        If a number is NaN or infinite, unless the mapping drops such rows.
-    BagExistsError
-        If `out` exists.
+    `mapping`: what its columns are.
+    `out`: rosbag2 folder, or `.mcap`; must not exist.
+    `progress`: called with what is done and the share that is done already.
+    Raises TableError: if the table cannot be read, lacks a column, or its time runs backwards;
+        names the line.
+    Raises NonFiniteError: if a number is NaN or infinite, unless the mapping drops such rows.
+    Raises BagExistsError: if `out` exists.
     """
     table = Path(table)
     progress('reading the table', 0.0)

@@ -44,10 +44,7 @@ class ChunkHead(NamedTuple):
 def chunk_head(data: object, start: int, stop: int) -> ChunkHead:
     """Read the head of the chunk whose record body is ``data[start:stop]``.
 
-    Raises
-    ------
-    ChunkError
-        Its parts do not add up to its length.
+    Raises ChunkError: its parts do not add up to its length.
     """
     end = start + _HEAD.size
     if end + _SIZE.size > stop:
@@ -67,10 +64,7 @@ def chunk_head(data: object, start: int, stop: int) -> ChunkHead:
 class Allowance:
     """What the chunks of a file may still hold.
 
-    Attributes
-    ----------
-    n_bytes, n_records
-        Decompressed bytes, and records in them.
+    `n_bytes`, `n_records`: decompressed bytes, and records in them.
     """
 
     n_bytes: int
@@ -86,10 +80,7 @@ class Allowance:
     def take(self, n_bytes: int, n_records: int) -> None:
         """Take from it.
 
-        Raises
-        ------
-        ChunkTooLargeError
-            There is not so much left.
+        Raises ChunkTooLargeError: there is not so much left.
         """
         self.n_bytes -= n_bytes
         self.n_records -= n_records
@@ -100,19 +91,11 @@ class Allowance:
 def unpacked(body: bytes, allowance: Allowance | None = None) -> bytes:
     """Return the records in a chunk, of the size and checksum that it declares.
 
-    Parameters
-    ----------
-    body
-        Of the chunk record.
-    allowance
-        What is decompressed is taken from it, be it of use or not.
-
-    Raises
-    ------
-    ChunkError
-        They have not, or do not decompress, or the compression is neither zstd nor LZ4.
-    ChunkTooLargeError
-        They are, or claim to be, more than `LARGEST_CHUNK`.
+    `body`: of the chunk record.
+    `allowance`: what is decompressed is taken from it, be it of use or not.
+    Raises ChunkError: they have not, or do not decompress, or the compression is neither zstd nor
+        LZ4.
+    Raises ChunkTooLargeError: they are, or claim to be, more than `LARGEST_CHUNK`.
     """
     head = chunk_head(body, 0, len(body))
     if head.size > LARGEST_CHUNK:

@@ -23,17 +23,10 @@ _FIRST_COMMAND_S = 3.0
 class Row:
     """What became of the motion after one rest.
 
-    Attributes
-    ----------
-    seed : int
-    rest_s : float
-        Length of the rest.
-    asked : str
-        What was asked for after it.
-    became : str
-        `obeyed`, `silent`, or why the graph says that it does not obey.
-    within_s : float
-        After the first command, in the graph's time.
+    `rest_s`: length of the rest.
+    `asked`: what was asked for after it.
+    `became`: `obeyed`, `silent`, or why the graph says that it does not obey.
+    `within_s`: after the first command, in the graph's time.
     """
 
     seed: int

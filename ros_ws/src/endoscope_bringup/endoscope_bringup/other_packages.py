@@ -23,10 +23,7 @@ def commands_of_other_packages() -> dict[str, str]:
     `importlib.metadata` finds the same, but takes ten times as long, at every start. Of two
     packages with the same command the one that stands first in `sys.path` counts.
 
-    Returns
-    -------
-    dict of str to str
-        Names of modules by that of the command, sorted.
+    Returns: names of modules by that of the command, sorted.
     """
     found: dict[str, str] = {}
     for folder in sys.path:

@@ -14,15 +14,10 @@ REDRAWN_S = 1.0
 class ProgressLine:
     """A bar of one line that says which step is under way, and for how long already.
 
-    Parameters
-    ----------
-    steps : int
-        How many steps there are, about: a bar is full only when all is done.
-    first : str
-        The step that begins at once. It is no line where there is no bar: bad input is refused in
-        it, with one line alone.
-    stream : TextIO, optional
-        Where to write; stderr if none is given. Where it is no terminal, each step is a line.
+    `steps`: how many steps there are, about: a bar is full only when all is done.
+    `first`: the step that begins at once. It is no line where there is no bar: bad input is refused
+        in it, with one line alone.
+    `stream`: where to write; stderr if none is given. Where it is no terminal, each step is a line.
     """
 
     def __init__(self, steps: int, first: str, stream: TextIO | None = None) -> None:

@@ -54,15 +54,10 @@ class OneLineParser(argparse.ArgumentParser):
 def add_subcommands(parser: argparse.ArgumentParser, modules: Iterable[str], *, dest: str) -> None:
     """Add one subparser to `parser` for each module.
 
-    Parameters
-    ----------
-    parser
-        The parser whose first positional argument shall choose the subcommand.
-    modules
-        Their full names, for example ``'endoscope_bringup.commands.demo'``, in the order of the
-        help.
-    dest
-        Attribute of the parsed arguments that will hold the choice; see `run_chosen`.
+    `parser`: the parser whose first positional argument shall choose the subcommand.
+    `modules`: their full names, for example ``'endoscope_bringup.commands.demo'``, in the order of
+        the help.
+    `dest`: attribute of the parsed arguments that will hold the choice; see `run_chosen`.
     """
     subparsers = parser.add_subparsers(dest=dest, metavar=dest.upper(), required=True)
     for name in modules:
@@ -105,11 +100,8 @@ def add_json_option(parser: argparse.ArgumentParser) -> None:
 def print_json(content: object) -> None:
     """Print what a table shows as one JSON document, numbers as numbers.
 
-    Parameters
-    ----------
-    content
-        Mappings, sequences, texts, numbers, truth values and None. What is not finite becomes null,
-        which JSON has; paths become texts.
+    `content`: mappings, sequences, texts, numbers, truth values and None. What is not finite
+        becomes null, which JSON has; paths become texts.
     """
     print(json.dumps(_plain(content), indent=1, ensure_ascii=False, allow_nan=False))
 

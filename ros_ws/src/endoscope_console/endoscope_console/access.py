@@ -77,13 +77,9 @@ class Refusal:
 class Admission:
     """What a request must carry to get in.
 
-    Attributes
-    ----------
-    origins
-        The page's own, for example ``http://127.0.0.1:8765``; a ``Host`` is the rest of one of
-        them.
-    without_origin
-        Whether a program may open a socket without naming an origin.
+    `origins`: the page's own, for example ``http://127.0.0.1:8765``; a ``Host`` is the rest of one
+        of them.
+    `without_origin`: whether a program may open a socket without naming an origin.
     """
 
     origins: frozenset[str]
@@ -97,10 +93,7 @@ class Admission:
     def refusal(self, scope: Mapping[str, Any]) -> Refusal | None:
         """Judge a request or a socket; None where it may pass.
 
-        Parameters
-        ----------
-        scope
-            Of ASGI.
+        `scope`: of ASGI.
         """
         if scope['type'] not in ('http', 'websocket'):
             return Refusal(404, 'kind', f'nothing here is of kind {scope["type"]}')
@@ -130,14 +123,9 @@ def _values(scope: Mapping[str, Any], name: bytes) -> list[str]:
 class Gate:
     """Lets in what an :class:`Admission` admits, and gives every answer its headers.
 
-    Parameters
-    ----------
-    app
-        What lies behind.
-    admission
-        What may pass; all else is refused.
-    counts
-        Refusals are counted here, by the name of the check.
+    `app`: what lies behind.
+    `admission`: what may pass; all else is refused.
+    `counts`: refusals are counted here, by the name of the check.
     """
 
     def __init__(self, app: App, admission: Admission, counts: Counter[str]) -> None:
@@ -187,10 +175,7 @@ async def _answer(refusal: Refusal, send: Send) -> None:
 class Tokens:
     """Two secrets: who knows the one may operate, who knows the other may look on.
 
-    Attributes
-    ----------
-    operator, viewer
-        At least 32 random bytes, as text that fits into an address.
+    `operator`, `viewer`: at least 32 random bytes, as text that fits into an address.
     """
 
     operator: str
@@ -205,10 +190,7 @@ class Tokens:
     def of_file(cls, path: Path) -> 'Tokens':
         """Read them from a file, or write new ones there that this user alone can read.
 
-        Raises
-        ------
-        TokenFileError
-            It is no file of two tokens, or others can read it.
+        Raises TokenFileError: it is no file of two tokens, or others can read it.
         """
         if not path.exists():
             tokens = cls.new()

@@ -23,16 +23,10 @@ class Level(StrEnum):
 class Alarm:
     """What asks for attention.
 
-    Attributes
-    ----------
-    id
-        By which it is acknowledged.
-    level
-        How urgent it is.
-    text
-        In words.
-    latched
-        Whether it stays until it was acknowledged.
+    `id`: by which it is acknowledged.
+    `level`: how urgent it is.
+    `text`: in words.
+    `latched`: whether it stays until it was acknowledged.
     """
 
     id: str
@@ -64,10 +58,7 @@ class Alarms:
     def acknowledge(self, name: str) -> None:
         """Take note that an alarm was seen, which ends it.
 
-        Raises
-        ------
-        AlarmStandsError
-            Its cause is still present, or there is none.
+        Raises AlarmStandsError: its cause is still present, or there is none.
         """
         if name not in self._kept:
             raise AlarmStandsError('there is nothing to acknowledge')

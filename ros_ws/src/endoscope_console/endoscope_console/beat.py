@@ -28,14 +28,10 @@ _UNTIL_STOPPED_S = 2.0
 class Situation(Conditions):
     """What the graph and the lease are like, as the other threads last said.
 
-    Attributes
-    ----------
-    speaks
-        Whether the handle's place is free and its own: only then it is a sender.
-    wanted, wanted_ns
-        Angles in rad that the console asks of the slave, shape (J,), and when they were heard.
-    scale
-        Slave motion for one radian of the handle.
+    `speaks`: whether the handle's place is free and its own: only then it is a sender.
+    `wanted`, `wanted_ns`: angles in rad that the console asks of the slave, shape (J,), and when
+        they were heard.
+    `scale`: slave motion for one radian of the handle.
     """
 
     speaks: bool = False
@@ -48,14 +44,9 @@ class Situation(Conditions):
 class Said:
     """Where the dead-man is, as of a beat.
 
-    Attributes
-    ----------
-    state, reason, missing
-        See :class:`OperatorDeadMan`.
-    counts
-        How often each reason has ended a grip.
-    speaks
-        Whether the handle is spoken for.
+    `state`, `reason`, `missing`: see :class:`OperatorDeadMan`.
+    `counts`: how often each reason has ended a grip.
+    `speaks`: whether the handle is spoken for.
     """
 
     state: DeadManState = DeadManState.OPEN
@@ -68,19 +59,10 @@ class Said:
 class Beat:
     """The thread; it shares one-slot mailboxes and a queue of arrivals with the others.
 
-    Parameters
-    ----------
-    node
-        By which to speak.
-    handle
-        Turns frames into angles.
-
-    Attributes
-    ----------
-    situation
-        To be replaced by whoever knows a newer one.
-    said
-        What the dead-man said in the last beat in which it changed.
+    `node`: by which to speak.
+    `handle`: turns frames into angles.
+    `situation`: to be replaced by whoever knows a newer one.
+    `said`: what the dead-man said in the last beat in which it changed.
     """
 
     def __init__(self, node: Node, handle: PadHandle) -> None:

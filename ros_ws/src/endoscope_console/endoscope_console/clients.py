@@ -28,10 +28,7 @@ _SECOND_NS = 1_000_000_000
 class FrameRate:
     """Whether a client sends more than it may: an allowance that fills up again.
 
-    Parameters
-    ----------
-    limit
-        Frames a second, and at once.
+    `limit`: frames a second, and at once.
     """
 
     def __init__(self, limit: int) -> None:
@@ -52,10 +49,7 @@ class FrameRate:
 class Outbox:
     """What waits to be sent to a client: the newest pictures, and the newest state.
 
-    Attributes
-    ----------
-    dropped
-        Pictures that it never got, since newer ones came.
+    `dropped`: pictures that it never got, since newer ones came.
     """
 
     def __init__(self) -> None:
@@ -93,22 +87,13 @@ class Outbox:
 class Client:
     """A socket that has said hello.
 
-    Attributes
-    ----------
-    id
-        Its name, ``c3``.
-    kind, role
-        Which socket, and what its bearer may be.
-    address
-        Of the machine it comes from.
-    rate
-        What it may send.
-    outbox
-        What waits for it, on the socket for telemetry.
-    tell
-        Sends it an object that it did not ask for, on the socket for commands.
-    orders
-        How many of its orders are not answered yet.
+    `id`: its name, ``c3``.
+    `kind`, `role`: which socket, and what its bearer may be.
+    `address`: of the machine it comes from.
+    `rate`: what it may send.
+    `outbox`: what waits for it, on the socket for telemetry.
+    `tell`: sends it an object that it did not ask for, on the socket for commands.
+    `orders`: how many of its orders are not answered yet.
     """
 
     id: str
@@ -129,10 +114,7 @@ class Client:
 class Clients:
     """All sockets, within the limits.
 
-    Parameters
-    ----------
-    counts
-        What is refused and dropped is counted here.
+    `counts`: what is refused and dropped is counted here.
     """
 
     def __init__(self, counts: Counter[str]) -> None:

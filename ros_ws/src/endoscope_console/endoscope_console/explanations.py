@@ -44,32 +44,18 @@ class ExplanationRefusedError(EndoscopeError):
 class Explanation:
     """One recording being explained, or explained.
 
-    Attributes
-    ----------
-    id
-        By which a page speaks of it.
-    bag
-        Name of the recording.
-    folder
-        Where report and improved plant are.
-    secret
-        Part of the report's address that nobody can guess.
-    running
-        Whether it is under way.
-    step
-        What is being done.
-    progress
-        Share that is done.
-    sentence
-        What was found; empty before.
-    error
-        Why nothing was; empty where something was.
-    experiment
-        Whether there is a motion that would tell more.
-    plant
-        By which plant it is explained.
-    report
-        Path of its report's address; None where there is none.
+    `id`: by which a page speaks of it.
+    `bag`: name of the recording.
+    `folder`: where report and improved plant are.
+    `secret`: part of the report's address that nobody can guess.
+    `running`: whether it is under way.
+    `step`: what is being done.
+    `progress`: share that is done.
+    `sentence`: what was found; empty before.
+    `error`: why nothing was; empty where something was.
+    `experiment`: whether there is a motion that would tell more.
+    `plant`: by which plant it is explained.
+    `report`: path of its report's address; None where there is none.
     """
 
     id: str
@@ -118,10 +104,8 @@ class Explanation:
 class Explanations:
     """Recordings of one folder, and what explains them.
 
-    Parameters
-    ----------
-    folder
-        Where recordings and plants are, and explanations: those that are there can be read again.
+    `folder`: where recordings and plants are, and explanations: those that are there can be read
+        again.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -172,10 +156,7 @@ class Explanations:
     def experiment_of(self, name: str) -> Path:
         """File with the motion that would tell more.
 
-        Raises
-        ------
-        ExplanationRefusedError
-            There is none.
+        Raises ExplanationRefusedError: there is none.
         """
         one = self._all.get(name)
         if one is None or not one.experiment:
@@ -192,10 +173,8 @@ class Explanations:
     ) -> Mapping[str, Any]:
         """Begin to explain a recording by a plant, the graph's own where none is named.
 
-        Raises
-        ------
-        ExplanationRefusedError
-            There is no such recording or plant, or another is being explained.
+        Raises ExplanationRefusedError: there is no such recording or plant, or another is being
+            explained.
         """
         bags, plants = self._bags(), self._plants()
         for kind, name, known in (
@@ -278,10 +257,7 @@ class Explanations:
     async def cancel(self, name: str) -> str:
         """End one that is under way.
 
-        Raises
-        ------
-        ExplanationRefusedError
-            None of that name is.
+        Raises ExplanationRefusedError: none of that name is.
         """
         one = self._all.get(name)
         if one is None or not one.running:

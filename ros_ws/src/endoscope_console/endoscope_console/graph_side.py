@@ -67,12 +67,8 @@ def identified(calibration: Health | None) -> bool:
 class Settings:
     """What the console node was last known to be set to.
 
-    Attributes
-    ----------
-    source
-        Where its commands come from; empty before it was asked.
-    scale
-        Slave motion for one radian of the handle.
+    `source`: where its commands come from; empty before it was asked.
+    `scale`: slave motion for one radian of the handle.
     """
 
     source: str = ''
@@ -82,23 +78,13 @@ class Settings:
 class GraphSide:
     """What the server hears of a graph, and asks of it.
 
-    Parameters
-    ----------
-    client
-        Heard here.
-    pictures
-        Taken here.
-    services
-        The thread that takes answers of services.
-
-    Attributes
-    ----------
-    settings
-        Of the console node; asked for once a second, and by whoever has changed them.
-    heard_ns
-        When the operating state was heard, by a steady clock.
-    ended
-        Status with which the graph of this program has ended; None while it runs, or is another's.
+    `client`: heard here.
+    `pictures`: taken here.
+    `services`: the thread that takes answers of services.
+    `settings`: of the console node; asked for once a second, and by whoever has changed them.
+    `heard_ns`: when the operating state was heard, by a steady clock.
+    `ended`: status with which the graph of this program has ended; None while it runs, or is
+        another's.
     """
 
     def __init__(self, client: _Client, pictures: Pictures, services: threading.Thread) -> None:
@@ -116,10 +102,8 @@ class GraphSide:
     def hear(self, now_ns: int) -> None:
         """Take all that has come until now, a steady time in ns, and ask for the settings.
 
-        Raises
-        ------
-        RuntimeError
-            The thread that takes answers of services has ended, which it never should.
+        Raises RuntimeError: the thread that takes answers of services has ended, which it never
+            should.
         """
         if not self._services.is_alive():
             raise RuntimeError('the thread that takes answers of services has ended')
@@ -211,12 +195,8 @@ class GraphSide:
 def graph_side(namespace: str, section_length: float) -> Iterator[GraphSide]:
     """Join the graph of a namespace, to be heard by the calling thread.
 
-    Parameters
-    ----------
-    namespace
-        Of the graph.
-    section_length
-        Length of the bending section in m.
+    `namespace`: of the graph.
+    `section_length`: length of the bending section in m.
     """
     with ExitStack() as stack:
         node = stack.enter_context(joined_node(NODE, namespace))

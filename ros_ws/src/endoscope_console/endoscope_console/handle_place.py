@@ -31,12 +31,8 @@ class Ask(Protocol):
 class HandlePlace:
     """Lives in the thread of the sockets; `ask` waits for the graph in another.
 
-    Attributes
-    ----------
-    lock
-        Of whoever changes what the console follows.
-    speaks
-        Whether the server is the one who speaks for the handle.
+    `lock`: of whoever changes what the console follows.
+    `speaks`: whether the server is the one who speaks for the handle.
     """
 
     def __init__(self, graph: GraphSide, beat: Beat, ask: Ask) -> None:

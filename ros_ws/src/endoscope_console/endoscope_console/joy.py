@@ -23,14 +23,9 @@ _LET_GO_NS = 10_000_000_000
 class JoyHand:
     """Reads the topic; its dead-man claims the lease where nobody has it.
 
-    Parameters
-    ----------
-    graph
-        In whose namespace the topic is.
-    operations
-        Hear it.
-    mapping
-        Of axes and buttons.
+    `graph`: in whose namespace the topic is.
+    `operations`: hear it.
+    `mapping`: of axes and buttons.
     """
 
     def __init__(self, graph: GraphSide, operations: Operations, mapping: JoyMapping) -> None:

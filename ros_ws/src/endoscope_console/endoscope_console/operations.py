@@ -77,14 +77,9 @@ class _Played:
 class Operations:
     """Obeys orders, one operator's at a time; lives in the thread of the sockets.
 
-    Attributes
-    ----------
-    graph, beat, clients, explanations, alarms
-        Which it is done with.
-    counts
-        Refusals are counted here.
-    lease
-        Of the one operator.
+    `graph`, `beat`, `clients`, `explanations`, `alarms`: which it is done with.
+    `counts`: refusals are counted here.
+    `lease`: of the one operator.
     """
 
     graph: GraphSide
@@ -237,12 +232,8 @@ class Operations:
     async def claim(self, client: Client, take: bool) -> str:
         """Make a client the operator; what became of it.
 
-        Raises
-        ------
-        OrderRefusedError
-            Somebody else is, or somebody else speaks for the handle.
-        GraphRefusedError
-            The console node does not follow a handle.
+        Raises OrderRefusedError: somebody else is, or somebody else speaks for the handle.
+        Raises GraphRefusedError: the console node does not follow a handle.
         """
         if self._closing:
             raise OrderRefusedError('the server of the page ends')

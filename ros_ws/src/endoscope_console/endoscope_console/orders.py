@@ -124,10 +124,7 @@ _hello = msgspec.json.Decoder(Hello)
 def read_order(text: str) -> Order:
     """Read an order.
 
-    Raises
-    ------
-    MalformedOrderError
-        It is none.
+    Raises MalformedOrderError: it is none.
     """
     return _read(_orders, text)
 
@@ -135,10 +132,7 @@ def read_order(text: str) -> Order:
 def read_hello(text: str) -> Hello:
     """Read the first words of a client.
 
-    Raises
-    ------
-    MalformedOrderError
-        They are something else.
+    Raises MalformedOrderError: they are something else.
     """
     return _read(_hello, text)
 

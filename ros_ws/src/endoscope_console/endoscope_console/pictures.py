@@ -53,23 +53,12 @@ _NOTHING = np.full((POINTS, 3), np.nan)
 class Stream:
     """A topic of joints, whose waiting samples are taken all at once.
 
-    Parameters
-    ----------
-    node
-        By which to listen.
-    topic
-        Its name.
-    names
-        The J joints, motors or wires.
-
-    Attributes
-    ----------
-    last
-        The newest sample; None before the first.
-    heard_ns
-        When it came, by this machine's clock.
-    malformed
-        Messages that were none.
+    `node`: by which to listen.
+    `topic`: its name.
+    `names`: the J joints, motors or wires.
+    `last`: the newest sample; None before the first.
+    `heard_ns`: when it came, by this machine's clock.
+    `malformed`: messages that were none.
     """
 
     def __init__(self, node: Node, topic: str, names: tuple[str, ...]) -> None:
@@ -109,28 +98,15 @@ class Stream:
 class Pictures:
     """Takes what waits on all streams and makes a picture of it.
 
-    Parameters
-    ----------
-    node
-        By which to listen.
-    length
-        Of the bending section in m.
-
-    Attributes
-    ----------
-    seq
-        Number of the newest picture.
-    made
-        Numbers of the last pictures and when each was made by a steady clock, shape (N, 2).
-    tensions
-        Newest tension of each wire in N, shape (4,); empty before the first.
-    wanted, wanted_ns
-        Angles in rad that the console asks of the slave, shape (J,), and when by a steady clock
-        they were found here; None where it asks for nothing.
-    drives
-        Whether the compensator puts out commands for the motors: what is wanted is obeyed.
-    tracked_age_s
-        How long ago the tracker was heard, in s; infinite before.
+    `node`: by which to listen.
+    `length`: of the bending section in m.
+    `seq`: number of the newest picture.
+    `made`: numbers of the last pictures and when each was made by a steady clock, shape (N, 2).
+    `tensions`: newest tension of each wire in N, shape (4,); empty before the first.
+    `wanted`, `wanted_ns`: angles in rad that the console asks of the slave, shape (J,), and when by
+        a steady clock they were found here; None where it asks for nothing.
+    `drives`: whether the compensator puts out commands for the motors: what is wanted is obeyed.
+    `tracked_age_s`: how long ago the tracker was heard, in s; infinite before.
     """
 
     def __init__(self, node: Node, length: float) -> None:
@@ -148,10 +124,7 @@ class Pictures:
     def make(self, now_ns: int, wall_ns: int) -> bytes:
         """Make one of all that has come since the last one.
 
-        Parameters
-        ----------
-        now_ns, wall_ns
-            Now in ns, by a steady clock and by this machine's.
+        `now_ns`, `wall_ns`: now in ns, by a steady clock and by this machine's.
         """
         for signal, stream in self._of_signals():
             values = stream.take()

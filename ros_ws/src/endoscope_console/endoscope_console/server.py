@@ -48,16 +48,10 @@ _MALFORMED, _AGAIN, _TOO_LARGE = 1008, 1013, 1009
 class Console:
     """Everything that the sockets need; lives in the thread of the sockets.
 
-    Attributes
-    ----------
-    graph, operations, clients, view, joy
-        What is heard, done and told.
-    tokens
-        Who may do what.
-    rig
-        Whose limits and measures a page is told.
-    counts
-        Of what was refused and dropped.
+    `graph`, `operations`, `clients`, `view`, `joy`: what is heard, done and told.
+    `tokens`: who may do what.
+    `rig`: whose limits and measures a page is told.
+    `counts`: of what was refused and dropped.
     """
 
     graph: GraphSide
@@ -240,10 +234,7 @@ class Console:
     async def make_pictures(self) -> None:
         """Hear the graph, and show it to all, until cancelled.
 
-        Raises
-        ------
-        RuntimeError
-            The thread of the handle has ended, which it never should.
+        Raises RuntimeError: the thread of the handle has ended, which it never should.
         """
         due_ns = time.monotonic_ns()
         while True:

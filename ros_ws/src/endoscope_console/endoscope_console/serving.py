@@ -127,10 +127,7 @@ class _Graph:
 def serve(args: argparse.Namespace) -> int:
     """Serve the page until a signal asks to end; 0.
 
-    Raises
-    ------
-    EndoscopeError
-        What was asked for cannot be; with what to do instead.
+    Raises EndoscopeError: what was asked for cannot be; with what to do instead.
     """
     rig = load_rig(args.rig)
     mapping = JoyMapping(_joy_parameters(args.joy))

@@ -27,14 +27,9 @@ _encode = msgspec.json.Encoder().encode
 class View:
     """Puts the state together, and says when there is news.
 
-    Parameters
-    ----------
-    operations
-        What is told of.
-    rig
-        Whose limits hold.
-    counts
-        Of what was refused and dropped.
+    `operations`: what is told of.
+    `rig`: whose limits hold.
+    `counts`: of what was refused and dropped.
     """
 
     def __init__(self, operations: Operations, rig: Rig, counts: Counter[str]) -> None:
@@ -47,10 +42,7 @@ class View:
     def news(self, now_ns: int) -> str:
         """The state as JSON where it has changed, and once a second; else empty.
 
-        Parameters
-        ----------
-        now_ns
-            Now, by a steady clock.
+        `now_ns`: now, by a steady clock.
         """
         now = self._steady(now_ns)
         if now == self._told and now_ns - self._told_ns < _REPEATED_NS:

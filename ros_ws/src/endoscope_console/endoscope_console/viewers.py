@@ -36,14 +36,9 @@ _EVENTS = Qos(100)
 class ViewedTopic:
     """A topic that viewers can see, and that is heard while one of them does.
 
-    Parameters
-    ----------
-    node
-        By which it is heard.
-    topic
-        What is shown.
-    context
-        Of the server.
+    `node`: by which it is heard.
+    `topic`: what is shown.
+    `context`: of the server.
     """
 
     def __init__(self, node: Node, topic: Topic, context: Context) -> None:
@@ -111,22 +106,10 @@ class _Listener(ServerListener):
 def viewers(namespace: str, port: int) -> Iterator[str]:
     """Let viewers read the topics of a graph, a hundred times a second at most.
 
-    Parameters
-    ----------
-    namespace
-        Of the graph.
-    port
-        At 127.0.0.1; 0 for any that is free.
-
-    Yields
-    ------
-    str
-        The address, which viewers are given as a Foxglove WebSocket.
-
-    Raises
-    ------
-    EndoscopeError
-        The port is taken.
+    `namespace`: of the graph.
+    `port`: at 127.0.0.1; 0 for any that is free.
+    Yields: the address, which viewers are given as a Foxglove WebSocket.
+    Raises EndoscopeError: the port is taken.
     """
     context = Context()
     with joined_node(NODE, namespace) as node:

@@ -28,22 +28,10 @@ class OutputExistsError(EndoscopeError, FileExistsError):
 def atomic_file(path: str | Path, *, overwrite: bool = True) -> Iterator[Path]:
     """Write a file under a temporary name; it takes its own name when the block ends well.
 
-    Parameters
-    ----------
-    path
-        Where the file shall be. Missing parent folders are made.
-    overwrite
-        Whether a file that is there already is replaced.
-
-    Yields
-    ------
-    Path
-        A hidden sibling of `path` with the same suffix, not yet existing; the block creates it.
-
-    Raises
-    ------
-    OutputExistsError
-        `path` is a folder, or it exists and `overwrite` is false.
+    `path`: where the file shall be. Missing parent folders are made.
+    `overwrite`: whether a file that is there already is replaced.
+    Yields: a hidden sibling of `path` with the same suffix, not yet existing; the block creates it.
+    Raises OutputExistsError: `path` is a folder, or it exists and `overwrite` is false.
     """
     target = Path(path)
     if target.is_dir():
@@ -64,20 +52,9 @@ def atomic_file(path: str | Path, *, overwrite: bool = True) -> Iterator[Path]:
 def atomic_directory(path: str | Path) -> Iterator[Path]:
     """Fill a folder under a temporary name; it takes its own name when the block ends well.
 
-    Parameters
-    ----------
-    path
-        Where the folder shall be; it may exist if it is empty. Missing parent folders are made.
-
-    Yields
-    ------
-    Path
-        An empty folder, a hidden sibling of `path`.
-
-    Raises
-    ------
-    OutputExistsError
-        `path` is a file or a folder with something in it.
+    `path`: where the folder shall be; it may exist if it is empty. Missing parent folders are made.
+    Yields: an empty folder, a hidden sibling of `path`.
+    Raises OutputExistsError: `path` is a file or a folder with something in it.
     """
     target = Path(path).resolve()
     require_free_directory(target)
@@ -94,10 +71,7 @@ def atomic_directory(path: str | Path) -> Iterator[Path]:
 def with_final_names(text: str) -> str:
     """Return a text in which outputs have the names that a person will find when they are done.
 
-    Parameters
-    ----------
-    text
-        A path, or a line that names outputs which are still under their temporary names.
+    `text`: a path, or a line that names outputs which are still under their temporary names.
     """
     return _PARTIAL.sub('', text)
 
@@ -105,12 +79,8 @@ def with_final_names(text: str) -> str:
 def require_free_directory(path: str | Path) -> None:
     """Check, before long work, that a folder can be written at `path`.
 
-    Raises
-    ------
-    OutputExistsError
-        `path` is a file or a folder with something in it.
-    OutputPlaceError
-        The folder that it would be made in takes nothing.
+    Raises OutputExistsError: `path` is a file or a folder with something in it.
+    Raises OutputPlaceError: the folder that it would be made in takes nothing.
     """
     target = Path(path).absolute()
     if target.is_dir():
@@ -124,10 +94,7 @@ def require_free_directory(path: str | Path) -> None:
 def require_place(path: str | Path) -> None:
     """Check, before long work, that something can be made at `path`.
 
-    Raises
-    ------
-    OutputPlaceError
-        The folder that it would be made in takes nothing.
+    Raises OutputPlaceError: the folder that it would be made in takes nothing.
     """
     target = Path(path).absolute()
     place = next(parent for parent in target.parents if parent.exists())

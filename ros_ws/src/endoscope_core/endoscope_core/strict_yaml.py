@@ -26,15 +26,8 @@ class YamlError(EndoscopeError, ValueError):
 def load_yaml(path: str | Path) -> Any:
     """Content of a YAML file.
 
-    Parameters
-    ----------
-    path
-        The file, UTF-8.
-
-    Raises
-    ------
-    YamlError
-        It cannot be read, or `parse_yaml` refuses it; names file and line.
+    `path`: the file, UTF-8.
+    Raises YamlError: it cannot be read, or `parse_yaml` refuses it; names file and line.
     """
     try:
         with Path(path).open('rb') as file:
@@ -49,18 +42,10 @@ def load_yaml(path: str | Path) -> Any:
 def parse_yaml(text: str, name: str) -> Any:
     """Content of a YAML text: mappings with unique keys, lists, texts, numbers, dates, nothing.
 
-    Parameters
-    ----------
-    text
-        One document.
-    name
-        Where the text is from, for messages.
-
-    Raises
-    ------
-    YamlError
-        It is no YAML, larger than `LARGEST`, deeper than `DEEPEST`, has a key twice, an alias (of
-        which a few lines can make gigabytes), a merge key, a tag, or a number that is
+    `text`: one document.
+    `name`: where the text is from, for messages.
+    Raises YamlError: it is no YAML, larger than `LARGEST`, deeper than `DEEPEST`, has a key twice,
+        an alias (of which a few lines can make gigabytes), a merge key, a tag, or a number that is
         none; names the line.
     """
     if len(text) > LARGEST:

@@ -18,15 +18,8 @@ def worker_pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
     An executor of its own, left by an error or a signal, would first do every task that was
     submitted, and workers of a killed process would go on with theirs, each for minutes.
 
-    Parameters
-    ----------
-    jobs : int
-        Number of processes.
-
-    Yields
-    ------
-    ProcessPoolExecutor
-        Left without an error, it waits for its tasks; otherwise they are given up.
+    `jobs`: number of processes.
+    Yields: left without an error, it waits for its tasks; otherwise they are given up.
     """
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context('spawn')

@@ -15,12 +15,8 @@ class DeviceError(EndoscopeError, RuntimeError):
 class MotorReading:
     """Newest valid state of J motor shafts.
 
-    Attributes
-    ----------
-    position, velocity, effort
-        rad, rad/s and N m, shape (J,).
-    age
-        Time in s since it was measured.
+    `position`, `velocity`, `effort`: rad, rad/s and N m, shape (J,).
+    `age`: time in s since it was measured.
     """
 
     position: tuple[float, ...]
@@ -41,10 +37,7 @@ class MotorDevice(Protocol):
     def open(self) -> None:
         """Connect and check the settings.
 
-        Raises
-        ------
-        DeviceError
-            Not reachable, or set up wrongly.
+        Raises DeviceError: not reachable, or set up wrongly.
         """
 
     def set_torque(self, on: bool) -> None:
@@ -56,17 +49,9 @@ class MotorDevice(Protocol):
     def exchange(self, goal: Sequence[float], periods: int) -> MotorReading | None:
         """Set the goal and give the newest reading.
 
-        Parameters
-        ----------
-        goal
-            Shaft angles in rad, shape (J,): the newest command.
-        periods
-            Control periods (1 ms) since the last call.
-
-        Returns
-        -------
-        MotorReading or None
-            None while there is no new valid reading.
+        `goal`: shaft angles in rad, shape (J,): the newest command.
+        `periods`: control periods (1 ms) since the last call.
+        Returns: none while there is no new valid reading.
         """
 
     def trouble(self) -> str:

@@ -11,12 +11,8 @@ _SILENT_NS = 250_000_000
 class ReadingThread[Reading](ABC):
     """Reads from `open` to `close`; nobody who takes the readings waits for the device.
 
-    Parameters
-    ----------
-    name
-        Of the thread.
-    kept
-        So many readings wait at most; the oldest gives way to the newest.
+    `name`: of the thread.
+    `kept`: so many readings wait at most; the oldest gives way to the newest.
     """
 
     def __init__(self, name: str, kept: int) -> None:

@@ -11,24 +11,13 @@ Numbers = tuple[float, ...]
 class SimulatedSlave:
     """Servos, wires and joints of a plant, advanced by the motor driver's beat.
 
-    Parameters
-    ----------
-    plant
-        The rig with its effects.
-    names
-        Motor names, one for each joint of the plant and in that order.
-    seed
-        Of the sensors' noise.
-
-    Attributes
-    ----------
-    tension
-        Noise-free wire tensions in N after the last exchange, shape (2 J,): positive and negative
-        wire of each joint in turn.
-    bending
-        Noise-free bending angles in rad as the tracker would read them, shape (J,).
-    goal
-        Where the servos go or stand, rad, shape (J,).
+    `plant`: the rig with its effects.
+    `names`: motor names, one for each joint of the plant and in that order.
+    `seed`: of the sensors' noise.
+    `tension`: noise-free wire tensions in N after the last exchange, shape (2 J,): positive and
+        negative wire of each joint in turn.
+    `bending`: noise-free bending angles in rad as the tracker would read them, shape (J,).
+    `goal`: where the servos go or stand, rad, shape (J,).
     """
 
     def __init__(self, plant: PlantDescription, names: Sequence[str], seed: int) -> None:

@@ -17,19 +17,10 @@ class DeviceFileError(EndoscopeError, ValueError):
 class Section:
     """One mapping of a YAML file.
 
-    Parameters
-    ----------
-    where
-        File and path of keys so far, for messages.
-    content
-        What the file has there.
-    keys
-        The keys that it may have.
-
-    Raises
-    ------
-    DeviceFileError
-        It is not a mapping, or has a key that is unknown.
+    `where`: file and path of keys so far, for messages.
+    `content`: what the file has there.
+    `keys`: the keys that it may have.
+    Raises DeviceFileError: it is not a mapping, or has a key that is unknown.
     """
 
     def __init__(self, where: str, content: Any, keys: Sequence[str]) -> None:
@@ -55,12 +46,8 @@ class Section:
     def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
         """The finite number under ``key``.
 
-        Parameters
-        ----------
-        low, high
-            What it may be, in the unit of the key.
-        default
-            What it is where it is missing; without one it is required.
+        `low`, `high`: what it may be, in the unit of the key.
+        `default`: what it is where it is missing; without one it is required.
         """
         value = self._given(key, default)
         if (
@@ -76,12 +63,8 @@ class Section:
     def whole(self, key: str, low: int, high: int, default: int | None = None) -> int:
         """The whole number under ``key``.
 
-        Parameters
-        ----------
-        low, high
-            What it may be.
-        default
-            What it is where it is missing; without one it is required.
+        `low`, `high`: what it may be.
+        `default`: what it is where it is missing; without one it is required.
         """
         value = self._given(key, default)
         if type(value) is not int or not low <= value <= high:
@@ -93,10 +76,7 @@ class Section:
     def sign(self, key: str, default: int | None = None) -> int:
         """The 1 or -1 under ``key``.
 
-        Parameters
-        ----------
-        default
-            What it is where it is missing; without one it is required.
+        `default`: what it is where it is missing; without one it is required.
         """
         value = self._given(key, default)
         if type(value) is not int or value not in (1, -1):
@@ -115,10 +95,7 @@ class Section:
     def vector(self, key: str, length: int) -> tuple[float, ...]:
         """The ``length`` finite numbers under ``key``.
 
-        Parameters
-        ----------
-        length
-            How many.
+        `length`: how many.
         """
         value = self._given(key, None)
         if (
@@ -147,19 +124,10 @@ class Section:
 def load_section(path: str | Path, what: str, keys: Sequence[str]) -> Section:
     """Read a YAML file that is one mapping.
 
-    Parameters
-    ----------
-    path
-        The file.
-    what
-        What kind of file it should be, for messages.
-    keys
-        The keys that it may have.
-
-    Raises
-    ------
-    DeviceFileError
-        It cannot be read, is not YAML, or has an unknown key.
+    `path`: the file.
+    `what`: what kind of file it should be, for messages.
+    `keys`: the keys that it may have.
+    Raises DeviceFileError: it cannot be read, is not YAML, or has an unknown key.
     """
     try:
         content = load_yaml(path)

@@ -48,21 +48,13 @@ class Place:
 class NextExperiment:
     """The motion that would tell rivals apart.
 
-    Attributes
-    ----------
-    why : str
-    separates : tuple of str
-        Ids.
-    waveform : str
-        Name of the family's member.
-    joint : str
-        The joint that moves.
-    distances : mapping of str to float
-        Smallest predicted distance between rivals for each motion tried, in noise units rms.
-    time, command : tuple
-        The chosen motion: s, and rad for each joint, as rows.
-    joints : tuple of str
-        Columns of `command`.
+    `separates`: ids.
+    `waveform`: name of the family's member.
+    `joint`: the joint that moves.
+    `distances`: smallest predicted distance between rivals for each motion tried, in noise units
+        rms.
+    `time`, `command`: the chosen motion: s, and rad for each joint, as rows.
+    `joints`: columns of `command`.
     """
 
     why: str
@@ -79,18 +71,12 @@ class NextExperiment:
 class Provenance:
     """What a report was made from, so that anybody can make it again.
 
-    Attributes
-    ----------
-    bag, plant : str
-        Files; the plant's is empty where it came from no file.
-    bag_sha256, plant_sha256 : str
-        Of their bytes; of all messages' files of a bag in the order of their names.
-    version : str
-        Of the program.
-    command : str
-        As it was typed; empty where no command line made it.
-    date : str
-        ISO 8601.
+    `bag`, `plant`: files; the plant's is empty where it came from no file.
+    `bag_sha256`, `plant_sha256`: of their bytes; of all messages' files of a bag in the order of
+        their names.
+    `version`: of the program.
+    `command`: as it was typed; empty where no command line made it.
+    `date`: ISO 8601.
     """
 
     bag: str
@@ -106,13 +92,8 @@ class Provenance:
 class ChainCut:
     """Misfit of wires and tip of one joint, in noise units (rms).
 
-    Attributes
-    ----------
-    joint : str
-    by_command : float
-        Driven by the command, through the simulated servo.
-    by_motor : float
-        Driven by the measured shaft.
+    `by_command`: driven by the command, through the simulated servo.
+    `by_motor`: driven by the measured shaft.
     """
 
     joint: str
@@ -129,33 +110,16 @@ class ChainCut:
 class ExplainedCase:
     """All that is known about one recording.
 
-    Attributes
-    ----------
-    recording : Recording
-        As audited.
-    audit : AuditReport
-    explanation : Explanation
-        The engine's own words.
-    verdict : Verdict
-        Of engine and audit together.
-    effects : tuple of NamedEffect
-        Of engine and audit together, most certain first.
-    places : tuple of Place
-    plant : PlantDescription
-        The improved plant: the engine's augmented one with what the audit found in it.
-    ladder : Ladder
-        On held-out blocks of the recording.
-    validation : Ladder
-        On the second recording; empty if none was given.
-    validation_name, baseline_name : str
-        Empty if none was given.
-    next_experiment : NextExperiment or None
-    cuts : tuple of ChainCut
-        Whether the refitted plant does better when the measured motor drives it.
-    band : float
-        Relative tolerance of the plant's parameters.
-    provenance : Provenance or None
-    runtime_s : float
+    `recording`: as audited.
+    `explanation`: the engine's own words.
+    `verdict`: of engine and audit together.
+    `effects`: of engine and audit together, most certain first.
+    `plant`: the improved plant: the engine's augmented one with what the audit found in it.
+    `ladder`: on held-out blocks of the recording.
+    `validation`: on the second recording; empty if none was given.
+    `validation_name`, `baseline_name`: empty if none was given.
+    `cuts`: whether the refitted plant does better when the measured motor drives it.
+    `band`: relative tolerance of the plant's parameters.
     """
 
     recording: Recording

@@ -60,30 +60,15 @@ def explain_recording(
 ) -> Explanation:
     """Explain why a recording differs from the simulation of a plant.
 
-    Parameters
-    ----------
-    recording : Recording
-        As audited: increasing stamps, wrong samples marked invalid.
-    plant : PlantDescription
-        The simulation that the engineer has.
-    baseline : Recording, optional
-        Healthy, of the same rig; only what is new since is explained.
-    band : float
-        Relative tolerance by which a healthy rig's parameters may differ from the plant's.
-    most_effects : int
-        Largest number of effects on a joint that are looked for.
-    given : mapping of joint to GivenPhysics, optional
-        The physics of each joint, if it is not to be searched.
-    left_out : tuple of str
-        Effects whose formulas are not tried, so that a law in none of the known forms can be met.
-    jobs : int
-        Tasks side by side.
-    progress : callable, optional
-        Told in a few words what is being done.
-
-    Returns
-    -------
-    Explanation
+    `recording`: as audited: increasing stamps, wrong samples marked invalid.
+    `plant`: the simulation that the engineer has.
+    `baseline`: healthy, of the same rig; only what is new since is explained.
+    `band`: relative tolerance by which a healthy rig's parameters may differ from the plant's.
+    `most_effects`: largest number of effects on a joint that are looked for.
+    `given`: the physics of each joint, if it is not to be searched.
+    `left_out`: effects whose formulas are not tried, so that a law in none of the known forms can
+        be met.
+    `progress`: told in a few words what is being done.
     """
     tell = progress or (lambda _: None)
     observations = tuple(o for o in with_held_noise(observe(recording, plant)) if o.channels)

@@ -36,12 +36,8 @@ class Verdict(StrEnum):
 class Estimate:
     """A fitted number with its 90 % interval.
 
-    Attributes
-    ----------
-    value, low, high : float
-        In `unit`; `low <= value <= high`.
-    unit : str
-        SI unit.
+    `value`, `low`, `high`: in `unit`; `low <= value <= high`.
+    `unit`: SI unit.
     """
 
     value: float
@@ -54,12 +50,9 @@ class Estimate:
 class NominalEstimate(Estimate):
     """A refitted parameter of the nominal plant.
 
-    Attributes
-    ----------
-    nominal : float
-        Value in the plant file.
-    in_band : bool
-        Whether the value is within the tolerance by which rigs differ from their description.
+    `nominal`: value in the plant file.
+    `in_band`: whether the value is within the tolerance by which rigs differ from their
+        description.
     """
 
     nominal: float
@@ -70,16 +63,10 @@ class NominalEstimate(Estimate):
 class NamedEffect:
     """One effect that was left out of the simulation.
 
-    Attributes
-    ----------
-    id, joint : str
-        Catalogue id and joint name.
-    parameters : mapping of str to Estimate
-        Fitted parameters by name.
-    alternatives : tuple of str
-        Ids that the data cannot tell from this one, nearest first.
-    evidence : mapping of str to float
-        Each key has its meaning in `report.sentences.EVIDENCE`.
+    `id`, `joint`: catalogue id and joint name.
+    `parameters`: fitted parameters by name.
+    `alternatives`: ids that the data cannot tell from this one, nearest first.
+    `evidence`: each key has its meaning in `report.sentences.EVIDENCE`.
     """
 
     id: str
@@ -103,14 +90,9 @@ class NamedEffect:
 class ChannelFit:
     """How well one signal is predicted on samples that were not used for fitting.
 
-    Attributes
-    ----------
-    rmse : float
-        In the signal's unit.
-    noise : float
-        Noise of the signal, in the same unit.
-    ratio : float
-        `rmse / noise`; 1 where nothing is left but noise.
+    `rmse`: in the signal's unit.
+    `noise`: noise of the signal, in the same unit.
+    `ratio`: `rmse / noise`; 1 where nothing is left but noise.
     """
 
     rmse: float
@@ -131,16 +113,10 @@ class ChannelFit:
 class Fitting:
     """How the fit of a joint ended.
 
-    Attributes
-    ----------
-    converged : bool
-        Whether further steps would gain nothing.
-    reason : str
-        Why it went no further, in words.
-    steps : int
-        Of the last fit.
-    at_bounds : tuple of str
-        Numbers that lie at an end of what is allowed.
+    `converged`: whether further steps would gain nothing.
+    `reason`: why it went no further, in words.
+    `steps`: of the last fit.
+    `at_bounds`: numbers that lie at an end of what is allowed.
     """
 
     converged: bool
@@ -153,17 +129,10 @@ class Fitting:
 class Candidate:
     """One composition of effects that was tried.
 
-    Attributes
-    ----------
-    joint : str
-    effects : tuple of str
-        And places of functions.
-    score : float
-        Logarithm of the evidence that it lacks against no effect, in nats; smaller is better.
-    misfit : float
-        Mean squared residual in noise units over all channels; 1 is noise alone.
-    beyond_band : bool
-        Whether nominal numbers were let leave their band.
+    `effects`: and places of functions.
+    `score`: logarithm of the evidence that it lacks against no effect, in nats; smaller is better.
+    `misfit`: mean squared residual in noise units over all channels; 1 is noise alone.
+    `beyond_band`: whether nominal numbers were let leave their band.
     """
 
     joint: str
@@ -177,34 +146,21 @@ class Candidate:
 class UnknownTerm:
     """A function of one state that the catalogue does not have, fitted in the simulator.
 
-    Attributes
-    ----------
-    joint : str
-        Where it acts.
-    place : str
-        Name in the table of places.
-    nodes, values, deviation : array (N,)
-        The state, the function and its standard deviation.
-    expression : str
-        The formula that comes nearest.
-    formula : array (N,)
-        Its values.
-    formula_share : float
-        Share of what the function does that the formula does.
-    formula_is_as_good : bool
-        Whether the recording does not tell it from the function.
-    explained : float
-        Share of the excess misfit that the function removes.
-    rivals : tuple of str
-        Other names that the recording does not tell from it, nearest first.
-    siblings : tuple of str
-        Nearest effects of the catalogue, nearest first.
-    multiplies : bool
-        Whether others at the same point of the chain are multiplied by one plus this function.
-    lag_s : float, optional
-        Time constant of an argument that lags.
-    factors : tuple of UnknownTerm
-        Functions of another state that multiply this one: both together are one of two states.
+    `joint`: where it acts.
+    `place`: name in the table of places.
+    `nodes`, `values`, `deviation` (N,): the state, the function and its standard deviation.
+    `expression`: the formula that comes nearest.
+    `formula` (N,): its values.
+    `formula_share`: share of what the function does that the formula does.
+    `formula_is_as_good`: whether the recording does not tell it from the function.
+    `explained`: share of the excess misfit that the function removes.
+    `rivals`: other names that the recording does not tell from it, nearest first.
+    `siblings`: nearest effects of the catalogue, nearest first.
+    `multiplies`: whether others at the same point of the chain are multiplied by one plus this
+        function.
+    `lag_s`: time constant of an argument that lags.
+    `factors`: functions of another state that multiply this one: both together are one of two
+        states.
     """
 
     joint: str
@@ -248,28 +204,18 @@ class UnknownTerm:
 class Explanation:
     """Everything the engine says about one recording.
 
-    Attributes
-    ----------
-    verdict : Verdict
-        Without the audit's findings: a caller that found a fault of the recording overrides it.
-    effects : tuple of NamedEffect
-        What was left out, most certain first; empty if nothing was.
-    parameters : mapping of joint name to mapping of parameter name to NominalEstimate
-        Nominal parameters of the final fit.
-    nominal, refitted, augmented : PlantDescription
-        The plant as given, with its parameters refitted, and with the named effects.
-    fit : mapping of 'nominal', 'refitted', 'augmented' to mapping of signal to ChannelFit
-        Signals are written `wires/measured_js:wire_x_pos`.
-    candidates : tuple of Candidate
-        Compositions that were refitted, best first.
-    unknown : UnknownTerm or None
-        The missing term for `unknown_physics`.
-    adequate : bool
-        Whether the augmented plant leaves nothing but noise and small errors of form.
-    beyond_form : float
-        What it leaves over what rigs of another form leave, of the worst joint.
-    fitting : mapping of joint name to Fitting
-        How the final fits ended.
+    `verdict`: without the audit's findings: a caller that found a fault of the recording overrides
+        it.
+    `effects`: what was left out, most certain first; empty if nothing was.
+    `parameters`: nominal parameters of the final fit.
+    `nominal`, `refitted`, `augmented`: the plant as given, with its parameters refitted, and with
+        the named effects.
+    `fit`: signals are written `wires/measured_js:wire_x_pos`.
+    `candidates`: compositions that were refitted, best first.
+    `unknown`: the missing term for `unknown_physics`.
+    `adequate`: whether the augmented plant leaves nothing but noise and small errors of form.
+    `beyond_form`: what it leaves over what rigs of another form leave, of the worst joint.
+    `fitting`: how the final fits ended.
     """
 
     verdict: Verdict

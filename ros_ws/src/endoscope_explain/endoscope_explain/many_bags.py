@@ -48,12 +48,8 @@ class TogetherError(EndoscopeError, ValueError):
 class Reported:
     """A finished report.
 
-    Attributes
-    ----------
-    files : mapping of str to bytes
-        By name.
-    told : str
-        What a person reads in the terminal; its first line is the verdict's sentence.
+    `files`: by name.
+    `told`: what a person reads in the terminal; its first line is the verdict's sentence.
     """
 
     files: Mapping[str, bytes]
@@ -92,10 +88,8 @@ def explained_cases(
 ) -> list[ExplainedCase]:
     """Explain bags side by side, of one rig where they have the `same_physics`.
 
-    Raises
-    ------
-    EndoscopeError
-        If a recording cannot be used, or what was asked for does not go together.
+    Raises EndoscopeError: if a recording cannot be used, or what was asked for does not go
+        together.
     """
     sources = _prepared(sources, jobs, same_physics, progress)
     if len(sources) == 1:
@@ -111,10 +105,7 @@ def explained_cases(
 def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = None) -> Reported:
     """Explain one bag.
 
-    Raises
-    ------
-    BagError
-        If a recording cannot be used.
+    Raises BagError: if a recording cannot be used.
     """
     case = explained_case(sources, jobs, progress)
     with tempfile.TemporaryDirectory() as scratch:
@@ -136,31 +127,16 @@ def explain_bags(
 ) -> dict[str, Reported]:
     """Explain bags and write their reports, all or none.
 
-    Parameters
-    ----------
-    sources : sequence of Sources
-    out : Path
-        New or empty folder: one report's own, or that of one folder for each bag.
-    jobs : int
-        Processes on this machine.
-    dask_address : str, optional
-        Scheduler of a cluster whose workers see the bags under the same paths.
-    same_physics : bool
-        Whether all bags show one rig, so that one choice of effects has to explain all of them.
-    say : callable
-        Told what was found.
-    progress : callable, optional
-        Told in a few words what is being done.
-
-    Returns
-    -------
-    dict of str to Reported
-        By the bag's name, which is that of its folder where there are several.
-
-    Raises
-    ------
-    EndoscopeError
-        If a recording, the folder or the cluster cannot be used; nothing is written then.
+    `out`: new or empty folder: one report's own, or that of one folder for each bag.
+    `jobs`: processes on this machine.
+    `dask_address`: scheduler of a cluster whose workers see the bags under the same paths.
+    `same_physics`: whether all bags show one rig, so that one choice of effects has to explain all
+        of them.
+    `say`: told what was found.
+    `progress`: told in a few words what is being done.
+    Returns: by the bag's name, which is that of its folder where there are several.
+    Raises EndoscopeError: if a recording, the folder or the cluster cannot be used; nothing is
+        written then.
     """
     require_free_directory(out)
     if same_physics or dask_address is None:

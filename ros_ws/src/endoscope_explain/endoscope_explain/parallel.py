@@ -17,18 +17,8 @@ def parallel_map[Task, Result](
     Threads are enough, as the compiled physics and linear algebra, where the time goes, let others
     run meanwhile; and closures over large recordings need not travel to other processes.
 
-    Parameters
-    ----------
-    function : callable
-    tasks : sequence
-    jobs : int
-        Number of threads.
-
-    Raises
-    ------
-    BaseException
-        What `function` raised first, in the order of the tasks; tasks that were not begun are
-        given up then.
+    Raises BaseException: what `function` raised first, in the order of the tasks; tasks that were
+        not begun are given up then.
     """
     if jobs <= 1 or len(tasks) <= 1:
         return [function(task) for task in tasks]

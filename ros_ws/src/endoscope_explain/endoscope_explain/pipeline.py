@@ -41,34 +41,19 @@ Engine = Callable[..., Explanation]
 class Sources:
     """What one explanation is made from.
 
-    Attributes
-    ----------
-    bag : Path
-        The recording to explain.
-    plant : PlantDescription
-        The simulation that an engineer has.
-    baseline : Path or None
-        A healthy recording of the same rig.
-    validate : Path or None
-        A second recording of the same rig to judge on.
-    without : collection of str
-        Topics that may be missing.
-    quick : bool
-        Whether to leave out the black boxes and the next experiment.
-    band : float
-        Relative tolerance of the plant's parameters.
-    most_effects : int
-        Largest number of effects on a joint that are looked for.
-    given : mapping of joint to GivenPhysics, or None
-        The physics of each joint, if it is not to be searched.
-    namespace : str or None
-        Of the rig's topics, where a bag has several rigs.
-    rig : Rig or None
-        What was recorded, where that is not what the bag says.
-    plant_file : Path or None
-        Where the plant was read from.
-    command : str
-        As it was typed.
+    `bag`: the recording to explain.
+    `plant`: the simulation that an engineer has.
+    `baseline`: a healthy recording of the same rig.
+    `validate`: a second recording of the same rig to judge on.
+    `without`: topics that may be missing.
+    `quick`: whether to leave out the black boxes and the next experiment.
+    `band`: relative tolerance of the plant's parameters.
+    `most_effects`: largest number of effects on a joint that are looked for.
+    `given`: the physics of each joint, if it is not to be searched.
+    `namespace`: of the rig's topics, where a bag has several rigs.
+    `rig`: what was recorded, where that is not what the bag says.
+    `plant_file`: where the plant was read from.
+    `command`: as it was typed.
     """
 
     bag: Path
@@ -90,12 +75,7 @@ class Sources:
 class Inputs:
     """The sources, read and audited.
 
-    Attributes
-    ----------
-    sources : Sources
-    audit : AuditReport
-    baseline, validation : Recording or None
-        As audited.
+    `baseline`, `validation`: as audited.
     """
 
     sources: Sources
@@ -120,10 +100,7 @@ class MisreadRecordingError(BagError):
 def require_as_named(path: Path, audit: AuditReport) -> None:
     """Refuse a recording that nothing can be fitted to.
 
-    Raises
-    ------
-    MisreadRecordingError
-        Says in one line what is wrong, and what would make it fit.
+    Raises MisreadRecordingError: says in one line what is wrong, and what would make it fit.
     """
     if audit.unusable:
         worst = audit.faults()[0]
@@ -133,10 +110,7 @@ def require_as_named(path: Path, audit: AuditReport) -> None:
 def read_inputs(sources: Sources) -> Inputs:
     """Read and audit all recordings of a case.
 
-    Raises
-    ------
-    BagError
-        If a recording cannot be used; the message names it.
+    Raises BagError: if a recording cannot be used; the message names it.
     """
 
     def read(path: Path, plant: PlantDescription) -> Recording:

@@ -38,15 +38,8 @@ def physics_of_all(
 ) -> list[GivenJoints]:
     """Read several recordings of a rig and choose the effects that explain all of them.
 
-    Returns
-    -------
-    list of mapping of joint name to GivenPhysics
-        For each recording.
-
-    Raises
-    ------
-    BagError
-        If a recording cannot be used, or has other joints than the first one.
+    Returns: for each recording.
+    Raises BagError: if a recording cannot be used, or has other joints than the first one.
     """
     recordings: list[dict[str, Anchors]] = []
     with threadpool_limits(1, 'blas'):
@@ -80,19 +73,10 @@ def shared_effects(
 ) -> list[GivenJoints]:
     """Choose effects for all recordings of a rig together.
 
-    Parameters
-    ----------
-    recordings : sequence of mapping of joint name to anchors
-        Nominal fits of each joint of each recording; see `search.refit.look`.
-    most_effects : int
-        Largest number of effects on a joint.
-    jobs : int
-    tell : callable
-
-    Returns
-    -------
-    list of mapping of joint name to GivenPhysics
-        For each recording; the effects are those of all, in the order in which they were added.
+    `recordings`: nominal fits of each joint of each recording; see `search.refit.look`.
+    `most_effects`: largest number of effects on a joint.
+    Returns: for each recording; the effects are those of all, in the order in which they were
+        added.
     """
     given: list[dict[str, GivenPhysics]] = [{} for _ in recordings]
     for joint in recordings[0]:
@@ -110,12 +94,8 @@ def searched(
 ) -> tuple[SharedChoice, SharedChoice | None]:
     """Add effects one by one to the best few choices: the best single effect may mislead.
 
-    Returns
-    -------
-    found : SharedChoice
-        With the effects that gain more than another form would.
-    refused : SharedChoice or None
-        The best one with an effect more, if another form may gain as much.
+    Returns `found`: with the effects that gain more than another form would.
+    Returns `refused`: the best one with an effect more, if another form may gain as much.
     """
     best, beam = nominal, [nominal]
     most_effects += len(lacking(nominal.recordings[0][0].model.base))

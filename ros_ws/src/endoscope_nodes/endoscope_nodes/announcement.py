@@ -21,10 +21,7 @@ class Announcement:
     That is when they have found each other and none of them waits for anything.  Where that takes
     longer than 5 s, it says what is waited for.
 
-    Parameters
-    ----------
-    runtime
-        With all its nodes.
+    `runtime`: with all its nodes.
     """
 
     def __init__(self, runtime: 'Runtime') -> None:

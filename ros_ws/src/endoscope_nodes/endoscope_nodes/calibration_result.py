@@ -39,20 +39,12 @@ def successful_result(
 ) -> DiagnosticArray:
     """Say which class was found.
 
-    Parameters
-    ----------
-    stamp_ns
-        Of the message, in ns.
-    verdict
-        What the classifier said.
-    backlash
-        Size in rad as the tracker measured it; None where it could not.
-    duration
-        Of the whole calibration, in s.
-    plants
-        Identified parameters of each joint; empty where they were not asked for.
-    zeros
-        What the zero of each load cell is off by, in N.
+    `stamp_ns`: of the message, in ns.
+    `verdict`: what the classifier said.
+    `backlash`: size in rad as the tracker measured it; None where it could not.
+    `duration`: of the whole calibration, in s.
+    `plants`: identified parameters of each joint; empty where they were not asked for.
+    `zeros`: what the zero of each load cell is off by, in N.
     """
     values: dict[str, object] = {'class_deg': verdict.class_deg, 'probability': verdict.probability}
     values |= {f'probability_{size}_deg': p for size, p in verdict.probabilities.items()}
@@ -118,17 +110,10 @@ def _zero_values(zeros: 'NDArray[np.float64] | None') -> dict[str, object]:
 def numbers_of(result: DiagnosticArray) -> JointState:
     """Return the figures of a result as numbers, which programs that plot can show.
 
-    Parameters
-    ----------
-    result
-        Of a success, an abort or a refusal.
-
-    Returns
-    -------
-    JointState
-        `name` is a figure's key, `position` its value in SI: ``class`` in rad, the others as in the
-        result; ``success`` is 1 or 0. What is no number, and what is there in degrees once more,
-        is left out.
+    `result`: of a success, an abort or a refusal.
+    Returns: `name` is a figure's key, `position` its value in SI: ``class`` in rad, the others as
+        in the result; ``success`` is 1 or 0. What is no number, and what is there in degrees once
+        more, is left out.
     """
     [status] = result.status
     numbers = {'success': float(status.level == OK)}

@@ -21,10 +21,8 @@ _SHORTEST_S = 0.2
 class SampledMotion:
     """Desired angles and velocities at the ticks of a motion.
 
-    Parameters
-    ----------
-    angle, velocity
-        rad and rad/s, shape (N, J), one row a tick; NaN for a joint that stays where it is.
+    `angle`, `velocity`: rad and rad/s, shape (N, J), one row a tick; NaN for a joint that stays
+        where it is.
     """
 
     def __init__(self, angle: Array, velocity: Array) -> None:
@@ -37,12 +35,8 @@ class SampledMotion:
     def at(self, tick: int, stay: Sequence[float]) -> tuple[list[float], list[float]]:
         """Angles and velocities at a tick.
 
-        Parameters
-        ----------
-        tick
-            Which; the last row holds beyond the end.
-        stay
-            Where joints are that do not move, rad, shape (J,).
+        `tick`: which; the last row holds beyond the end.
+        `stay`: where joints are that do not move, rad, shape (J,).
         """
         row = min(tick, len(self._angle) - 1)
         angle = [s if math.isnan(a) else a for a, s in zip(self._angle[row], stay, strict=True)]
@@ -52,17 +46,9 @@ class SampledMotion:
 def sample_motion(name: str, joints: Sequence[str], tick: float) -> SampledMotion:
     """Sample a named motion for some of the joints.
 
-    Parameters
-    ----------
-    joints
-        Those that move; the others stay where they are.
-    tick
-        In s.
-
-    Raises
-    ------
-    ValueError
-        There is no motion of that name.
+    `joints`: those that move; the others stay where they are.
+    `tick`: in s.
+    Raises ValueError: there is no motion of that name.
     """
     motion = motion_by_name(name)
     time = np.arange(round(motion.duration / tick) + 1) * tick
@@ -79,10 +65,7 @@ def sample_motion(name: str, joints: Sequence[str], tick: float) -> SampledMotio
 def load_command_file(path: Path, tick: float) -> SampledMotion:
     """Sample a command file, interpolating between its rows.
 
-    Raises
-    ------
-    CommandFileError
-        The file cannot be played.
+    Raises CommandFileError: the file cannot be played.
     """
     return SampledMotion(*read_command_file(path, JOINTS).sampled(tick))
 
@@ -92,14 +75,9 @@ def approach(
 ) -> SampledMotion:
     """A minimum-jerk motion of all joints from one pose to another.
 
-    Parameters
-    ----------
-    start, end
-        rad, shape (J,).
-    speed
-        Largest speed in rad/s.
-    tick
-        In s.
+    `start`, `end`: rad, shape (J,).
+    `speed`: largest speed in rad/s.
+    `tick`: in s.
     """
     distance = float(np.max(np.abs(np.subtract(end, start))))
     duration = max(_SHORTEST_S, _PEAK_OF_MEAN * distance / speed)

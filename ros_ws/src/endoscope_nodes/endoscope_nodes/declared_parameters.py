@@ -25,17 +25,11 @@ def declare_parameters[P](
 ) -> P:
     """Declare every field of the dataclass ``kind`` on ``node`` and return its checked values.
 
-    Parameters
-    ----------
-    on_change
-        Called with the new values after a dynamic parameter was set.
-    check
-        Called with the new values before they are taken; raises `ParameterError` to refuse them.
-
-    Raises
-    ------
-    ParameterError
-        A value is NaN or infinite, of the wrong type, out of range, or not one of the choices.
+    `on_change`: called with the new values after a dynamic parameter was set.
+    `check`: called with the new values before they are taken; raises `ParameterError` to refuse
+        them.
+    Raises ParameterError: a value is NaN or infinite, of the wrong type, out of range, or not one
+        of the choices.
     """
     fields = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
     hints = typing.get_type_hints(kind)
@@ -102,10 +96,7 @@ def check_overrides(nodes: list[Node]) -> None:
     An override given to every node of a composition alike (without a node's name) need only be
     known to one of them.
 
-    Raises
-    ------
-    ParameterError
-        Names the override and the nearest valid parameter.
+    Raises ParameterError: names the override and the nearest valid parameter.
     """
     declared = {node: set(node._parameters) for node in nodes}
     given = {node: set(node._parameter_overrides) for node in nodes}

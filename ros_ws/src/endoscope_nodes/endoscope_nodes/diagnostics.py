@@ -42,12 +42,8 @@ def _text(value: object) -> str:
 class Diagnostics:
     """Collects the reports of a node's subcomponents and publishes them at 1 Hz.
 
-    Parameters
-    ----------
-    node
-        Its name, with namespace, is the first half of every status name.
-    ticker
-        Gives the pace and the stamps.
+    `node`: its name, with namespace, is the first half of every status name.
+    `ticker`: gives the pace and the stamps.
     """
 
     def __init__(self, node: Node, ticker: Ticker) -> None:

@@ -30,10 +30,8 @@ def stay_on_this_machine() -> None:
     them.  `ROS_AUTOMATIC_DISCOVERY_RANGE` in the environment (`SUBNET` for other machines) wins,
     and so do `ROS_STATIC_PEERS` and a profile of one's own for Fast DDS.
 
-    Raises
-    ------
-    DiscoveryRangeError
-        The range is none that ROS 2 knows, for example ``localhost`` in lower case.
+    Raises DiscoveryRangeError: the range is none that ROS 2 knows, for example ``localhost`` in
+        lower case.
     """
     # ROS 2 takes an empty range for SUBNET.
     chosen = os.environ.get(RANGE) or 'LOCALHOST'

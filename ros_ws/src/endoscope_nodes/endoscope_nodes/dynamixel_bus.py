@@ -15,19 +15,10 @@ def build_motors(
 ) -> DynamixelMotors:
     """Make the bus that the parameters describe.
 
-    Parameters
-    ----------
-    parameters
-        Of the motor driver.
-    names
-        The motors.
-    goal_timeout
-        Time in s after which a goal that the node has not renewed is given up.
-
-    Raises
-    ------
-    ParameterError
-        They do not fit together.
+    `parameters`: of the motor driver.
+    `names`: the motors.
+    `goal_timeout`: time in s after which a goal that the node has not renewed is given up.
+    Raises ParameterError: they do not fit together.
     """
     p = parameters
     for name in ('servo_ids', 'servo_directions', 'servo_zeros'):

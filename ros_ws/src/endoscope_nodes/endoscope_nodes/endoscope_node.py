@@ -25,25 +25,13 @@ NAMESPACE = 'endoscope'
 class EndoscopeNode(Node):
     """A node in the ``/endoscope`` namespace that lives in a :class:`Runtime`.
 
-    Parameters
-    ----------
-    name
-        Name of the node, without namespace.
-    runtime
-        The process it lives in.
-
-    Attributes
-    ----------
-    ticker
-        The beat and the time that all nodes of the process share.
-    rig
-        What stands on the table, the same for all nodes of the process.
-    diagnostics
-        Reports published on ``/diagnostics``.
-    exit_code
-        What the process should say when it ends; 0 unless the node sets it.
-    given
-        Values of its parameters that are not the defaults, as they were when it was built.
+    `name`: name of the node, without namespace.
+    `runtime`: the process it lives in.
+    `ticker`: the beat and the time that all nodes of the process share.
+    `rig`: what stands on the table, the same for all nodes of the process.
+    `diagnostics`: reports published on ``/diagnostics``.
+    `exit_code`: what the process should say when it ends; 0 unless the node sets it.
+    `given`: values of its parameters that are not the defaults, as they were when it was built.
     """
 
     def __init__(self, name: str, runtime: 'Runtime') -> None:
@@ -123,10 +111,7 @@ class EndoscopeNode(Node):
     def require_real_time(self, device: str) -> None:
         """Refuse a real device in simulated time.
 
-        Raises
-        ------
-        ParameterError
-            Time is simulated.
+        Raises ParameterError: time is simulated.
         """
         if self.ticker.simulated:
             raise ParameterError(

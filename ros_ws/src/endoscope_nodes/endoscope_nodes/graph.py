@@ -36,12 +36,8 @@ def compose(runtime: Runtime, real_time: bool = False) -> None:
     Time is simulated where all devices are and the command line does not say otherwise: in
     lock-step a busy machine makes the simulated slave slower, and nothing else.
 
-    Parameters
-    ----------
-    runtime
-        Without nodes.
-    real_time
-        Whether to run in real time all the same.
+    `runtime`: without nodes.
+    `real_time`: whether to run in real time all the same.
     """
     if not real_time and _is_simulated(runtime):
         runtime.keep_lock_step(

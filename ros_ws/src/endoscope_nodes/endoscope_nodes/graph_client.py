@@ -55,10 +55,7 @@ class GraphClient(GraphListener):
 
     Parameters are those of :class:`endoscope_nodes.graph_listener.GraphListener`.
 
-    Attributes
-    ----------
-    told
-        Called with what is waited for, in words, before an order can be given.
+    `told`: called with what is waited for, in words, before an order can be given.
     """
 
     def __init__(
@@ -79,10 +76,7 @@ class GraphClient(GraphListener):
     def find(self, patience_s: float) -> None:
         """Wait until the supervisor is heard and hears.
 
-        Raises
-        ------
-        NoGraphError
-            Nobody does within so long.
+        Raises NoGraphError: nobody does within so long.
         """
         if self.wait_until(lambda: bool(self.state) and self._is_heard(), patience_s):
             return
@@ -111,10 +105,8 @@ class GraphClient(GraphListener):
 
         Parameters are those of :meth:`ask_and_see`.
 
-        Raises
-        ------
-        GraphRefusedError
-            With the supervisor's reason, or because the state is not reached in time.
+        Raises GraphRefusedError: with the supervisor's reason, or because the state is not reached
+            in time.
         """
         target = _OPENS[command]
         asked_ns = time.time_ns()
@@ -135,19 +127,11 @@ class GraphClient(GraphListener):
     ) -> str:
         """Give a state command, and see whether the state lasts; that state.
 
-        Parameters
-        ----------
-        command
-            Of the supervisor.
-        patience_s
-            For how long to wait.
-        withdrawn
-            Whether it is not wanted any more, so that it is not given again.
-
-        Raises
-        ------
-        GraphRefusedError
-            As of :meth:`ask`, or because a node's trouble came to light at once; with its cause.
+        `command`: of the supervisor.
+        `patience_s`: for how long to wait.
+        `withdrawn`: whether it is not wanted any more, so that it is not given again.
+        Raises GraphRefusedError: as of :meth:`ask`, or because a node's trouble came to light at
+            once; with its cause.
         """
         state = self.ask(command, patience_s, withdrawn)
         if state == 'ENABLED' and self.wait_until(lambda: self.state != state, _STEADY_S):
@@ -204,10 +188,7 @@ class GraphClient(GraphListener):
 
         Parameters are those of :meth:`ask_and_see`.
 
-        Raises
-        ------
-        GraphRefusedError
-            With the reason of the supervisor or of calibration.
+        Raises GraphRefusedError: with the reason of the supervisor or of calibration.
         """
         known = self.known_orders(patience_s)
         what = 'the way home: calibration does not begin it'
@@ -223,10 +204,7 @@ class GraphClient(GraphListener):
     def known_orders(self, patience_s: float = PATIENCE_S) -> frozenset[int]:
         """Ids of the orders that calibration has been given; what it is asked next is none of them.
 
-        Raises
-        ------
-        GraphRefusedError
-            Calibration is not heard.
+        Raises GraphRefusedError: calibration is not heard.
         """
         self.wait_for(lambda: bool(self.orders), 'calibration', patience_s)
         return frozenset(self.orders)
@@ -266,17 +244,11 @@ class GraphClient(GraphListener):
     ) -> Health:
         """Calibrate, and wait for the result.
 
-        Parameters
-        ----------
-        progress
-            Called with what is being done and the share that is done, as often as it is heard.
-        patience_s
-            For how long calibration may say nothing.
-
-        Raises
-        ------
-        GraphRefusedError
-            It was refused or aborted, or the tube is of no known class; with the reason.
+        `progress`: called with what is being done and the share that is done, as often as it is
+            heard.
+        `patience_s`: for how long calibration may say nothing.
+        Raises GraphRefusedError: it was refused or aborted, or the tube is of no known class; with
+            the reason.
         """
         known = self.known_orders(patience_s)
         try:
@@ -298,10 +270,7 @@ class GraphClient(GraphListener):
     def trigger(self, service: str, patience_s: float = PATIENCE_S) -> str:
         """Call a service that only begins or ends something; what it answers.
 
-        Raises
-        ------
-        GraphRefusedError
-            With the node's reason.
+        Raises GraphRefusedError: with the node's reason.
         """
         answer = self.call(Trigger, service, Trigger.Request(), patience_s)
         if not answer.success:
@@ -317,10 +286,7 @@ class GraphClient(GraphListener):
     def call(self, kind: type, service: str, request: Any, patience_s: float = PATIENCE_S) -> Any:
         """Call a service and wait for its answer.
 
-        Raises
-        ------
-        NoGraphError
-            Nobody serves it, or nobody answers.
+        Raises NoGraphError: nobody serves it, or nobody answers.
         """
         client = self.client(kind, service)
         if not self.wait_until(client.service_is_ready, patience_s):
@@ -330,10 +296,7 @@ class GraphClient(GraphListener):
     def answer(self, future: Future, what: str, patience_s: float = PATIENCE_S) -> Any:
         """Wait for the answer to a call.
 
-        Raises
-        ------
-        NoGraphError
-            Nobody answers.
+        Raises NoGraphError: nobody answers.
         """
         if not self.wait_until(future.done, patience_s):
             raise NoGraphError(f'{what} has not answered for {patience_s:g} s')

@@ -55,18 +55,11 @@ class NoGraphError(GraphRefusedError):
 class Health:
     """What a node last said of a part of itself on ``/diagnostics``, or of a result.
 
-    Attributes
-    ----------
-    level
-        0 for good health, 1 for a warning, 2 for an error.
-    message
-        In words.
-    values
-        By key.
-    stamp_ns, received_ns
-        When it was said by the graph's clock, and heard by this machine's.
-    session
-        Motion session that it is of, for results.
+    `level`: 0 for good health, 1 for a warning, 2 for an error.
+    `message`: in words.
+    `values`: by key.
+    `stamp_ns`, `received_ns`: when it was said by the graph's clock, and heard by this machine's.
+    `session`: motion session that it is of, for results.
     """
 
     level: int
@@ -80,32 +73,19 @@ class Health:
 class GraphListener(ClosedOnExit):
     """Listens to a graph; it hears only while it waits for something.
 
-    Parameters
-    ----------
-    node
-        In the namespace of the graph, by which to listen.
-    serve
-        Lets the node be served for so many seconds; what is waited for is looked at in between.
-    clock
-        Time in s by which patience is measured.
-
-    Attributes
-    ----------
-    state, session
-        Operating state and motion session as last heard; empty before.
-    state_ns, open_ns
-        When the state was heard, and when a session was last heard to be open.
-    graph_ns
-        The supervisor's time when it last spoke; 0 before.
-    health
-        By status, without the namespace: ``supervisor: operating state``.
-    heard_ns
-        When each node was last heard on ``/diagnostics``.
-    calibration, compensator
-        Last result of a calibration, and the model in force; None before the first.
-    orders
-        How each order to calibrate or to go home has fared, by its id; empty until calibration is
-        heard.
+    `node`: in the namespace of the graph, by which to listen.
+    `serve`: lets the node be served for so many seconds; what is waited for is looked at in
+        between.
+    `clock`: time in s by which patience is measured.
+    `state`, `session`: operating state and motion session as last heard; empty before.
+    `state_ns`, `open_ns`: when the state was heard, and when a session was last heard to be open.
+    `graph_ns`: the supervisor's time when it last spoke; 0 before.
+    `health`: by status, without the namespace: ``supervisor: operating state``.
+    `heard_ns`: when each node was last heard on ``/diagnostics``.
+    `calibration`, `compensator`: last result of a calibration, and the model in force; None before
+        the first.
+    `orders`: how each order to calibrate or to go home has fared, by its id; empty until
+        calibration is heard.
     """
 
     def __init__(
@@ -243,10 +223,7 @@ class GraphListener(ClosedOnExit):
     ) -> None:
         """Listen until something has come true.
 
-        Raises
-        ------
-        GraphRefusedError
-            It has not within so long.
+        Raises GraphRefusedError: it has not within so long.
         """
         if not self.wait_until(condition, patience_s):
             raise GraphRefusedError(f'waited {patience_s:g} s in vain for {what}')

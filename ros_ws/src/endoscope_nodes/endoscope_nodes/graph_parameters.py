@@ -41,16 +41,10 @@ class UnknownParameterError(EndoscopeError, ValueError):
 class GraphParameter:
     """A parameter as its node has it.
 
-    Attributes
-    ----------
-    node, name
-        Whose, and which.
-    value
-        Now.
-    description
-        What it means, its unit at the end in brackets, and within what bounds it may be.
-    type
-        One of rcl_interfaces/msg/ParameterType.
+    `node`, `name`: whose, and which.
+    `value`: now.
+    `description`: what it means, its unit at the end in brackets, and within what bounds it may be.
+    `type`: one of rcl_interfaces/msg/ParameterType.
     """
 
     node: str
@@ -62,10 +56,7 @@ class GraphParameter:
     def parse(self, text: str) -> Any:
         """Read a value of this parameter's type.
 
-        Raises
-        ------
-        UnknownParameterError
-            It is none.
+        Raises UnknownParameterError: it is none.
         """
         kind, wanted = _WANTED[self.type]
         if self.type >= Kind.PARAMETER_BOOL_ARRAY or self.type == Kind.PARAMETER_BYTE_ARRAY:
@@ -101,10 +92,7 @@ def _whole(kind: type, value: Any) -> Any:
 def node_and_parameter(name: str) -> tuple[str, str]:
     """Split ``NODE.PARAMETER``.
 
-    Raises
-    ------
-    UnknownParameterError
-        It is not of that form.
+    Raises UnknownParameterError: it is not of that form.
     """
     node, _, parameter = name.strip('/').partition('.')
     if not node or not parameter:
@@ -117,12 +105,9 @@ def read_parameter(
 ) -> GraphParameter:
     """Ask a node for a parameter called ``NODE.PARAMETER``.
 
-    Raises
-    ------
-    UnknownParameterError
-        There is no such node or parameter; with the nearest that there is.
-    NoGraphError
-        The node does not answer.
+    Raises UnknownParameterError: there is no such node or parameter; with the nearest that there
+        is.
+    Raises NoGraphError: the node does not answer.
     """
     node, parameter = node_and_parameter(name)
     own = _names(client, node, patience_s)
@@ -136,12 +121,8 @@ def read_parameters(
 ) -> list[GraphParameter]:
     """Ask a node for all of its parameters, in the order of their names.
 
-    Raises
-    ------
-    UnknownParameterError
-        There is no such node; with the nearest that there is.
-    NoGraphError
-        The node does not answer.
+    Raises UnknownParameterError: there is no such node; with the nearest that there is.
+    Raises NoGraphError: the node does not answer.
     """
     return _read(client, node, sorted(_names(client, node, patience_s)), patience_s)
 
@@ -198,12 +179,8 @@ def set_parameters(
 ) -> None:
     """Give a node new values of some parameters: all of them or, where it refuses one, none.
 
-    Raises
-    ------
-    GraphRefusedError
-        With the node's reason.
-    NoGraphError
-        The node does not answer.
+    Raises GraphRefusedError: with the node's reason.
+    Raises NoGraphError: the node does not answer.
     """
     kind, service = SetParametersAtomically, f'{node}/set_parameters_atomically'
     result = client.call(kind, service, _request(values), patience_s).result

@@ -27,15 +27,8 @@ def handle_senders(node: Node) -> list[str]:
 class HandleSender:
     """The one sender of ``master/measured_js`` and ``master/clutch``, in whichever thread.
 
-    Parameters
-    ----------
-    node
-        In the namespace of the graph.
-
-    Attributes
-    ----------
-    clutch
-        Whether it is held, as was last said.
+    `node`: in the namespace of the graph.
+    `clutch`: whether it is held, as was last said.
     """
 
     def __init__(self, node: Node) -> None:

@@ -17,12 +17,9 @@ _LONGEST_S = 5.0
 def is_heard(node: str, namespace: str, longest_s: float) -> bool:
     """Listen to ``/diagnostics`` until a node speaks.
 
-    Parameters
-    ----------
-    node, namespace
-        Its name, which a status bears before the colon, alone or behind the namespace.
-    longest_s
-        For how long to listen, in s; a node speaks once a second.
+    `node`, `namespace`: its name, which a status bears before the colon, alone or behind the
+        namespace.
+    `longest_s`: for how long to listen, in s; a node speaks once a second.
     """
     # Only now: whoever asks for help need not wait for ROS.
     import rclpy

@@ -12,12 +12,8 @@ class InFlight:
     The middleware hands a message to its readers one after the other.  On a busy machine one of
     them may be told of it later than the next tick, which would then depend on the machine.
 
-    Attributes
-    ----------
-    count
-        Messages on their way, once for each reader.
-    landed
-        Called when the last one has been dealt with.
+    `count`: messages on their way, once for each reader.
+    `landed`: called when the last one has been dealt with.
     """
 
     def __init__(self) -> None:

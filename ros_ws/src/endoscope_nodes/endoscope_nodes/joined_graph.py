@@ -25,10 +25,7 @@ LAST_DOMAIN = 232
 def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterator[GraphClient]:
     """Join the graph of a namespace as a node of this name, for as long as the block lasts.
 
-    Raises
-    ------
-    EndoscopeError
-        The namespace or the domain cannot be one.
+    Raises EndoscopeError: the namespace or the domain cannot be one.
     """
     with joined_node(name, namespace, domain) as node:
         executor = SingleThreadedExecutor(context=node.context)
@@ -50,10 +47,7 @@ def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterat
 def joined_node(name: str, namespace: str, domain: int | None = None) -> Iterator[Node]:
     """A node of this name in the namespace of a graph, which its owner has to serve.
 
-    Raises
-    ------
-    EndoscopeError
-        The namespace or the domain cannot be one.
+    Raises EndoscopeError: the namespace or the domain cannot be one.
     """
     stay_on_this_machine()
     log_as_asked()

@@ -30,14 +30,10 @@ _STAMP_END = 12
 class JointSample(NamedTuple):
     """One JointState, values in the order of the names that the subscriber asked for.
 
-    Attributes
-    ----------
-    stamp_ns
-        Header stamp in ns.
-    position, velocity, effort
-        rad, rad/s, N m (N for wires); empty where the message has none.
-    session
-        Frame of the header: for commands, the motion session that they belong to.
+    `stamp_ns`: header stamp in ns.
+    `position`, `velocity`, `effort`: rad, rad/s, N m (N for wires); empty where the message has
+        none.
+    `session`: frame of the header: for commands, the motion session that they belong to.
     """
 
     stamp_ns: int
@@ -50,14 +46,9 @@ class JointSample(NamedTuple):
 class JointPublisher:
     """Publishes JointStates of fixed names and fields.
 
-    Parameters
-    ----------
-    names
-        The J joints.
-    fields
-        Which of ``position``, ``velocity``, ``effort`` the messages carry, in this order.
-    events
-        What of the topic the node's executor is to be told; as usual where None.
+    `names`: the J joints.
+    `fields`: which of ``position``, ``velocity``, ``effort`` the messages carry, in this order.
+    `events`: what of the topic the node's executor is to be told; as usual where None.
     """
 
     def __init__(
@@ -122,12 +113,8 @@ class JointPublisher:
 class JointReader:
     """Reads JointStates of certain joints out of CDR bytes.
 
-    Parameters
-    ----------
-    names
-        The joints asked for.
-    exact
-        Whether other joints in a message make it unacceptable: right for commands.
+    `names`: the joints asked for.
+    `exact`: whether other joints in a message make it unacceptable: right for commands.
     """
 
     def __init__(self, names: Sequence[str], exact: bool = False) -> None:
@@ -142,10 +129,8 @@ class JointReader:
     def read(self, data: bytes) -> JointSample:
         """Read one message.
 
-        Raises
-        ------
-        MalformedMessageError
-            Not a JointState, of an absurd size, or not of the joints asked for.
+        Raises MalformedMessageError: not a JointState, of an absurd size, or not of the joints
+            asked for.
         """
         if len(data) > LARGEST_BYTES:
             raise MalformedMessageError(f'has {len(data)} bytes; at most {LARGEST_BYTES} are read')
@@ -195,19 +180,10 @@ class JointReader:
 class JointSubscription:
     """Delivers the JointStates of a topic as samples.
 
-    Parameters
-    ----------
-    callback
-        Called with each sample.
-    on_malformed
-        Called with the reason where a message is not a JointState of these joints.
-
-    Attributes
-    ----------
-    malformed
-        How many messages were unreadable or of other joints.
-    subscription
-        The subscription of rclpy.
+    `callback`: called with each sample.
+    `on_malformed`: called with the reason where a message is not a JointState of these joints.
+    `malformed`: how many messages were unreadable or of other joints.
+    `subscription`: the subscription of rclpy.
     """
 
     def __init__(

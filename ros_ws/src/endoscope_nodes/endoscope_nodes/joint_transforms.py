@@ -15,10 +15,7 @@ def section_of(instrument: InstrumentFacts) -> Vertebrae:
 class JointTransforms:
     """Writes `/tf`, which few have the message class of.
 
-    Parameters
-    ----------
-    section
-        Whose joints they are.
+    `section`: whose joints they are.
     """
 
     def __init__(self, section: Vertebrae) -> None:

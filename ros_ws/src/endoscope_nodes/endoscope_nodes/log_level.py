@@ -17,10 +17,7 @@ def log_as_asked() -> None:
 
     A `--log-level` among the ROS arguments of a program wins.
 
-    Raises
-    ------
-    LogLevelError
-        There is no such level.
+    Raises LogLevelError: there is no such level.
     """
     asked = os.environ.get(LOG_LEVEL_VARIABLE)
     if not asked:

@@ -11,11 +11,8 @@ def all_matched(nodes: Sequence[Node]) -> bool:
     Both sides have to know of each other, and each finds the other at its own time.  Endpoints of
     other nodes do not count.
 
-    Parameters
-    ----------
-    nodes
-        Nodes of this process.  One that reads topics by other means than subscriptions of its own
-        lists them in ``extra_readers() -> [(topic, publishers found)]``.
+    `nodes`: nodes of this process.  One that reads topics by other means than subscriptions of its
+        own lists them in ``extra_readers() -> [(topic, publishers found)]``.
     """
     here = {(node.get_name(), node.get_namespace()) for node in nodes}
     for node in nodes:

@@ -35,16 +35,10 @@ def help_of(
 ) -> str:
     """Return the help of a program.
 
-    Parameters
-    ----------
-    name
-        Of the program.
-    purpose
-        What it does, a sentence.
-    nodes
-        Those that it runs, in their order.
-    options
-        Its own words, and what each does.
+    `name`: of the program.
+    `purpose`: what it does, a sentence.
+    `nodes`: those that it runs, in their order.
+    `options`: its own words, and what each does.
     """
     words = ''.join(f'[{word}] ' for word, _ in options)
     blank = ' ' * len(f'{name} {words}')

@@ -21,18 +21,12 @@ UNKNOWN_TUBE, NOT_JUDGED, NOT_REACHED = 'unknown_tube', 'not_judged', 'not_reach
 class OrderFeedback:
     """How an order fares, by codes.
 
-    Attributes
-    ----------
-    order
-        `CALIBRATE` or `HOME`; empty before the first.
-    id
-        No other order has it: the time in ns at which this one was given, or just after it.
-    state, phase, code
-        What became of it, what is done for it now, and why it was rejected or aborted.
-    progress
-        From 0 to 1.
-    words
-        The same for a person.
+    `order`: `CALIBRATE` or `HOME`; empty before the first.
+    `id`: no other order has it: the time in ns at which this one was given, or just after it.
+    `state`, `phase`, `code`: what became of it, what is done for it now, and why it was rejected or
+        aborted.
+    `progress`: from 0 to 1.
+    `words`: the same for a person.
     """
 
     order: str = ''

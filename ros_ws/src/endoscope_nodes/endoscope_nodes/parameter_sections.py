@@ -27,22 +27,11 @@ def check_sections(args: Sequence[str], namespace: str) -> list[str]:
     A file may serve several processes and rigs, so that a section need not be for a node of this
     process, but for one of this project.
 
-    Parameters
-    ----------
-    args
-        The command line, which rcl has read without an error.
-    namespace
-        That of the nodes here, for example ``'/endoscope'``.
-
-    Returns
-    -------
-    list of str
-        Sections for another namespace, a line each.
-
-    Raises
-    ------
-    ParameterError
-        A name that no node of this project has, one without its namespace, or a parameter twice.
+    `args`: the command line, which rcl has read without an error.
+    `namespace`: that of the nodes here, for example ``'/endoscope'``.
+    Returns: sections for another namespace, a line each.
+    Raises ParameterError: a name that no node of this project has, one without its namespace, or a
+        parameter twice.
     """
     renamed = [rule.partition('__node:=')[2] for rule in _values_of(args, ('-r', '--remap'))]
     known = sorted({*NODES, *renamed} - {''})

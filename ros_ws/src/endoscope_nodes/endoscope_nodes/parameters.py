@@ -27,18 +27,11 @@ def parameter(
 ) -> Any:
     """Describe one parameter as a dataclass field.
 
-    Parameters
-    ----------
-    default
-        Value where nothing else is given: bool, int, float, str, or a tuple of float or str.
-    description, unit
-        What it does, as help and reference show it.
-    low, high
-        Inclusive limits of a number (of each number of a tuple).
-    choices
-        The only strings allowed; empty for any.
-    dynamic
-        Whether it may change while the node runs.
+    `default`: value where nothing else is given: bool, int, float, str, or a tuple of float or str.
+    `description`, `unit`: what it does, as help and reference show it.
+    `low`, `high`: inclusive limits of a number (of each number of a tuple).
+    `choices`: the only strings allowed; empty for any.
+    `dynamic`: whether it may change while the node runs.
     """
     return dataclasses.field(
         default=default,
@@ -57,16 +50,10 @@ def parameter(
 class Described:
     """A parameter in words.
 
-    Attributes
-    ----------
-    name, description, unit
-        Of the parameter.
-    default
-        As it is written on a command line, for example ``[1, 2]``; ``''`` for an empty text.
-    allowed
-        For example ``from 0 to 3`` or ``one of none, motion``; empty where anything goes.
-    dynamic
-        Whether it may change while the node runs.
+    `name`, `description`, `unit`: of the parameter.
+    `default`: as it is written on a command line, for example ``[1, 2]``; ``''`` for an empty text.
+    `allowed`: for example ``from 0 to 3`` or ``one of none, motion``; empty where anything goes.
+    `dynamic`: whether it may change while the node runs.
     """
 
     name: str
@@ -127,17 +114,9 @@ def constraints(field: dataclasses.Field) -> str:
 def checked(node: str, field: dataclasses.Field, hint: Any, value: Any) -> Any:
     """Return a value as the type of its parameter.
 
-    Parameters
-    ----------
-    node
-        Whose parameter it is, for errors.
-    field, hint
-        Of the dataclass.
-
-    Raises
-    ------
-    ParameterError
-        It is of another type, not finite or out of bounds.
+    `node`: whose parameter it is, for errors.
+    `field`, `hint`: of the dataclass.
+    Raises ParameterError: it is of another type, not finite or out of bounds.
     """
     where = f"{node}: parameter '{field.name}'"
     item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None

@@ -19,18 +19,11 @@ _HELP = ('-h', '--help')
 class Program:
     """One command of the package.
 
-    Attributes
-    ----------
-    name
-        That of the command, and of the node if it runs a single one.
-    module
-        Module of the package whose ``main()`` runs it.
-    purpose
-        What it does, a sentence or two.
-    composed
-        Nodes that it runs; empty for the one of its name.
-    options
-        Words of its own that it understands, and what each does.
+    `name`: that of the command, and of the node if it runs a single one.
+    `module`: module of the package whose ``main()`` runs it.
+    `purpose`: what it does, a sentence or two.
+    `composed`: nodes that it runs; empty for the one of its name.
+    `options`: words of its own that it understands, and what each does.
     """
 
     name: str
@@ -47,15 +40,8 @@ class Program:
     def __call__(self, argv: Sequence[str] | None = None) -> int:
         """Run it.
 
-        Parameters
-        ----------
-        argv
-            The command line without the name of the program; ``sys.argv`` by default.
-
-        Returns
-        -------
-        int
-            Exit status; see the help.
+        `argv`: the command line without the name of the program; ``sys.argv`` by default.
+        Returns: exit status; see the help.
         """
         end_when_asked(self.name)
         return exit_status(self.name, lambda: self._run(sys.argv[1:] if argv is None else argv))

@@ -13,16 +13,10 @@ class RawSubscription:
     now and then, and does not tell the stamps. The middleware's queue is read directly here, so
     the executor does not know of this subscription at all.
 
-    Parameters
-    ----------
-    node
-        Its name and namespace hold for the topic.
-    kind
-        Message class.
-    topic
-        Relative or full name; remapped as usual.
-    qos
-        What is asked for; its depth is the queue.
+    `node`: its name and namespace hold for the topic.
+    `kind`: message class.
+    `topic`: relative or full name; remapped as usual.
+    `qos`: what is asked for; its depth is the queue.
     """
 
     def __init__(self, node: Node, kind: type, topic: str, qos: QoSProfile) -> None:

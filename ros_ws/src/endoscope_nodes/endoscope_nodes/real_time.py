@@ -43,21 +43,12 @@ def enter_real_time(
 ) -> None:
     """Apply the parameters to a process; the calling thread and what it starts become urgent.
 
-    Parameters
-    ----------
-    node
-        Name of the node that was given the parameters, for errors.
-    wanted
-        Its parameters.
-    urgent
-        Further threads to give the priority to, for example those of DDS and of devices.
-    simulated
-        Whether time is simulated, which runs as fast as it can and must not do so before all else.
-
-    Raises
-    ------
-    ParameterError
-        One of them cannot be had here; says which permission is missing.
+    `node`: name of the node that was given the parameters, for errors.
+    `wanted`: its parameters.
+    `urgent`: further threads to give the priority to, for example those of DDS and of devices.
+    `simulated`: whether time is simulated, which runs as fast as it can and must not do so before
+        all else.
+    Raises ParameterError: one of them cannot be had here; says which permission is missing.
     """
     if wanted.cores:
         _keep_to(node, set(wanted.cores))

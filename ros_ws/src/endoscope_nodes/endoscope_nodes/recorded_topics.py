@@ -19,10 +19,7 @@ def message_class(type_name: str) -> type:
 
     That of ``'tf2_msgs/msg/TFMessage'`` is for bytes alone where its package is not installed.
 
-    Raises
-    ------
-    UnknownTypeError
-        The package is not installed or has no such message.
+    Raises UnknownTypeError: the package is not installed or has no such message.
     """
     package, _, name = type_name.partition('/msg/')
     try:
@@ -37,12 +34,8 @@ def message_class(type_name: str) -> type:
 def suitable_qos(latched: bool, publishers: Sequence[TopicEndpointInfo]) -> QoSProfile:
     """Return the QoS that hears every publisher, and latched messages where all are latched.
 
-    Parameters
-    ----------
-    latched
-        Whether to ask for latched messages while nobody publishes yet.
-    publishers
-        Those known at the moment.
+    `latched`: whether to ask for latched messages while nobody publishes yet.
+    `publishers`: those known at the moment.
     """
     offered = [p.qos_profile for p in publishers]
     if offered:

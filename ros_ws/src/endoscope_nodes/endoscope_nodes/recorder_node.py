@@ -72,10 +72,7 @@ class RecorderNode(EndoscopeNode):
     session begins another one, until all of them have taken the rig's ``recording.room``. Whoever
     calls ``recorder/start`` or ``recorder/stop`` decides alone from then on.
 
-    Attributes
-    ----------
-    last_report
-        How the last recording went; None before it ended.
+    `last_report`: how the last recording went; None before it ended.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -128,10 +125,7 @@ class RecorderNode(EndoscopeNode):
     def start(self) -> Path:
         """Begin a recording and return where it goes.
 
-        Raises
-        ------
-        BagError
-            One is being made already, its place is taken, or the disk is full.
+        Raises BagError: one is being made already, its place is taken, or the disk is full.
         """
         if self._session is not None:
             there = with_final_names(str(self._session.path))
@@ -148,10 +142,7 @@ class RecorderNode(EndoscopeNode):
     def stop(self, ended: str = 'on request') -> SessionReport:
         """End the recording and say how it went.
 
-        Raises
-        ------
-        BagError
-            There is none.
+        Raises BagError: there is none.
         """
         if self._session is None:
             raise BagError('not recording')
@@ -373,10 +364,7 @@ def new_bag() -> str:
 def checked_names(topics: tuple[str, ...]) -> tuple[str, ...]:
     """Return names of topics, if all of them can be some.
 
-    Raises
-    ------
-    ParameterError
-        One cannot.
+    Raises ParameterError: one cannot.
     """
     for topic in topics:
         try:

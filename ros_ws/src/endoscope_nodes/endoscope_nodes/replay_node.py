@@ -32,10 +32,7 @@ class ReplayNode(EndoscopeNode):
     refuses to talk into a running system: where another node publishes one of the topics, or
     measures a motor that recorded commands would move, it says so and ends.
 
-    Attributes
-    ----------
-    published
-        Messages sent so far.
+    `published`: messages sent so far.
     """
 
     def __init__(self, runtime: Runtime) -> None:

@@ -198,10 +198,7 @@ class Runtime(ClosedOnExit):
         A graph in another namespace than the usual has a clock of its own there: two rigs of a
         domain do not share one.
 
-        Parameters
-        ----------
-        conductor
-            Values of its parameters, where the command line has none.
+        `conductor`: values of its parameters, where the command line has none.
         """
         self.chosen = {**conductor, **self.given('conductor')}
         with self._asked('conductor') as node:
@@ -218,11 +215,8 @@ class Runtime(ClosedOnExit):
     def ticker_of(self, node: EndoscopeNode) -> Ticker:
         """Give the process's ticker; the first node to ask decides whether time is simulated.
 
-        Raises
-        ------
-        ParameterError
-            Nodes of one process disagree about ``use_sim_time``, or the command line has
-            parameters for nodes that there are not.
+        Raises ParameterError: nodes of one process disagree about ``use_sim_time``, or the command
+            line has parameters for nodes that there are not.
         """
         simulated = node.get_parameter('use_sim_time').value is True
         if self._ticker is None:
@@ -280,10 +274,7 @@ class Runtime(ClosedOnExit):
     def plant(self) -> PlantDescription:
         """The simulated slave, read when it is asked for first.
 
-        Raises
-        ------
-        ParameterError
-            See :func:`load_slave`.
+        Raises ParameterError: see :func:`load_slave`.
         """
         if self._plant is None:
             self._plant = load_slave(*self._plant_source)
@@ -303,16 +294,9 @@ class Runtime(ClosedOnExit):
     def prepare(self, whole_process: bool = False) -> None:
         """Check the parameters and make ready for a long life; call it before the nodes are served.
 
-        Parameters
-        ----------
-        whole_process
-            Whether nothing but the nodes runs here, so that a real-time priority that the system
-            grants may be taken unasked.
-
-        Raises
-        ------
-        ParameterError
-            See :meth:`check_parameters` and :func:`enter_real_time`.
+        `whole_process`: whether nothing but the nodes runs here, so that a real-time priority that
+            the system grants may be taken unasked.
+        Raises ParameterError: see :meth:`check_parameters` and :func:`enter_real_time`.
         """
         self.check_parameters()
         self._enter_real_time(whole_process)
@@ -347,10 +331,7 @@ class Runtime(ClosedOnExit):
     def check_parameters(self) -> None:
         """Refuse overrides that no node knows.
 
-        Raises
-        ------
-        ParameterError
-            A parameter override, or a node with overrides, that nobody knows.
+        Raises ParameterError: a parameter override, or a node with overrides, that nobody knows.
         """
         names = [node.get_name() for node in self.nodes]
         for name in self._overrides:
@@ -413,17 +394,10 @@ def run_nodes(
 ) -> int:
     """Run nodes composed in this process until SIGINT, SIGTERM or SIGHUP stops them.
 
-    Parameters
-    ----------
-    factories
-        Called in order with the runtime; each gives a node.
-    args
-        Command line; ``sys.argv`` by default.
-
-    Returns
-    -------
-    int
-        0, the exit code that a node asked for, or 2 for parameters or arguments that were refused.
+    `factories`: called in order with the runtime; each gives a node.
+    `args`: command line; ``sys.argv`` by default.
+    Returns: 0, the exit code that a node asked for, or 2 for parameters or arguments that were
+        refused.
     """
 
     def compose(runtime: Runtime) -> None:

@@ -7,10 +7,7 @@ class SampleClock:
     The choice depends on the stamp alone, so that whoever knows the rate knows which stamps to
     expect.
 
-    Parameters
-    ----------
-    rate
-        In Hz; a rate above that of the ticks samples at every tick.
+    `rate`: in Hz; a rate above that of the ticks samples at every tick.
     """
 
     def __init__(self, rate: float) -> None:

@@ -10,17 +10,9 @@ from endoscope_nodes.parameters import ParameterError
 def load_slave(source: str, path: str) -> PlantDescription:
     """Load a plant file; an empty path is the nominal plant.
 
-    Parameters
-    ----------
-    source
-        Who names the file.
-    path
-        Of the plant.yaml.
-
-    Raises
-    ------
-    ParameterError
-        The file cannot be read as a plant of both joints, or spoils recordings.
+    `source`: who names the file.
+    `path`: of the plant.yaml.
+    Raises ParameterError: the file cannot be read as a plant of both joints, or spoils recordings.
     """
     if not path:
         return PlantDescription()

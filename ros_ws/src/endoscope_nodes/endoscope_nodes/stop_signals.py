@@ -27,10 +27,7 @@ def end_when_asked(program: str) -> None:
     For a program that is still starting and has opened nothing: an exception out of a handler would
     be raised wherever the imports are, some of which turn it into another one or lose it.
 
-    Parameters
-    ----------
-    program
-        Name to begin the line with.
+    `program`: name to begin the line with.
     """
 
     def end(number: int, frame: FrameType | None) -> None:
@@ -49,10 +46,7 @@ class StopSignals:
     its work nor say that it ends.  Further signals change nothing: whatever is being finished is
     finished, and only SIGKILL ends a process that hangs.
 
-    Attributes
-    ----------
-    on_stop
-        Called at the first signal; must be safe to call from another thread.
+    `on_stop`: called at the first signal; must be safe to call from another thread.
     """
 
     def __init__(self, on_stop: Callable[[], None]) -> None:

@@ -32,28 +32,18 @@ class Ticker:
     nodes of a process, because a timer or a subscription of each node's own would cost more than
     most nodes do.
 
-    Parameters
-    ----------
-    node
-        Hosts the timer or the subscription.
-    simulated
-        Whether ``/clock`` gives the time.
-    stride
-        Milliseconds from beat to beat; simulated time beats as ``/clock`` does, whoever gives it.
-    clock
-        Topic of the simulated time.
-
-    Attributes
-    ----------
-    ticks, missed
-        Beats delivered, and beats that were due but came too late to be told from the next.
-    late_ns
-        Time that this process was not run though a beat was due, so far, in ns; delays of up to
-        5 ms, which every desktop kernel makes, do not count.
-    in_flight
-        What the nodes of this process have sent each other in simulated time.
-    paced
-        Whether simulated time goes no faster than a person's: set by who gives it in this process.
+    `node`: hosts the timer or the subscription.
+    `simulated`: whether ``/clock`` gives the time.
+    `stride`: milliseconds from beat to beat; simulated time beats as ``/clock`` does, whoever gives
+        it.
+    `clock`: topic of the simulated time.
+    `ticks`, `missed`: beats delivered, and beats that were due but came too late to be told from
+        the next.
+    `late_ns`: time that this process was not run though a beat was due, so far, in ns; delays of up
+        to 5 ms, which every desktop kernel makes, do not count.
+    `in_flight`: what the nodes of this process have sent each other in simulated time.
+    `paced`: whether simulated time goes no faster than a person's: set by who gives it in this
+        process.
     """
 
     def __init__(self, node: Node, simulated: bool, stride: int = 1, clock: str = CLOCK) -> None:

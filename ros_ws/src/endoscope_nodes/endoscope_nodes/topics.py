@@ -17,14 +17,9 @@ from endoscope_nodes import names
 class Qos:
     """Quality of service, as far as the interface uses it.
 
-    Attributes
-    ----------
-    depth
-        Messages that the queue keeps, the newest ones.
-    reliable
-        Whether what is lost is sent again; best effort otherwise.
-    latched
-        Whether a reader that comes late is given the last message (transient local).
+    `depth`: messages that the queue keeps, the newest ones.
+    `reliable`: whether what is lost is sent again; best effort otherwise.
+    `latched`: whether a reader that comes late is given the last message (transient local).
     """
 
     depth: int
@@ -89,16 +84,10 @@ class Topic:
 class Service:
     """A service of the graph; all are `std_srvs/srv/Trigger`: success, and a message in words.
 
-    Attributes
-    ----------
-    name
-        Relative to the namespace of the graph.
-    served_by
-        Node.
-    purpose
-        What it does and when it is refused.
-    device
-        Device without which it is not there; empty for none.
+    `name`: relative to the namespace of the graph.
+    `served_by`: node.
+    `purpose`: what it does and when it is refused.
+    `device`: device without which it is not there; empty for none.
     """
 
     name: str

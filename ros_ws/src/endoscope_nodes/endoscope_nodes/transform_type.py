@@ -83,10 +83,8 @@ class _Description(Structure):
 def transform_class() -> type:
     """Return a class without fields for publishers of bytes and raw subscriptions.
 
-    Raises
-    ------
-    UnknownTypeError
-        Another middleware than Fast DDS is in use, and `tf2_msgs` not installed.
+    Raises UnknownTypeError: another middleware than Fast DDS is in use, and `tf2_msgs` not
+        installed.
     """
     if rclpy_implementation.rclpy_get_rmw_implementation_identifier() != _RMW:
         raise UnknownTypeError(f'message type {TF_MESSAGE}: not installed')

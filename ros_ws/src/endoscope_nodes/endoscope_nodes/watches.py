@@ -80,14 +80,9 @@ def senders_in_words(node: EndoscopeNode, topic: str) -> str:
 class SessionWatch:
     """A node's part in the motion sessions of the supervisor, told on `/diagnostics`.
 
-    Parameters
-    ----------
-    on_enter
-        Called when the node has entered a session.
-    on_leave
-        Called when it is in none any more.
-    session
-        Kept by somebody else; one of its own by default.
+    `on_enter`: called when the node has entered a session.
+    `on_leave`: called when it is in none any more.
+    `session`: kept by somebody else; one of its own by default.
     """
 
     def __init__(
@@ -119,12 +114,8 @@ class SessionWatch:
     ) -> SenderWatch:
         """Watch who sends on a topic: a second sender ends the node's part.
 
-        Parameters
-        ----------
-        subscription
-            By which the topic is heard.
-        on_crowd
-            Called with who there was, instead; it calls :meth:`leave`.
+        `subscription`: by which the topic is heard.
+        `on_crowd`: called with who there was, instead; it calls :meth:`leave`.
         """
         senders = SenderWatch(self._node, subscription)
         self._streams.append((senders, on_crowd or self.leave))
@@ -193,12 +184,8 @@ class ClutchWatch:
     A second sender ends the node's part in the session, and the clutch counts as released until it
     is let go of: who held it is not known.
 
-    Parameters
-    ----------
-    session
-        The node's part in motion sessions.
-    on_release
-        Called when it is let go of, or heard again after having been silent.
+    `session`: the node's part in motion sessions.
+    `on_release`: called when it is let go of, or heard again after having been silent.
     """
 
     def __init__(
@@ -246,12 +233,8 @@ class StreamWatch:
     A loop that came late has heard nothing meanwhile: its delay is not taken for silence, up to
     once the time allowed, and is told beside it.
 
-    Parameters
-    ----------
-    ticker
-        Gives the time.
-    topic
-        Name for its troubles.
+    `ticker`: gives the time.
+    `topic`: name for its troubles.
     """
 
     def __init__(self, ticker: Ticker, topic: str) -> None:
@@ -298,14 +281,9 @@ class MeasuredPose:
     One serves all nodes of a process, because a subscription of each node's own would cost more
     than most nodes do; :meth:`listen` lets another of them host the subscriptions.
 
-    Attributes
-    ----------
-    tracked
-        Newest bending angles of the tracker; None before the first.
-    shafts_ns
-        When the newest shaft angles came, a monotonic time in ns.
-    host
-        Node that subscribes.
+    `tracked`: newest bending angles of the tracker; None before the first.
+    `shafts_ns`: when the newest shaft angles came, a monotonic time in ns.
+    `host`: node that subscribes.
     """
 
     def __init__(self, node: EndoscopeNode) -> None:
@@ -401,15 +379,10 @@ class CommandReport:
     on the way are told as such, with who was not run and what helps: the hop that starves is the
     first whose share is low.
 
-    Parameters
-    ----------
-    gate
-        The gate.
-    ticker
-        Knows for how long this process was not run.
-    on_starved
-        Called with the reason when more than half of the commands were lost in two reports in a
-        row: a rate of which a half would be carried better.
+    `gate`: the gate.
+    `ticker`: knows for how long this process was not run.
+    `on_starved`: called with the reason when more than half of the commands were lost in two
+        reports in a row: a rate of which a half would be carried better.
     """
 
     def __init__(

@@ -87,10 +87,7 @@ def write_rows(file: Path | None, rows: Sequence[Any]) -> None:
 def seeds(text: str) -> range:
     """Read a range of seeds, `A-B` with both ends, or one.
 
-    Raises
-    ------
-    argparse.ArgumentTypeError
-        If it is none.
+    Raises argparse.ArgumentTypeError: if it is none.
     """
     found = re.fullmatch(r'(\d+)(?:-(\d+))?', text)
     if not found or int(found[2] or found[1]) < int(found[1]):

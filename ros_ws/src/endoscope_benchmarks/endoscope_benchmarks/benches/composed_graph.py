@@ -36,22 +36,15 @@ _PLAYING = {'source': 'motion', 'motion': 'periodic'}
 class ComposedFigure:
     """All nodes in one process, in real time.
 
-    Attributes
-    ----------
-    seconds
-        Length of the measurement.
-    ticks
-        Share of the 1 kHz ticks that took place.
-    latency_p50_ms, latency_p99_ms
-        From the instant at which the console's tick was due to the motor driver's obeying it.
-    cores
-        CPU time of the process per second.
-    recorded, lost
-        Messages in the bag, and messages that publishers sent and the recorder did not get.
-    state
-        Operating state at the end, with the cause of a fault.
-    load
-        Load average of the machine at the end.
+    `seconds`: length of the measurement.
+    `ticks`: share of the 1 kHz ticks that took place.
+    `latency_p50_ms`, `latency_p99_ms`: from the instant at which the console's tick was due to the
+        motor driver's obeying it.
+    `cores`: CPU time of the process per second.
+    `recorded`, `lost`: messages in the bag, and messages that publishers sent and the recorder did
+        not get.
+    `state`: operating state at the end, with the cause of a fault.
+    `load`: load average of the machine at the end.
     """
 
     seconds: float
@@ -87,10 +80,7 @@ class ComposedFigure:
 def run_graph_bench(seconds: float) -> ComposedFigure:
     """Measure all nodes, recorder included, composed in this process in real time.
 
-    Parameters
-    ----------
-    seconds
-        Length of the measurement, after some seconds of settling.
+    `seconds`: length of the measurement, after some seconds of settling.
     """
     with tempfile.TemporaryDirectory() as folder:
         bag = str(Path(folder) / 'bag')

@@ -16,14 +16,10 @@ TRUTH = '.truth.json'
 class Outcome:
     """What was said of one case, beside its truth.
 
-    Attributes
-    ----------
-    right : bool
-        All that was concealed is named, or listed as an alternative where the motion tells no more.
-    exact : bool
-        And nothing else is named.
-    numbers : tuple of str
-        Each number that could be measured another way: true value, estimate and interval.
+    `right`: all that was concealed is named, or listed as an alternative where the motion tells no
+        more.
+    `exact`: and nothing else is named.
+    `numbers`: each number that could be measured another way: true value, estimate and interval.
     """
 
     right: bool
@@ -86,18 +82,10 @@ def run(args: argparse.Namespace) -> int:
 def judged(report: Mapping[str, Any], truth: Mapping[str, Any]) -> Outcome:
     """Compare a report with the truth of its case.
 
-    Parameters
-    ----------
-    report : mapping
-        Content of report.json.
-    truth : mapping
-        `effects`: ids; `also_true`: ids that may be named as well; `verdict`: one that is asked
-        for, or None; `excitation`: `calibration` where the motion is too poor to tell rivals apart;
-        `comparable`: true values by effect and parameter.
-
-    Returns
-    -------
-    Outcome
+    `report`: content of report.json.
+    `truth`: `effects`: ids; `also_true`: ids that may be named as well; `verdict`: one that is
+        asked for, or None; `excitation`: `calibration` where the motion is too poor to tell rivals
+        apart; `comparable`: true values by effect and parameter.
     """
     concealed, allowed = set(truth['effects']), set(truth.get('also_true', ()))
     named = [name for name in _named(report) if name not in allowed]

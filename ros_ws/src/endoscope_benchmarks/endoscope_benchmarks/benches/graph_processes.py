@@ -22,23 +22,14 @@ _PATIENCE_S = 120.0
 class ProcessesFigure:
     """Each node a process of its own.
 
-    Attributes
-    ----------
-    rate
-        Beats per second that were asked for.
-    ticks
-        Share of them that the motor driver made.
-    commands
-        Commands that it obeyed, as a share of those beats.
-    cores
-        CPU time of all processes per second.
-    load
-        Load average of the machine at the end.
-    state
-        Operating state at the end.
-    hops
-        What became of the commands from node to node: how many the console sent, how many of them
-        the compensator and the motor driver obeyed, and why the others were refused. What is
+    `rate`: beats per second that were asked for.
+    `ticks`: share of them that the motor driver made.
+    `commands`: commands that it obeyed, as a share of those beats.
+    `cores`: CPU time of all processes per second.
+    `load`: load average of the machine at the end.
+    `state`: operating state at the end.
+    `hops`: what became of the commands from node to node: how many the console sent, how many of
+        them the compensator and the motor driver obeyed, and why the others were refused. What is
         missing beyond the refusals was replaced by newer ones before it was read.
     """
 
@@ -67,17 +58,9 @@ class ProcessesFigure:
 def run_processes_bench(rate: int, seconds: float) -> ProcessesFigure:
     """Measure the graph with each node in a process of its own.
 
-    Parameters
-    ----------
-    rate
-        Beats per second; a divisor of 1000.
-    seconds
-        Length of the measurement.
-
-    Raises
-    ------
-    RuntimeError
-        A node does not start, or the slave cannot be enabled.
+    `rate`: beats per second; a divisor of 1000.
+    `seconds`: length of the measurement.
+    Raises RuntimeError: a node does not start, or the slave cannot be enabled.
     """
     domain = 100 + (os.getpid() + rate) % 130
     with (

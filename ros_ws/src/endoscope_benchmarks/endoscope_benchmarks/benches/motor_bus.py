@@ -13,18 +13,11 @@ _STEP_S = 1e-3
 class MotorBusFigure:
     """What one run measured.
 
-    Attributes
-    ----------
-    baud
-        Bits per second.
-    cycle_bytes
-        Bytes of a cycle.
-    limit, rate
-        Cycles per second that the line carries, and that were run.
-    readings
-        New readings per second; a servo's clock tells milliseconds apart, no less.
-    failed
-        Cycles without a valid reading.
+    `baud`: bits per second.
+    `cycle_bytes`: bytes of a cycle.
+    `limit`, `rate`: cycles per second that the line carries, and that were run.
+    `readings`: new readings per second; a servo's clock tells milliseconds apart, no less.
+    `failed`: cycles without a valid reading.
     """
 
     baud: int
@@ -80,19 +73,10 @@ def run(args: argparse.Namespace) -> int:
 def run_motor_bus_bench(baud: int, seconds: float, fast: bool = False) -> MotorBusFigure:
     """Run two servos as fast as the bus goes.
 
-    Parameters
-    ----------
-    baud
-        Bits per second.
-    seconds
-        Length of the run.
-    fast
-        Whether to use fast sync read.
-
-    Raises
-    ------
-    RuntimeError
-        The servos cannot be enabled.
+    `baud`: bits per second.
+    `seconds`: length of the run.
+    `fast`: whether to use fast sync read.
+    Raises RuntimeError: the servos cannot be enabled.
     """
     from endoscope_devices.dynamixel.bus_thread import BusThread
     from endoscope_devices.dynamixel.emulator.process import EmulatorProcess

@@ -24,14 +24,9 @@ _MATCHING_TIMEOUT_S = 20.0
 class RecorderFigure:
     """What one run measured.
 
-    Attributes
-    ----------
-    asked_rate, sent_rate
-        Messages per second that were asked for, and that the sender managed.
-    sent, recorded
-        Messages sent, and found in the bag.
-    cpu_share
-        CPU time of the recorder's process per second, in cores, while messages came.
+    `asked_rate`, `sent_rate`: messages per second that were asked for, and that the sender managed.
+    `sent`, `recorded`: messages sent, and found in the bag.
+    `cpu_share`: CPU time of the recorder's process per second, in cores, while messages came.
     """
 
     asked_rate: int
@@ -91,17 +86,9 @@ def run(args: argparse.Namespace) -> int:
 def run_recorder_bench(rate: int, seconds: float) -> RecorderFigure:
     """Send `rate` messages per second for `seconds` to a recorder process and measure it.
 
-    Parameters
-    ----------
-    rate
-        Messages per second over all topics.
-    seconds
-        Length of the run.
-
-    Raises
-    ------
-    RuntimeError
-        The recorder did not find the topics, or failed.
+    `rate`: messages per second over all topics.
+    `seconds`: length of the run.
+    Raises RuntimeError: the recorder did not find the topics, or failed.
     """
     from endoscope_bags import open_bag
 

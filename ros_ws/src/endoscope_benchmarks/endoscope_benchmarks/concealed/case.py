@@ -12,20 +12,12 @@ from endoscope_explain.recording import Recording
 class Law:
     """A concealed law, and what may be said of it.
 
-    Attributes
-    ----------
-    name : str
-        Effect, or place of the law.
-    joint : str
-        On which it acts; empty where it acts on all.
-    stage : str
-        Of the chain.
-    ids : frozenset of str
-        Effects that are a right name.
-    places : frozenset of str
-        Places that are right.
-    is_unknown : bool
-        Whether the right name is that it is unknown, wherever it is said to be.
+    `name`: effect, or place of the law.
+    `joint`: on which it acts; empty where it acts on all.
+    `stage`: of the chain.
+    `ids`: effects that are a right name.
+    `places`: places that are right.
+    `is_unknown`: whether the right name is that it is unknown, wherever it is said to be.
     """
 
     name: str
@@ -40,27 +32,16 @@ class Law:
 class Case:
     """A rig as it was described and as it is, and its recordings.
 
-    Attributes
-    ----------
-    stratum : str
-    seed : int
-    described, bare, true : PlantDescription
-        The rig as its engineer describes it, as it is without the laws, and with them.
-    laws : tuple of Law
-        Concealed; empty where nothing is.
-    recording, second : Recording
-        To explain, and of another motion to judge on.
-    baseline : Recording or None
-        The rig before anything was concealed.
-    left_out : tuple of str
-        Effects whose formulas are not tried.
-    also : frozenset of str
-        Effects and places that are no false names: the form of the rig itself.
-    moved : float
-        What the laws change, over the signal, each alone, of the channel that shows it most: the
-        least of them.
-    note : str
-        What else is particular.
+    `described`, `bare`, `true`: the rig as its engineer describes it, as it is without the laws,
+        and with them.
+    `laws`: concealed; empty where nothing is.
+    `recording`, `second`: to explain, and of another motion to judge on.
+    `baseline`: the rig before anything was concealed.
+    `left_out`: effects whose formulas are not tried.
+    `also`: effects and places that are no false names: the form of the rig itself.
+    `moved`: what the laws change, over the signal, each alone, of the channel that shows it most:
+        the least of them.
+    `note`: what else is particular.
     """
 
     stratum: str

@@ -35,16 +35,11 @@ class Criteria:
 class Bank:
     """What the cases say, with NaN left out.
 
-    Attributes
-    ----------
-    truth : array (n,)
-        Share of the best gain that the truth has.
-    sizes : list of array
-        Shares of all names of the same cases.
-    beyond, exact : array (k,), array (k,)
-        What is left over what another form leaves, and whether all was said rightly.
-    errors : array (l,)
-        Of numbers, over what their intervals would allow with a `REACH` of one.
+    `truth` (n,): share of the best gain that the truth has.
+    `sizes`: shares of all names of the same cases.
+    `beyond`, `exact` (k,): what is left over what another form leaves, and whether all was said
+        rightly.
+    `errors` (l,): of numbers, over what their intervals would allow with a `REACH` of one.
     """
 
     truth: Array
@@ -71,10 +66,7 @@ def bank_of(rows: Sequence[Row]) -> Bank:
 def derived(bank: Bank) -> Criteria:
     """Criteria from a bank of cases.
 
-    Raises
-    ------
-    ValueError
-        If it has too few cases for the quantiles.
+    Raises ValueError: if it has too few cases for the quantiles.
     """
     return Criteria(
         1.0 - conformal(1.0 - bank.truth, HOLDS),
@@ -86,10 +78,7 @@ def derived(bank: Bank) -> Criteria:
 def conformal(scores: Array, chance: float) -> float:
     """Limit that the next score does not exceed with a chance.
 
-    Raises
-    ------
-    ValueError
-        If there are too few scores to say so.
+    Raises ValueError: if there are too few scores to say so.
     """
     rank = math.ceil((len(scores) + 1) * chance)
     if rank > len(scores):

@@ -87,25 +87,11 @@ def drawn_form(
 ) -> tuple[Form, float]:
     """Draw a law at a place that is no line over the visited range.
 
-    Parameters
-    ----------
-    generator : numpy.random.Generator
-    place_id : str
-    joint : str
-    visited : (float, float)
-        Range of the place's argument; of one that repeats, the range in which the period is drawn.
-
-    Returns
-    -------
-    form : callable
-        The law by its strength: the rms over the range in the unit of the place.
-    largest : float
-        Strength at which it would leave what the place takes.
-
-    Raises
-    ------
-    RuntimeError
-        If no tree of a thousand will do.
+    `visited`: range of the place's argument; of one that repeats, the range in which the period is
+        drawn.
+    Returns `form`: the law by its strength: the rms over the range in the unit of the place.
+    Returns `largest`: strength at which it would leave what the place takes.
+    Raises RuntimeError: if no tree of a thousand will do.
     """
     place = FUNCTIONS[place_id]
     for _ in range(_TRIES):
@@ -195,12 +181,7 @@ def visited(
 ) -> dict[Argument, tuple[float, float]]:
     """Range of the argument of every place; of one that repeats, that of its period.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-    command : array (N, J)
-        Motor shaft command in rad, every ms.
-    joint : str
+    `command` (N, J): motor shaft command in rad, every ms.
     """
     names = plant.joint_names()
     distance = TermSpec(joint, 'exponent_of_distance', '0*d')

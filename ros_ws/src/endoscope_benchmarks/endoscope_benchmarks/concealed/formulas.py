@@ -38,12 +38,7 @@ def drawn_formula(
     What makes the effect vanish is its strength: some of the parameters that do so are drawn, and
     grow together. An effect that is a limit comes the nearer the stronger it is.
 
-    Parameters
-    ----------
-    generator : numpy.random.Generator
-    effect_id, joint : str
-    duration : float
-        Of the recording in s.
+    `duration`: of the recording in s.
     """
     effect = CATALOGUE[effect_id]
     sizes = [p for p in effect.parameters if math.isfinite(p.off) and p.off < p.high]

@@ -14,13 +14,8 @@ from endoscope_explain.explanation import Explanation, Verdict
 class Statement:
     """One thing that is said to be missing.
 
-    Attributes
-    ----------
-    name : str
-        Effect, or place of an unknown term.
-    joint, stage : str
-    rivals : tuple of str
-        Names that may stand for it as well.
+    `name`: effect, or place of an unknown term.
+    `rivals`: names that may stand for it as well.
     """
 
     name: str
@@ -40,21 +35,13 @@ class Statement:
 class Judgement:
     """How far what is said is right.
 
-    Attributes
-    ----------
-    first : bool
-        As many statements as there are laws, the first ones, name all of them; where nothing is
-        concealed, nothing is said.
-    place, stage : bool
-        They point at the right places, and parts of the chain.
-    exact : bool
-        All is named first, and nothing else is said.
-    false : int
-        Names that are of no law.
-    in_set : bool
-        Each law is among the first statements or their rivals.
-    set_size : float
-        Names of a statement with its rivals, mean of the first ones.
+    `first`: as many statements as there are laws, the first ones, name all of them; where nothing
+        is concealed, nothing is said.
+    `place`, `stage`: they point at the right places, and parts of the chain.
+    `exact`: all is named first, and nothing else is said.
+    `false`: names that are of no law.
+    `in_set`: each law is among the first statements or their rivals.
+    `set_size`: names of a statement with its rivals, mean of the first ones.
     """
 
     first: bool
@@ -88,13 +75,8 @@ def judged(
 ) -> Judgement:
     """Compare what is said with what is concealed.
 
-    Parameters
-    ----------
-    laws : sequence of Law
-    said : sequence of Statement
-        The most certain first.
-    also : frozenset of str
-        Effects and places that are neither right nor false.
+    `said`: the most certain first.
+    `also`: effects and places that are neither right nor false.
     """
     named = [s for s in said if any(_names(s, law) for law in laws)]
     wrong = [s for s in said if s not in named and s.name not in also and not s.places & also]

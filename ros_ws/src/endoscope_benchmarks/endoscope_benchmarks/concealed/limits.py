@@ -15,15 +15,9 @@ SHARES = (0.1, 0.032, 0.01, 0.0032, 0.001)
 class Limit:
     """The weakest strength at which an effect is named.
 
-    Attributes
-    ----------
-    effect : str
-    share : float
-        Of the signal that it moves most; NaN where it is not named at any.
-    numbers : tuple of str
-        Of the effect at that strength, one for each rig.
-    missed_as : tuple of str
-        What was said where it was weaker; empty for nothing.
+    `share`: of the signal that it moves most; NaN where it is not named at any.
+    `numbers`: of the effect at that strength, one for each rig.
+    `missed_as`: what was said where it was weaker; empty for nothing.
     """
 
     effect: str
@@ -35,11 +29,8 @@ class Limit:
 def limit_of(effect: str, seeds: range) -> Limit:
     """Make an effect weaker until it is not named on each of some rigs.
 
-    Parameters
-    ----------
-    effect : str
-    seeds : range
-        Of the rigs; the effect, but for its strength, and the rig are the same for the same seed.
+    `seeds`: of the rigs; the effect, but for its strength, and the rig are the same for the same
+        seed.
     """
     found, numbers = float('nan'), tuple[str, ...]()
     for share in SHARES:

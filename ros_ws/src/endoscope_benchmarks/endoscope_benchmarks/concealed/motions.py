@@ -28,10 +28,7 @@ def commissioning(generator: np.random.Generator, joints: int) -> Array:
     They come in an order of their own for each joint; joints after the first begin later, so that
     what appears on them meanwhile is coupling.
 
-    Returns
-    -------
-    array (N, joints)
-        Motor shaft command in rad.
+    Returns (N, joints): motor shaft command in rad.
     """
     signals = []
     for k in range(joints):

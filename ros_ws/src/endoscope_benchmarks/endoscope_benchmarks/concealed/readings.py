@@ -30,15 +30,10 @@ MEAN_OVER = 10
 class Noise:
     """Forms of noise that the description of the sensors does not have.
 
-    Attributes
-    ----------
-    slow : float
-        Rms of a slow part (Ornstein-Uhlenbeck) of load cells and tracker, in their white noise.
-    slow_s : float
-        Its correlation time.
-    freedom : float
-        Degrees of freedom of Student's t that load cells and tracker draw from, of the same rms;
-        infinite for a normal distribution.
+    `slow`: rms of a slow part (Ornstein-Uhlenbeck) of load cells and tracker, in their white noise.
+    `slow_s`: its correlation time.
+    `freedom`: degrees of freedom of Student's t that load cells and tracker draw from, of the same
+        rms; infinite for a normal distribution.
     """
 
     slow: float = 0.0
@@ -50,13 +45,9 @@ class Noise:
 class Readings:
     """Noise-free readings at their stamps, for J joints.
 
-    Attributes
-    ----------
-    time, tracker_time : array (N,), array (M,)
-        In s.
-    command, shaft_position, shaft_velocity, shaft_effort : array (N, J)
-    tension : array (N, J, 2)
-    bending : array (M, J)
+    Shapes: `command`, `shaft_position`, `shaft_velocity`, `shaft_effort` (N, J), `tension` (N, J,
+        2), `bending` (M, J).
+    `time`, `tracker_time` (N,): in s.
     """
 
     time: Array
@@ -166,11 +157,7 @@ def misfit(plant: PlantDescription, recording: Recording, sensors: SensorParamet
 def in_noise(signals: Mapping[str, Array], sensors: SensorParameters) -> list[Array]:
     """Signals over the noise of the sensors, column by column: means of what is judged as one.
 
-    Parameters
-    ----------
-    signals : mapping of str to array (N, J) or (N, J, 2)
-        As `Readings.signals`; shaft velocity is left out.
-    sensors : SensorParameters
+    `signals` (N, J): as `Readings.signals`; shaft velocity is left out.
     """
     kinds = (
         ('shaft_position', 0.0, 2.0 * math.pi / sensors.encoder_counts),

@@ -39,12 +39,7 @@ def true_rig(
 ) -> PlantDescription:
     """A rig of that description: numbers within 10 % of it, and the form of a healthy rig.
 
-    Parameters
-    ----------
-    generator : numpy.random.Generator
-    described : PlantDescription
-    drilled : bool
-        Whether the radii are off, too.
+    `drilled`: whether the radii are off, too.
     """
     joints = {}
     for name, joint in described.joints.items():

@@ -28,12 +28,8 @@ class OutOfReachError(RuntimeError):
 def moved(bare: Readings, other: Readings) -> float:
     """Rms of what a law changes, over the rms of the signal about its mean, of the worst channel.
 
-    Parameters
-    ----------
-    bare : Readings
-        Without the law.
-    other : Readings
-        With it.
+    `bare`: without the law.
+    `other`: with it.
     """
     return max(
         float(np.sqrt(np.mean((b - a) ** 2)) / max(np.std(a), 1e-12))
@@ -46,26 +42,12 @@ def scaled_to(
 ) -> tuple[float, float]:
     """Find the strength at which a law moves what is measured by `aim`.
 
-    Parameters
-    ----------
-    aim : float
-        Share, see `moved`.
-    seen : callable
-        What is read by the law's strength, without the law at zero; raises ValueError where the law
-        cannot be as strong.
-    start : float
-        Strength where to begin.
-
-    Returns
-    -------
-    strength : float
-    share : float
-        That is reached.
-
-    Raises
-    ------
-    OutOfReachError
-        If no strength reaches the share.
+    `aim`: share, see `moved`.
+    `seen`: what is read by the law's strength, without the law at zero; raises ValueError where the
+        law cannot be as strong.
+    `start`: strength where to begin.
+    Returns `share`: that is reached.
+    Raises OutOfReachError: if no strength reaches the share.
     """
     bare = seen(0.0)
     strength, below, above = start, 0.0, math.inf
@@ -99,24 +81,10 @@ def drawn_as_strong[L](
 ) -> tuple[L, float, float]:
     """Draw a law, and how much it moves, anew where it cannot move as much.
 
-    Parameters
-    ----------
-    generator : numpy.random.Generator
-    aims : (float, float)
-        Ends of the share of the signal, drawn by its logarithm.
-    draw : callable
-        A law, what is read by its strength, and a strength to begin at; see `scaled_to`.
-
-    Returns
-    -------
-    law
-    strength, share : float
-        At which it is, and that it moves.
-
-    Raises
-    ------
-    RuntimeError
-        If no law of some moves its share.
+    `aims`: ends of the share of the signal, drawn by its logarithm.
+    `draw`: a law, what is read by its strength, and a strength to begin at; see `scaled_to`.
+    Returns `strength, share`: at which it is, and that it moves.
+    Raises RuntimeError: if no law of some moves its share.
     """
     for _ in range(_LAWS):
         law, seen, begin = draw()
@@ -134,12 +102,8 @@ def left(bare: PlantDescription, true: PlantDescription, command: Array) -> floa
     The refit is linear, around the rig without the law, and holds the rig's numbers to the spreads
     from which they are drawn.
 
-    Parameters
-    ----------
-    bare, true : PlantDescription
-        The rig without the law and with it.
-    command : array (N, J)
-        Motor shaft command in rad, every ms.
+    `bare`, `true`: the rig without the law and with it.
+    `command` (N, J): motor shaft command in rad, every ms.
     """
 
     def seen(plant: PlantDescription) -> list[Array]:

@@ -26,36 +26,22 @@ GOOD = 1.3
 class Row(Judgement):
     """What was concealed, what was said, and how far it is right.
 
-    Attributes
-    ----------
-    stratum, seed
-        Of the case.
-    concealed : tuple of str
-        Laws with their joints.
-    note : str
-        What is particular to the case.
-    moved : float
-        What the laws change, over the signal.
-    left : float
-        What a refit of the rig's numbers leaves of them, over noise.
-    verdict : str
-    said : tuple of str
-        Names with their joints, most certain first.
-    held, intervals : int
-        Intervals that hold the true number, of how many: those of the plant, and of the numbers of
-        named effects that could be measured another way.
-    nominal, refitted, augmented : float
-        Misfit of the second recording over noise, of the worst signal.
-    seconds : float
-        That explaining took.
-    truth_share : float
-        Gain of the truth over that of the best term; NaN where it is not one.
-    shares : tuple of float
-        The same of each name that was tried, the best first.
-    beyond_form : float
-        What is left over what rigs of another form leave, of the worst joint.
-    errors : tuple of float
-        Error of each number over what its interval would allow on that side with a `REACH` of one.
+    `stratum`, `seed`: of the case.
+    `concealed`: laws with their joints.
+    `note`: what is particular to the case.
+    `moved`: what the laws change, over the signal.
+    `left`: what a refit of the rig's numbers leaves of them, over noise.
+    `said`: names with their joints, most certain first.
+    `held`, `intervals`: intervals that hold the true number, of how many: those of the plant, and
+        of the numbers of named effects that could be measured another way.
+    `nominal`, `refitted`, `augmented`: misfit of the second recording over noise, of the worst
+        signal.
+    `seconds`: that explaining took.
+    `truth_share`: gain of the truth over that of the best term; NaN where it is not one.
+    `shares`: the same of each name that was tried, the best first.
+    `beyond_form`: what is left over what rigs of another form leave, of the worst joint.
+    `errors`: error of each number over what its interval would allow on that side with a `REACH` of
+        one.
     """
 
     stratum: str
@@ -91,13 +77,7 @@ class Row(Judgement):
 
 
 def explained(stratum: str, seed: int) -> Row:
-    """Draw a case, explain it on one core, and judge what is said.
-
-    Parameters
-    ----------
-    stratum : str
-    seed : int
-    """
+    """Draw a case, explain it on one core, and judge what is said."""
     return row_of(drawn_case(stratum, seed))
 
 

@@ -46,10 +46,7 @@ class BrowserError(EndoscopeError, RuntimeError):
 class Chromium(ClosedOnExit):
     """A browser with a profile of its own, which ends and is removed with it.
 
-    Raises
-    ------
-    BrowserError
-        There is none, or it does not start.
+    Raises BrowserError: there is none, or it does not start.
     """
 
     def __init__(self) -> None:
@@ -92,10 +89,7 @@ class Chromium(ClosedOnExit):
     def call(self, method: str, session: str = '', **parameters: Any) -> dict[str, Any]:
         """Order something of the browser, or of the tab of a session; the answer.
 
-        Raises
-        ------
-        BrowserError
-            It is refused, or there is no answer within a minute.
+        Raises BrowserError: it is refused, or there is no answer within a minute.
         """
         number = self.post(method, session, **parameters)
         end = time.monotonic() + _PATIENCE_S
@@ -141,12 +135,8 @@ class Chromium(ClosedOnExit):
 class Tab:
     """A tab.
 
-    Parameters
-    ----------
-    browser
-        To which it belongs.
-    address
-        That it shows.
+    `browser`: to which it belongs.
+    `address`: that it shows.
     """
 
     def __init__(self, browser: Chromium, address: str) -> None:
@@ -183,10 +173,7 @@ class Tab:
     def value(self, expression: str) -> Any:
         """What an expression, or the promise that it makes, comes to in the page.
 
-        Raises
-        ------
-        BrowserError
-            It throws.
+        Raises BrowserError: it throws.
         """
         told = self.call(
             'Runtime.evaluate', expression=expression, returnByValue=True, awaitPromise=True

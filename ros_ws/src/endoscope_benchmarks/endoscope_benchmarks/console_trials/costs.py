@@ -37,12 +37,8 @@ _FRAMES = """new Promise((done) => {
 def first_motion(hand: Hand, began_s: float) -> str:
     """How long it takes from the start of the program to a slave in motion, in words.
 
-    Parameters
-    ----------
-    hand
-        Whose browser was started when all nodes were heard.
-    began_s
-        When the program was started, by the monotonic clock.
+    `hand`: whose browser was started when all nodes were heard.
+    `began_s`: when the program was started, by the monotonic clock.
     """
     hand.move()
     took_s = time.monotonic() - began_s
@@ -57,17 +53,9 @@ def first_motion(hand: Hand, began_s: float) -> str:
 def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
     """From a key that is pressed to the first change of the handle, and of ``motor/servo_jp``.
 
-    Parameters
-    ----------
-    hand
-        Of the operator, who has Space down and the slave at rest before each.
-    inputs
-        How many.
-
-    Yields
-    ------
-    str
-        Each in words.
+    `hand`: of the operator, who has Space down and the slave at rest before each.
+    `inputs`: how many.
+    Yields: each in words.
     """
     console = hand.console
     took_ms: dict[str, list[float]] = {'master/measured_js': [], 'motor/servo_jp': []}
@@ -99,17 +87,9 @@ def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
 def costs_of_viewers(console: ServedConsole, seconds: float) -> Iterator[str]:
     """CPU time of the server and ticks of the graph, while no browser runs on the machine.
 
-    Parameters
-    ----------
-    console
-        That nobody operates.
-    seconds
-        Of each figure.
-
-    Yields
-    ------
-    str
-        Each figure in words.
+    `console`: that nobody operates.
+    `seconds`: of each figure.
+    Yields: each figure in words.
     """
     yield _cost(console, seconds, 'nobody looks on')
     with ExitStack() as stack:
@@ -121,17 +101,9 @@ def costs_of_viewers(console: ServedConsole, seconds: float) -> Iterator[str]:
 def costs_with_browser(hand: Hand, seconds: float) -> Iterator[str]:
     """CPU time of the server, ticks of the graph and frames of a page beside the browser.
 
-    Parameters
-    ----------
-    hand
-        Of the operator, whose page is the first client.
-    seconds
-        Of each figure.
-
-    Yields
-    ------
-    str
-        Each figure in words.
+    `hand`: of the operator, whose page is the first client.
+    `seconds`: of each figure.
+    Yields: each figure in words.
     """
     console = hand.console
     hand.take_controls()

@@ -16,12 +16,8 @@ _RELEASED_S = 10.0
 class Event:
     """Something that ends the motion.
 
-    Attributes
-    ----------
-    happens
-        Makes it happen, and waits for no answer.
-    is_over
-        Brings the page back, or another one, in front of an operator who still holds on.
+    `happens`: makes it happen, and waits for no answer.
+    `is_over`: brings the page back, or another one, in front of an operator who still holds on.
     """
 
     happens: Callable[[Hand], object]
@@ -32,16 +28,10 @@ class Event:
 class Outcome:
     """What one event led to.
 
-    Attributes
-    ----------
-    last_change_ms
-        From the event to the last change of ``motor/servo_jp``.
-    clutch_ms
-        From the event to the word that the clutch is free.
-    crept
-        How far a shaft's goal went in the time watched, rad.
-    load
-        Load average of the machine.
+    `last_change_ms`: from the event to the last change of ``motor/servo_jp``.
+    `clutch_ms`: from the event to the word that the clutch is free.
+    `crept`: how far a shaft's goal went in the time watched, rad.
+    `load`: load average of the machine.
     """
 
     last_change_ms: float
@@ -118,21 +108,11 @@ EVENTS = {
 def undergo(event: Event, hand: Hand, settled_s: float, watched_s: float) -> Outcome:
     """Let something happen to an operator who holds the slave in motion.
 
-    Parameters
-    ----------
-    event
-        That happens.
-    hand
-        Of the operator.
-    settled_s
-        After the word on the clutch, s: what moves within it still counts to the motion.
-    watched_s
-        For how long the motors are watched after that, s.
-
-    Raises
-    ------
-    ConsoleError
-        The clutch is not released.
+    `event`: that happens.
+    `hand`: of the operator.
+    `settled_s`: after the word on the clutch, s: what moves within it still counts to the motion.
+    `watched_s`: for how long the motors are watched after that, s.
+    Raises ConsoleError: the clutch is not released.
     """
     console = hand.console
     for _ in range(_TRIES):

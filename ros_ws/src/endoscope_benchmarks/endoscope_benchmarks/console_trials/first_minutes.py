@@ -129,14 +129,9 @@ def _hold_until(hand: Hand, code: str, begun: Callable[[], bool]) -> None:
 class LongMotion:
     """What became of a motion that was played for long.
 
-    Attributes
-    ----------
-    trouble
-        The fault that ended it; empty where none did.
-    recorded, lost
-        Messages.
-    factors
-        Simulated seconds in a real one, as told each second, in order of size.
+    `trouble`: the fault that ended it; empty where none did.
+    `recorded`, `lost`: messages.
+    `factors`: simulated seconds in a real one, as told each second, in order of size.
     """
 
     trouble: str

@@ -28,19 +28,10 @@ _TEXT = 'document.body?.innerText'
 class Hand(ClosedOnExit):
     """An operator at a page.
 
-    Parameters
-    ----------
-    console
-        That serves the page.
-    network
-        Between the page and it.
-
-    Attributes
-    ----------
-    browser, tab
-        In which the page is.
-    page_processes
-        Numbers of the processes that ran pages when the slave was last set in motion.
+    `console`: that serves the page.
+    `network`: between the page and it.
+    `browser`, `tab`: in which the page is.
+    `page_processes`: numbers of the processes that ran pages when the slave was last set in motion.
     """
 
     def __init__(self, console: ServedConsole, network: Relay) -> None:

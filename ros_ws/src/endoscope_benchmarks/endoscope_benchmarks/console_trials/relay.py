@@ -18,14 +18,9 @@ _AT_ONCE = struct.pack('ii', 1, 0)
 class Relay(ClosedOnExit):
     """Passes TCP connections of 127.0.0.1 on to a port, both ways.
 
-    Attributes
-    ----------
-    port
-        At which it listens.
-    target
-        To which it passes on.
-    silent
-        Whether it passes nothing on: what is sent meanwhile arrives late.
+    `port`: at which it listens.
+    `target`: to which it passes on.
+    `silent`: whether it passes nothing on: what is sent meanwhile arrives late.
     """
 
     def __init__(self) -> None:

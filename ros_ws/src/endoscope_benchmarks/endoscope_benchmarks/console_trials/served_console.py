@@ -44,17 +44,9 @@ class ConsoleError(EndoscopeError, RuntimeError):
 class Heard:
     """Angles of a topic as they came.
 
-    Parameters
-    ----------
-    names
-        The J joints or motors.
-
-    Attributes
-    ----------
-    at_ns
-        When each message was received, ns since the epoch.
-    angles
-        What it said, in rad, each of shape (J,).
+    `names`: the J joints or motors.
+    `at_ns`: when each message was received, ns since the epoch.
+    `angles`: what it said, in rad, each of shape (J,).
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -95,27 +87,14 @@ class Heard:
 class ServedConsole(ClosedOnExit):
     """The program in a process of its own, and a node that looks on.
 
-    Parameters
-    ----------
-    folder
-        Where it is started, and writes its bag.
-    domain
-        ROS domain.
-    origins
-        Addresses of relays under which the page is reached, too.
-    real_time
-        Whether the graph goes by the wall clock.
-
-    Attributes
-    ----------
-    address, token, viewer_token
-        By which one operates, and looks on.
-    client
-        The node's side of the graph.
-    handle, motors
-        Where the handle was said to be, and what the motors were told.
-    clutches
-        When the clutch was spoken of, and whether it was held.
+    `folder`: where it is started, and writes its bag.
+    `domain`: ROS domain.
+    `origins`: addresses of relays under which the page is reached, too.
+    `real_time`: whether the graph goes by the wall clock.
+    `address`, `token`, `viewer_token`: by which one operates, and looks on.
+    `client`: the node's side of the graph.
+    `handle`, `motors`: where the handle was said to be, and what the motors were told.
+    `clutches`: when the clutch was spoken of, and whether it was held.
     """
 
     def __init__(
@@ -193,10 +172,7 @@ class ServedConsole(ClosedOnExit):
     ) -> None:
         """Listen until something has come true.
 
-        Raises
-        ------
-        ConsoleError
-            It has not in time, or the program has ended.
+        Raises ConsoleError: it has not in time, or the program has ended.
         """
         end = time.monotonic() + patience_s
         while not self.client.wait_until(condition, 0.5):

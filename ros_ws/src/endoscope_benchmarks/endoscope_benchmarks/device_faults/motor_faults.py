@@ -20,21 +20,13 @@ AFTERMATH_S = 2.0
 class MotorFault:
     """Something that goes wrong in motion.
 
-    Attributes
-    ----------
-    what
-        In words.
-    inject
-        Makes it happen.
-    ends_in
-        Operating state that follows; ``ENABLED`` for a fault that motion survives or that only
-        ends it.
-    stops
-        Whether the shafts stand still afterwards.
-    cause
-        Pattern of words that the cause of the FAULT must hold.
-    apart
-        Nodes that must be processes of their own.
+    `what`: in words.
+    `inject`: makes it happen.
+    `ends_in`: operating state that follows; ``ENABLED`` for a fault that motion survives or that
+        only ends it.
+    `stops`: whether the shafts stand still afterwards.
+    `cause`: pattern of words that the cause of the FAULT must hold.
+    `apart`: nodes that must be processes of their own.
     """
 
     what: str
@@ -49,22 +41,15 @@ class MotorFault:
 class FaultOutcome:
     """What followed a fault.
 
-    Attributes
-    ----------
-    what
-        The fault.
-    state
-        Operating state at the end.
-    cause
-        Of the FAULT; empty without one.
-    fault_s, stopped_s
-        Seconds from the fault to FAULT and to the shafts' standing still; None if they never did.
-    longest_gap_s
-        Longest silence of `motor/measured_js` in the bag after the fault.
-    faults_in_bag
-        FAULT messages in the bag after the fault.
-    largest_error
-        Largest difference in rad between a reading in the bag and where the servo was at its stamp.
+    `what`: the fault.
+    `state`: operating state at the end.
+    `cause`: of the FAULT; empty without one.
+    `fault_s`, `stopped_s`: seconds from the fault to FAULT and to the shafts' standing still; None
+        if they never did.
+    `longest_gap_s`: longest silence of `motor/measured_js` in the bag after the fault.
+    `faults_in_bag`: FAULT messages in the bag after the fault.
+    `largest_error`: largest difference in rad between a reading in the bag and where the servo was
+        at its stamp.
     """
 
     what: str
@@ -162,18 +147,11 @@ def undergo(
 ) -> FaultOutcome:
     """Make a fault happen in motion, and look at what follows.
 
-    Parameters
-    ----------
-    fault
-        Which.
-    folder
-        For the bag.
-    aftermath
-        How long to look at least, in s.
-    patience
-        Silence of the servos in s that is a fault, instead of the usual.
-    domain
-        ROS domain; by default one that goes with the process.
+    `fault`: which.
+    `folder`: for the bag.
+    `aftermath`: how long to look at least, in s.
+    `patience`: silence of the servos in s that is a fault, instead of the usual.
+    `domain`: ROS domain; by default one that goes with the process.
     """
     with MotorRig(folder, fault.apart, patience, domain) as rig:
         rig.enable_and_move()

@@ -56,16 +56,10 @@ class MotorRig(ClosedOnExit):
     The console plays ``60 sin t``, which passes uncompensated.  The tension of the wires is the
     rig's own to say.
 
-    Parameters
-    ----------
-    folder
-        For the terminal's link and the bag.
-    apart
-        Nodes that live in processes of their own, so that they can be killed.
-    patience
-        Silence of the servos in s that is a fault, instead of the usual.
-    domain
-        ROS domain; by default one that goes with the process.
+    `folder`: for the terminal's link and the bag.
+    `apart`: nodes that live in processes of their own, so that they can be killed.
+    `patience`: silence of the servos in s that is a fault, instead of the usual.
+    `domain`: ROS domain; by default one that goes with the process.
     """
 
     def __init__(
@@ -129,10 +123,7 @@ class MotorRig(ClosedOnExit):
     def node(self, name: str) -> Node:
         """Give a node of this process.
 
-        Raises
-        ------
-        StopIteration
-            There is none of that name.
+        Raises StopIteration: there is none of that name.
         """
         return next(node for node in self.runtime.nodes if node.get_name() == name)
 
@@ -162,12 +153,8 @@ class MotorRig(ClosedOnExit):
     def wait(self, condition: Callable[[], bool], patience: float = PATIENCE_S) -> bool:
         """Serve the nodes until something has come true; whether it did in time.
 
-        Parameters
-        ----------
-        condition
-            Looked at every few milliseconds.
-        patience
-            How long to wait, in s.
+        `condition`: looked at every few milliseconds.
+        `patience`: how long to wait, in s.
         """
         future = Future()
 
@@ -187,10 +174,7 @@ class MotorRig(ClosedOnExit):
     def enable_and_move(self) -> None:
         """Enable the slave and wait until the shafts swing.
 
-        Raises
-        ------
-        RuntimeError
-            They do not.
+        Raises RuntimeError: they do not.
         """
         tried = [0.0]
 
@@ -222,10 +206,7 @@ class MotorRig(ClosedOnExit):
     def stopped_after(self, since: float) -> float | None:
         """Seconds from ``since`` until both shafts stood still for good; None if they move.
 
-        Parameters
-        ----------
-        since
-            Monotonic time in s.
+        `since`: monotonic time in s.
         """
         last = since
         for device in (1, 2):

@@ -68,18 +68,11 @@ class HostileCase(Protocol):
 class Outcomes:
     """What became of files of one kind.
 
-    Attributes
-    ----------
-    kind
-        One of `KINDS`.
-    counts
-        Files by outcome, one of `OUTCOMES`.
-    peak
-        Most memory that a process took, in bytes, with all libraries that it needs.
-    longest
-        Longest time that a file took, in s.
-    bad
-        The first files that ended otherwise than they must: number and what happened.
+    `kind`: one of `KINDS`.
+    `counts`: files by outcome, one of `OUTCOMES`.
+    `peak`: most memory that a process took, in bytes, with all libraries that it needs.
+    `longest`: longest time that a file took, in s.
+    `bad`: the first files that ended otherwise than they must: number and what happened.
     """
 
     kind: str
@@ -113,16 +106,10 @@ class _OvertimeError(BaseException):
 def try_files(kind: str, cases: int, seed: int, jobs: int) -> Iterator[Outcomes]:
     """Try so many files of a kind; yield what became of each batch.
 
-    Parameters
-    ----------
-    kind
-        One of `KINDS`.
-    cases
-        How many.
-    seed
-        Another seed draws other files; one file depends on its kind, its number and the seed only.
-    jobs
-        Processes.
+    `kind`: one of `KINDS`.
+    `cases`: how many.
+    `seed`: another seed draws other files; one file depends on its kind, its number and the seed
+        only.
     """
     with worker_pool(jobs) as pool:
         batches: dict[Future[Outcomes], range] = {}

@@ -19,14 +19,9 @@ Said = tuple[tuple[str, str, str], ...]
 class Mistake:
     """What was done to a recording, and what the audit may say of it.
 
-    Attributes
-    ----------
-    change : callable
-        From a recording and a random generator to the recording as it was mistaken.
-    said : tuple of tuple of (str, str, str)
-        Id, topic and words of each finding; any one of the tuples will do.
-    joints : int
-        How many the recording must have.
+    `change`: from a recording and a random generator to the recording as it was mistaken.
+    `said`: id, topic and words of each finding; any one of the tuples will do.
+    `joints`: how many the recording must have.
     """
 
     change: Change

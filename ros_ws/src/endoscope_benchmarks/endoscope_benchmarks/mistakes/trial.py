@@ -15,16 +15,8 @@ from endoscope_explain.audit import audit_recording
 class Row:
     """What was said.
 
-    Attributes
-    ----------
-    name : str
-        Of the mistake; empty where none was made.
-    seed : int
-    right : bool
-        Whether the mistake and nothing else was said, or nothing where none was made.
-    unusable : bool
-    seconds : float
-    said : tuple of str
+    `name`: of the mistake; empty where none was made.
+    `right`: whether the mistake and nothing else was said, or nothing where none was made.
     """
 
     name: str

@@ -15,12 +15,8 @@ Rows = NDArray[np.intp]
 class CrossValidation:
     """Accuracy on recordings whose tube configuration was not trained with.
 
-    Parameters
-    ----------
-    accuracy : tuple of float
-        Share of right classes of each fold.
-    confusion : ndarray of int, shape (7, 7)
-        Rows are true classes, columns named ones, over all folds.
+    `accuracy`: share of right classes of each fold.
+    `confusion` (7, 7): rows are true classes, columns named ones, over all folds.
     """
 
     accuracy: tuple[float, ...]
@@ -53,10 +49,8 @@ def grouped_folds(
 
     Classes are as frequent in every fold, and each tube configuration is on one side only.
 
-    Raises
-    ------
-    DatasetError
-        If there are fewer than two folds, or a class has fewer configurations than there are folds.
+    Raises DatasetError: if there are fewer than two folds, or a class has fewer configurations than
+        there are folds.
     """
     classes = np.unique(dataset.class_deg)
     least = min(len(set(dataset.configuration[dataset.class_deg == c])) for c in classes)

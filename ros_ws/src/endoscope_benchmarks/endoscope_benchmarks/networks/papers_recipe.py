@@ -48,21 +48,11 @@ def train_network(
 ) -> Network:
     """Train a network; the same seed on the same machine gives the same weights.
 
-    Parameters
-    ----------
-    tension : ndarray, shape (R, 9000, 4)
-        N.
-    class_deg : ndarray of int, shape (R,)
-    seed : int
-        Of the first weights and of the order of the batches.
-    settings : TrainingSettings, optional
-    kind : str
-        One of `NETWORKS`.
-
-    Returns
-    -------
-    Network
-        In evaluation mode.
+    Shapes: `class_deg` (R,).
+    `tension` (R, 9000, 4): N.
+    `seed`: of the first weights and of the order of the batches.
+    `kind`: one of `NETWORKS`.
+    Returns: in evaluation mode.
     """
     settings = settings or TrainingSettings()
     torch.manual_seed(seed)
@@ -104,10 +94,8 @@ def cross_validate(
 ) -> CrossValidation:
     """Stratified k-fold cross-validation that keeps each tube configuration on one side.
 
-    Raises
-    ------
-    DatasetError
-        If there are fewer than two folds, or a class has fewer configurations than there are folds.
+    Raises DatasetError: if there are fewer than two folds, or a class has fewer configurations than
+        there are folds.
     """
     named = np.zeros_like(dataset.class_deg)
     split = grouped_folds(dataset, seed, folds)

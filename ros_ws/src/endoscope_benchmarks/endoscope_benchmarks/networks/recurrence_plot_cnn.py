@@ -16,10 +16,7 @@ class RecurrencePlotCnn(nn.Module):
     series, not thresholded; each of two stages has 32 filters of 3 x 3, ReLU, pooling and dropout,
     then follow 128 units. A state here is the tension averaged over 150 ms.
 
-    Parameters
-    ----------
-    classes : int
-        Number of classes.
+    `classes`: number of classes.
     """
 
     offset: Tensor

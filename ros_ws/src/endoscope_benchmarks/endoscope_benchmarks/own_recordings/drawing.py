@@ -28,18 +28,10 @@ NOMINAL = 0.5
 class Case:
     """One recording.
 
-    Attributes
-    ----------
-    seed : int
-    lock_step : bool
-    joint : JointParameters
-        Of the slave.
-    actions : tuple of str
-        Names in `ACTIONS`.
-    calibration : str
-        Motion by which the tube is calibrated.
-    cut : (float, float)
-        Share of the recording that is left out at its beginning and at its end.
+    `joint`: of the slave.
+    `actions`: names in `ACTIONS`.
+    `calibration`: motion by which the tube is calibrated.
+    `cut`: share of the recording that is left out at its beginning and at its end.
     """
 
     seed: int

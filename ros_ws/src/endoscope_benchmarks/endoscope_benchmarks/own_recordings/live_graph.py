@@ -31,20 +31,13 @@ RATE = {True: 500, False: 1000}
 class LiveGraph(ClosedOnExit):
     """All nodes, recorder included, in this process.
 
-    Parameters
-    ----------
-    bag
-        Where the recording goes, which lasts from the beginning to :meth:`stop`; None for none.
-    domain
-        ROS domain of the graph; by default one of this process's own.
-    lock_step
-        Whether simulated time goes on as the nodes follow, or the wall clock gives the time.
-    overrides
-        Parameter values by node name.
-    rate
-        Beats a second; by default that of `RATE`.
-    rig
-        What stands on the table; as shipped if not given.
+    `bag`: where the recording goes, which lasts from the beginning to :meth:`stop`; None for none.
+    `domain`: ROS domain of the graph; by default one of this process's own.
+    `lock_step`: whether simulated time goes on as the nodes follow, or the wall clock gives the
+        time.
+    `overrides`: parameter values by node name.
+    `rate`: beats a second; by default that of `RATE`.
+    `rig`: what stands on the table; as shipped if not given.
     """
 
     def __init__(
@@ -112,14 +105,9 @@ class LiveGraph(ClosedOnExit):
     ) -> None:
         """Let the slave follow a handle.
 
-        Parameters
-        ----------
-        angles
-            Where the handle is so many s after its clutch was engaged, rad, shape (J,).
-        rate
-            Messages of the handle in a second.
-        seconds
-            How long its clutch is held.
+        `angles`: where the handle is so many s after its clutch was engaged, rad, shape (J,).
+        `rate`: messages of the handle in a second.
+        `seconds`: how long its clutch is held.
         """
         self.set('console', source='master')
         hand = HandleSender(self.node)

@@ -26,18 +26,10 @@ UNNAMED = (Verdict.CONSISTENT, Verdict.PARAMETERS_DIFFER, Verdict.INSUFFICIENT_D
 class Row:
     """What was said of one recording.
 
-    Attributes
-    ----------
-    seed : int
-    way : str
-        How it was made.
-    length : float
-        In s, once cut.
-    verdict, sentence : str
-    load : float
-        Of the machine while it was made.
-    seconds : float
-        Time to make and explain it.
+    `way`: how it was made.
+    `length`: in s, once cut.
+    `load`: of the machine while it was made.
+    `seconds`: time to make and explain it.
     """
 
     seed: int

@@ -49,22 +49,14 @@ class OwnExample:
 class Problem:
     """One joint of a case, M samples on a common grid.
 
-    Attributes
-    ----------
-    joint : str
-        The one of which the refitted plant leaves most.
-    refitted, described : Fit
-        Of the nominal plant.
-    left_out : tuple of str
-        Effects whose formulas are not tried.
-    time : array (M,)
-        In s from the first command.
-    residuals : array (M, 5)
-        Measured less simulated, in noise units, of each of `SIGNALS`.
-    states : mapping of str to array (M,)
-        Along the simulation, in SI units: time t, command u, servo error e, shaft angle m with its
-        derivatives dm, ddm, bending angle q with dq, ddq, sliding speed v, distance slid d,
-        tensions at the motor ta and tb, their mean T and difference D, the other joint's angle.
+    `joint`: the one of which the refitted plant leaves most.
+    `refitted`, `described`: of the nominal plant.
+    `left_out`: effects whose formulas are not tried.
+    `time` (M,): in s from the first command.
+    `residuals` (M, 5): measured less simulated, in noise units, of each of `SIGNALS`.
+    `states` (M,): along the simulation, in SI units: time t, command u, servo error e, shaft angle
+        m with its derivatives dm, ddm, bending angle q with dq, ddq, sliding speed v, distance slid
+        d, tensions at the motor ta and tb, their mean T and difference D, the other joint's angle.
     """
 
     joint: str

@@ -32,12 +32,8 @@ _FORK = multiprocessing.get_context('forkserver')
 class NodeProcesses(ClosedOnExit):
     """Processes of nodes, by name; ``graph`` is that of all nodes composed.
 
-    Parameters
-    ----------
-    domain
-        ROS domain.
-    folder
-        For what each process says, ``NAME.log``.
+    `domain`: ROS domain.
+    `folder`: for what each process says, ``NAME.log``.
     """
 
     def __init__(self, domain: int, folder: Path) -> None:
@@ -59,10 +55,7 @@ class NodeProcesses(ClosedOnExit):
     def start(self, name: str, parameters: Mapping[str, Mapping[str, object]]) -> None:
         """Start a node, or all of them, with parameters by node.
 
-        Raises
-        ------
-        ValueError
-            It runs already.
+        Raises ValueError: it runs already.
         """
         if name in self._processes:
             raise ValueError(f'{name} runs already')

@@ -40,27 +40,14 @@ class Operator(ClosedOnExit):
 
     Nothing is sent or heard but in :meth:`serve`; what was heard is judged by its stamps.
 
-    Parameters
-    ----------
-    domain
-        ROS domain.
-
-    Attributes
-    ----------
-    source
-        ``master``, ``outside``, or ``none`` where the console plays by itself.
-    clutch
-        Whether the hand holds it.
-    shafts, goals
-        What `motor/measured_js` and `motor/servo_jp` said.
-    sent
-        Commands sent to `slave/servo_jp`: session, stamp in ns, positions and velocities.
-    replays
-        Whether each command is followed by an old one, sent anew.
-    late_ns
-        How far stamps are behind.
-    graph
-        What the graph says, and by which it is asked.
+    `domain`: ROS domain.
+    `source`: ``master``, ``outside``, or ``none`` where the console plays by itself.
+    `clutch`: whether the hand holds it.
+    `shafts`, `goals`: what `motor/measured_js` and `motor/servo_jp` said.
+    `sent`: commands sent to `slave/servo_jp`: session, stamp in ns, positions and velocities.
+    `replays`: whether each command is followed by an old one, sent anew.
+    `late_ns`: how far stamps are behind.
+    `graph`: what the graph says, and by which it is asked.
     """
 
     def __init__(self, domain: int) -> None:

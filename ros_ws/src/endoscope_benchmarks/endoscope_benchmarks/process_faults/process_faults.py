@@ -44,17 +44,11 @@ _TURN_S = 0.004
 class ProcessFault:
     """Something that goes wrong in motion.
 
-    Attributes
-    ----------
-    inject
-        Makes it happen.
-    source
-        Whose motion it is: ``master`` for the handle, ``motion`` for one that the console plays,
-        ``outside`` for a program that writes `slave/servo_jp` itself.
-    kills
-        Process that is gone afterwards.
-    pauses
-        Whether the operator himself lets the slave stand and move again.
+    `inject`: makes it happen.
+    `source`: whose motion it is: ``master`` for the handle, ``motion`` for one that the console
+        plays, ``outside`` for a program that writes `slave/servo_jp` itself.
+    `kills`: process that is gone afterwards.
+    `pauses`: whether the operator himself lets the slave stand and move again.
     """
 
     inject: Callable[[ProcessRig], object]
@@ -67,27 +61,18 @@ class ProcessFault:
 class Outcome:
     """What followed a fault; angles in rad, times in s.
 
-    Attributes
-    ----------
-    state, cause
-        Operating state before the next enable, and why.
-    goal_step, goal_share
-        Largest step of `motor/servo_jp`, and the largest in parts of what the shaper allows.
-    shaft_step, shaft_speed
-        Largest step of a shaft from reading to reading, and its largest speed over 10 ms.
-    still_s
-        From the fault to standstill; None where the motion went on, or the plant died.
-    unasked
-        How far shafts went at rest, with no session open, before the next enable.
-    gap_s
-        Longest time between two readings of the shafts, by their stamps.
-    enabled_s
-        From the next enable to motion; None where that did not come.
-    before
-        What ended the motion before the fault, each time that it was tried again.
-    bag
-        Seconds between the last message of a killed recorder's bag and the fault; messages lost by
-        one that lives, below zero.
+    `state`, `cause`: operating state before the next enable, and why.
+    `goal_step`, `goal_share`: largest step of `motor/servo_jp`, and the largest in parts of what
+        the shaper allows.
+    `shaft_step`, `shaft_speed`: largest step of a shaft from reading to reading, and its largest
+        speed over 10 ms.
+    `still_s`: from the fault to standstill; None where the motion went on, or the plant died.
+    `unasked`: how far shafts went at rest, with no session open, before the next enable.
+    `gap_s`: longest time between two readings of the shafts, by their stamps.
+    `enabled_s`: from the next enable to motion; None where that did not come.
+    `before`: what ended the motion before the fault, each time that it was tried again.
+    `bag`: seconds between the last message of a killed recorder's bag and the fault; messages lost
+        by one that lives, below zero.
     """
 
     state: str
@@ -107,10 +92,7 @@ class Outcome:
 def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
     """Make a fault happen at a random instant of the motion, and look at what follows.
 
-    Raises
-    ------
-    RuntimeError
-        The graph does not move, or not long enough.
+    Raises RuntimeError: the graph does not move, or not long enough.
     """
     operator = rig.operator
     if fault.kills == 'recorder' and 'recorder' in rig.processes.running:

@@ -17,16 +17,10 @@ _MOVED_RAD = 0.02
 class ProcessRig(ClosedOnExit):
     """The nodes in processes of their own, or all of them in one.
 
-    Parameters
-    ----------
-    rate
-        Beats per second.
-    composed
-        Whether all nodes live in one process.
-    folder
-        For bags and logs.
-    random
-        For whatever is left to chance.
+    `rate`: beats per second.
+    `composed`: whether all nodes live in one process.
+    `folder`: for bags and logs.
+    `random`: for whatever is left to chance.
     """
 
     def __init__(self, rate: int, composed: bool, folder: Path, random: Random) -> None:
@@ -60,10 +54,7 @@ class ProcessRig(ClosedOnExit):
     def revive(self) -> None:
         """Start what does not run, and wait until every node is heard.
 
-        Raises
-        ------
-        RuntimeError
-            One is not.
+        Raises RuntimeError: one is not.
         """
         for name in self.names:
             if name not in self.processes.running:

@@ -27,17 +27,9 @@ _SPEED_NS = 10_000_000
 def goal_step(goals: Sequence[JointSample], motors: MotorFacts) -> tuple[float, float]:
     """Largest step of goals that follow each other in a session, in rad, and what is over a bound.
 
-    Parameters
-    ----------
-    goals
-        In the order of their stamps.
-    motors
-        Their `speed` times the time between two stamps bounds a step.
-
-    Returns
-    -------
-    tuple of float
-        Largest step, and the largest step in parts of its bound.
+    `goals`: in the order of their stamps.
+    `motors`: their `speed` times the time between two stamps bounds a step.
+    Returns: largest step, and the largest step in parts of its bound.
     """
     largest, share = 0.0, 0.0
     for before, after in itertools.pairwise(goals):
@@ -53,10 +45,7 @@ def goal_step(goals: Sequence[JointSample], motors: MotorFacts) -> tuple[float, 
 class ShaftTrace:
     """Readings of the shafts by stamp.
 
-    Parameters
-    ----------
-    samples
-        In any order.
+    `samples`: in any order.
     """
 
     def __init__(self, samples: Sequence[JointSample]) -> None:
@@ -92,16 +81,10 @@ class ShaftTrace:
     def standstill(self, since_ns: int, open_ns: int, until_ns: int) -> tuple[float | None, float]:
         """When the shafts came to rest, and how far they went without anybody's enable.
 
-        Parameters
-        ----------
-        since_ns, open_ns, until_ns
-            Stamps of the fault, of the last word that a session was open, and of the next enable.
-
-        Returns
-        -------
-        tuple
-            Seconds from ``since_ns`` to the first reading from which on the shafts stayed for 0.3
-            s, None if they never did; and the largest distance in rad that they went until the
+        `since_ns`, `open_ns`, `until_ns`: stamps of the fault, of the last word that a session was
+            open, and of the next enable.
+        Returns: seconds from ``since_ns`` to the first reading from which on the shafts stayed for
+            0.3 s, None if they never did; and the largest distance in rad that they went until the
             enable once they had come to rest and no session had been open for `HELD_S`.
         """
         inside = (self._stamps >= since_ns) & (self._stamps < until_ns)

@@ -35,37 +35,27 @@ NODES, FEW_NODES = 30, 12
 class Laws:
     """What acts in a rig beside its nominal physics; by default nothing does.
 
-    Attributes
-    ----------
-    late_s : float
-        Commands take effect so much later.
-    play_rad : float
-        Between the gear's flanks.
-    eccentric_rad, eccentric_cycles, eccentric_phase : float
-        The pulley runs ahead by eccentric_rad (sin(cycles shaft + phase) - sin phase).
-    drag_nm, drag_speed : float
-        The motor also turns a gear: drag_nm (2 / pi) atan(speed / drag_speed), N m and rad/s.
-    sticking, sticking_speed : float
-        The exponent is 1 + sticking / (1 + (v / sticking_speed)^1.5) times as large where the wire
-        is wound at v, m/s.
-    bent_anew, bent_at_s, bent_within_s : float
-        It grows by the share bent_anew around a time, as a hyperbolic tangent.
-    running_in, running_in_m : float
-        It is larger by the share running_in / (1 + way / running_in_m)^2 after some way wound.
-    weight_nm, weight_rad, stop_rad, stop_stiffness : float
-        See `Acting`.
-    breath_nm, breath_hz, breath_phase : float
-        Moment of a breath that dwells at its end: breath_nm (1 - 2 |cos|^3) of half the cycle
-        (Lujan et al., Med. Phys. 26, 1999).
-    push_nm, push_at_s, push_within_s : float
-        Moment from a time on, as a hyperbolic tangent.
-    filter_s : float
-        The tracker tells the mean of so long.
-    field_rad, field_width : float
-        The tracker reads more by field_rad (1 - exp(-(angle / field_width)^2)).
-    gain, warming_n, warming_s, neighbour : float
-        The first cell reads this factor, and warms up by warming_n (1 - exp(-t / warming_s)); both
-        read a share of their neighbour.
+    `late_s`: commands take effect so much later.
+    `play_rad`: between the gear's flanks.
+    `eccentric_rad`, `eccentric_cycles`, `eccentric_phase`: the pulley runs ahead by eccentric_rad
+        (sin(cycles shaft + phase) - sin phase).
+    `drag_nm`, `drag_speed`: the motor also turns a gear: drag_nm (2 / pi) atan(speed / drag_speed),
+        N m and rad/s.
+    `sticking`, `sticking_speed`: the exponent is 1 + sticking / (1 + (v / sticking_speed)^1.5)
+        times as large where the wire is wound at v, m/s.
+    `bent_anew`, `bent_at_s`, `bent_within_s`: it grows by the share bent_anew around a time, as a
+        hyperbolic tangent.
+    `running_in`, `running_in_m`: it is larger by the share running_in / (1 + way / running_in_m)^2
+        after some way wound.
+    `weight_nm`, `weight_rad`, `stop_rad`, `stop_stiffness`: see `Acting`.
+    `breath_nm`, `breath_hz`, `breath_phase`: moment of a breath that dwells at its end: breath_nm
+        (1 - 2 |cos|^3) of half the cycle (Lujan et al., Med. Phys. 26, 1999).
+    `push_nm`, `push_at_s`, `push_within_s`: moment from a time on, as a hyperbolic tangent.
+    `filter_s`: the tracker tells the mean of so long.
+    `field_rad`, `field_width`: the tracker reads more by field_rad (1 - exp(-(angle /
+        field_width)^2)).
+    `gain`, `warming_n`, `warming_s`, `neighbour`: the first cell reads this factor, and warms up by
+        warming_n (1 - exp(-t / warming_s)); both read a share of their neighbour.
     """
 
     late_s: float = 0.0
@@ -105,18 +95,12 @@ class Laws:
 class Form:
     """How a law is drawn.
 
-    Attributes
-    ----------
-    words : str
-        What it is, as a mechanic says it.
-    strength : str
-        The number of `Laws` by which it is strong.
-    begin : float
-        By how much that differs from nothing where the search for a strength begins.
-    ranges : mapping of str to (float, float)
-        Ends between which its other numbers are drawn by their logarithm, phases evenly.
-    within, reached : mapping of str to (float, float)
-        The same in shares of the recording's length, and of the largest angle that the tip reaches.
+    `words`: what it is, as a mechanic says it.
+    `strength`: the number of `Laws` by which it is strong.
+    `begin`: by how much that differs from nothing where the search for a strength begins.
+    `ranges`: ends between which its other numbers are drawn by their logarithm, phases evenly.
+    `within`, `reached`: the same in shares of the recording's length, and of the largest angle that
+        the tip reaches.
     """
 
     words: str
@@ -192,13 +176,8 @@ def drawn_laws(
 ) -> Callable[[float], Laws]:
     """Draw everything about a law but its strength: at zero there is none, at one its `begin`.
 
-    Parameters
-    ----------
-    generator : numpy.random.Generator
-    name : str
-        Of `FORMS`.
-    duration, reached : float
-        Of the recording in s, and the largest angle of its tip in rad.
+    `name`: of `FORMS`.
+    `duration`, `reached`: of the recording in s, and the largest angle of its tip in rad.
     """
     form = FORMS[name]
     chosen: dict[str, Any] = {}

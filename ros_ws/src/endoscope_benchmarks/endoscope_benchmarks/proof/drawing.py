@@ -43,9 +43,7 @@ class NoSuchEffectError(EndoscopeError, ValueError):
 def require_drawn(effect: str, form: str) -> None:
     """Refuse an effect that is not drawn.
 
-    Raises
-    ------
-    NoSuchEffectError
+    Raises NoSuchEffectError.
     """
     known = list(FORMS if form == OTHER else DRAWN)
     if form == SLAVE:
@@ -59,20 +57,10 @@ def require_drawn(effect: str, form: str) -> None:
 def drawn(form: str, seed: int, number: int, effect: str | None = None) -> tuple[Case, dict]:
     """Draw a rig.
 
-    Parameters
-    ----------
-    form : str
-        Of `SIMULATORS`, or `SLAVE`.
-    seed, number : int
-        The same rig for the same of both.
-    effect : str, optional
-        What is concealed; drawn if not given.
-
-    Returns
-    -------
-    Case
-    dict
-        The truth as plain data.
+    `form`: of `SIMULATORS`, or `SLAVE`.
+    `seed`, `number`: the same rig for the same of both.
+    `effect`: what is concealed; drawn if not given.
+    Returns: the truth as plain data.
     """
     generator = np.random.default_rng([seed, number])
     if form == OTHER:

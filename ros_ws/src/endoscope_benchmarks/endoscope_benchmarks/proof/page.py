@@ -30,11 +30,7 @@ PLANTS = ('nominal', 'refitted', 'augmented')
 def page(outcomes: Sequence[Outcome], facts: Mapping[str, str]) -> str:
     """HTML of the proof: a page that needs no other file, with links to the reports beside it.
 
-    Parameters
-    ----------
-    outcomes : sequence of Outcome
-    facts : mapping of str to str
-        How it was made.
+    `facts`: how it was made.
     """
     environment = Environment(
         loader=PackageLoader('endoscope_benchmarks', 'proof/templates'),

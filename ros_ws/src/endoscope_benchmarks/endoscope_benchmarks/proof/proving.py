@@ -26,19 +26,11 @@ Say = Callable[[str], None]
 class Proof:
     """What is to be proven.
 
-    Attributes
-    ----------
-    count : int
-        Rigs.
-    form : str
-        Of `SIMULATORS`, or `SLAVE`.
-    seed : int
-    effect : str or None
-        What is concealed; drawn if None.
-    jobs : int
-        Rigs side by side.
-    command : str
-        As it was typed.
+    `count`: rigs.
+    `form`: of `SIMULATORS`, or `SLAVE`.
+    `effect`: what is concealed; drawn if None.
+    `jobs`: rigs side by side.
+    `command`: as it was typed.
     """
 
     count: int
@@ -52,10 +44,7 @@ class Proof:
 def prove(proof: Proof, folder: Path, say: Say) -> list[Outcome]:
     """Record rigs into a folder, explain them, and compare what is said with what was sealed.
 
-    Raises
-    ------
-    EndoscopeError
-        If nothing can be written, or a seal was broken.
+    Raises EndoscopeError: if nothing can be written, or a seal was broken.
     """
     with worker_pool(min(proof.jobs, proof.count)) as pool:
         rigs = _recorded(proof, folder, pool, say)

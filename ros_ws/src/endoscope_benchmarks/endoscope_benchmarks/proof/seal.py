@@ -26,10 +26,7 @@ def seal(path: Path, truth: dict) -> str:
 def opened(path: Path, told: str) -> dict:
     """Read a truth whose digest was told before.
 
-    Raises
-    ------
-    BrokenSealError
-        The file is another one now.
+    Raises BrokenSealError: the file is another one now.
     """
     if digest(path) != told:
         raise BrokenSealError(f'{path}: its SHA-256 is not the one that was told: it was changed')

@@ -34,12 +34,8 @@ LATEST_S = 4.0
 class Tracking:
     """How the tip follows a motion under a command that was planned with a plant.
 
-    Attributes
-    ----------
-    time : array (N,)
-        In s.
-    desired, measured : array (N, J)
-        In rad.
+    `time` (N,): in s.
+    `desired`, `measured` (N, J): in rad.
     """
 
     time: Array
@@ -82,16 +78,10 @@ def record(plant: PlantDescription, motion: str, bag: Path, seed: int) -> None:
 def tracked(slave: PlantDescription, known: PlantDescription, folder: Path, seed: int) -> Tracking:
     """Move the slave by the inverse of a plant.
 
-    Parameters
-    ----------
-    slave : PlantDescription
-        As the slave is.
-    known : PlantDescription
-        That the command is planned with.
-    folder : Path
-        For the command and the recording; made here.
-    seed : int
-        Of the sensors' noise.
+    `slave`: as the slave is.
+    `known`: that the command is planned with.
+    `folder`: for the command and the recording; made here.
+    `seed`: of the sensors' noise.
     """
     folder.mkdir()
     motion = motion_by_name(TRACKED)

@@ -56,17 +56,11 @@ BALANCED = 1e-12  # N m
 class Acting:
     """What acts on wires and joint beside what `NOMINAL` has.
 
-    Attributes
-    ----------
-    rubbing : array (N,)
-        Factor on the exponent of all nodes before each row.
-    moment : array (N,)
-        On the joint from outside before each row, N m.
-    weight_nm, weight_rad : float
-        Moment -weight_nm sin(angle + weight_rad).
-    stop_rad, stop_stiffness : float
-        Contact of two round bodies beyond an angle on either side (Hertz 1882): its moment is
-        stop_stiffness (|angle| - stop_rad)^1.5, N m/rad^1.5.
+    `rubbing` (N,): factor on the exponent of all nodes before each row.
+    `moment` (N,): on the joint from outside before each row, N m.
+    `weight_nm`, `weight_rad`: moment -weight_nm sin(angle + weight_rad).
+    `stop_rad`, `stop_stiffness`: contact of two round bodies beyond an angle on either side (Hertz
+        1882): its moment is stop_stiffness (|angle| - stop_rad)^1.5, N m/rad^1.5.
     """
 
     rubbing: Array

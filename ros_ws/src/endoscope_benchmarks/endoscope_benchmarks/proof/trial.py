@@ -63,14 +63,9 @@ class Rig:
 class Passage:
     """The signal of the second recording in which most is left when only numbers are refitted.
 
-    Attributes
-    ----------
-    signal, unit : str
-    time : array (N,)
-        In s.
-    measured : array (N,)
-    predicted : dict of str to array (N,)
-        By the plant as described, refitted and improved.
+    Shapes: `measured` (N,).
+    `time` (N,): in s.
+    `predicted` (N,): by the plant as described, refitted and improved.
     """
 
     signal: str
@@ -111,15 +106,8 @@ class Answer:
 class Outcome:
     """Truth beside answer.
 
-    Attributes
-    ----------
-    rig : Rig
-    answer : Answer
-    truth : dict
-        As it was sealed.
-    judgement : Judgement
-    tracking : dict of str to Tracking
-        How the slave follows a motion that is planned with the plant as described, and as
+    `truth`: as it was sealed.
+    `tracking`: how the slave follows a motion that is planned with the plant as described, and as
         improved; empty of a rig that does not run.
     """
 
@@ -183,10 +171,7 @@ def explained(number: int, folder: Path, command: str) -> Answer:
 def compared(rig: Rig, answer: Answer) -> Outcome:
     """Open a rig's seal and judge what was said of it.
 
-    Raises
-    ------
-    BrokenSealError
-        The truth was changed after it was sealed.
+    Raises BrokenSealError: the truth was changed after it was sealed.
     """
     truth = opened(rig.folder / TRUTH, rig.sha256)
     return Outcome(rig, answer, truth, judged(rig.laws, answer.said, rig.also))

@@ -56,17 +56,10 @@ Number = tuple[float, float, float]
 class Tubes:
     """The five tubes.
 
-    Attributes
-    ----------
-    told : tuple of Told
-        Judged on the second cycle.
-    effects : tuple of str
-        That are missing from all of them together; where none can be named, the best one.
-    named : bool
-        Whether they are named.
-    search : tuple of str
-        What it said.
-    wide, explained : tuple of Fit
+    `told`: judged on the second cycle.
+    `effects`: that are missing from all of them together; where none can be named, the best one.
+    `named`: whether they are named.
+    `search`: what it said.
     """
 
     told: tuple[Told, ...]
@@ -138,16 +131,10 @@ def numbers(fits: Sequence[Fit], jobs: int) -> dict[str, list[Number | None]]:
 class State:
     """The rig in another state.
 
-    Attributes
-    ----------
-    told : tuple of Told
-        The recording that was fitted, then those that are predicted from it.
-    fit : Fit
-        With the tubes' effects.
-    needed : mapping of str to float
-        Logarithm of the evidence that is lost without each of the tubes' effects.
-    alone : tuple of str
-        What would be named by this recording alone.
+    `told`: the recording that was fitted, then those that are predicted from it.
+    `fit`: with the tubes' effects.
+    `needed`: logarithm of the evidence that is lost without each of the tubes' effects.
+    `alone`: what would be named by this recording alone.
     """
 
     told: tuple[Told, ...]

@@ -80,11 +80,8 @@ def as_described(model: JointModel) -> Array:
 class Plant:
     """A fitted plant, without a recording.
 
-    Attributes
-    ----------
-    model : JointModel
-        Whatever it was fitted to.
-    theta : array (n,)
+    Shapes: `theta` (n,).
+    `model`: whatever it was fitted to.
     """
 
     model: JointModel
@@ -143,13 +140,8 @@ def best_refitted(plants: Sequence[Plant]) -> Fit:
 class Told:
     """What plants say of one recording.
 
-    Attributes
-    ----------
-    take : Take
-    begin, end : float
-        Between which it is judged, s.
-    plants : mapping of str to Plant
-        On the whole recording; keys are those of the report's plants.
+    `begin`, `end`: between which it is judged, s.
+    `plants`: on the whole recording; keys are those of the report's plants.
     """
 
     take: Take

@@ -22,19 +22,11 @@ from endoscope_explain.search.levels import search
 class TakenOut:
     """What was made of a tube whose plant lacks a piece.
 
-    Attributes
-    ----------
-    tube, piece : str
-    lost : float
-        Logarithm of the evidence that the piece's lack costs.
-    named : tuple of str
-        What is missing, in the order in which it was found.
-    number : Number or None
-        The piece's first number and its interval as found; None where it was not.
-    whole : Number
-        The same of the whole plant, fitted to the same cycle.
-    told : Told
-        Without the piece, with what was found, and whole; on the second cycle.
+    `lost`: logarithm of the evidence that the piece's lack costs.
+    `named`: what is missing, in the order in which it was found.
+    `number`: the piece's first number and its interval as found; None where it was not.
+    `whole`: the same of the whole plant, fitted to the same cycle.
+    `told`: without the piece, with what was found, and whole; on the second cycle.
     """
 
     tube: str

@@ -47,21 +47,12 @@ _PHASE_DIGITS = 1e-4
 class Take:
     """One recording, M values of the tracker.
 
-    Attributes
-    ----------
-    name : str
-    cycle_s : float
-        Of the phase.
-    time, command : array (N,)
-        s, and desired bending in rad; in force until the next one.
-    seen : array (M,)
-        When the tracker gave a new value, s.
-    angle : array (M,)
-        rad.
-    tension : array (M, 2), or None
-        N.
-    latency_s : float
-        By how much tensions are older than their rows.
+    `cycle_s`: of the phase.
+    `time`, `command` (N,): s, and desired bending in rad; in force until the next one.
+    `seen` (M,): when the tracker gave a new value, s.
+    `angle` (M,): rad.
+    `tension` (M, 2): N.
+    `latency_s`: by how much tensions are older than their rows.
     """
 
     name: str
@@ -111,10 +102,7 @@ class Take:
 def require_recordings(folder: Path) -> None:
     """Refuse a folder that lacks a recording.
 
-    Raises
-    ------
-    EndoscopeError
-        Names those that it lacks.
+    Raises EndoscopeError: names those that it lacks.
     """
     lacking = [name for name in NAMES if not (folder / f'{name}.txt').is_file()]
     if lacking:

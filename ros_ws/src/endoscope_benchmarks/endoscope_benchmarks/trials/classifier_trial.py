@@ -29,12 +29,8 @@ _UNSEEN = 515_151
 class SizeTrial:
     """One tube of any size.
 
-    Parameters
-    ----------
-    size : float
-        True backlash size in rad, mean of the joints.
-    result : ClassificationResult or None
-        None where the classifier refused.
+    `size`: true backlash size in rad, mean of the joints.
+    `result`: none where the classifier refused.
     """
 
     size: float

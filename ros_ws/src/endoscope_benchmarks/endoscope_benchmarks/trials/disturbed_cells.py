@@ -45,12 +45,8 @@ FAULTS: dict[str, Spoil] = {
 class Tubes:
     """R tubes of known size and their tensions without noise.
 
-    Parameters
-    ----------
-    size : ndarray, shape (R,)
-        rad.
-    tension : ndarray of float32, shape (R, N, 4)
-        N at 1 kHz, what the classifier reads of the record.
+    `size` (R,): rad.
+    `tension` (R, N, 4): n at 1 kHz, what the classifier reads of the record.
     """
 
     size: NDArray[np.float64]
@@ -61,14 +57,9 @@ class Tubes:
 class Outcome:
     """What a classifier says of R tubes.
 
-    Parameters
-    ----------
-    right, wrong, refused : float
-        Shares; right and wrong by the class nearest to the true size.
-    rmse : float
-        Error of the size in rad of what was not refused.
-    holds : float
-        Share of sizes in their 90 % interval, of what was not refused.
+    `right`, `wrong`, `refused`: shares; right and wrong by the class nearest to the true size.
+    `rmse`: error of the size in rad of what was not refused.
+    `holds`: share of sizes in their 90 % interval, of what was not refused.
     """
 
     right: float

@@ -30,13 +30,8 @@ _MOST_RIGS = 1000
 class NeverSeenTube:
     """One random rig in one random tube.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-    size : float
-        True backlash size in rad, mean of the joints.
-    noise : int
-        Seed of the sensors.
+    `size`: true backlash size in rad, mean of the joints.
+    `noise`: seed of the sensors.
     """
 
     plant: PlantDescription
@@ -47,17 +42,9 @@ class NeverSeenTube:
 def never_seen_tube(seed: int, number: int, size_deg: float | None = None) -> NeverSeenTube:
     """Draw a rig, how evenly its tube is bent, and bend it until the backlash has its size.
 
-    Parameters
-    ----------
-    seed, number : int
-        Together they choose rig, tube and noise.
-    size_deg : float, optional
-        Backlash size in deg; uniform between 42 and 98 if not given.
-
-    Raises
-    ------
-    RuntimeError
-        If no rig of a thousand reaches the size.
+    `seed`, `number`: together they choose rig, tube and noise.
+    `size_deg`: backlash size in deg; uniform between 42 and 98 if not given.
+    Raises RuntimeError: if no rig of a thousand reaches the size.
     """
     generator = np.random.default_rng([_UNSEEN, seed, number])
     drawn = float(generator.uniform(SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG))

@@ -37,12 +37,7 @@ _NO_LIMIT_NS = 1_000_000_000
 class ReadTube:
     """A tube of one class, and its tensions without noise.
 
-    Parameters
-    ----------
-    class_deg : int
-    configuration : TubeConfiguration
-    tension : ndarray, shape (N, 4)
-        In N at 1 kHz.
+    `tension` (N, 4): in N at 1 kHz.
     """
 
     class_deg: int
@@ -54,16 +49,10 @@ class ReadTube:
 class RateTrial:
     """What became of one calibration.
 
-    Parameters
-    ----------
-    class_deg : int
-        True class.
-    size : float
-        True backlash size in rad.
-    result : ClassificationResult or None
-        None where it was refused.
-    reason : str
-        Of the refusal.
+    `class_deg`: true class.
+    `size`: true backlash size in rad.
+    `result`: none where it was refused.
+    `reason`: of the refusal.
     """
 
     class_deg: int
@@ -101,17 +90,10 @@ def judged_at_rate(
 ) -> RateTrial:
     """Read, resample and judge one calibration.
 
-    Parameters
-    ----------
-    classifier, tube
-    rate : float
-        Readings a second; each comes up to `JITTER` of the interval early or late.
-    seed : int
-        Of phase, jitter and noise.
-    gap : float
-        Time in s without readings, where the tension bends most; however long, it is bridged.
-    delay : float
-        Time in s by which a reading is older than its stamp.
+    `rate`: readings a second; each comes up to `JITTER` of the interval early or late.
+    `seed`: of phase, jitter and noise.
+    `gap`: time in s without readings, where the tension bends most; however long, it is bridged.
+    `delay`: time in s by which a reading is older than its stamp.
     """
     generator = np.random.default_rng([_UNSEEN, seed, round(rate)])
     motion = calibration_motion(classifier.motion)

@@ -43,16 +43,10 @@ _SETTLED = (0.5 * np.pi, 2.5 * np.pi)
 class RealRecording:
     """One tube, N samples.
 
-    Parameters
-    ----------
-    bend : int
-        Of the tube, deg.
-    phase : ndarray, shape (N,)
-        rad, which at 0.159 Hz is s.
-    desired, actual : ndarray, shape (N,)
-        rad.
-    tension : ndarray, shape (N, 2)
-        N.
+    `bend`: of the tube, deg.
+    `phase` (N,): rad, which at 0.159 Hz is s.
+    `desired`, `actual` (N,): rad.
+    `tension` (N, 2): N.
     """
 
     bend: int
@@ -141,17 +135,11 @@ def models_on_real_recordings(
 class LeftOneOut:
     """A tube whose parameters come from the others.
 
-    Parameters
-    ----------
-    bend : int
-        Of the tube left out, deg.
-    left : float or None
-        rad rms by which the model at the predicted size misses the actual angle: what its inverse
-        as feed-forward would leave. None where the table does not reach.
-    uncompensated : float
-        rad rms, actual less desired angle.
-    size_error : float
-        rad, predicted less true backlash size.
+    `bend`: of the tube left out, deg.
+    `left`: rad rms by which the model at the predicted size misses the actual angle: what its
+        inverse as feed-forward would leave. None where the table does not reach.
+    `uncompensated`: rad rms, actual less desired angle.
+    `size_error`: rad, predicted less true backlash size.
     """
 
     bend: int

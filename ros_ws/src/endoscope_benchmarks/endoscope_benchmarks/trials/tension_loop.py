@@ -16,22 +16,11 @@ def tension_loop_width(
     straight line with the backlash size; on the simulated rig it falls from a capstan exponent of
     0.7 on, and hardly changes below.
 
-    Parameters
-    ----------
-    desired : array_like, shape (N,)
-        Angle, in time order, over at least one whole loop.
-    tension_positive, tension_negative : array_like, shape (N,)
-        Tensions in N of the wires that pull towards positive and negative angles.
-
-    Returns
-    -------
-    float
-        In the unit of `desired`.
-
-    Raises
-    ------
-    ValueError
-        As `width_at_mid_height`.
+    `desired` (N,): angle, in time order, over at least one whole loop.
+    `tension_positive`, `tension_negative` (N,): tensions in N of the wires that pull towards
+        positive and negative angles.
+    Returns: in the unit of `desired`.
+    Raises ValueError: as `width_at_mid_height`.
     """
     difference = np.asarray(tension_negative, dtype=float) - np.asarray(tension_positive)
     return width_at_mid_height(desired, difference)
@@ -40,9 +29,7 @@ def tension_loop_width(
 def leave_one_out_errors(feature: ArrayLike, target: ArrayLike) -> NDArray[np.float64]:
     """Errors (R,) of a straight line through all other points, at each of R >= 3 points.
 
-    Parameters
-    ----------
-    feature, target : array_like, shape (R,)
+    Shapes: `feature`, `target` (R,).
     """
     x, y = np.asarray(feature, dtype=float), np.asarray(target, dtype=float)
     errors = np.empty_like(y)

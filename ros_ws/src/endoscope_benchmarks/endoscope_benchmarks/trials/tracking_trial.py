@@ -26,17 +26,11 @@ TICK = 1.0e-3
 class TrackingTrial:
     """What came of it, N ticks of 1 ms, J joints; angles in rad.
 
-    Parameters
-    ----------
-    time, desired : ndarray, shape (N,)
-    bending : ndarray, shape (N, J)
-        True bending angle.
-    command : ndarray, shape (N, J)
-        Joint-equivalent motor command.
-    tension : ndarray, shape (N, J, 2)
-        True tensions of the positive and the negative wire at the motor, N.
-    rmse : float
-        Of all joints in the signal's steady part.
+    Shapes: `time`, `desired` (N,).
+    `bending` (N, J): true bending angle.
+    `command` (N, J): joint-equivalent motor command.
+    `tension` (N, J, 2): true tensions of the positive and the negative wire at the motor, N.
+    `rmse`: of all joints in the signal's steady part.
     """
 
     time: NDArray[np.float64]
@@ -62,19 +56,11 @@ def run_tracking_trial(
 ) -> TrackingTrial:
     """Drive every joint of a rig along a signal.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-    signal : Signal
-        Desired angle of every joint.
-    law : FeedforwardLaw
-    feedback : bool
-        Whether the tracker's noisy readings are used: learnt from by the law in mode
+    `signal`: desired angle of every joint.
+    `feedback`: whether the tracker's noisy readings are used: learnt from by the law in mode
         'adaptive_physical', otherwise by the controller.
-    seed : int
-        Of the tracker's noise.
-    controller : optional
-        What corrects from the tracker; the adaptive law of the second paper if not given.
+    `seed`: of the tracker's noise.
+    `controller`: what corrects from the tracker; the adaptive law of the second paper if not given.
     """
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, seed)
     joints = len(rig.joints)

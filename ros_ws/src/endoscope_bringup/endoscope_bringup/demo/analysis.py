@@ -48,25 +48,10 @@ def analyse(
 ) -> DemoResults:
     """Figures of all runs, from the recordings alone.
 
-    Parameters
-    ----------
-    bags : dict of str to Path
-        Recording of each tube.
-    segments : sequence of Segment
-    calibrations : sequence of CalibrationFacts
-    lost : dict of str to int
-        Messages that the recorder missed, by topic.
-
-    Returns
-    -------
-    DemoResults
-
-    Raises
-    ------
-    BagError
-        If a recording lacks what is needed.
-    ValueError
-        If a run ended before its motion did.
+    `bags`: recording of each tube.
+    `lost`: messages that the recorder missed, by topic.
+    Raises BagError: if a recording lacks what is needed.
+    Raises ValueError: if a run ended before its motion did.
     """
     recordings = {tube: open_bag(path) for tube, path in bags.items()}
     angles = {tube: Angles.of(recording) for tube, recording in recordings.items()}
@@ -91,12 +76,7 @@ def analyse(
 class Angles:
     """What was asked of the joints of one tube and what the tracker saw, s and rad.
 
-    Attributes
-    ----------
-    time : array (N,)
-    actual : array (N, J)
-    asked_time : array (M,)
-    asked : array (M, J)
+    Shapes: `time` (N,), `actual` (N, J), `asked_time` (M,), `asked` (M, J).
     """
 
     time: Array
@@ -137,17 +117,8 @@ class Angles:
 def run_of(angles: Angles, shafts: tuple[Array, Array], segment: Segment) -> TrackingRun:
     """The steady part of a run, beside what was asked for in this very run.
 
-    Parameters
-    ----------
-    angles : Angles
-    shafts : tuple of array (K,), (K, J)
-        Stamps in s and shaft angles in rad.
-    segment : Segment
-
-    Raises
-    ------
-    ValueError
-        If the run ended before its motion did.
+    `shafts` (K,): stamps in s and shaft angles in rad.
+    Raises ValueError: if the run ended before its motion did.
     """
     own = angles.between(segment.start, segment.end)
     signal = motion_by_name(segment.motion).joints[JOINTS[0]]
@@ -174,18 +145,9 @@ def run_of(angles: Angles, shafts: tuple[Array, Array], segment: Segment) -> Tra
 def start_of_motion(time: Array, desired: Array, signal: Signal) -> float:
     """When a motion began: the way to it from the measured pose comes first.
 
-    Parameters
-    ----------
-    time : array (N,)
-        Seconds.
-    desired : array (N,)
-        What was asked for then, rad: the signal, cut where the reach of the tube ends.
-    signal : Signal
-
-    Returns
-    -------
-    float
-        Seconds, to a millisecond.
+    `time` (N,): seconds.
+    `desired` (N,): what was asked for then, rad: the signal, cut where the reach of the tube ends.
+    Returns: seconds, to a millisecond.
     """
     late = np.flatnonzero(time >= LATEST_START_S)[::10]
     least, most = desired[late].min(), desired[late].max()
@@ -201,17 +163,9 @@ def start_of_motion(time: Array, desired: Array, signal: Signal) -> float:
 def reversals(time: Array, desired_deg: Array) -> Array:
     """Instants at which a desired angle turns back.
 
-    Parameters
-    ----------
-    time : array (N,)
-        Seconds.
-    desired_deg : array (N,)
-        An angle that was cut turns where it comes off its end.
-
-    Returns
-    -------
-    array (R,)
-        Where the way back begins that leads back by `TURNED_DEG` at least, s.
+    `time` (N,): seconds.
+    `desired_deg` (N,): an angle that was cut turns where it comes off its end.
+    Returns (R,): where the way back begins that leads back by `TURNED_DEG` at least, s.
     """
     turns = []
     moves = np.diff(desired_deg)
@@ -228,14 +182,9 @@ def reversals(time: Array, desired_deg: Array) -> Array:
 def longest_crossing(time: Array, shafts: Array, start: float, end: float) -> Crossing:
     """Longest stretch at more than half the motors' top speed.
 
-    Parameters
-    ----------
-    time : array (K,)
-        Seconds.
-    shafts : array (K, J)
-        Shaft angles, rad.
-    start, end : float
-        Of the interval that is looked at, s.
+    `time` (K,): seconds.
+    `shafts` (K, J): shaft angles, rad.
+    `start`, `end`: of the interval that is looked at, s.
     """
     rig = shipped_rig()
     inside = (time >= start) & (time < end)

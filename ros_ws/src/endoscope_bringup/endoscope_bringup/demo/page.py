@@ -25,16 +25,8 @@ def endoscope_picture() -> str:
 def report_page(results: DemoResults, facts: dict[str, str]) -> str:
     """HTML of the whole report.
 
-    Parameters
-    ----------
-    results : DemoResults
-    facts : dict of str to str
-        How it was made (date, seed, command, clock), shown at the foot.
-
-    Returns
-    -------
-    str
-        A page that needs no other file.
+    `facts`: how it was made (date, seed, command, clock), shown at the foot.
+    Returns: a page that needs no other file.
     """
     environment = Environment(
         loader=PackageLoader('endoscope_bringup', 'demo/templates'),

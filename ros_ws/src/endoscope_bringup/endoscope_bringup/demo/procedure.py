@@ -34,12 +34,8 @@ COMPENSATOR = {
 class Tube:
     """A shape of the insertion tube.
 
-    Attributes
-    ----------
-    name : str
-        The colon section of the first paper's experiment (section 4) whose backlash it has.
-    bend : float
-        Sum of the tube's bends in that shape, rad; both joints are the recorded family's.
+    `name`: the colon section of the first paper's experiment (section 4) whose backlash it has.
+    `bend`: sum of the tube's bends in that shape, rad; both joints are the recorded family's.
     """
 
     name: str
@@ -61,19 +57,11 @@ class Segment:
 class CalibrationFacts:
     """What one calibration announced.
 
-    Attributes
-    ----------
-    tube : str
-    start : float
-        Stamp in s at which the sinusoid began.
-    class_deg : float
-        Class chosen.
-    probabilities : dict of int to float
-        By class in degrees.
-    duration : float
-        Seconds from request to result.
-    reach_deg : tuple of (float, float)
-        Least and greatest angle to which each joint can be bent in this tube.
+    `start`: stamp in s at which the sinusoid began.
+    `class_deg`: class chosen.
+    `probabilities`: by class in degrees.
+    `duration`: seconds from request to result.
+    `reach_deg`: least and greatest angle to which each joint can be bent in this tube.
     """
 
     tube: str

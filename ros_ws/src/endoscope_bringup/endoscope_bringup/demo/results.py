@@ -15,19 +15,11 @@ Array = NDArray[np.float64]
 class CalibrationOutcome:
     """One calibration: what the wires said and what was made of it.
 
-    Attributes
-    ----------
-    facts : CalibrationFacts
-        What was announced.
-    time : array (N,)
-        Seconds since the sinusoid began.
-    tension : array (N, 4)
-        Load cells in N, in the order of `wires`.
-    wires : tuple of str
-    tracked_at : array (M,)
-        Stamps of the tracker on the same clock.
-    desired_deg, actual_deg : array (M, J)
-        Commanded and tracked angle of each joint.
+    `facts`: what was announced.
+    `time` (N,): seconds since the sinusoid began.
+    `tension` (N, 4): load cells in N, in the order of `wires`.
+    `tracked_at` (M,): stamps of the tracker on the same clock.
+    `desired_deg`, `actual_deg` (M, J): commanded and tracked angle of each joint.
     """
 
     facts: CalibrationFacts
@@ -50,12 +42,8 @@ class Crossing:
 
     No signal of the demonstration asks for that: it is the dead zone of a reversal.
 
-    Attributes
-    ----------
-    seconds : float
-        0 where there was none.
-    width_deg : float
-        Bending for which the shaft would have turned as far without friction.
+    `seconds`: 0 where there was none.
+    `width_deg`: bending for which the shaft would have turned as far without friction.
     """
 
     seconds: float
@@ -66,17 +54,11 @@ class Crossing:
 class TrackingRun:
     """One motion tracked by one method, over its steady part, at the tracker's stamps.
 
-    Attributes
-    ----------
-    tube, motion : str
-    method : Method
-    time : array (N,)
-        Seconds since the motion began.
-    desired_deg, actual_deg : array (N, J)
-        What each joint was asked for in this very run, and what the tracker saw.
-    reversals : tuple of array
-        For each joint the instants on the same clock at which what was asked for turned back.
-    crossing : Crossing
+    `time` (N,): seconds since the motion began.
+    `desired_deg`, `actual_deg` (N, J): what each joint was asked for in this very run, and what the
+        tracker saw.
+    `reversals`: for each joint the instants on the same clock at which what was asked for turned
+        back.
     """
 
     tube: str
@@ -114,16 +96,9 @@ class TrackingRun:
 class DemoResults:
     """All that the report shows.
 
-    Attributes
-    ----------
-    calibrations : tuple of CalibrationOutcome
-    runs : tuple of TrackingRun
-    noise_deg : float
-        What the tracker says of a tip that rests, rms.
-    messages : dict of str to int
-        Recorded messages by topic.
-    lost : dict of str to int
-        Messages missing from the recording by topic.
+    `noise_deg`: what the tracker says of a tip that rests, rms.
+    `messages`: recorded messages by topic.
+    `lost`: messages missing from the recording by topic.
     """
 
     calibrations: tuple[CalibrationOutcome, ...]
@@ -135,10 +110,7 @@ class DemoResults:
     def run(self, tube: str, motion: str, method: Method) -> TrackingRun:
         """The run of that tube, motion and method.
 
-        Raises
-        ------
-        KeyError
-            If it was not made.
+        Raises KeyError: if it was not made.
         """
         for run in self.runs:
             if (run.tube, run.motion, run.method) == (tube, motion, method):

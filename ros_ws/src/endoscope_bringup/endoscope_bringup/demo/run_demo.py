@@ -36,26 +36,11 @@ def run_demo(
 ) -> DemoResults:
     """Run the procedure on every tube, and write bags, figures and report into a folder.
 
-    Parameters
-    ----------
-    folder : Path
-        Exists; gets a bag and a plant file for each tube, `report.html` and `figures.json`.
-    tubes : sequence of Tube
-    seed : int
-        Of the sensors' noise; the same seed gives the same bags unless `real_time`.
-    real_time : bool
-        Whether to run by the wall clock instead of in lock-step on /clock.
-    progress : callable
-        Told, in a line, what happens; must be picklable.
-
-    Returns
-    -------
-    DemoResults
-
-    Raises
-    ------
-    EndoscopeError
-        If a node refuses, or the graph stands still.
+    `folder`: exists; gets a bag and a plant file for each tube, `report.html` and `figures.json`.
+    `seed`: of the sensors' noise; the same seed gives the same bags unless `real_time`.
+    `real_time`: whether to run by the wall clock instead of in lock-step on /clock.
+    `progress`: told, in a line, what happens; must be picklable.
+    Raises EndoscopeError: if a node refuses, or the graph stands still.
     """
     began = time.monotonic()
     recordings = _run_tubes(folder, tubes, seed, real_time, progress)

@@ -56,28 +56,12 @@ def run_tube(
 ) -> TubeRecording:
     """Enable, calibrate, and track every motion by every method on one simulated tube.
 
-    Parameters
-    ----------
-    tube : Tube
-    folder : Path
-        Gets the bag, and the plant file of the slave.
-    domain : int
-        ROS domain of the graph.
-    seed : int
-        Of the sensors' noise.
-    real_time : bool
-        Whether to run by the wall clock instead of in lock-step on /clock.
-    progress : callable
-        Told, in a line, what happens.
-
-    Returns
-    -------
-    TubeRecording
-
-    Raises
-    ------
-    EndoscopeError
-        If a node refuses, or the graph stands still.
+    `folder`: gets the bag, and the plant file of the slave.
+    `domain`: ROS domain of the graph.
+    `seed`: of the sensors' noise.
+    `real_time`: whether to run by the wall clock instead of in lock-step on /clock.
+    `progress`: told, in a line, what happens.
+    Raises EndoscopeError: if a node refuses, or the graph stands still.
     """
     name = tube.name.replace(' ', '_')
     plant_file = folder / f'{name}.plant.yaml'

@@ -26,12 +26,7 @@ COLUMN, HEADING = 14, 3
 class TableRow:
     """One figure of one motion in one tube, in degrees.
 
-    Attributes
-    ----------
-    tube, motion, figure : str
-    values : dict of Method to float
-    paper_none, paper_proposed : PaperFigure or None
-        On the paper's rig; None where the paper does not say.
+    `paper_none`, `paper_proposed`: on the paper's rig; None where the paper does not say.
     """
 
     tube: str

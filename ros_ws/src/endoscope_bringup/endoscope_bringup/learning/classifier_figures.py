@@ -28,10 +28,7 @@ def training_figure(curve: Sequence[tuple[int, float]]) -> str:
 def save_figures(folder: Path, figures: Mapping[str, str]) -> None:
     """Write NAME.svg for each figure to a new folder, whole or not at all.
 
-    Raises
-    ------
-    OutputExistsError
-        If there is something at `folder` already.
+    Raises OutputExistsError: if there is something at `folder` already.
     """
     with atomic_directory(folder) as partial:
         for name, text in figures.items():

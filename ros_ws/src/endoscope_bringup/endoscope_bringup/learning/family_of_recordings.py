@@ -42,12 +42,7 @@ _RAD = np.pi / 180.0
 
 @dataclass(frozen=True)
 class IdentifiedFamily:
-    """A family, and the lumped plant fitted likewise.
-
-    Attributes
-    ----------
-    family, lumped : TubeFamily
-    """
+    """A family, and the lumped plant fitted likewise."""
 
     family: TubeFamily
     lumped: TubeFamily

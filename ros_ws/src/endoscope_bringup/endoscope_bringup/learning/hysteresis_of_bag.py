@@ -29,22 +29,10 @@ def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecord
     The motor angle is the measured one; where it is missing, the motor's command or the desired
     angle passed through the nominal servo.
 
-    Parameters
-    ----------
-    bag : Recording
-    gear : float
-        Shaft angle for one radian at the joint.
-
-    Returns
-    -------
-    dict of str to endoscope_core.identification.Recording
-
-    Raises
-    ------
-    NoHysteresisError
-        If `gear` is not positive, or no joint has both angles for at least a second.
-    BagError
-        If the bending angle is missing or a message is damaged.
+    `gear`: shaft angle for one radian at the joint.
+    Raises NoHysteresisError: if `gear` is not positive, or no joint has both angles for at least a
+        second.
+    Raises BagError: if the bending angle is missing or a message is damaged.
     """
     if not gear > 0.0:
         raise NoHysteresisError(f'gear = {gear} must be positive')

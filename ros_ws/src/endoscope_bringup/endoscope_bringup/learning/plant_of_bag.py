@@ -18,14 +18,9 @@ Array = NDArray[np.float64]
 class PlantRecording:
     """One joint, N samples at 1 kHz.
 
-    Parameters
-    ----------
-    command : ndarray, shape (N,)
-        Joint-equivalent motor command in rad.
-    tension : ndarray, shape (N, 2)
-        N.
-    bending : ndarray, shape (N,) or None
-        rad, NaN where the tracker says nothing.
+    `command` (N,): joint-equivalent motor command in rad.
+    `tension` (N, 2): N.
+    `bending` (N,): rad, NaN where the tracker says nothing.
     """
 
     command: Array
@@ -38,18 +33,9 @@ def plant_recordings_of_bag(bag: Recording, gear: float) -> dict[str, PlantRecor
 
     The recording should begin at rest at zero, as a calibration does.
 
-    Parameters
-    ----------
-    bag : Recording
-    gear : float
-        Shaft angle for one radian at the joint.
-
-    Raises
-    ------
-    NoHysteresisError
-        If `gear` is not positive or no joint has both.
-    BagError
-        If a message is damaged.
+    `gear`: shaft angle for one radian at the joint.
+    Raises NoHysteresisError: if `gear` is not positive or no joint has both.
+    Raises BagError: if a message is damaged.
     """
     if not gear > 0.0:
         raise NoHysteresisError(f'gear = {gear} must be positive')

@@ -32,12 +32,8 @@ _NEXT_WORD_S = 1.5
 class Reply:
     """What the graph answered.
 
-    Attributes
-    ----------
-    lines
-        In words, the answer itself first.
-    values
-        The same for programs.
+    `lines`: in words, the answer itself first.
+    `values`: the same for programs.
     """
 
     lines: tuple[str, ...]
@@ -47,12 +43,8 @@ class Reply:
 def act(client: GraphClient, args: argparse.Namespace) -> Reply:
     """Do what the command line asks for.
 
-    Raises
-    ------
-    GraphRefusedError
-        The graph refuses it, or does not do it in time.
-    UnknownParameterError
-        There is no such node, parameter or value.
+    Raises GraphRefusedError: the graph refuses it, or does not do it in time.
+    Raises UnknownParameterError: there is no such node, parameter or value.
     """
     action, patience_s = args.action, args.timeout
     if action == 'get':

@@ -27,10 +27,7 @@ _PROMPT_S = 0.01
 def listing(client: GraphClient, patience_s: float, as_json: bool) -> None:
     """Print all topics of the interface, and others of the namespace.
 
-    Raises
-    ------
-    NoGraphError
-        Nobody is there.
+    Raises NoGraphError: nobody is there.
     """
     if not client.wait_until(lambda: bool(client.nodes()), patience_s):
         raise NoGraphError(f'no graph answers in {client.where}: start one with `graph`')
@@ -162,10 +159,7 @@ def rate(
 ) -> None:
     """Measure until so many messages or seconds, or Ctrl-C, and print the statistics.
 
-    Raises
-    ------
-    NoGraphError
-        Nobody sends it.
+    Raises NoGraphError: nobody sends it.
     """
     times: list[int] = []
     try:
@@ -203,10 +197,7 @@ def echo(
 ) -> None:
     """Print messages as they come.
 
-    Raises
-    ------
-    NoGraphError
-        Nobody sends it.
+    Raises NoGraphError: nobody sends it.
     """
     say: Callable[[Any], None] = _print_json if as_json else _print_lines
     for data, _, kind in _messages(client, name, count, seconds, patience_s):

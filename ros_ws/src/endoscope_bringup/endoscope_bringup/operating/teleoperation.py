@@ -48,10 +48,7 @@ _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
     """Move the slave by the terminal's keys until the operator has enough; the exit status.
 
-    Raises
-    ------
-    GraphRefusedError
-        The graph does not take a handle.
+    Raises GraphRefusedError: the graph does not take a handle.
     """
     client.find(args.timeout)
     source = read_parameter(client, 'console.source', args.timeout).value

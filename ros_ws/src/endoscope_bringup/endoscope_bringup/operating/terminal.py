@@ -37,10 +37,7 @@ class TerminalLostError(Exception):
 def check_terminal() -> None:
     """Refuse to go on without a terminal.
 
-    Raises
-    ------
-    NoTerminalError
-        Stdin or stdout is none.
+    Raises NoTerminalError: stdin or stdout is none.
     """
     for stream, name in ((sys.stdin, 'stdin'), (sys.stdout, 'stdout')):
         if not stream.isatty():
@@ -54,10 +51,7 @@ class Terminal(ClosedOnExit):
 
     Signals of keys stay on: Ctrl-C interrupts even where this program hangs.
 
-    Attributes
-    ----------
-    told_apart
-        Whether it tells presses and releases apart.
+    `told_apart`: whether it tells presses and releases apart.
     """
 
     def __init__(self) -> None:
@@ -70,10 +64,7 @@ class Terminal(ClosedOnExit):
     def open(self) -> None:
         """Take the terminal over, and ask it what it can do.
 
-        Raises
-        ------
-        TerminalLostError
-            The terminal is gone.
+        Raises TerminalLostError: the terminal is gone.
         """
         try:
             self._before = termios.tcgetattr(self._in)
@@ -105,10 +96,7 @@ class Terminal(ClosedOnExit):
     def read(self) -> list[KeyEvent]:
         """Take the key events that have come.
 
-        Raises
-        ------
-        TerminalLostError
-            The terminal is gone.
+        Raises TerminalLostError: the terminal is gone.
         """
         events: list[KeyEvent] = []
         while select.select([self._in], [], [], 0.0)[0]:

@@ -28,18 +28,11 @@ class UnseenTensionError(ClassifierError):
 class ClassificationResult:
     """What the classifier says of one calibration.
 
-    Parameters
-    ----------
-    class_deg : int
-        The likeliest class: backlash size in deg.
-    probability : float
-        Of that class.
-    probabilities : dict of int to float
-        Of each class, by its size in deg; they add up to one.
-    size : float, optional
-        Backlash size in rad, where the classifier regresses it.
-    interval : tuple of float, optional
-        Lower and upper end in rad of the interval that holds the size nine times in ten.
+    `class_deg`: the likeliest class: backlash size in deg.
+    `probability`: of that class.
+    `probabilities`: of each class, by its size in deg; they add up to one.
+    `size`: backlash size in rad, where the classifier regresses it.
+    `interval`: lower and upper end in rad of the interval that holds the size nine times in ten.
     """
 
     class_deg: int
@@ -69,12 +62,8 @@ class Classifier(Protocol):
     def classify(self, tension: ArrayLike) -> ClassificationResult:
         """Class of the tensions (N, 4) in N at 1 kHz from the start of the motion.
 
-        Raises
-        ------
-        UnseenTensionError
-            If they are like nothing that the classifier knows.
-        ClassifierError
-            If they are no recording of the motion.
+        Raises UnseenTensionError: if they are like nothing that the classifier knows.
+        Raises ClassifierError: if they are no recording of the motion.
         """
         ...
 
@@ -84,10 +73,7 @@ def checked_tension(
 ) -> np.ndarray:
     """Tensions as an array of the shape that a calibration has.
 
-    Raises
-    ------
-    ClassifierError
-        If the shape is another or a value is not finite.
+    Raises ClassifierError: if the shape is another or a value is not finite.
     """
     array: np.ndarray = np.asarray(tension, dtype=dtype)
     if array.shape != shape:

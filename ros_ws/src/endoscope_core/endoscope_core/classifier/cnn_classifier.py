@@ -53,13 +53,9 @@ _FAR = 'the tensions are too far from those of all known tubes'
 class HeldOutCalibration:
     """What rigs held out from the training say of the network.
 
-    Parameters
-    ----------
-    inflation : float
-        Half the width of an interval, in the network's standard deviations.
-    ceiling, doubt : float
-        Distance of the features, and probability of 'none of these', up to which tensions are
-        those of known tubes.
+    `inflation`: half the width of an interval, in the network's standard deviations.
+    `ceiling`, `doubt`: distance of the features, and probability of 'none of these', up to which
+        tensions are those of known tubes.
     """
 
     inflation: float
@@ -71,17 +67,12 @@ class HeldOutCalibration:
 class Judgement:
     """What the network makes of R recordings.
 
-    Parameters
-    ----------
-    size, deviation : ndarray, shape (R,)
-        Backlash size in rad, mean of the joints, and the standard deviation of its error as the
-        network takes it, before calibration on rigs held out.
-    none : ndarray, shape (R,)
-        Probability that the tensions are of no tube but of disturbed cells or another motion.
-    distance : ndarray, shape (R,)
-        Of the features from those of the training (Mahalanobis).
-    gap : ndarray, shape (R,)
-        By which the loop of a wire fails to close, N: the greatest of the wires.
+    `size`, `deviation` (R,): backlash size in rad, mean of the joints, and the standard deviation
+        of its error as the network takes it, before calibration on rigs held out.
+    `none` (R,): probability that the tensions are of no tube but of disturbed cells or another
+        motion.
+    `distance` (R,): of the features from those of the training (Mahalanobis).
+    `gap` (R,): by which the loop of a wire fails to close, N: the greatest of the wires.
     """
 
     size: Array
@@ -158,15 +149,9 @@ def evaluated(weights: Mapping[str, Single], courses: Single) -> tuple[Array, Ar
 class CnnClassifier:
     """A trained network, calibrated on rigs held out from it.
 
-    Parameters
-    ----------
-    weights : mapping of str to ndarray of float32
-        Of the shapes that `cnn_shapes` gives.
-    calibration : HeldOutCalibration
-    classes_deg : tuple of int
-        Backlash sizes of the classes in deg.
-    motion : str
-        Calibration motion whose tensions it reads.
+    `weights`: of the shapes that `cnn_shapes` gives.
+    `classes_deg`: backlash sizes of the classes in deg.
+    `motion`: calibration motion whose tensions it reads.
     """
 
     def __init__(
@@ -188,17 +173,11 @@ class CnnClassifier:
     def classify(self, tension: ArrayLike) -> ClassificationResult:
         """Class, backlash size and interval of one calibration.
 
-        Parameters
-        ----------
-        tension : array_like, shape (N, 4)
-            N at 1 kHz from the start of the motion, wires in the order x_pos, x_neg, y_pos, y_neg.
-
-        Raises
-        ------
-        UnseenTensionError
-            If the tensions are unlike any of the training, or their size is none of the classes.
-        ClassifierError
-            If the shape is another or a value is not finite.
+        `tension` (N, 4): n at 1 kHz from the start of the motion, wires in the order x_pos, x_neg,
+            y_pos, y_neg.
+        Raises UnseenTensionError: if the tensions are unlike any of the training, or their size is
+            none of the classes.
+        Raises ClassifierError: if the shape is another or a value is not finite.
         """
         array = checked_tension(tension, (self._samples, WIRES))
         judgement = self.judged(course(array, self.motion)[None])

@@ -51,18 +51,12 @@ _LEAST_RIGS, _LEAST_STEPS = 40, 10
 class CnnTraining:
     """How much is simulated, and how the network is trained with it.
 
-    Parameters
-    ----------
-    rigs, strange, held_out : int
-        Simulated rigs to train with; recordings of slack wires and other motions; rigs on which
-        intervals and refusals are calibrated.
-    steps, batch, warm_up : int
-        Steps of AdamW with recordings in each; in the first `warm_up` the size is learnt by its
-        squared error, then by its likelihood.
-    spoilt : float
-        Share of a batch that is of no tube.
-    learning_rate, smoothing : float
-        Peak of one cycle; of the labels.
+    `rigs`, `strange`, `held_out`: simulated rigs to train with; recordings of slack wires and other
+        motions; rigs on which intervals and refusals are calibrated.
+    `steps`, `batch`, `warm_up`: steps of AdamW with recordings in each; in the first `warm_up` the
+        size is learnt by its squared error, then by its likelihood.
+    `spoilt`: share of a batch that is of no tube.
+    `learning_rate`, `smoothing`: peak of one cycle; of the labels.
     """
 
     rigs: int = 5000
@@ -79,10 +73,7 @@ class CnnTraining:
     def of_size(cls, rigs: int, steps: int) -> 'CnnTraining':
         """Training with so many rigs and steps, and what belongs to them.
 
-        Raises
-        ------
-        EndoscopeError
-            If they are too few to train or to calibrate with.
+        Raises EndoscopeError: if they are too few to train or to calibrate with.
         """
         if rigs < _LEAST_RIGS or steps < _LEAST_STEPS:
             raise EndoscopeError(
@@ -96,15 +87,10 @@ class CnnTraining:
 class TrainedCnn:
     """A classifier, and how it came about.
 
-    Parameters
-    ----------
-    classifier : CnnClassifier
-    held_out : dict
-        What the rigs held out say for each instrument and reading rate: share of right classes,
-        rms error of the size in deg, share of sizes in their interval, and of rigs refused. Half of
-        the rigs calibrate the intervals that the other half is judged by.
-    curve : list of tuple of (int, float)
-        Steps and mean loss since the entry before.
+    `held_out`: what the rigs held out say for each instrument and reading rate: share of right
+        classes, rms error of the size in deg, share of sizes in their interval, and of rigs
+        refused. Half of the rigs calibrate the intervals that the other half is judged by.
+    `curve`: steps and mean loss since the entry before.
     """
 
     classifier: CnnClassifier
@@ -121,17 +107,10 @@ def train_cnn(
 ) -> TrainedCnn:
     """Simulate, train and calibrate; the same seed on the same machine gives the same weights.
 
-    Parameters
-    ----------
-    motion : str
-        Calibration motion, one of `CALIBRATION_MOTIONS`.
-    seed : int
-        Of rigs, first weights and batches.
-    settings : CnnTraining, optional
-    kept : path, optional
-        File in which the training is kept and from which it goes on where it was interrupted.
-    report : callable
-        Takes lines of progress.
+    `motion`: calibration motion, one of `CALIBRATION_MOTIONS`.
+    `seed`: of rigs, first weights and batches.
+    `kept`: file in which the training is kept and from which it goes on where it was interrupted.
+    `report`: takes lines of progress.
     """
     settings = settings or CnnTraining()
     torch.set_num_threads(1)

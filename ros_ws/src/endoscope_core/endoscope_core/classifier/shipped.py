@@ -26,18 +26,10 @@ def shipped_weights(motion: str) -> Path:
 def load_classifier(weights: str | Path | None = None, motion: str = SINUSOID) -> CnnClassifier:
     """Classifier for a calibration motion.
 
-    Parameters
-    ----------
-    weights : path, optional
-        As `endoscope train` writes them; those that come with this package if not given.
-    motion : str
-        One of `CALIBRATION_MOTIONS`.
-
-    Raises
-    ------
-    ClassifierError
-        If a file is missing, is not what `endoscope train` writes, was damaged, is for another
-        motion, or holds numbers that give no answer.
+    `weights`: as `endoscope train` writes them; those that come with this package if not given.
+    `motion`: one of `CALIBRATION_MOTIONS`.
+    Raises ClassifierError: if a file is missing, is not what `endoscope train` writes, was damaged,
+        is for another motion, or holds numbers that give no answer.
     """
     path = Path(weights) if weights else shipped_weights(motion)
     description, state = read_weights(path)

@@ -7,10 +7,7 @@ from endoscope_core.classifier.pytorch import Tensor, nn, torch
 class StandardisedTension(nn.Module):
     """A network that sees each wire by mean and spread of what it is trained on.
 
-    Attributes
-    ----------
-    offset, scale : Tensor, shape (4, 1)
-        N; kept with the weights.
+    `offset`, `scale`: n; kept with the weights.
     """
 
     offset: Tensor

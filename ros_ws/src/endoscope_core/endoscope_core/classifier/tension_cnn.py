@@ -16,10 +16,7 @@ class TensionCnn(StandardisedTension):
     Eight unpadded strides of three reduce 6,561 samples to exactly one: of 9,000 the last 2,439
     are not seen. Softmax belongs to the loss in training and to the caller otherwise.
 
-    Parameters
-    ----------
-    outputs : int
-        Of the dense layer: a logit for each class, and what else it is to tell.
+    `outputs`: of the dense layer: a logit for each class, and what else it is to tell.
     """
 
     def __init__(self, outputs: int) -> None:

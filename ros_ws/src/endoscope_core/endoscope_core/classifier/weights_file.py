@@ -28,10 +28,8 @@ class WeightsFileError(EndoscopeError, ValueError):
 def weights_path(path: str | Path) -> Path:
     """Check the name of a weights file before long work.
 
-    Raises
-    ------
-    WeightsFileError
-        If its suffix is .json, which the file beside it needs, or it is a folder.
+    Raises WeightsFileError: if its suffix is .json, which the file beside it needs, or it is a
+        folder.
     """
     path = Path(path)
     if path.suffix == '.json' or path.is_dir():
@@ -44,10 +42,7 @@ def save_weights(
 ) -> None:
     """Write arrays to ``path`` and a description to the JSON file of the same name beside it.
 
-    Raises
-    ------
-    WeightsFileError
-        If `path` cannot hold weights.
+    Raises WeightsFileError: if `path` cannot hold weights.
     """
     path = weights_path(path)
     described = {'schema': SCHEMA, 'kind': 'cnn', **description}
@@ -59,10 +54,8 @@ def save_weights(
 def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Description and arrays of a weights file.
 
-    Raises
-    ------
-    ClassifierError
-        If a file is missing, is not what `endoscope train` writes, or was damaged since.
+    Raises ClassifierError: if a file is missing, is not what `endoscope train` writes, or was
+        damaged since.
     """
     path = Path(path)
     sidecar = path.with_suffix('.json')
@@ -112,10 +105,7 @@ def fitting(
 ) -> dict[str, np.ndarray]:
     """The arrays, whose names, shapes and type must be those that are due.
 
-    Raises
-    ------
-    ValueError
-        If they are not.
+    Raises ValueError: if they are not.
     """
     for name in shapes.keys() | state.keys():
         if name not in state or name not in shapes:
@@ -132,10 +122,7 @@ def fitting(
 def classes_of(description: dict[str, Any]) -> tuple[int, ...]:
     """Backlash sizes in deg of the classes.
 
-    Raises
-    ------
-    ValueError
-        If they are not whole, increasing degrees of a turn.
+    Raises ValueError: if they are not whole, increasing degrees of a turn.
     """
     classes = description.get('classes_deg')
     if (

@@ -13,12 +13,7 @@ from endoscope_core.control.tracker_feedback import FADE_TIME, STALE_AFTER, Trac
 
 
 class AdaptiveBacklashJoint:
-    """`adapt` with its state and the filter of the robust term.
-
-    Parameters
-    ----------
-    settings : AdaptiveBacklashSettings
-    """
+    """`adapt` with its state and the filter of the robust term."""
 
     def __init__(self, settings: AdaptiveBacklashSettings) -> None:
         self.settings = settings

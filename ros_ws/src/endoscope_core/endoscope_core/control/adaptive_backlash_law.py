@@ -135,16 +135,9 @@ def adapt(
 ) -> AdaptationState:
     """Estimates after one tracker measurement.
 
-    Parameters
-    ----------
-    settings : AdaptiveBacklashSettings
-    state : AdaptationState
-    error : float
-        Measured less desired angle at the instant of the measurement, rad.
-    desired, direction : float
-        ``theta`` (rad) and ``s`` that the measured angle answers to.
-    dt : float
-        s since the measurement before.
+    `error`: measured less desired angle at the instant of the measurement, rad.
+    `desired`, `direction`: ``theta`` (rad) and ``s`` that the measured angle answers to.
+    `dt`: s since the measurement before.
     """
     c = settings
     bounded = limited(error, c.error_limit)

@@ -48,10 +48,7 @@ class TurningPoints:
     two larger swings, as in the counting of rainflow cycles (ASTM E1049). Should more than twelve
     be left, the smallest swing goes.
 
-    Parameters
-    ----------
-    values : sequence of float
-        Begin, turning points and present value.
+    `values`: begin, turning points and present value.
     """
 
     def __init__(self, values: Sequence[float]) -> None:
@@ -229,13 +226,7 @@ def packed_joint(joint: JointParameters) -> tuple[Array, Flags]:
 
 
 class InternalModel:
-    """The nominal plant of one joint, at rest at first; angles of motor are the shaft's.
-
-    Parameters
-    ----------
-    joint : JointParameters
-    limits : MotorLimits
-    """
+    """The nominal plant of one joint, at rest at first; angles of motor are the shaft's."""
 
     def __init__(self, joint: JointParameters, limits: MotorLimits) -> None:
         self._limits = limits
@@ -280,10 +271,7 @@ class InternalModel:
     def seek(self, angle: float, dt: float) -> bool:
         """Turn the shaft so that the joint is at `angle` (rad) after `dt` s.
 
-        Returns
-        -------
-        bool
-            Whether it is; otherwise the shaft has gone as far as its limits allow.
+        Returns: whether it is; otherwise the shaft has gone as far as its limits allow.
         """
         m, way = self._limits, self._limits.speed * dt
         # A shaft that is beyond its travel may stay there, and come back.
@@ -295,10 +283,7 @@ class InternalModel:
     def go_through(self, angles: Sequence[float]) -> list[float]:
         """Begin at rest and bend the joint to one angle (rad) after the other, slowly.
 
-        Returns
-        -------
-        list of float
-            Shaft angle in rad at each.
+        Returns: shaft angle in rad at each.
         """
         path = np.array(angles, dtype=float)
         _go_through_angles(

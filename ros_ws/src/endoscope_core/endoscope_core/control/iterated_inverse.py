@@ -34,14 +34,9 @@ SMOOTHING_S = 0.012
 class PlannedCommand:
     """A command for a known motion.
 
-    Attributes
-    ----------
-    command : array (N, J)
-        Joint-equivalent, rad, one for each tick of 1 ms.
-    bending : array (N, J)
-        What the plant's tip is expected to do, rad.
-    rmse : float
-        Of the expected tip, rad.
+    `command` (N, J): joint-equivalent, rad, one for each tick of 1 ms.
+    `bending` (N, J): what the plant's tip is expected to do, rad.
+    `rmse`: of the expected tip, rad.
     """
 
     command: Array
@@ -54,25 +49,13 @@ def iterated_inverse(
 ) -> PlannedCommand:
     """Find the command under which a plant's tip moves as desired.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-        With its effects.
-    desired, velocity : array (N, J)
-        rad and rad/s at every tick of 1 ms, from rest at zero.
-    iterations : int
-        How often to simulate and correct.
-
-    Returns
-    -------
-    PlannedCommand
-        The best of all iterations; within the motor's travel, so that an angle that cannot be
+    `plant`: with its effects.
+    `desired`, `velocity` (N, J): rad and rad/s at every tick of 1 ms, from rest at zero.
+    `iterations`: how often to simulate and correct.
+    Returns: the best of all iterations; within the motor's travel, so that an angle that cannot be
         reached does not wind it up.
-
-    Raises
-    ------
-    ValueError
-        If the motion is not finite, has not a column for each joint, or the plant is invalid.
+    Raises ValueError: if the motion is not finite, has not a column for each joint, or the plant is
+        invalid.
     """
     desired, velocity = np.asarray(desired, dtype=float), np.asarray(velocity, dtype=float)
     names = plant.joint_names()

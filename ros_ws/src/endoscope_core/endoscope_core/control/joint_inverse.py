@@ -33,10 +33,7 @@ class JointInverse(Protocol):
 class Passing:
     """No compensation: the desired angle passes, its direction is remembered.
 
-    Parameters
-    ----------
-    travel : float
-        rad over which the memory of the direction builds up.
+    `travel`: rad over which the memory of the direction builds up.
     """
 
     def __init__(self, travel: float) -> None:
@@ -68,14 +65,10 @@ class Passing:
 class HysteresisInverse:
     """Inverse of a hysteresis model, driven by the desired angle as it will be `lead` s later.
 
-    Parameters
-    ----------
-    parameters : HysteresisParameters
-    lead : float
-        s.
-    dead_band : float
-        rad by which the foreseen angle may turn back without any effect, half of it either way: the
-        lead makes a motion the other way of every slowing down, and the inverse amplifies it.
+    `lead`: s.
+    `dead_band`: rad by which the foreseen angle may turn back without any effect, half of it either
+        way: the lead makes a motion the other way of every slowing down, and the inverse amplifies
+        it.
     """
 
     def __init__(self, parameters: HysteresisParameters, lead: float, dead_band: float) -> None:

@@ -7,17 +7,9 @@ from collections.abc import Sequence
 def check_settings(settings: object, positive: Sequence[str]) -> None:
     """Refuse a setting that is no number, or negative, or zero where that cannot be.
 
-    Parameters
-    ----------
-    settings : object
-        Its attributes are the settings.
-    positive : sequence of str
-        Those that must not be zero.
-
-    Raises
-    ------
-    ValueError
-        Names the setting.
+    `settings`: its attributes are the settings.
+    `positive`: those that must not be zero.
+    Raises ValueError: names the setting.
     """
     for name, value in vars(settings).items():
         if not (math.isfinite(value) and value >= 0.0):

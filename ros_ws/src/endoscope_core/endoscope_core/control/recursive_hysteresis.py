@@ -69,10 +69,6 @@ class RecursiveHysteresisJoint:
     while the covariance has grown back to what it was in the beginning, so that standing still
     forgets nothing (no blow-up); one reading counts for no more than three standard deviations, and
     several beyond that in a row return the covariance to its beginning: the tube has been bent.
-
-    Parameters
-    ----------
-    settings : RecursiveHysteresisSettings
     """
 
     def __init__(self, settings: RecursiveHysteresisSettings) -> None:

@@ -22,12 +22,8 @@ class Play:
     way. What comes out is never further from the value than half the band (Visintin, Differential
     Models of Hysteresis, 1994, section III.2).
 
-    Parameters
-    ----------
-    half_width : float
-        Half the band, in the unit of the value.
-    value : float
-        To begin with.
+    `half_width`: half the band, in the unit of the value.
+    `value`: to begin with.
     """
 
     def __init__(self, half_width: float, value: float) -> None:
@@ -52,12 +48,8 @@ class SmoothFollower:
     ``exp(-w t)``, is nowhere negative: a motion one way comes out as a motion one way, and a step
     is approached without overshoot.
 
-    Parameters
-    ----------
-    bandwidth : float
-        `w` in rad/s; half the power is left at ``0.64 w``.
-    position : float
-        To begin with, at rest.
+    `bandwidth`: `w` in rad/s; half the power is left at ``0.64 w``.
+    `position`: to begin with, at rest.
     """
 
     def __init__(self, bandwidth: float, position: float) -> None:
@@ -83,15 +75,10 @@ def limited(value: float, bound: float) -> float:
 def worked_off(value: float, travel: float, bound: float) -> float:
     """What is left of a value of which each step takes off some, until nothing is left.
 
-    Parameters
-    ----------
-    value : float
-        rad.
-    travel : float
-        Way in rad, either way, that the desired angle has moved: `SHARE_OF_TRAVEL` of it is taken
-        off at most.
-    bound : float
-        Most in rad that may be taken off.
+    `value`: rad.
+    `travel`: way in rad, either way, that the desired angle has moved: `SHARE_OF_TRAVEL` of it is
+        taken off at most.
+    `bound`: most in rad that may be taken off.
     """
     most = min(bound, SHARE_OF_TRAVEL * travel)
     return value - limited(value, most)

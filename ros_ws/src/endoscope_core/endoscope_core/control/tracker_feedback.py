@@ -70,14 +70,10 @@ class JointLaw(Protocol):
     ) -> None:
         """Learn from one measurement.
 
-        Parameters
-        ----------
-        error : float
-            Measured less desired angle at the instant of the measurement, rad.
-        correction, desired, direction : float
-            Correction in force (rad), desired angle (rad) and direction memory that it answers to.
-        dt : float
-            s since the measurement before.
+        `error`: measured less desired angle at the instant of the measurement, rad.
+        `correction`, `desired`, `direction`: correction in force (rad), desired angle (rad) and
+            direction memory that it answers to.
+        `dt`: s since the measurement before.
         """
         ...
 

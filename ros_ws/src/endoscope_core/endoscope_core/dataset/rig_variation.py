@@ -44,14 +44,9 @@ bent; at the end, friction is twice what it is at the motor."""
 class Instrument:
     """How an instrument differs from the one that was recorded.
 
-    Attributes
-    ----------
-    factors : Mapping
-        For each joint, factors on its parameters by their names.
-    pretension : Mapping
-        For each joint, what its wires are tighter by, N.
-    tightening : Mapping
-        For each joint, what its pretension profile is higher by.
+    `factors`: for each joint, factors on its parameters by their names.
+    `pretension`: for each joint, what its wires are tighter by, N.
+    `tightening`: for each joint, what its pretension profile is higher by.
     """
 
     factors: Mapping[str, Mapping[str, float]]
@@ -122,15 +117,9 @@ def in_tube(
 ) -> PlantDescription:
     """An instrument in a tube.
 
-    Parameters
-    ----------
-    instrument : Instrument
-    bend : float
-        Sum of the tube's bends, rad.
-    unevenness : float
-        See `TubeConfiguration`.
-    family : TubeFamily, optional
-        The shipped one if not given.
+    `bend`: sum of the tube's bends, rad.
+    `unevenness`: see `TubeConfiguration`.
+    `family`: the shipped one if not given.
     """
     joint = (family or shipped_family()).joint(bend)
     profile = joint.friction_profile or (0.0,)

@@ -52,13 +52,9 @@ _EARLIER = 1000
 class TrainingRigs:
     """R recordings without noise, N samples at 1 kHz.
 
-    Parameters
-    ----------
-    tension : ndarray of float32, shape (R, N, 4)
-        N.
-    size : ndarray, shape (R,)
-        Backlash size in rad under the sinusoid, mean of the joints; NaN where the recording is of
-        slack wires or of another motion.
+    `tension` (R, N, 4): N.
+    `size` (R,): backlash size in rad under the sinusoid, mean of the joints; NaN where the
+        recording is of slack wires or of another motion.
     """
 
     tension: NDArray[np.float32]

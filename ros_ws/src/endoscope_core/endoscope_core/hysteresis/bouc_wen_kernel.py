@@ -56,23 +56,12 @@ def bouc_wen_normalised_step(y: float, delta: float, travel: float, rho: float, 
     for a step of any size: the state cannot leave [-1, 1], whatever the sampling. For n = 1 the
     step is exact.
 
-    Parameters
-    ----------
-    y : float
-        State in [-1, 1].
-    delta : float
-        Change of the driving angle in rad, monotone within the step.
-    travel : float
-        ``h_max / A`` in rad: distance over which the state builds up.
-    rho : float
-        ``(B - C) / (B + C)``, in (-1, 1].
-    n : float
-        Sharpness, at least 1.
-
-    Returns
-    -------
-    float
-        New state in [-1, 1].
+    `y`: state in [-1, 1].
+    `delta`: change of the driving angle in rad, monotone within the step.
+    `travel`: ``h_max / A`` in rad: distance over which the state builds up.
+    `rho`: ``(B - C) / (B + C)``, in (-1, 1].
+    `n`: sharpness, at least 1.
+    Returns: new state in [-1, 1].
     """
     if delta == 0.0:
         return y

@@ -23,16 +23,10 @@ from endoscope_core.compiled_cache import njit
 def dahl_step(y: float, delta: float, travel: float, exponent: float) -> float:
     """State in [-1, 1] after the driving angle has moved by `delta` rad, exactly, for any step.
 
-    Parameters
-    ----------
-    y : float
-        State in [-1, 1].
-    delta : float
-        Monotone change of the driving angle, rad.
-    travel : float
-        rad over which the state builds up.
-    exponent : float
-        Shape, positive; below 1 saturation is reached in a finite distance, above 1 slowly.
+    `y`: state in [-1, 1].
+    `delta`: monotone change of the driving angle, rad.
+    `travel`: rad over which the state builds up.
+    `exponent`: shape, positive; below 1 saturation is reached in a finite distance, above 1 slowly.
     """
     if delta == 0.0:
         return y

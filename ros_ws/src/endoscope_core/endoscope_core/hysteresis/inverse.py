@@ -53,13 +53,8 @@ class Inverse(Protocol):
 class DirectInverse:
     """Inverse of a model with one memory, which the desired angle drives.
 
-    Parameters
-    ----------
-    model : MemoryModel
-    direction : float
-        Memory to begin with, in [-1, 1].
-    angle : float
-        Desired angle to begin with, rad.
+    `direction`: memory to begin with, in [-1, 1].
+    `angle`: desired angle to begin with, rad.
     """
 
     def __init__(self, model: MemoryModel, direction: float, angle: float) -> None:
@@ -87,13 +82,8 @@ class DirectInverse:
 class PlayStackInverse:
     """Exact inverse of the Prandtl-Ishlinskii model.
 
-    Parameters
-    ----------
-    parameters : PrandtlIshlinskiiParameters
-    direction : float
-        In [-1, 1]; the plays begin as far on their sides as this says.
-    angle : float
-        Desired angle to begin with, rad.
+    `direction`: in [-1, 1]; the plays begin as far on their sides as this says.
+    `angle`: desired angle to begin with, rad.
     """
 
     def __init__(

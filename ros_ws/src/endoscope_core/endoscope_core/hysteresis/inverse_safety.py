@@ -15,10 +15,7 @@ _ROUNDING = 1.0 + 1e-9
 def check_numbers(model: str, values: Mapping[str, Any]) -> None:
     """Refuse parameters that are not finite numbers.
 
-    Raises
-    ------
-    ValueError
-        Names the model and the parameter.
+    Raises ValueError: names the model and the parameter.
     """
     for name, value in values.items():
         if not math.isfinite(value):
@@ -28,10 +25,7 @@ def check_numbers(model: str, values: Mapping[str, Any]) -> None:
 def check_range(model: str, name: str, value: float, low: float, high: float) -> None:
     """Refuse a parameter out of ``[low, high]``.
 
-    Raises
-    ------
-    ValueError
-        Names model, parameter and range.
+    Raises ValueError: names model, parameter and range.
     """
     if not low <= value <= high:
         raise ValueError(f'{model} parameter {name} = {value:g} must lie in [{low:g}, {high:g}]')
@@ -40,21 +34,11 @@ def check_range(model: str, name: str, value: float, low: float, high: float) ->
 def check_inverse(model: str, alpha: float, lag: float, slope: float) -> None:
     """Refuse a model whose inverse would not be safe.
 
-    Parameters
-    ----------
-    model : str
-        Name in messages.
-    alpha : float
-        Ratio of actual to driving angle: the inverse divides by it.
-    lag : float
-        rad, half the width of a saturated loop along the actual angle.
-    slope : float
-        Greatest slope of the inverse.
-
-    Raises
-    ------
-    ValueError
-        Names what is out of bounds.
+    `model`: name in messages.
+    `alpha`: ratio of actual to driving angle: the inverse divides by it.
+    `lag`: rad, half the width of a saturated loop along the actual angle.
+    `slope`: greatest slope of the inverse.
+    Raises ValueError: names what is out of bounds.
     """
     check_range(model, 'alpha', alpha, SMALLEST_ALPHA, GREATEST_ALPHA)
     if not -1e-12 <= lag <= GREATEST_LAG * _ROUNDING:

@@ -20,10 +20,7 @@ class NamedNumbers:
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """Parameters from a mapping of exactly their names.
 
-        Raises
-        ------
-        ValueError
-            If a name is missing or unknown, or the parameters are unsafe.
+        Raises ValueError: if a name is missing or unknown, or the parameters are unsafe.
         """
         wanted = {field.name for field in fields(cls)}
         if set(values) != wanted:

@@ -41,15 +41,9 @@ class ClassParameterError(EndoscopeError, ValueError):
 class ClassIdentification:
     """What has been identified for one class.
 
-    Parameters
-    ----------
-    class_deg : int
-    feedforward : LawParameters
-        What the compensator works with.
-    model : LawParameters
-        What was fitted; the same for the plant.
-    rmse : float
-        rad, or N for the plant, that the model leaves of the recordings.
+    `feedforward`: what the compensator works with.
+    `model`: what was fitted; the same for the plant.
+    `rmse`: rad, or N for the plant, that the model leaves of the recordings.
     """
 
     class_deg: int

@@ -67,18 +67,13 @@ class FamilyFitError(EndoscopeError, ValueError):
 class TubeRecording:
     """One tube of a rig, moved from rest, sampled evenly: N samples.
 
-    Attributes
-    ----------
-    bend : float
-        Of the tube, rad.
-    tick : float
-        Between samples, s.
-    desired, angle : array (N,)
-        Commanded and measured bending angle, rad; the measured one is zero at the start.
-    tension : array (N, 2)
-        Load cells of the positive and the negative wire, N.
-    cycles : tuple of int
-        Samples at which the first cycle, the second and so on begin, and at which the last ends.
+    `bend`: of the tube, rad.
+    `tick`: between samples, s.
+    `desired`, `angle` (N,): commanded and measured bending angle, rad; the measured one is zero at
+        the start.
+    `tension` (N, 2): load cells of the positive and the negative wire, N.
+    `cycles`: samples at which the first cycle, the second and so on begin, and at which the last
+        ends.
     """
 
     bend: float
@@ -195,22 +190,11 @@ def fit_family(
     reason the search is begun again from places near the best. A load cell shows no less than its
     offset, which the least tension therefore bounds.
 
-    Parameters
-    ----------
-    recordings : sequence of TubeRecording
-    priors : mapping
-        As `PRIORS`; keys left out are nominal.
-    friction_profile : tuple of float, optional
-        Held, instead of fitted.
-    starts : int
-        Searches.
-    seed : int
-        Of where they begin.
-
-    Raises
-    ------
-    FamilyFitError
-        If there is no recording, or one is short, or holds what is not finite.
+    `priors`: as `PRIORS`; keys left out are nominal.
+    `friction_profile`: held, instead of fitted.
+    `starts`: searches.
+    `seed`: of where they begin.
+    Raises FamilyFitError: if there is no recording, or one is short, or holds what is not finite.
     """
     _check(recordings)
     free = {k: v for k, v in priors.items() if friction_profile is None or k != 'friction_profile'}

@@ -32,11 +32,7 @@ Bounds = list[tuple[float, float]]
 class Candidates:
     """A box and what a point of it means.
 
-    Parameters
-    ----------
-    bounds : list of (float, float)
-    make : callable
-        ``make(x) -> parameters``, safe for every point of the box.
+    `make`: ``make(x) -> parameters``, safe for every point of the box.
     """
 
     bounds: Bounds

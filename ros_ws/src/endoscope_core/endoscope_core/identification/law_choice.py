@@ -32,16 +32,10 @@ class LawChoiceError(EndoscopeError, ValueError):
 class CalibrationFindings:
     """What a calibration found out about the tube.
 
-    Parameters
-    ----------
-    class_deg : int, optional
-        Hysteresis class, backlash size in deg.
-    size : float, optional
-        Backlash size in rad.
-    plants : tuple of PhysicalParameters
-        Of each joint; empty where the plant was not identified.
-    reaches : tuple of Reach
-        How far each joint can be bent in this tube; empty where that is not known.
+    `class_deg`: hysteresis class, backlash size in deg.
+    `size`: backlash size in rad.
+    `plants`: of each joint; empty where the plant was not identified.
+    `reaches`: how far each joint can be bent in this tube; empty where that is not known.
     """
 
     class_deg: int | None = None
@@ -53,14 +47,10 @@ class CalibrationFindings:
 class LawChoice:
     """Finds the parameters of a mode, and keeps the files that it has read.
 
-    Parameters
-    ----------
-    joints : int
-        Number of joints.
-    parameter_sets : str
-        File with a parameter set for each class; empty for those that come with the project.
-    table : str
-        Updated table; empty for one made of the class parameters.
+    `joints`: number of joints.
+    `parameter_sets`: file with a parameter set for each class; empty for those that come with the
+        project.
+    `table`: updated table; empty for one made of the class parameters.
     """
 
     def __init__(self, joints: int, parameter_sets: str = '', table: str = '') -> None:
@@ -73,21 +63,12 @@ class LawChoice:
     def law(self, mode: str, selected_by: str, findings: CalibrationFindings) -> FeedforwardLaw:
         """The law of a mode after a calibration.
 
-        Parameters
-        ----------
-        mode : str
-            One of `endoscope_core.control.MODES`.
-        selected_by : str
-            'class' takes the class's set (first paper), 'size' blends the updated table at the
-            regressed backlash size, 'plant' takes the plant that the calibration identified.
-        findings : CalibrationFindings
-
-        Raises
-        ------
-        LawChoiceError
-            If the calibration does not say what is needed: nothing is guessed.
-        ClassParameterError, UpdatedTableError
-            If a file cannot be used, or has nothing for this class or size.
+        `mode`: one of `endoscope_core.control.MODES`.
+        `selected_by`: 'class' takes the class's set (first paper), 'size' blends the updated table
+            at the regressed backlash size, 'plant' takes the plant that the calibration identified.
+        Raises LawChoiceError: if the calibration does not say what is needed: nothing is guessed.
+        Raises ClassParameterError, UpdatedTableError: if a file cannot be used, or has nothing for
+            this class or size.
         """
         if mode == 'none':
             return FeedforwardLaw()

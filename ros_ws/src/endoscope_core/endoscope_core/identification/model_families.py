@@ -43,21 +43,13 @@ _SLOPE = 0.99 * GREATEST_INVERSE_SLOPE
 class ModelFamily:
     """How a model is fitted by variable projection (Golub and Pereyra 1973).
 
-    Parameters
-    ----------
-    shape_bounds : tuple of (float, float)
-        Of the parameters that are searched.
-    linear_bounds : tuple of (float, float)
-        Of the factors of `columns`.
-    path : callable
-        ``path(driver, y0, shape) -> y (N,)``.
-    columns : callable
-        ``columns(driver, y) -> (N, K)``.
-    build : callable
-        ``build(shape, factors, offset) -> parameters``, safe whatever the arguments within their
-        bounds: where the inverse would be too steep, the travel is lengthened.
-    has_offset : bool
-        Whether the model itself has an offset.
+    `shape_bounds`: of the parameters that are searched.
+    `linear_bounds`: of the factors of `columns`.
+    `path`: ``path(driver, y0, shape) -> y (N,)``.
+    `columns`: ``columns(driver, y) -> (N, K)``.
+    `build`: ``build(shape, factors, offset) -> parameters``, safe whatever the arguments within
+        their bounds: where the inverse would be too steep, the travel is lengthened.
+    `has_offset`: whether the model itself has an offset.
     """
 
     shape_bounds: tuple[tuple[float, float], ...]

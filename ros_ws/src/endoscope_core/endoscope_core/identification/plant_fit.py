@@ -153,14 +153,9 @@ def _rms(values: Array) -> float:
 class _Search:
     """The numbers of a rig whose tubes are bent, sought from a motion.
 
-    Attributes
-    ----------
-    in_tube : callable
-        The joint by the bend in rad.
-    held : array (K,)
-        Shaft command on ticks, rad.
-    wires, angle : array (M, 2), array (M,)
-        Where they are scored, N and rad; NaN where there is no angle.
+    `in_tube`: the joint by the bend in rad.
+    `held` (K,): shaft command on ticks, rad.
+    `wires`, `angle` (M, 2): where they are scored, N and rad; NaN where there is no angle.
     """
 
     in_tube: Callable[[float], JointParameters]
@@ -252,19 +247,10 @@ def plants_of_calibration(
     Where friction lets the joint go to one side only a little, the way to the other shows where it
     rests: a motion to one side and back tells a tight tube's reach worse than one to both.
 
-    Parameters
-    ----------
-    command : array_like, shape (N,)
-        Joint-equivalent motor command of every joint at 1 kHz, rad.
-    tension : array_like, shape (N, 2 J)
-        Positive and negative wire of each joint in turn, N.
-    gear : float
-        Shaft angle for one radian at the joint.
-
-    Raises
-    ------
-    PlantFitError
-        If the recording shows no plant.
+    `command` (N,): joint-equivalent motor command of every joint at 1 kHz, rad.
+    `tension` (N, 2 J): positive and negative wire of each joint in turn, N.
+    `gear`: shaft angle for one radian at the joint.
+    Raises PlantFitError: if the recording shows no plant.
     """
     u = np.asarray(command, dtype=float)
     wires = np.asarray(tension, dtype=float)

@@ -20,15 +20,8 @@ PHASE, DESIRED, ACTUAL, POSITIVE, NEGATIVE = 0, 1, 3, 4, 5
 def tube_recordings(folder: Path) -> list[TubeRecording]:
     """All tubes of a folder with two cycles each in real time, sorted by bend.
 
-    Parameters
-    ----------
-    folder : Path
-        With a file `BEND.txt` for each tube, bend in deg.
-
-    Raises
-    ------
-    IdentificationError
-        If there is none, or one has no two cycles.
+    `folder`: with a file `BEND.txt` for each tube, bend in deg.
+    Raises IdentificationError: if there is none, or one has no two cycles.
     """
     found = []
     for path in folder.glob('[0-9]*.txt'):

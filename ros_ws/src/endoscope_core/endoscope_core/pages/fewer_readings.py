@@ -19,12 +19,8 @@ def banded(x: Array, y: Array) -> tuple[Array, Array, Array]:
     Neighbours share a reading, so that the band is as connected as the line through all readings,
     and none of these lies outside.
 
-    Parameters
-    ----------
-    x : array (N,)
-        Increasing.
-    y : array (N,)
-        NaN is left out; a stretch of nothing else is NaN.
+    `x` (N,): increasing.
+    `y` (N,): naN is left out; a stretch of nothing else is NaN.
     """
     step = math.ceil((len(y) - 1) / MOST_BINS)
     begins = np.arange(0, len(y) - 1, step)

@@ -44,26 +44,16 @@ _ACTIONS = (
 class Curve:
     """A curve of a plot.
 
-    Attributes
-    ----------
-    label : str
-    x : array (N,) or (N + 1,)
-        Where the values are, increasing unless the plot is a loop; of N + 1 elements, the edges of
-        the stretches in each of which a value holds. In the unit that the plot names.
-    y : array (N,)
-        NaN leaves a gap.
-    colour : str
-        A variable of look.css without its dashes.
-    width : float
-        Of the line, px.
-    dash : tuple of float
-        Lengths of strokes and gaps in px; none for a solid line.
-    low, high : array (N,), optional
-        A band around the curve.
-    time : array (N,), optional
-        Of each point of a loop, s, which says what part of it another plot of the figure shows.
-    to : str
-        Label of another curve of the plot, with the same `x`; the area between them is filled.
+    `x` (N,): where the values are, increasing unless the plot is a loop; of N + 1 elements, the
+        edges of the stretches in each of which a value holds. In the unit that the plot names.
+    `y` (N,): naN leaves a gap.
+    `colour`: a variable of look.css without its dashes.
+    `width`: of the line, px.
+    `dash`: lengths of strokes and gaps in px; none for a solid line.
+    `low`, `high` (N,): a band around the curve.
+    `time` (N,): of each point of a loop, s, which says what part of it another plot of the figure
+        shows.
+    `to`: label of another curve of the plot, with the same `x`; the area between them is filled.
     """
 
     label: str
@@ -94,33 +84,19 @@ class Curve:
 class Plot:
     """One plot of a figure.
 
-    Attributes
-    ----------
-    title : str
-        What is drawn, with its unit.
-    x_label : str
-        What is across, with its unit; plots of a figure that name the same are zoomed together.
-    curves : tuple of Curve
-    columns : int
-        Width, of the figure's twelve columns.
-    height : int
-        Of the drawing without its axis, px.
-    loop : bool
-        Whether the curves run back and forth in `x`.
-    square : bool
-        Whether it is as high as it is wide.
-    range_x, range_y : tuple of (float, float), optional
-        What is seen at first; by default all.
-    log : bool
-        Whether values are drawn by their logarithm.
-    level : tuple of (float, str), optional
-        A value that a dotted line marks, and its word.
-    diagonal : bool
-        Whether a dotted line marks where both axes have the same value.
-    shaded : tuple of (float, float)
-        Stretches of `x` that are pointed at.
-    marks : tuple of float
-        Places on `x` that are pointed at.
+    `title`: what is drawn, with its unit.
+    `x_label`: what is across, with its unit; plots of a figure that name the same are zoomed
+        together.
+    `columns`: width, of the figure's twelve columns.
+    `height`: of the drawing without its axis, px.
+    `loop`: whether the curves run back and forth in `x`.
+    `square`: whether it is as high as it is wide.
+    `range_x`, `range_y`: what is seen at first; by default all.
+    `log`: whether values are drawn by their logarithm.
+    `level`: a value that a dotted line marks, and its word.
+    `diagonal`: whether a dotted line marks where both axes have the same value.
+    `shaded`: stretches of `x` that are pointed at.
+    `marks`: places on `x` that are pointed at.
     """
 
     title: str
@@ -157,11 +133,7 @@ def scripts() -> str:
 def figure_html(plots: Sequence[Plot], caption: str = '') -> str:
     """Return plots that belong together as a `<figure>`.
 
-    Parameters
-    ----------
-    plots : sequence of Plot
-        Row by row.
-    caption : str
+    `plots`: row by row.
     """
     places: dict[bytes, int] = {}
     kept: list[list[float | None]] = []

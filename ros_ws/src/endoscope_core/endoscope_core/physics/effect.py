@@ -28,33 +28,20 @@ class Stage(StrEnum):
 class Parameter:
     """One parameter of an effect.
 
-    Attributes
-    ----------
-    name, unit : str
-        Name in plant.yaml and SI unit.
-    low, high : float
-        Bounds within which the physics is defined and a fit may move.
-    typical : float
-        Value where plant.yaml gives none.
-    off : float
-        Value at which the effect vanishes, or NaN where no value of this parameter does that.
-    choices : tuple of float
-        All admissible values of a parameter that is not continuous (a wire's number); else empty.
-    words : tuple of str
-        What each choice, or each whole number from `low` on, stands for.
-    starts : tuple of float
-        Where a fit begins; the typical value if empty.
-    comparable : bool
-        Whether a person could measure the parameter another way.
-    phase : bool
-        Whether half a turn more reverses the effect.
-    scale : float
-        Where the effect is far from linear in this parameter, the change over which it nearly is;
-        else 0.
-    counted : bool
-        Whether it is a whole number, which a fit steps through one by one.
-    is_duration : bool
-        Whether it is the length of the recording, which nobody has to look for.
+    `name`, `unit`: name in plant.yaml and SI unit.
+    `low`, `high`: bounds within which the physics is defined and a fit may move.
+    `typical`: value where plant.yaml gives none.
+    `off`: value at which the effect vanishes, or NaN where no value of this parameter does that.
+    `choices`: all admissible values of a parameter that is not continuous (a wire's number); else
+        empty.
+    `words`: what each choice, or each whole number from `low` on, stands for.
+    `starts`: where a fit begins; the typical value if empty.
+    `comparable`: whether a person could measure the parameter another way.
+    `phase`: whether half a turn more reverses the effect.
+    `scale`: where the effect is far from linear in this parameter, the change over which it nearly
+        is; else 0.
+    `counted`: whether it is a whole number, which a fit steps through one by one.
+    `is_duration`: whether it is the length of the recording, which nobody has to look for.
     """
 
     name: str
@@ -110,27 +97,16 @@ class Symptom(StrEnum):
 class Traits:
     """What a search for missing physics must know of an effect.
 
-    Attributes
-    ----------
-    depends_on_time
-        It is told from others only where a motion is made twice.
-    of_device
-        It belongs to a device that all joints share.
-    of_shape
-        It belongs to the shape of the tube, and is another in each recording.
-    rugged
-        Its misfit has many valleys: a fit needs many starts and wide difference steps.
-    audited
-        No simulation shows it: it is found in the recording itself.
-    symptom
-        By which the recording itself shows it; None for most.
-    resembles_time
-        What it does is not told from a change with time where a motion is made once.
-    rescales
-        Nominal parameter that it scales by so much that a described value is ambiguous, and by how
-        much; None for most.
-    families
-        Places whose smooth functions hold its formula as one of many.
+    `depends_on_time`: it is told from others only where a motion is made twice.
+    `of_device`: it belongs to a device that all joints share.
+    `of_shape`: it belongs to the shape of the tube, and is another in each recording.
+    `rugged`: its misfit has many valleys: a fit needs many starts and wide difference steps.
+    `audited`: no simulation shows it: it is found in the recording itself.
+    `symptom`: by which the recording itself shows it; None for most.
+    `resembles_time`: what it does is not told from a change with time where a motion is made once.
+    `rescales`: nominal parameter that it scales by so much that a described value is ambiguous, and
+        by how much; None for most.
+    `families`: places whose smooth functions hold its formula as one of many.
     """
 
     depends_on_time: bool = False

@@ -45,12 +45,8 @@ class FamilyError(EndoscopeError, ValueError):
 class Readings:
     """How the recorded rig reads its plant.
 
-    Attributes
-    ----------
-    load_cell_offset : tuple of (float, float)
-        What each load cell shows without tension, N.
-    load_cell_delay, tracker_delay : float
-        By how much tensions and angle are recorded late, s.
+    `load_cell_offset`: what each load cell shows without tension, N.
+    `load_cell_delay`, `tracker_delay`: by how much tensions and angle are recorded late, s.
     """
 
     load_cell_offset: tuple[float, float] = (0.0, 0.0)
@@ -62,21 +58,13 @@ class Readings:
 class TubeFamily:
     """Joints of one rig over the bend of its tube.
 
-    Attributes
-    ----------
-    lines : mapping of str to tuple of float
-        Of a nominal key: its value at `CENTRE`, then by how much it, or its logarithm, grows with
-        the bend and with its square, counted in `SPAN` from `CENTRE`. Keys left out are nominal.
-    friction_profile : tuple of float
-        Of all tubes.
-    readings : Readings
-    provenance : mapping
-        Where the numbers are from and what they leave; carried along, not used.
-
-    Raises
-    ------
-    FamilyError
-        If a key is unknown, or a line has no number, too many, or one that is not finite.
+    `lines`: of a nominal key: its value at `CENTRE`, then by how much it, or its logarithm, grows
+        with the bend and with its square, counted in `SPAN` from `CENTRE`. Keys left out are
+        nominal.
+    `friction_profile`: of all tubes.
+    `provenance`: where the numbers are from and what they leave; carried along, not used.
+    Raises FamilyError: if a key is unknown, or a line has no number, too many, or one that is not
+        finite.
     """
 
     lines: Mapping[str, tuple[float, ...]]
@@ -96,19 +84,9 @@ class TubeFamily:
     def joint(self, bend: float) -> JointParameters:
         """The joint of a tube.
 
-        Parameters
-        ----------
-        bend : float
-            Of the tube, rad.
-
-        Returns
-        -------
-        JointParameters
-
-        Raises
-        ------
-        FamilyError
-            If the bend is outside of 0 to `MOST_BENT`, or a number is out of its bounds there.
+        `bend`: of the tube, rad.
+        Raises FamilyError: if the bend is outside of 0 to `MOST_BENT`, or a number is out of its
+            bounds there.
         """
         if not 0.0 <= bend <= MOST_BENT:
             raise FamilyError(
@@ -143,10 +121,7 @@ class TubeFamily:
 def load_family(path: str | Path = SHIPPED) -> TubeFamily:
     """Read a family; the one that is shipped if no path is given.
 
-    Raises
-    ------
-    FamilyError
-        If the file cannot be read or is no family; names the file and the key.
+    Raises FamilyError: if the file cannot be read or is no family; names the file and the key.
     """
     try:
         content = load_yaml(path)

@@ -29,15 +29,9 @@ class Fold(StrEnum):
 class Hook:
     """A place in the chain.
 
-    Attributes
-    ----------
-    name : str
-    fold : Fold
-    arguments : str
-        Of the hook and of every link, separated by commas. `p`, `x`: arrays of parameters and
-        states. Of a value that goes through, the first argument after them is the value.
-    results : int
-        How many numbers a link gives.
+    `arguments`: of the hook and of every link, separated by commas. `p`, `x`: arrays of parameters
+        and states. Of a value that goes through, the first argument after them is the value.
+    `results`: how many numbers a link gives.
     """
 
     name: str
@@ -143,15 +137,7 @@ def on_samples(
 def hook(effect: Effect, at: Hook) -> Callable[[Function], Function]:
     """Link a compiled function of an effect to a hook, whose arguments it has.
 
-    Parameters
-    ----------
-    effect : Effect
-    at : Hook
-
-    Returns
-    -------
-    callable
-        A decorator that gives the function back.
+    Returns: a decorator that gives the function back.
     """
 
     def link(function: Function) -> Function:

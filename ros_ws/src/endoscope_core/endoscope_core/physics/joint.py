@@ -200,18 +200,11 @@ def bend(
 ) -> None:
     """Bend the joint to where it comes to rest at the end of a tick.
 
-    Parameters
-    ----------
-    x : array (states,)
-        Changed in place.
-    table : array (TABLE_ROWS, CELLS + 1)
-    p, on : array (parameters,), array (flags,) of bool
-    way : float
-        By how much the pulley has wound up the positive wire in this tick, m.
-    other : float
-        The other joint's angle, rad.
-    time, tick : float
-        Middle of the tick and its length, s.
+    Shapes: `table` (TABLE_ROWS, CELLS + 1), `p`, `on` (parameters,).
+    `x` (states,): changed in place.
+    `way`: by how much the pulley has wound up the positive wire in this tick, m.
+    `other`: the other joint's angle, rad.
+    `time`, `tick`: middle of the tick and its length, s.
     """
     # The way at the joint is not known yet: it will be much like the last one.
     ahead = p[JOINT_RADIUS] * x[JOINT_STEP]

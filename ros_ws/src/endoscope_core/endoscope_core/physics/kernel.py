@@ -138,15 +138,10 @@ def settle(
 ) -> None:
     """Bring a joint to rest, its wires tightened at angle zero and the motor gone to `shaft` since.
 
-    Parameters
-    ----------
-    x, history, sheath : array (states,), array (HISTORIES, HISTORY), array (SHEATH_ROWS, CELLS + 1)
-        Written.
-    p, on : array (parameters,), array (flags,) of bool
-    shaft : float
-        Rad.
-    tick : float
-        That of all ticks to come, s.
+    Shapes: `p`, `on` (parameters,).
+    `x`, `history`, `sheath` (states,): written.
+    `shaft`: rad.
+    `tick`: that of all ticks to come, s.
     """
     x[:] = 0.0
     a11, a12, a21, a22 = transition(p[MOTOR_BANDWIDTH], p[MOTOR_DAMPING_RATIO], tick)
@@ -174,13 +169,9 @@ def settle(
 def turn_to(x: Array, history: Array, sheath: Array, p: Array, on: Flags, shaft: float) -> None:
     """Turn the motor of a joint at rest to `shaft`, so slowly that nothing but friction remembers.
 
-    Parameters
-    ----------
-    x, history, sheath : array (states,), array (HISTORIES, HISTORY), array (SHEATH_ROWS, CELLS + 1)
-        As `settle` leaves them; written.
-    p, on : array (parameters,), array (flags,) of bool
-    shaft : float
-        Rad.
+    Shapes: `p`, `on` (parameters,).
+    `x`, `history`, `sheath` (states,): as `settle` leaves them; written.
+    `shaft`: rad.
     """
     table = sheath[:TABLE_ROWS]
     begin = x[MOTOR]
@@ -403,15 +394,10 @@ def advance_tick(
 ) -> None:
     """Advance one joint by one tick with a row of inputs in force.
 
-    Parameters
-    ----------
-    x, history, sheath : array (states,), array (HISTORIES, HISTORY), array (SHEATH_ROWS, CELLS + 1)
-        Changed in place; from `settle`.
-    p, on : array (parameters,), array (flags,) of bool
-    inputs : array (INPUTS,)
-        See `layout.INPUTS`.
-    tick : float
-        That of `settle`, s.
+    Shapes: `p`, `on` (parameters,).
+    `x`, `history`, `sheath` (states,): changed in place; from `settle`.
+    `inputs` (INPUTS,): see `layout.INPUTS`.
+    `tick`: that of `settle`, s.
     """
     table = sheath[:TABLE_ROWS]
     time = (x[TICKS] + 0.5) * tick
@@ -507,18 +493,11 @@ def advance_joints(
 ) -> None:
     """Advance all joints side by side by some ticks, with the same input in each.
 
-    Parameters
-    ----------
-    x, histories, sheaths : array (J, ...)
-        As in `advance_tick`; changed in place.
-    p, on : array (J, parameters), array (J, flags) of bool
-    inputs : array (J, INPUTS)
-        Two joints see each other's angle, which is written into it.
-    ticks : int
-        0 only reads the sensors.
-    tick : float
-    out : array (J, OUTPUTS)
-        What the sensors read after the ticks.
+    Shapes: `p`, `on` (J, parameters).
+    `x`, `histories`, `sheaths` (J, ...): as in `advance_tick`; changed in place.
+    `inputs` (J, INPUTS): two joints see each other's angle, which is written into it.
+    `ticks`: 0 only reads the sensors.
+    `out` (J, OUTPUTS): what the sensors read after the ticks.
     """
     joints = inputs.shape[0]
     for n in range(ticks + 1):
@@ -544,18 +523,11 @@ def run_joints(
 ) -> None:
     """Run all joints side by side over a whole input.
 
-    Parameters
-    ----------
-    x, histories, sheaths : array (J, ...)
-        As in `advance_tick`; changed in place.
-    p, on : array (J, parameters), array (J, flags) of bool
-    inputs : array (J, N, INPUTS)
-        Changed where `coupled`.
-    coupled : bool
-        Whether each joint sees the other's angle, which is then written into its input.
-    tick : float
-    out : array (J, N, OUTPUTS)
-        Row k is what the sensors read at tick k, before command k acts.
+    Shapes: `p`, `on` (J, parameters).
+    `x`, `histories`, `sheaths` (J, ...): as in `advance_tick`; changed in place.
+    `inputs` (J, N, INPUTS): changed where `coupled`.
+    `coupled`: whether each joint sees the other's angle, which is then written into its input.
+    `out` (J, N, OUTPUTS): row k is what the sensors read at tick k, before command k acts.
     """
     joints, ticks = inputs.shape[0], inputs.shape[1]
     for n in range(ticks):

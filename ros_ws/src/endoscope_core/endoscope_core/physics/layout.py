@@ -55,12 +55,8 @@ ELEMENTS = 3
 class Slots:
     """Hands out consecutive indices of the flag, parameter and state arrays.
 
-    Attributes
-    ----------
-    flags, parameters, states : int
-        How many there are so far.
-    shaft_angles : list of int
-        States that begin at the shaft's angle.
+    `flags`, `parameters`, `states`: how many there are so far.
+    `shaft_angles`: states that begin at the shaft's angle.
     """
 
     def __init__(self) -> None:

@@ -50,24 +50,12 @@ class Answer:
 def hold_on_ticks(times: Array, values: Array, ticks: int, tick: float = TICK) -> Array:
     """Commands that are each in force until the next one, as the mean over each tick.
 
-    Parameters
-    ----------
-    times : array (N,)
-        Seconds, not decreasing. Before the first one, the first command is in force.
-    values : array (N, J)
-    ticks : int
-        Number of ticks M, the first one beginning at zero.
-    tick : float
-        In s.
-
-    Returns
-    -------
-    array (M, J)
-
-    Raises
-    ------
-    ValueError
-        If the stamps decrease.
+    Shapes: `values` (N, J).
+    `times` (N,): seconds, not decreasing. Before the first one, the first command is in force.
+    `ticks`: number of ticks M, the first one beginning at zero.
+    `tick`: in s.
+    Returns (M, J).
+    Raises ValueError: if the stamps decrease.
     """
     if np.any(np.diff(times) < 0):
         raise ValueError('the stamps of the commands decrease')
@@ -103,29 +91,14 @@ def answer_commands(
     The stamps are what the devices' clocks say: a plant whose tracker's clock is skewed answers
     with the angle of the time at which that clock said so.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-        J joints, in the order of the commands' columns.
-    command_stamps : array (N,) of int64
-        Stamps in ns, not decreasing.
-    shaft_commands : array (N, J)
-        Motor shaft angle in rad, in force from its stamp until the next one.
-    answer_stamps : AnswerStamps
-    start_shaft : array (J,), optional
-        Shaft angle in rad at which the rig rests at first; the first command if not given.
-    read_delay : float
-        Seconds from a stamp to the reading that carries it: zero, or the length of a cycle where
-        a rig stamps the cycle's beginning, sends the command and then reads.
-
-    Returns
-    -------
-    Answer
-
-    Raises
-    ------
-    ValueError
-        If the stamps decrease, or a command is not finite.
+    `plant`: j joints, in the order of the commands' columns.
+    `command_stamps` (N,): stamps in ns, not decreasing.
+    `shaft_commands` (N, J): motor shaft angle in rad, in force from its stamp until the next one.
+    `start_shaft` (J,): shaft angle in rad at which the rig rests at first; the first command if not
+        given.
+    `read_delay`: seconds from a stamp to the reading that carries it: zero, or the length of a
+        cycle where a rig stamps the cycle's beginning, sends the command and then reads.
+    Raises ValueError: if the stamps decrease, or a command is not finite.
     """
     origin = min(answer_stamps.first(), int(command_stamps[0]))
     faults = recording_faults(plant)

@@ -34,10 +34,7 @@ from endoscope_core.physics.layout import (
 def with_nominal_in_place(plant: PlantDescription) -> PlantDescription:
     """The same plant with nominal physics that is among its effects as numbers of its joints.
 
-    Raises
-    ------
-    UnknownEffectError, ValueError
-        As for `pack`.
+    Raises UnknownEffectError, ValueError: as for `pack`.
     """
     pack(plant)
     joints, kept = dict(plant.joints), []
@@ -54,12 +51,9 @@ def with_nominal_in_place(plant: PlantDescription) -> PlantDescription:
 def effect_values(spec: EffectSpec) -> Array:
     """Values of an effect's parameters in slot order, typical where the spec gives none.
 
-    Raises
-    ------
-    UnknownEffectError
-        If the effect or one of its parameters is unknown.
-    ValueError
-        If a value is not finite, outside the parameter's bounds or, where it must be, not whole.
+    Raises UnknownEffectError: if the effect or one of its parameters is unknown.
+    Raises ValueError: if a value is not finite, outside the parameter's bounds or, where it must
+        be, not whole.
     """
     definition = describe(spec.id)
     names = [parameter.name for parameter in definition.parameters]
@@ -90,19 +84,10 @@ def effect_values(spec: EffectSpec) -> Array:
 def pack(plant: PlantDescription) -> tuple[Array, Flags]:
     """Parameter and flag arrays of a plant.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-
-    Returns
-    -------
-    parameters : array (J, parameters)
-    flags : array (J, flags) of bool, or of `FLAGS_OF_FUNCTIONS` where the plant has terms
-
-    Raises
-    ------
-    UnknownEffectError, ValueError
-        If an effect or place is unknown, on an unknown joint, given twice, or out of bounds.
+    Returns `parameters` (J, parameters).
+    Returns `flags` (J, flags).
+    Raises UnknownEffectError, ValueError: if an effect or place is unknown, on an unknown joint,
+        given twice, or out of bounds.
     """
     names = plant.joint_names()
     parameters = np.zeros((len(names), SLOTS.parameters))
@@ -171,23 +156,14 @@ def rest_state(
 ) -> tuple[Array, Array, Array]:
     """States, histories and sheaths of joints at rest, or just set in motion.
 
-    Parameters
-    ----------
-    parameters, on : array (J, parameters), array (J, flags) of bool
-        From `pack`.
-    tick : float
-        In s.
-    shaft : array (J,) or (J, K), optional
-        Shaft angle in rad to which each motor has gone since the wires were tightened at zero, or
-        K angles to which it has gone one after the other; zero if not given.
-    speed : array (J,), optional
-        Of each motor, which is on its way to its command, in rad/s; zero if not given.
-
-    Returns
-    -------
-    states : array (J, states)
-    histories : array (J, HISTORIES, HISTORY)
-    sheaths : array (J, SHEATH_ROWS, CELLS + 1)
+    `parameters`, `on` (J, parameters): from `pack`.
+    `tick`: in s.
+    `shaft` (J,): shaft angle in rad to which each motor has gone since the wires were tightened at
+        zero, or K angles to which it has gone one after the other; zero if not given.
+    `speed` (J,): of each motor, which is on its way to its command, in rad/s; zero if not given.
+    Returns `states` (J, states).
+    Returns `histories` (J, HISTORIES, HISTORY).
+    Returns `sheaths` (J, SHEATH_ROWS, CELLS + 1).
     """
     joints = len(parameters)
     states = np.zeros((joints, SLOTS.states))

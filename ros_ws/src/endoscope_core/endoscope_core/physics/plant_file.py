@@ -100,19 +100,9 @@ def load_plant(path: str | Path) -> PlantDescription:
 def plant_from_mapping(content: Any) -> PlantDescription:
     """A plant description from the content of a plant.yaml.
 
-    Parameters
-    ----------
-    content : Mapping
-        With the keys `joints`, `sensors` and `effects`, each optional.
-
-    Returns
-    -------
-    PlantDescription
-
-    Raises
-    ------
-    ValueError
-        If a key is unknown or a value invalid; the message names it and the nearest valid one.
+    `content`: with the keys `joints`, `sensors` and `effects`, each optional.
+    Raises ValueError: if a key is unknown or a value invalid; the message names it and the nearest
+        valid one.
     """
     sections = _section(content, 'the plant')
     _check_keys(sections, ('joints', 'sensors', 'effects'), 'the plant')

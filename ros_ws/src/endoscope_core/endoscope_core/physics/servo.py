@@ -11,18 +11,9 @@ def transition(
 ) -> tuple[float, float, float, float]:
     """Exact transition of the servo over `step` s: rows of the matrix on (m - u, m').
 
-    Parameters
-    ----------
-    bandwidth : float
-        Rad/s.
-    damping_ratio : float
-    step : float
-        S.
-
-    Returns
-    -------
-    (float, float, float, float)
-        Ogata, Modern Control Engineering, 5th ed. 2010, sec. 5-3.
+    `bandwidth`: rad/s.
+    `step`: s.
+    Returns: ogata, Modern Control Engineering, 5th ed. 2010, sec. 5-3.
     """
     sigma = damping_ratio * bandwidth
     discriminant = damping_ratio * damping_ratio - 1.0

@@ -42,18 +42,13 @@ def wire_states(cells: int) -> int:
 def tabulate(table: Array, places: Array, exponents: Array, falling: float, rising: float) -> None:
     """Work out the shapes of a sliding wire's tension.
 
-    Parameters
-    ----------
-    table : array (TABLE_ROWS, N + 1)
-        Written: both shapes at the nodes, their weighted sums from the motor to each node and from
-        each node to the joint (a difference of the former would be lost in rounding where friction
-        is great), and the nodes' weights.
-    places : array (N + 1,)
-        The nodes' places along the wire, from 0 at the motor to 1 at the joint.
-    exponents : array (N + 1,)
-        Nominal capstan exponent from the motor to each node.
-    falling, rising : float
-        Factors on it where the wire slides towards the motor, and towards the joint.
+    `table` (TABLE_ROWS, N + 1): written: both shapes at the nodes, their weighted sums from the
+        motor to each node and from each node to the joint (a difference of the former would be lost
+        in rounding where friction is great), and the nodes' weights.
+    `places` (N + 1,): the nodes' places along the wire, from 0 at the motor to 1 at the joint.
+    `exponents` (N + 1,): nominal capstan exponent from the motor to each node.
+    `falling`, `rising`: factors on it where the wire slides towards the motor, and towards the
+        joint.
     """
     nodes = table.shape[1]
     fallen, risen = 0.0, 0.0
@@ -107,32 +102,18 @@ def moved(
 ) -> tuple[float, float, int, float, float, float]:
     """What moving one end would do to a wire.
 
-    Parameters
-    ----------
-    x : array (states,)
-        Not changed.
-    wire : int
-        Where the wire's states begin.
-    table : array (TABLE_ROWS, N + 1)
-    end : int
-        `MOTOR_END` or `JOINT_END`.
-    force : float
-        Stiffness times the way of the end, positive where it pulls the wire out of the sheath, N.
-    floor : float
-        Least tension that a node can have, N: zero, or what load-independent friction adds.
-
-    Returns
-    -------
-    tension : float
-        At that end, N.
-    slope : float
-        Of the tension by the force.
-    count : int
-        Nodes behind the front.
-    amplitude : float
-        Behind the front, N.
-    gap, other_gap : float
-        Slack left at this and at the other end, N.
+    Shapes: `table` (TABLE_ROWS, N + 1).
+    `x` (states,): not changed.
+    `wire`: where the wire's states begin.
+    `end`: `MOTOR_END` or `JOINT_END`.
+    `force`: stiffness times the way of the end, positive where it pulls the wire out of the sheath,
+        N.
+    `floor`: least tension that a node can have, N: zero, or what load-independent friction adds.
+    Returns `tension`: at that end, N.
+    Returns `slope`: of the tension by the force.
+    Returns `count`: nodes behind the front.
+    Returns `amplitude`: behind the front, N.
+    Returns `gap, other_gap`: slack left at this and at the other end, N.
     """
     nodes = table.shape[1]
     own = x[wire + GAP + end]
@@ -293,14 +274,9 @@ def relax(x: Array, wire: int, table: Array, work: Array) -> None:
     Statistical Inference under Order Restrictions, 1972, sec. 1.2) of tension over shape, once for
     each way.
 
-    Parameters
-    ----------
-    x : array (states,)
-    wire : int
-    table : array (TABLE_ROWS, N + 1)
-        With the new shapes.
-    work : array (3, N + 1)
-        Overwritten.
+    Shapes: `x` (states,).
+    `table` (TABLE_ROWS, N + 1): with the new shapes.
+    `work` (3, N + 1): overwritten.
     """
     nodes = table.shape[1]
     for shape in range(2):

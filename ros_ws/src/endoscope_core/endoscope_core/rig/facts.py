@@ -161,12 +161,8 @@ class Timeouts:
 class TensionFacts:
     """Tensions of a wire in N.
 
-    Attributes
-    ----------
-    ceiling
-        At which the slave goes to FAULT.
-    calibration_ceiling
-        At which a calibration is aborted.
+    `ceiling`: at which the slave goes to FAULT.
+    `calibration_ceiling`: at which a calibration is aborted.
     """
 
     ceiling: float = _fact(0.1, 500.0)

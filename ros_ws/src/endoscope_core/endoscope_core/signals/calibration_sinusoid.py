@@ -57,17 +57,10 @@ def begun_sinusoid(
 ) -> Signal:
     """Sine from rest, whose amplitude rises smoothly, brought back to rest at zero at last.
 
-    Parameters
-    ----------
-    name : str
-    amplitude, omega : float
-        rad and rad/s.
-    ramp : float
-        Time in s within which the amplitude rises.
-    steady : tuple of float
-        Interval in s of the result; the way back begins where it ends.
-    way_back : float
-        Length of the way back in s.
+    `amplitude`, `omega`: rad and rad/s.
+    `ramp`: time in s within which the amplitude rises.
+    `steady`: interval in s of the result; the way back begins where it ends.
+    `way_back`: length of the way back in s.
     """
 
     def rising(time: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -30,14 +30,9 @@ class CommandFileError(EndoscopeError, ValueError):
 class CommandTable:
     """A sampled motion.
 
-    Attributes
-    ----------
-    joints : tuple of str
-        Columns of `angle`.
-    time : array (N,)
-        Increasing, in s.
-    angle : array (N, J)
-        Desired bending angles in rad.
+    `joints`: columns of `angle`.
+    `time` (N,): increasing, in s.
+    `angle` (N, J): desired bending angles in rad.
     """
 
     joints: tuple[str, ...]
@@ -59,20 +54,11 @@ def write_command_file(
 ) -> None:
     """Write a command file, whole or not at all.
 
-    Parameters
-    ----------
-    path : str or Path
-    time : array (N,)
-        In s, increasing.
-    angle : array (N, J)
-        In rad.
-    joints : sequence of str
-        Names of the columns of `angle`.
-
-    Raises
-    ------
-    CommandFileError
-        If the table has another shape, is not finite, or its time does not increase.
+    `time` (N,): in s, increasing.
+    `angle` (N, J): in rad.
+    `joints`: names of the columns of `angle`.
+    Raises CommandFileError: if the table has another shape, is not finite, or its time does not
+        increase.
     """
     time, angle = np.asarray(time, float), np.asarray(angle, float)
     table = CommandTable(tuple(joints), time, angle)
@@ -88,21 +74,9 @@ def write_command_file(
 def read_command_file(path: str | Path, joints: Sequence[str] = JOINTS) -> CommandTable:
     """Read a command file.
 
-    Parameters
-    ----------
-    path : str or Path
-    joints : sequence of str
-        Columns that it must have; the table has them in this order.
-
-    Returns
-    -------
-    CommandTable
-
-    Raises
-    ------
-    CommandFileError
-        If the file cannot be read, lacks a column, or a value is not a finite number or out of
-        order.
+    `joints`: columns that it must have; the table has them in this order.
+    Raises CommandFileError: if the file cannot be read, lacks a column, or a value is not a finite
+        number or out of order.
     """
     path = Path(path)
     wanted = (TIME, *joints)

@@ -38,15 +38,8 @@ class Signal:
     def __call__(self, time: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Angle and velocity at the given times.
 
-        Parameters
-        ----------
-        time : array_like, shape (N,) or scalar
-            Seconds since the signal began.
-
-        Returns
-        -------
-        angle, velocity : ndarray, shape of `time`
-            rad and rad/s.
+        `time` (N,): seconds since the signal began.
+        Returns `angle, velocity`: rad and rad/s.
         """
         asked = np.asarray(time, dtype=float)
         flat = np.atleast_1d(asked).ravel()

@@ -10,15 +10,8 @@ from endoscope_core.signals.signal import FloatArray, Signal
 def smooth_step(phase: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Quintic rise from 0 to 1 with zero speed and acceleration at both ends.
 
-    Parameters
-    ----------
-    phase : ndarray, shape (N,)
-        0 at the start, 1 at the end; values outside are clipped.
-
-    Returns
-    -------
-    value, slope : ndarray, shape (N,)
-        Height and its derivative with respect to `phase`.
+    `phase` (N,): 0 at the start, 1 at the end; values outside are clipped.
+    Returns `value, slope` (N,): height and its derivative with respect to `phase`.
     """
     s = np.clip(phase, 0.0, 1.0)
     value = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
@@ -31,17 +24,9 @@ def window(
 ) -> tuple[FloatArray, FloatArray]:
     """Amplitude that rises smoothly from 0 to 1 and falls back to 0 at the end.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Seconds since the start.
-    duration, rise, fall : float
-        Length of the whole, of the rise and of the fall in s.
-
-    Returns
-    -------
-    value, rate : ndarray, shape (N,)
-        Amplitude factor and its time derivative in 1/s.
+    `time` (N,): seconds since the start.
+    `duration`, `rise`, `fall`: length of the whole, of the rise and of the fall in s.
+    Returns `value, rate` (N,): amplitude factor and its time derivative in 1/s.
     """
     up, up_slope = smooth_step(time / rise)
     down, down_slope = smooth_step((duration - time) / fall)

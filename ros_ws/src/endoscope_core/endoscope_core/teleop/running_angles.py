@@ -13,15 +13,8 @@ class RunningAngles:
     What the console wants of the slave tells where a limit is, be it of the joint, of the tube or
     of the console's own: the angles wait there, and turn round at once.
 
-    Parameters
-    ----------
-    joints
-        How many there are.
-
-    Attributes
-    ----------
-    position
-        In rad, shape (J,).
+    `joints`: how many there are.
+    `position`: in rad, shape (J,).
     """
 
     def __init__(self, joints: int) -> None:
@@ -42,24 +35,14 @@ class RunningAngles:
     ) -> tuple[bool, ...]:
         """Go on at a speed.
 
-        Parameters
-        ----------
-        speed
-            In rad/s, shape (J,).
-        usual
-            Greatest speed in rad/s for which the slave is given time to follow, shape (J,).
-        elapsed
-            Time in s since the last call of this grip.
-        wanted
-            Angles in rad that the console asks of the slave now, shape (J,); None while it follows
-            nobody: the angles do not move before it does, nor away from what it has reached.
-        scale
-            Slave motion for one radian of the handle.
-
-        Returns
-        -------
-        tuple of bool, shape (J,)
-            Joints that do not follow any further.
+        `speed`: in rad/s, shape (J,).
+        `usual`: greatest speed in rad/s for which the slave is given time to follow, shape (J,).
+        `elapsed`: time in s since the last call of this grip.
+        `wanted`: angles in rad that the console asks of the slave now, shape (J,); None while it
+            follows nobody: the angles do not move before it does, nor away from what it has
+            reached.
+        `scale`: slave motion for one radian of the handle.
+        Returns: joints that do not follow any further.
         """
         at_limit = [False] * len(self.position)
         if wanted is None:

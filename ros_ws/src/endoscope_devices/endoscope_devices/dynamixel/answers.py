@@ -16,12 +16,8 @@ from endoscope_devices.dynamixel.packet import (
 class Reply(NamedTuple):
     """What a servo answered.
 
-    Attributes
-    ----------
-    error
-        Error byte; the alert bit alone is no refusal.
-    data
-        Parameters after the error byte.
+    `error`: error byte; the alert bit alone is no refusal.
+    `data`: parameters after the error byte.
     """
 
     error: int
@@ -31,23 +27,12 @@ class Reply(NamedTuple):
 class AnswerCollector:
     """Matches packets with the open request by kind, id, order and length.
 
-    Parameters
-    ----------
-    devices
-        Ids that answer, in this order.
-    size
-        Data bytes of each answer.
-    fast
-        Whether all answer in one packet (fast sync read).
-
-    Attributes
-    ----------
-    replies
-        Answers so far, by id.
-    stray
-        Valid packets that answer no open question: late, repeated, or of another servo.
-    reader
-        Counts damage.
+    `devices`: ids that answer, in this order.
+    `size`: data bytes of each answer.
+    `fast`: whether all answer in one packet (fast sync read).
+    `replies`: answers so far, by id.
+    `stray`: valid packets that answer no open question: late, repeated, or of another servo.
+    `reader`: counts damage.
     """
 
     def __init__(self, devices: Sequence[int], size: int, fast: bool = False) -> None:

@@ -39,10 +39,7 @@ class SetUpError(BusError):
 def wanted_registers(settings: BusSettings) -> dict[Register, int]:
     """What every servo's registers shall hold before it may be enabled, in counts.
 
-    Parameters
-    ----------
-    settings
-        Of the bus.
+    `settings`: of the bus.
     """
     return {
         RETURN_DELAY_TIME: settings.return_delay_counts,
@@ -63,25 +60,12 @@ def bring_up(bus: PacketHandler, device: int, settings: BusSettings) -> ServoMod
 
     Registers of the EEPROM, which wears, are written only where they differ.
 
-    Parameters
-    ----------
-    bus
-        Where it is.
-    device
-        Its id.
-    settings
-        What to set.
-
-    Returns
-    -------
-    ServoModel
-        What it is.
-
-    Raises
-    ------
-    BusError
-        It does not answer, is another model, reports a hardware error, or does not keep what was
-        written.
+    `bus`: where it is.
+    `device`: its id.
+    `settings`: what to set.
+    Returns: what it is.
+    Raises BusError: it does not answer, is another model, reports a hardware error, or does not
+        keep what was written.
     """
     number, _ = bus.ping(device)
     if number not in MODELS:
@@ -107,21 +91,11 @@ def verify(
     Whole areas are read, each of a length that nothing else has, so that no answer to an earlier
     question can be taken for them.
 
-    Parameters
-    ----------
-    bus
-        Where the servo is.
-    device
-        Its id.
-    settings
-        What it shall hold.
-    but
-        A register that may differ.
-
-    Raises
-    ------
-    BusError
-        It does not answer, or a register differs.
+    `bus`: where the servo is.
+    `device`: its id.
+    `settings`: what it shall hold.
+    `but`: a register that may differ.
+    Raises BusError: it does not answer, or a register differs.
     """
     wanted = wanted_registers(settings)
     for area in ([r for r in wanted if r.eeprom], [r for r in wanted if not r.eeprom]):
@@ -163,20 +137,11 @@ def _refuse_hardware_errors(bus: PacketHandler, device: int) -> None:
 def enable(bus: PacketHandler, goals: Mapping[int, int], settings: BusSettings) -> None:
     """Let servos hold the positions where they are.
 
-    Parameters
-    ----------
-    bus
-        Where they are.
-    goals
-        Where they are to stay, in counts, by id: positions that have passed every check of a
+    `bus`: where they are.
+    `goals`: where they are to stay, in counts, by id: positions that have passed every check of a
         reading, which the answer to a single question has not.
-    settings
-        What they must hold.
-
-    Raises
-    ------
-    BusError
-        Anything is not as it was set; no torque is switched on then.
+    `settings`: what they must hold.
+    Raises BusError: anything is not as it was set; no torque is switched on then.
     """
     for device, goal in goals.items():
         # Only 0 ends the error state of a watchdog that has tripped, and until then goals are

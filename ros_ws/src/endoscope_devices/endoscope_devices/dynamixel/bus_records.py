@@ -10,12 +10,8 @@ from endoscope_devices.motor_device import MotorReading
 class TimedReading:
     """A reading of all shafts.
 
-    Attributes
-    ----------
-    reading
-        What was measured.
-    taken_ns
-        Our monotonic time in ns at which the oldest of it was taken.
+    `reading`: what was measured.
+    `taken_ns`: our monotonic time in ns at which the oldest of it was taken.
     """
 
     reading: MotorReading
@@ -26,16 +22,10 @@ class TimedReading:
 class ServoHealth:
     """What is known of a servo beside its motion.
 
-    Attributes
-    ----------
-    model
-        Its name.
-    error
-        Error byte of its last answer.
-    hardware
-        Hardware errors in words.
-    voltage, temperature
-        V and °C, as last read.
+    `model`: its name.
+    `error`: error byte of its last answer.
+    `hardware`: hardware errors in words.
+    `voltage`, `temperature`: v and °C, as last read.
     """
 
     model: str = ''
@@ -49,16 +39,10 @@ class ServoHealth:
 class BusFigures:
     """What the thread counts.
 
-    Attributes
-    ----------
-    cycles, readings
-        Cycles run, and those that gave a new reading of all servos.
-    failures
-        Failed cycles by reason.
-    last_failure
-        The last one in words.
-    last_ns
-        Monotonic time in ns of the last valid reading.
+    `cycles`, `readings`: cycles run, and those that gave a new reading of all servos.
+    `failures`: failed cycles by reason.
+    `last_failure`: the last one in words.
+    `last_ns`: monotonic time in ns of the last valid reading.
     """
 
     cycles: int = 0

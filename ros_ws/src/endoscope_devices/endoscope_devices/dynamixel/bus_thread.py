@@ -54,23 +54,12 @@ _LARGEST_CURRENT_A = 1193 * CURRENT_UNIT
 class BusThread:
     """Runs the bus of some servos.
 
-    Parameters
-    ----------
-    settings
-        Of the bus.
-    mounts
-        The J servos.
-
-    Attributes
-    ----------
-    newest
-        The newest valid reading, replaced as a whole.
-    figures
-        Counts.
-    health
-        State of each servo.
-    armed
-        Whether goals are obeyed.
+    `settings`: of the bus.
+    `mounts`: the J servos.
+    `newest`: the newest valid reading, replaced as a whole.
+    `figures`: counts.
+    `health`: state of each servo.
+    `armed`: whether goals are obeyed.
     """
 
     def __init__(self, settings: BusSettings, mounts: Sequence[ServoMount]) -> None:
@@ -101,10 +90,7 @@ class BusThread:
     def start(self) -> None:
         """Open the port, set all servos up, and begin.
 
-        Raises
-        ------
-        DeviceError
-            The port cannot be opened, or a servo is not as it must be.
+        Raises DeviceError: the port cannot be opened, or a servo is not as it must be.
         """
         try:
             self._connect()
@@ -122,10 +108,7 @@ class BusThread:
     def set_goal(self, goal: Sequence[float]) -> None:
         """Renew the goal.
 
-        Parameters
-        ----------
-        goal
-            Shaft angles in rad, shape (J,).
+        `goal`: shaft angles in rad, shape (J,).
         """
         self._goal = (tuple(goal), time.monotonic_ns())
 

@@ -38,26 +38,15 @@ BAUD_CODES = {
 class Register:
     """One entry of the control table.
 
-    Attributes
-    ----------
-    name
-        As the e-manual calls it.
-    address, size
-        First byte and number of bytes, little endian.
-    unit
-        SI unit of ``scale``; empty for codes and flags.
-    scale
-        SI units in one count.
-    signed
-        Whether the value is two's complement.
-    writable
-        Access is RW rather than R.
-    eeprom
-        Kept without power, and only writable while torque is off.
-    initial
-        Factory value (for RAM: the value after power-up).
-    low, high
-        Allowed counts.
+    `name`: as the e-manual calls it.
+    `address`, `size`: first byte and number of bytes, little endian.
+    `unit`: SI unit of ``scale``; empty for codes and flags.
+    `scale`: SI units in one count.
+    `signed`: whether the value is two's complement.
+    `writable`: access is RW rather than R.
+    `eeprom`: kept without power, and only writable while torque is off.
+    `initial`: factory value (for RAM: the value after power-up).
+    `low`, `high`: allowed counts.
     """
 
     name: str
@@ -75,15 +64,8 @@ class Register:
     def encode(self, counts: int) -> bytes:
         """Little-endian bytes of a value.
 
-        Parameters
-        ----------
-        counts
-            Value in counts.
-
-        Raises
-        ------
-        OverflowError
-            It does not fit.
+        `counts`: value in counts.
+        Raises OverflowError: it does not fit.
         """
         return counts.to_bytes(self.size, 'little', signed=self.signed)
 
@@ -201,14 +183,9 @@ TABLE_SIZE = 662
 class ServoModel:
     """What the e-manual's 'Specifications' say of a servo at 12 V.
 
-    Attributes
-    ----------
-    name
-        As printed on it.
-    torque_constant
-        Stall torque by stall current, N m/A.
-    no_load_speed
-        rad/s.
+    `name`: as printed on it.
+    `torque_constant`: stall torque by stall current, N m/A.
+    `no_load_speed`: rad/s.
     """
 
     name: str
@@ -243,10 +220,7 @@ ALERT = 0x80
 def error_in_words(error: int) -> str:
     """What the error byte of a status packet says (e-manual 'Protocol 2.0', 'Error').
 
-    Parameters
-    ----------
-    error
-        The byte; its highest bit alone means that Hardware Error Status(70) is not zero.
+    `error`: the byte; its highest bit alone means that Hardware Error Status(70) is not zero.
     """
     number = error & ~ALERT
     words = [_ERROR_NUMBERS.get(number, f'error number {number}')] if number else []
@@ -258,10 +232,7 @@ def error_in_words(error: int) -> str:
 def hardware_errors_in_words(status: int) -> str:
     """Name the bits of Hardware Error Status(70); empty for none.
 
-    Parameters
-    ----------
-    status
-        The register's value.
+    `status`: the register's value.
     """
     return ', '.join(
         _HARDWARE_ERRORS.get(bit, f'unknown bit {bit}') for bit in range(8) if status >> bit & 1

@@ -41,20 +41,12 @@ _ATTEMPTS = 3
 class ServoFinding:
     """What a servo says of itself.
 
-    Attributes
-    ----------
-    device, baud
-        Id, and the speed at which it was found.
-    model, firmware
-        Name and version.
-    voltage, temperature
-        V and °C.
-    hardware
-        Hardware errors in words.
-    mode, current_limit, return_delay, torque
-        Settings; A and s.
-    complete
-        Whether all of this was read: it may answer a ping and then no more.
+    `device`, `baud`: id, and the speed at which it was found.
+    `model`, `firmware`: name and version.
+    `voltage`, `temperature`: v and °C.
+    `hardware`: hardware errors in words.
+    `mode`, `current_limit`, `return_delay`, `torque`: settings; A and s.
+    `complete`: whether all of this was read: it may answer a ping and then no more.
     """
 
     device: int
@@ -87,16 +79,10 @@ class ServoFinding:
 class PortFinding:
     """What is behind a port.
 
-    Attributes
-    ----------
-    port
-        Device file.
-    latency
-        Latency timer in s, None where the adapter has none.
-    servos
-        What was found.
-    advice
-        What to change, one line each.
+    `port`: device file.
+    `latency`: latency timer in s, None where the adapter has none.
+    `servos`: what was found.
+    `advice`: what to change, one line each.
     """
 
     port: str
@@ -120,12 +106,8 @@ def serial_ports() -> list[str]:
 def examine(port: str, bauds: Sequence[int] = tuple(BAUD_CODES.values())) -> PortFinding:
     """Look for servos on a port at several speeds, without changing anything.
 
-    Parameters
-    ----------
-    port
-        Device file.
-    bauds
-        Bits per second.
+    `port`: device file.
+    `bauds`: bits per second.
     """
     finding = PortFinding(port, latency_timer(port))
     try:
@@ -143,19 +125,10 @@ def examine(port: str, bauds: Sequence[int] = tuple(BAUD_CODES.values())) -> Por
 def reboot(port: str, baud: int, device: int) -> None:
     """Restart a servo, which ends its shutdown.
 
-    Parameters
-    ----------
-    port
-        Device file.
-    baud
-        Speed of the servo.
-    device
-        Its id.
-
-    Raises
-    ------
-    DeviceError
-        The port cannot be used, or the servo does not answer.
+    `port`: device file.
+    `baud`: speed of the servo.
+    `device`: its id.
+    Raises DeviceError: the port cannot be used, or the servo does not answer.
     """
     line = BusPort(port, baud)
     line.open()
@@ -168,10 +141,7 @@ def reboot(port: str, baud: int, device: int) -> None:
 def advise(finding: PortFinding) -> list[str]:
     """Say what to change about what was found.
 
-    Parameters
-    ----------
-    finding
-        Of a port that could be used.
+    `finding`: of a port that could be used.
     """
     advice = []
     if finding.latency is not None and finding.latency > _WANTED_LATENCY_S:

@@ -14,12 +14,8 @@ from endoscope_devices.motor_device import MotorReading
 class DynamixelMotors:
     """Servos on a serial port, run by a thread of their own.
 
-    Parameters
-    ----------
-    settings
-        Of the bus.
-    mounts
-        The J servos, in the order of the motors.
+    `settings`: of the bus.
+    `mounts`: the J servos, in the order of the motors.
     """
 
     def __init__(self, settings: BusSettings, mounts: Sequence[ServoMount]) -> None:

@@ -59,19 +59,11 @@ def crc16(data: bytes) -> int:
 def encode(device: int, instruction: int, parameters: bytes = b'') -> bytes:
     """Make a packet, stuffed.
 
-    Parameters
-    ----------
-    device
-        Id, or ``BROADCAST_ID``.
-    instruction
-        An :class:`Instruction`, or ``STATUS`` with the error byte first in the parameters.
-    parameters
-        Unstuffed.
-
-    Raises
-    ------
-    ValueError
-        Longer than a servo takes.
+    `device`: id, or ``BROADCAST_ID``.
+    `instruction`: an :class:`Instruction`, or ``STATUS`` with the error byte first in the
+        parameters.
+    `parameters`: unstuffed.
+    Raises ValueError: longer than a servo takes.
     """
     body = bytes((instruction,)) + parameters.replace(_BARE, _STUFFED)
     length = len(body) + CRC_SIZE
@@ -84,16 +76,11 @@ def encode(device: int, instruction: int, parameters: bytes = b'') -> bytes:
 class Packet(NamedTuple):
     """A packet whose CRC is right.
 
-    Attributes
-    ----------
-    device
-        Id.
-    instruction
-        ``STATUS`` for an answer.
-    parameters
-        Unstuffed (but as they came in the answer to a fast sync read, which is never stuffed).
-    size
-        Bytes on the wire.
+    `device`: id.
+    `instruction`: ``STATUS`` for an answer.
+    `parameters`: unstuffed (but as they came in the answer to a fast sync read, which is never
+        stuffed).
+    `size`: bytes on the wire.
     """
 
     device: int
@@ -105,12 +92,8 @@ class Packet(NamedTuple):
 class PacketReader:
     """Finds packets in a stream of bytes that may be damaged in any way.
 
-    Attributes
-    ----------
-    wrong_crc
-        Packets dropped for their CRC or their stuffing.
-    skipped
-        Bytes dropped because they belong to no packet.
+    `wrong_crc`: packets dropped for their CRC or their stuffing.
+    `skipped`: bytes dropped because they belong to no packet.
     """
 
     def __init__(self) -> None:
@@ -178,17 +161,9 @@ def split_fast_answer(packet: Packet, size: int) -> dict[int, tuple[int, bytes]]
     Every servo adds error, id, data and the CRC of all that came before (e-manual 'Fast Sync
     Read'), so that each part is checked by itself.
 
-    Parameters
-    ----------
-    packet
-        The answer.
-    size
-        Bytes of data of each servo.
-
-    Returns
-    -------
-    dict
-        Error byte and data by id; empty if the packet is not such an answer.
+    `packet`: the answer.
+    `size`: bytes of data of each servo.
+    Returns: error byte and data by id; empty if the packet is not such an answer.
     """
     body = packet.parameters
     step = 2 + size + CRC_SIZE

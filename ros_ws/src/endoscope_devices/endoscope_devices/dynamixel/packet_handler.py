@@ -56,16 +56,10 @@ class RefusedError(BusError):
 class BusCounts:
     """What has been seen on the bus.
 
-    Attributes
-    ----------
-    requests, answers
-        Requests that want an answer, and answers taken.
-    missing
-        Answers that did not come in time.
-    stray
-        Valid packets that answered no open request: late, repeated, or of another servo.
-    damaged
-        Packets dropped for their CRC.
+    `requests`, `answers`: requests that want an answer, and answers taken.
+    `missing`: answers that did not come in time.
+    `stray`: valid packets that answered no open request: late, repeated, or of another servo.
+    `damaged`: packets dropped for their CRC.
     """
 
     requests: int = 0
@@ -79,16 +73,11 @@ class BusCounts:
 class PacketHandler:
     """Speaks Protocol 2.0 on an open port.
 
-    Parameters
-    ----------
-    port
-        Open.
-    margin
-        Time in s granted to an answer beyond its time on the wire.
-    counts
-        Counts requests and answers.
-    return_delay
-        Return delay of the servos in s, as far as known; the largest there is until then.
+    `port`: open.
+    `margin`: time in s granted to an answer beyond its time on the wire.
+    `counts`: counts requests and answers.
+    `return_delay`: return delay of the servos in s, as far as known; the largest there is until
+        then.
     """
 
     port: BusPort
@@ -103,12 +92,8 @@ class PacketHandler:
     def time_out(self, sent: int, answers: Sequence[int]) -> float:
         """Time in s within which all answers must have come.
 
-        Parameters
-        ----------
-        sent
-            Bytes of the request.
-        answers
-            Data bytes of each answer.
+        `sent`: bytes of the request.
+        `answers`: data bytes of each answer.
         """
         on_the_wire = sent + sum(STATUS_OVERHEAD + size for size in answers)
         return (
@@ -120,10 +105,7 @@ class PacketHandler:
     def drain(self, quiet: float) -> None:
         """Throw away what still arrives, so that it answers no later request.
 
-        Parameters
-        ----------
-        quiet
-            Time in s for which the line must be quiet; a line that never is is left after ten
+        `quiet`: time in s for which the line must be quiet; a line that never is is left after ten
             times that.
         """
         latest = time.monotonic() + 10.0 * quiet
@@ -133,15 +115,8 @@ class PacketHandler:
     def ping(self, device: int) -> tuple[int, int]:
         """Model number and firmware version of a servo.
 
-        Parameters
-        ----------
-        device
-            Its id.
-
-        Raises
-        ------
-        NoReplyError
-            It does not answer.
+        `device`: its id.
+        Raises NoReplyError: it does not answer.
         """
         reply = self._ask(device, Instruction.PING, b'', _PING_SIZE)
         return reply.data[0] | reply.data[1] << 8, reply.data[2]
@@ -149,17 +124,9 @@ class PacketHandler:
     def read(self, device: int, address: int, size: int) -> Reply:
         """Read bytes of a servo's control table.
 
-        Parameters
-        ----------
-        device
-            Its id.
-        address, size
-            First byte and number of bytes.
-
-        Raises
-        ------
-        NoReplyError, RefusedError
-            It does not answer, or with an error.
+        `device`: its id.
+        `address`, `size`: first byte and number of bytes.
+        Raises NoReplyError, RefusedError: it does not answer, or with an error.
         """
         asked = size + 1 if size == self._size_before else size
         reply = self._ask(device, Instruction.READ, _words(address, asked), asked)
@@ -168,60 +135,35 @@ class PacketHandler:
     def write(self, device: int, address: int, data: bytes) -> None:
         """Write bytes of a servo's control table.
 
-        Parameters
-        ----------
-        device
-            Its id.
-        address
-            First byte.
-        data
-            What to write.
-
-        Raises
-        ------
-        NoReplyError, RefusedError
-            It does not answer, or with an error.
+        `device`: its id.
+        `address`: first byte.
+        `data`: what to write.
+        Raises NoReplyError, RefusedError: it does not answer, or with an error.
         """
         self._ask(device, Instruction.WRITE, _words(address) + data, 0)
 
     def reboot(self, device: int) -> None:
         """Restart a servo: all of RAM is lost and torque is off.
 
-        Parameters
-        ----------
-        device
-            Its id.
-
-        Raises
-        ------
-        NoReplyError, RefusedError
-            It does not answer, or with an error.
+        `device`: its id.
+        Raises NoReplyError, RefusedError: it does not answer, or with an error.
         """
         self._ask(device, Instruction.REBOOT, b'', 0, attempts=1)
 
     def read_register(self, device: int, register: Register) -> int:
         """Value of a register in counts; see :meth:`read`.
 
-        Parameters
-        ----------
-        device
-            Id of the servo.
-        register
-            Which.
+        `device`: id of the servo.
+        `register`: which.
         """
         return register.decode(self.read(device, register.address, register.size).data)
 
     def write_register(self, device: int, register: Register, counts: int) -> None:
         """Set a register; see :meth:`write`.
 
-        Parameters
-        ----------
-        device
-            Id of the servo.
-        register
-            Which.
-        counts
-            Its new value.
+        `device`: id of the servo.
+        `register`: which.
+        `counts`: its new value.
         """
         self.write(device, register.address, register.encode(counts))
 
@@ -262,24 +204,13 @@ class PacketHandler:
     ) -> dict[int, Reply]:
         """Send bytes and collect the answers of some servos.
 
-        Parameters
-        ----------
-        request
-            One packet or more; those before the last want no answer.
-        devices
-            Who answers, in this order.
-        size
-            Data bytes of each answer.
-        fast
-            Whether all answer in one packet (fast sync read).
-        margin
-            Time in s granted in addition.
-
-        Returns
-        -------
-        dict
-            Answers by id; those that did not come are missing. Raises OSError when the adapter is
-            gone.
+        `request`: one packet or more; those before the last want no answer.
+        `devices`: who answers, in this order.
+        `size`: data bytes of each answer.
+        `fast`: whether all answer in one packet (fast sync read).
+        `margin`: time in s granted in addition.
+        Returns: answers by id; those that did not come are missing. Raises OSError when the adapter
+            is gone.
         """
         port = self.port
         port.clearPort()
@@ -322,14 +253,9 @@ class PacketHandler:
 def sync_read_request(address: int, size: int, devices: Sequence[int], fast: bool = False) -> bytes:
     """Bytes that make several servos answer with the same registers.
 
-    Parameters
-    ----------
-    address, size
-        First byte and number of bytes.
-    devices
-        Their ids, in the order of the answers.
-    fast
-        Whether to answer in one packet.
+    `address`, `size`: first byte and number of bytes.
+    `devices`: their ids, in the order of the answers.
+    `fast`: whether to answer in one packet.
     """
     instruction = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
     return encode(BROADCAST_ID, instruction, _words(address, size) + bytes(devices))
@@ -338,17 +264,9 @@ def sync_read_request(address: int, size: int, devices: Sequence[int], fast: boo
 def sync_write_request(address: int, size: int, data: Mapping[int, bytes]) -> bytes:
     """Bytes that set the same registers of several servos, which do not answer.
 
-    Parameters
-    ----------
-    address, size
-        First byte and number of bytes.
-    data
-        What to write, by id.
-
-    Raises
-    ------
-    ValueError
-        An id that no servo has, or data of another size.
+    `address`, `size`: first byte and number of bytes.
+    `data`: what to write, by id.
+    Raises ValueError: an id that no servo has, or data of another size.
     """
     parameters = _words(address, size)
     for device, value in data.items():

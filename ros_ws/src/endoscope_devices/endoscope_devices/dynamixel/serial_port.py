@@ -18,10 +18,7 @@ _TTY = Path('/sys/class/tty')
 def byte_time(baud: int) -> float:
     """Seconds that one byte takes (8 data bits, no parity, 1 stop bit).
 
-    Parameters
-    ----------
-    baud
-        Bits per second.
+    `baud`: bits per second.
     """
     return BITS_PER_BYTE / baud
 
@@ -35,12 +32,8 @@ def latency_timer(port_name: str) -> float | None:
 class BusPort(PortHandler):
     """A serial port with a Dynamixel bus behind it.
 
-    Parameters
-    ----------
-    port_name
-        Device file.
-    baud
-        Bits per second.
+    `port_name`: device file.
+    `baud`: bits per second.
     """
 
     def __init__(self, port_name: str, baud: int) -> None:
@@ -67,10 +60,8 @@ class BusPort(PortHandler):
     def open(self) -> None:
         """Open the port.
 
-        Raises
-        ------
-        DeviceError
-            There is no such port, it cannot be used, or the speed is none of the servos'.
+        Raises DeviceError: there is no such port, it cannot be used, or the speed is none of the
+            servos'.
         """
         try:
             opened = self.openPort()
@@ -93,16 +84,9 @@ class BusPort(PortHandler):
     def receive(self, deadline: float) -> bytes:
         """Bytes that are there, waiting for the first of them.
 
-        Parameters
-        ----------
-        deadline
-            Time of ``time.monotonic`` in s up to which to wait. What came before it but could not
-            be fetched in time, as when this process was held up, is still given.
-
-        Returns
-        -------
-        bytes
-            Empty if nothing came; raises OSError when the adapter is gone.
+        `deadline`: time of ``time.monotonic`` in s up to which to wait. What came before it but
+            could not be fetched in time, as when this process was held up, is still given.
+        Returns: empty if nothing came; raises OSError when the adapter is gone.
         """
         wait = max(0.0, deadline - time.monotonic())
         ready, _, _ = select.select([self.ser.fileno()], [], [], wait)

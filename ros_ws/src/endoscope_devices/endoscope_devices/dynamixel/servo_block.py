@@ -37,14 +37,9 @@ JITTER = 0.02
 class ServoBlock:
     """One reading of a servo, in the servo's own direction and zero.
 
-    Attributes
-    ----------
-    tick
-        Realtime Tick(120), ms.
-    watchdog
-        Bus Watchdog(98).
-    current, velocity, position
-        A, rad/s, rad.
+    `tick`: realtime Tick(120), ms.
+    `watchdog`: bus Watchdog(98).
+    `current`, `velocity`, `position`: A, rad/s, rad.
     """
 
     tick: int
@@ -57,10 +52,7 @@ class ServoBlock:
 def decode_block(data: bytes) -> ServoBlock:
     """Take the bytes of a block apart (all little endian, current, velocity, position signed).
 
-    Parameters
-    ----------
-    data
-        ``BLOCK_SIZE`` bytes.
+    `data`: ``BLOCK_SIZE`` bytes.
     """
     tick, watchdog, current, velocity, position = _LAYOUT.unpack(data)
     return ServoBlock(
@@ -75,12 +67,8 @@ class BlockJudge:
     tick that fits our clock, the watchdog as it was set, and a shaft that moved no faster than
     it can.
 
-    Parameters
-    ----------
-    max_speed
-        Largest speed of the shaft in rad/s.
-    max_current
-        Largest current in A.
+    `max_speed`: largest speed of the shaft in rad/s.
+    `max_current`: largest current in A.
     """
 
     def __init__(self, max_speed: float, max_current: float) -> None:
@@ -100,21 +88,11 @@ class BlockJudge:
     ) -> tuple[Freshness | None, str]:
         """Judge one block.
 
-        Parameters
-        ----------
-        block
-            As read.
-        watchdog
-            What Bus Watchdog(98) was set to.
-        asked_ns, received_ns
-            Our monotonic time in ns before the request and after the answer.
-
-        Returns
-        -------
-        Freshness or None
-            None if the block is refused.
-        str
-            Why it is refused.
+        `block`: as read.
+        `watchdog`: what Bus Watchdog(98) was set to.
+        `asked_ns`, `received_ns`: our monotonic time in ns before the request and after the answer.
+        Returns: none if the block is refused.
+        Returns: why it is refused.
         """
         if block.watchdog not in (watchdog, -1):
             return None, 'has lost its settings: it has restarted'

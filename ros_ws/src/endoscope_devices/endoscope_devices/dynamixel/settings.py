@@ -17,16 +17,10 @@ from endoscope_devices.motor_device import DeviceError
 class ServoMount:
     """How a servo is built in.
 
-    Attributes
-    ----------
-    name
-        Of the motor it is.
-    device
-        Its id on the bus.
-    direction
-        1, or -1 where the shaft's positive sense is the servo's negative one.
-    zero
-        Servo angle in rad at which the shaft is at 0.
+    `name`: of the motor it is.
+    `device`: its id on the bus.
+    `direction`: 1, or -1 where the shaft's positive sense is the servo's negative one.
+    `zero`: servo angle in rad at which the shaft is at 0.
     """
 
     name: str
@@ -47,24 +41,15 @@ class ServoMount:
 class BusSettings:
     """Everything about the bus that a person may want to change.
 
-    Attributes
-    ----------
-    port, baud
-        Device file and bits per second.
-    current_limit
-        Current in A at which the servos' firmware limits the tension of the wires.
-    watchdog
-        Silence in s after which a servo stops by itself; a multiple of 20 ms is taken.
-    return_delay
-        Time in s that a servo waits before it answers.
-    rate
-        Cycles per second at most; 0 for as many as the bus carries.
-    goal_timeout
-        Time in s after which a goal that nobody renewed is given up and the measured position held.
-    fault_after
-        Silence of a servo in s after which motion is refused until it is enabled anew.
-    fast
-        Whether to use fast sync read (firmware 45 and newer).
+    `port`, `baud`: device file and bits per second.
+    `current_limit`: current in A at which the servos' firmware limits the tension of the wires.
+    `watchdog`: silence in s after which a servo stops by itself; a multiple of 20 ms is taken.
+    `return_delay`: time in s that a servo waits before it answers.
+    `rate`: cycles per second at most; 0 for as many as the bus carries.
+    `goal_timeout`: time in s after which a goal that nobody renewed is given up and the measured
+        position held.
+    `fault_after`: silence of a servo in s after which motion is refused until it is enabled anew.
+    `fast`: whether to use fast sync read (firmware 45 and newer).
     """
 
     port: str

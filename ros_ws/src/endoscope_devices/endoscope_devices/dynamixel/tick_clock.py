@@ -25,10 +25,7 @@ class TickClock:
     the drift between the clocks; that of a late answer, or of a counter that stands still, lies
     above them, and that of a counter that began anew lies anywhere.
 
-    Parameters
-    ----------
-    drift
-        Largest rate error between the two clocks; an oscillator without a crystal keeps 1 %.
+    `drift`: largest rate error between the two clocks; an oscillator without a crystal keeps 1 %.
     """
 
     def __init__(self, drift: float = 0.01) -> None:
@@ -45,13 +42,9 @@ class TickClock:
     def judge(self, tick: int, asked_ns: int, received_ns: int) -> Freshness:
         """Judge the tick of a reading; only a new one moves the clock.
 
-        Parameters
-        ----------
-        tick
-            The register's value.
-        asked_ns, received_ns
-            Our monotonic time in ns just before the request was sent and just after the answer
-            came.
+        `tick`: the register's value.
+        `asked_ns`, `received_ns`: our monotonic time in ns just before the request was sent and
+            just after the answer came.
         """
         if self._tick < 0 or received_ns - self._seen_ns > TICK_PERIOD * _MS // 4:
             self._set(tick, received_ns)
@@ -74,10 +67,7 @@ class TickClock:
     def taken_ns(self, tick: int) -> int:
         """Our monotonic time in ns at which a tick that was judged new began.
 
-        Parameters
-        ----------
-        tick
-            The register's value.
+        `tick`: the register's value.
         """
         middle = (self._low_ns + self._high_ns) // 2
         turns = round((self._seen_ns - middle - tick * _MS) / (TICK_PERIOD * _MS))

@@ -10,10 +10,7 @@ from endoscope_devices.dynamixel.servo_block import BLOCK_ADDRESS, BLOCK_SIZE
 def bytes_of_cycle(servos: int) -> int:
     """Bytes of one sync write of goals and one sync read with its answers, unstuffed.
 
-    Parameters
-    ----------
-    servos
-        How many there are.
+    `servos`: how many there are.
     """
     devices = range(1, servos + 1)
     goals = {device: bytes(GOAL_POSITION.size) for device in devices}
@@ -25,13 +22,8 @@ def bytes_of_cycle(servos: int) -> int:
 def cycles_per_second(baud: int, servos: int, return_delay: float = 0.0) -> float:
     """Largest rate that the line carries.
 
-    Parameters
-    ----------
-    baud
-        Bits per second.
-    servos
-        How many there are.
-    return_delay
-        Time in s that each servo waits before it answers.
+    `baud`: bits per second.
+    `servos`: how many there are.
+    `return_delay`: time in s that each servo waits before it answers.
     """
     return 1.0 / (bytes_of_cycle(servos) * byte_time(baud) + servos * return_delay)

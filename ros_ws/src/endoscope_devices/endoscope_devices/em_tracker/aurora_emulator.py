@@ -39,23 +39,12 @@ _STEP_S = 0.004
 class AuroraEmulator(ClosedOnExit):
     """Serves commands in a thread until it is closed.
 
-    Parameters
-    ----------
-    sources
-        The wired sensors.
-    link
-        Link to the port, which stays the same when the tracker is plugged in again.
-    latency
-        Time in s from measuring a frame to having it ready.
-    line_speed
-        Whether bytes take their time.
-
-    Attributes
-    ----------
-    unit
-        The tracker behind the line.
-    tap
-        What becomes of replies on the way: pieces, each with the seconds that it takes.
+    `sources`: the wired sensors.
+    `link`: link to the port, which stays the same when the tracker is plugged in again.
+    `latency`: time in s from measuring a frame to having it ready.
+    `line_speed`: whether bytes take their time.
+    `unit`: the tracker behind the line.
+    `tap`: what becomes of replies on the way: pieces, each with the seconds that it takes.
     """
 
     def __init__(
@@ -158,16 +147,11 @@ class AuroraEmulator(ClosedOnExit):
 class InstrumentInField:
     """The sensor in the tip of an instrument that bends with constant curvature.
 
-    Parameters
-    ----------
-    bending
-        ``bend_x`` and ``bend_y`` in rad at a time in s.
-    base_position, base_orientation
-        Of the instrument's base in the frame of the field generator: m, shape (3,), and x, y, z, w.
-    roll
-        Angle in rad by which the sensor is turned about its own axis as it is mounted.
-    length
-        Of the bending section in m.
+    `bending`: ``bend_x`` and ``bend_y`` in rad at a time in s.
+    `base_position`, `base_orientation`: of the instrument's base in the frame of the field
+        generator: m, shape (3,), and x, y, z, w.
+    `roll`: angle in rad by which the sensor is turned about its own axis as it is mounted.
+    `length`: of the bending section in m.
     """
 
     def __init__(
@@ -187,10 +171,7 @@ class InstrumentInField:
     def __call__(self, seconds: float) -> SensorView:
         """Where the sensor is.
 
-        Parameters
-        ----------
-        seconds
-            Since frame 0.
+        `seconds`: since frame 0.
         """
         position, orientation = tip_pose(self.bending(seconds), self._length)
         place, turn = self._base

@@ -16,10 +16,7 @@ _COMM = f'COMM:{{}}{ndicapy.NDI_8N1:03d}{ndicapy.NDI_NOHANDSHAKE}'
 class TrackerReplyError(DeviceError):
     """A reply that is missing, spoilt, or says that the tracker refused.
 
-    Attributes
-    ----------
-    silent
-        Whether nothing came at all.
+    `silent`: whether nothing came at all.
     """
 
     def __init__(self, command: str, words: str, *, silent: bool = False) -> None:
@@ -30,10 +27,7 @@ class TrackerReplyError(DeviceError):
 class AuroraPort:
     """Commands and replies.
 
-    Parameters
-    ----------
-    path
-        Device path.
+    `path`: device path.
     """
 
     def __init__(self, path: str) -> None:
@@ -47,10 +41,7 @@ class AuroraPort:
         A tracker that does not answer at 9600 baud was left at another rate: a serial break resets
         it.
 
-        Raises
-        ------
-        DeviceError
-            There is no port, or no tracker at it.
+        Raises DeviceError: there is no port, or no tracker at it.
         """
         self._guard = NdiLineGuard(self._path)
         self._device = ndicapy.ndiOpen(self._guard.inner)
@@ -67,15 +58,8 @@ class AuroraPort:
     def ask(self, command: str) -> str:
         """Send a command; give its reply without CRC.
 
-        Parameters
-        ----------
-        command
-            With its colon; ndicapi adds the CRC.
-
-        Raises
-        ------
-        TrackerReplyError
-            No reply, a wrong CRC, or an error of the tracker.
+        `command`: with its colon; ndicapi adds the CRC.
+        Raises TrackerReplyError: no reply, a wrong CRC, or an error of the tracker.
         """
         if self._guard is None:
             raise TrackerReplyError(command, 'not connected', silent=True)
@@ -93,10 +77,7 @@ class AuroraPort:
         The tracker answers in order: once the line has been quiet and the tracker then told its
         revision, nothing older is under way.
 
-        Raises
-        ------
-        DeviceError
-            It has not come yet, or the port is gone.
+        Raises DeviceError: it has not come yet, or the port is gone.
         """
         if self._guard is not None:
             self._guard.settle()

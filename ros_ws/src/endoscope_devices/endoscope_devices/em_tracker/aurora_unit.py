@@ -27,18 +27,11 @@ _FIRMWARE = 'AURORA Rev 012'
 class SensorView:
     """Where a sensor is.
 
-    Attributes
-    ----------
-    position
-        m, in the frame of the field generator, shape (3,).
-    orientation
-        Unit quaternion x, y, z, w, shape (4,).
-    error
-        Indicated error in m.
-    out_of_volume
-        Whether the measurement volume ends before it.
-    broken
-        Whether a coil of the sensor is broken: then there is no position.
+    `position`: m, in the frame of the field generator, shape (3,).
+    `orientation`: unit quaternion x, y, z, w, shape (4,).
+    `error`: indicated error in m.
+    `out_of_volume`: whether the measurement volume ends before it.
+    `broken`: whether a coil of the sensor is broken: then there is no position.
     """
 
     position: Sequence[float] = (0.0, 0.0, -0.2)
@@ -102,21 +95,11 @@ class _Frame:
 class AuroraUnit:
     """The tracker without its line.
 
-    Parameters
-    ----------
-    sources
-        One wired sensor each, in ports 1, 2, ...
-    now
-        Time in s, monotonic.
-    latency
-        Time in s from measuring a frame to having it ready.
-
-    Attributes
-    ----------
-    baud
-        Rate that it listens at.
-    frame_zero
-        When frame 0 was, in s.
+    `sources`: one wired sensor each, in ports 1, 2, ...
+    `now`: time in s, monotonic.
+    `latency`: time in s from measuring a frame to having it ready.
+    `baud`: rate that it listens at.
+    `frame_zero`: when frame 0 was, in s.
     """
 
     def __init__(
@@ -142,10 +125,7 @@ class AuroraUnit:
     def answer(self, line: bytes) -> bytes:
         """Reply to a command line without its carriage return.
 
-        Parameters
-        ----------
-        line
-            ``NAME:parametersCRC`` or ``NAME parameters``.
+        `line`: ``NAME:parametersCRC`` or ``NAME parameters``.
         """
         try:
             name, parameters = self._taken_apart(line)

@@ -11,10 +11,7 @@ class FrameClock:
     not the host's clock, to tell when data was collected).  The line follows clocks that drift
     apart by up to ``1e-4``.
 
-    Parameters
-    ----------
-    rate
-        Frames a second in Hz.
+    `rate`: frames a second in Hz.
     """
 
     def __init__(self, rate: float) -> None:
@@ -25,17 +22,9 @@ class FrameClock:
     def stamp(self, frame: int, asked_ns: int) -> int:
         """Time of a frame that was seen for the first time.
 
-        Parameters
-        ----------
-        frame
-            Its number, larger than the last.
-        asked_ns
-            When the reply that brought it was asked for, in ns.
-
-        Returns
-        -------
-        int
-            In ns of the same clock, never later than ``asked_ns``.
+        `frame`: its number, larger than the last.
+        `asked_ns`: when the reply that brought it was asked for, in ns.
+        Returns: in ns of the same clock, never later than ``asked_ns``.
         """
         seen = asked_ns - frame * self._period_ns
         self._offset_ns = seen if self._offset_ns is None else min(seen, self._latest_ns(frame))
@@ -45,10 +34,7 @@ class FrameClock:
     def ahead_ns(self, frame: int, asked_ns: int) -> int:
         """How much earlier than it can have been measured a frame was seen; 0 if it was not.
 
-        Parameters
-        ----------
-        frame, asked_ns
-            As in `stamp`.
+        `frame`, `asked_ns`: as in `stamp`.
         """
         if self._offset_ns is None:
             return 0

@@ -34,21 +34,11 @@ class NdiLineGuard:
     The port is touched by one thread at a time: by the guard's between a command and its reply, by
     the caller's otherwise.
 
-    Parameters
-    ----------
-    path
-        Device path of the tracker's port.
-    frame_timeout
-        Longest wait in s for the reply to TX.
-
-    Attributes
-    ----------
-    inner
-        Path for ndicapi.
-    trouble
-        What was wrong with the last reply; empty if nothing.
-    silent
-        Whether the last reply did not come at all.
+    `path`: device path of the tracker's port.
+    `frame_timeout`: longest wait in s for the reply to TX.
+    `inner`: path for ndicapi.
+    `trouble`: what was wrong with the last reply; empty if nothing.
+    `silent`: whether the last reply did not come at all.
     """
 
     def __init__(self, path: str, frame_timeout: float = 0.1) -> None:
@@ -72,10 +62,7 @@ class NdiLineGuard:
     def set_baud(self, baud: int) -> None:
         """Go on at another rate, which the tracker has agreed to.
 
-        Parameters
-        ----------
-        baud
-            In bit/s.
+        `baud`: in bit/s.
         """
         self._port.baudrate = baud
 
@@ -92,10 +79,7 @@ class NdiLineGuard:
     def reset(self) -> None:
         """Send a serial break, after which the tracker is at 9600 baud (Aurora API Guide, RESET).
 
-        Raises
-        ------
-        DeviceError
-            It does not say that it was reset.
+        Raises DeviceError: it does not say that it was reset.
         """
         try:
             self._port.baudrate = 9600

@@ -33,10 +33,7 @@ CONFIRMATIONS = 3
 class PoseCheck:
     """Judges each pose by the last one that was believed.
 
-    Parameters
-    ----------
-    rate
-        Frames a second in Hz.
+    `rate`: frames a second in Hz.
     """
 
     def __init__(self, rate: float) -> None:
@@ -48,10 +45,7 @@ class PoseCheck:
     def believable(self, tool: ToolReading) -> bool:
         """Whether a tip can have come there, no faster than servos and hand move it.
 
-        Parameters
-        ----------
-        tool
-            With a pose, of a later frame than the last.
+        `tool`: with a pose, of a later frame than the last.
         """
         if self._believed is not None and not self._near(self._believed, tool):
             agrees = self._candidate is not None and self._near(self._candidate, tool)

@@ -40,19 +40,12 @@ class PortStatus(IntFlag):
 class ToolReading:
     """One tool in one frame.
 
-    Attributes
-    ----------
-    handle
-        Port handle.
-    status
-        Port status.
-    frame
-        Frame number.
-    position, orientation
-        m, shape (3,), and unit quaternion x, y, z, w, shape (4,), in the frame of the field
-        generator; empty where the sensor is missing.
-    error
-        The tracker's own estimate in m.
+    `handle`: port handle.
+    `status`: port status.
+    `frame`: frame number.
+    `position`, `orientation`: m, shape (3,), and unit quaternion x, y, z, w, shape (4,), in the
+        frame of the field generator; empty where the sensor is missing.
+    `error`: the tracker's own estimate in m.
     """
 
     handle: int
@@ -70,15 +63,8 @@ class MalformedReplyError(ValueError):
 def parse_tx(text: str) -> list[ToolReading]:
     """Tools of a reply; those that are disabled or unplugged are left out.
 
-    Parameters
-    ----------
-    text
-        Without CRC and carriage return.
-
-    Raises
-    ------
-    MalformedReplyError
-        Any character is not where it belongs, or a number cannot be.
+    `text`: without CRC and carriage return.
+    Raises MalformedReplyError: any character is not where it belongs, or a number cannot be.
     """
     count = _COUNT.match(text)
     if count is None:

@@ -21,12 +21,8 @@ def faithful(data: bytes) -> Sequence[tuple[float, bytes]]:
 class ByteRelay:
     """A thread between two ends; it ends when either end goes away.
 
-    Parameters
-    ----------
-    near, far
-        File descriptors, read and written here; the caller closes them.
-    tap_for
-        Gives the tap in force at an end from which bytes come, ``'near'`` or ``'far'``.
+    `near`, `far`: file descriptors, read and written here; the caller closes them.
+    `tap_for`: gives the tap in force at an end from which bytes come, ``'near'`` or ``'far'``.
     """
 
     def __init__(self, near: int, far: int, tap_for: Callable[[str], Tap]) -> None:

@@ -13,18 +13,10 @@ class SerialCable(ClosedOnExit):
 
     A pseudo-terminal has no baud rate, parity or break: bytes arrive at once and whole.
 
-    Parameters
-    ----------
-    host
-        Link by which the driver finds its port; it stays the same when the cable is plugged in
+    `host`: link by which the driver finds its port; it stays the same when the cable is plugged in
         again, as a udev link does.
-
-    Attributes
-    ----------
-    device
-        Path of the device's port.
-    to_host, to_device
-        What becomes of bytes on the way; a test sets them.
+    `device`: path of the device's port.
+    `to_host`, `to_device`: what becomes of bytes on the way; a test sets them.
     """
 
     def __init__(self, host: Path) -> None:

@@ -10,17 +10,9 @@ from endoscope_devices.emulation.byte_relay import ByteRelay, Tap, faithful
 class TcpCable(ClosedOnExit):
     """Accepts connections on a port of its own and carries them to a server.
 
-    Parameters
-    ----------
-    server_port
-        Port of the server on this machine.
-
-    Attributes
-    ----------
-    port
-        Where to connect instead.
-    to_host, to_device
-        What becomes of bytes on the way; a test sets them.
+    `server_port`: port of the server on this machine.
+    `port`: where to connect instead.
+    `to_host`, `to_device`: what becomes of bytes on the way; a test sets them.
     """
 
     def __init__(self, server_port: int) -> None:

@@ -51,22 +51,14 @@ class SerialSettings:
 class Transmitter:
     """How the transmitter is asked.
 
-    Attributes
-    ----------
-    unit
-        Modbus address.
-    function
-        3 (holding registers) or 4 (input registers).
-    big_word_first
-        Whether the more significant register of a 32-bit value comes first.
-    rate
-        Readings a second in Hz.
-    reply_timeout
-        In s.
-    latency
-        Time in s by which a register is older than the question for it: filter and conversion.
-    serial
-        Line settings for RTU.
+    `unit`: Modbus address.
+    `function`: 3 (holding registers) or 4 (input registers).
+    `big_word_first`: whether the more significant register of a 32-bit value comes first.
+    `rate`: readings a second in Hz.
+    `reply_timeout`: in s.
+    `latency`: time in s by which a register is older than the question for it: filter and
+        conversion.
+    `serial`: line settings for RTU.
     """
 
     unit: int
@@ -82,16 +74,10 @@ class Transmitter:
 class WireCell:
     """One cell: ``tension = sign * newton_per_count * (count - zero)``.
 
-    Attributes
-    ----------
-    register, type
-        First register and its type, a key of ``REGISTER_TYPES``.
-    newton_per_count
-        Sensitivity in N a count.
-    sign
-        1 or -1: which way the count goes when the wire is pulled.
-    zero
-        Count without tension.
+    `register`, `type`: first register and its type, a key of ``REGISTER_TYPES``.
+    `newton_per_count`: sensitivity in N a count.
+    `sign`: 1 or -1: which way the count goes when the wire is pulled.
+    `zero`: count without tension.
     """
 
     register: int
@@ -103,10 +89,7 @@ class WireCell:
     def tension(self, count: float) -> float:
         """Tension in N at a count.
 
-        Parameters
-        ----------
-        count
-            As read.
+        `count`: as read.
         """
         return self.sign * self.newton_per_count * (count - self.zero)
 
@@ -115,18 +98,14 @@ class WireCell:
 class FaultLimits:
     """What no real tension does.
 
-    Attributes
-    ----------
-    broken_below, broken_above, saturated_below, saturated_above
-        Counts.
-    frozen_after
-        In s; 0 to leave it out.
-    spike_rate, spike_noise
-        Fastest change in N/s, and what noise may add in N.  A wire of stiffness k on a pulley of
-        radius r, whose shaft turns at w, changes its tension at the cell by k r w exp(phi) at most,
-        phi being the sheath's capstan exponent (Euler-Eytelwein): 1620 N/s for the nominal 2000 N/m
-        and 5 mm, the greatest exponent of 3 and the 8.06 rad/s of an XM430-W210 without load.
-        Noise: seven times that of a difference of two readings at the 0.1 N rms that a tare allows.
+    `broken_below`, `broken_above`, `saturated_below`, `saturated_above`: counts.
+    `frozen_after`: in s; 0 to leave it out.
+    `spike_rate`, `spike_noise`: fastest change in N/s, and what noise may add in N.  A wire of
+        stiffness k on a pulley of radius r, whose shaft turns at w, changes its tension at the cell
+        by k r w exp(phi) at most, phi being the sheath's capstan exponent (Euler-Eytelwein): 1620
+        N/s for the nominal 2000 N/m and 5 mm, the greatest exponent of 3 and the 8.06 rad/s of an
+        XM430-W210 without load. Noise: seven times that of a difference of two readings at the 0.1
+        N rms that a tare allows.
     """
 
     broken_below: float
@@ -142,14 +121,10 @@ class FaultLimits:
 class TareLimits:
     """When a tare is refused.
 
-    Attributes
-    ----------
-    noise, drift
-        Largest standard deviation, and largest change from one half second to the next, in N.
-    largest
-        Largest tension in N that may be taken for zero.
-    shaft_speed
-        Speed of a motor shaft in rad/s from which the wires count as moving.
+    `noise`, `drift`: largest standard deviation, and largest change from one half second to the
+        next, in N.
+    `largest`: largest tension in N that may be taken for zero.
+    `shaft_speed`: speed of a motor shaft in rad/s from which the wires count as moving.
     """
 
     noise: float = 0.1

@@ -22,21 +22,12 @@ class ChannelCheck:
     that tells an old reply of Modbus RTU, which has no number: kept on the way and sent again, it
     is left out where the tension has gone on by more than a wire can in one interval.
 
-    Parameters
-    ----------
-    wire
-        Name for messages.
-    cell
-        Its calibration.
-    limits
-        What no real tension does.
-
-    Attributes
-    ----------
-    fault
-        What is wrong, naming the wire; empty while readings are good.
-    spikes, new_levels
-        Readings that changed too fast, and how often three of them were taken for a new level.
+    `wire`: name for messages.
+    `cell`: its calibration.
+    `limits`: what no real tension does.
+    `fault`: what is wrong, naming the wire; empty while readings are good.
+    `spikes`, `new_levels`: readings that changed too fast, and how often three of them were taken
+        for a new level.
     """
 
     def __init__(self, wire: str, cell: WireCell, limits: FaultLimits) -> None:
@@ -59,17 +50,9 @@ class ChannelCheck:
     def read(self, time_ns: int, count: float) -> float | None:
         """Take a count; give the tension in N, or None where it cannot be believed.
 
-        Parameters
-        ----------
-        time_ns
-            When it was read, in ns of a monotonic clock.
-        count
-            As read.
-
-        Returns
-        -------
-        float or None
-            None during a fault, and for its first ``CONFIRMATIONS - 1`` good readings after.
+        `time_ns`: when it was read, in ns of a monotonic clock.
+        `count`: as read.
+        Returns: none during a fault, and for its first ``CONFIRMATIONS - 1`` good readings after.
         """
         trouble = self._trouble(time_ns, count)
         if trouble:

@@ -37,10 +37,7 @@ class ReplyTrouble(StrEnum):
 class ReplyError(Exception):
     """A reply that is not accepted.
 
-    Attributes
-    ----------
-    trouble
-        The kind.
+    `trouble`: the kind.
     """
 
     def __init__(self, trouble: ReplyTrouble, words: str) -> None:
@@ -51,12 +48,8 @@ class ReplyError(Exception):
 class Framing(ABC):
     """How requests and replies lie in bytes; one request is out at a time.
 
-    Parameters
-    ----------
-    unit
-        Modbus address.
-    function
-        3 or 4.
+    `unit`: Modbus address.
+    `function`: 3 or 4.
     """
 
     def __init__(self, unit: int, function: int) -> None:
@@ -69,30 +62,21 @@ class Framing(ABC):
     def request(self, address: int, count: int) -> bytes:
         """Bytes that ask for registers.
 
-        Parameters
-        ----------
-        address, count
-            First register and number of registers.
+        `address`, `count`: first register and number of registers.
         """
 
     @abstractmethod
     def length(self, head: bytes) -> int:
         """How long the reply is, as far as its first bytes tell.
 
-        Parameters
-        ----------
-        head
-            What has come so far; at least two bytes more are always wanted than decide.
+        `head`: what has come so far; at least two bytes more are always wanted than decide.
         """
 
     @abstractmethod
     def accept(self, reply: bytes) -> tuple[int, ...] | None:
         """Registers of the reply to the last request; None if it answers an earlier one.
 
-        Raises
-        ------
-        ReplyError
-            It is not the reply to that request.
+        Raises ReplyError: it is not the reply to that request.
         """
 
     def _pdu(self, address: int, count: int, transaction: int = 0) -> ReadHoldingRegistersRequest:
@@ -128,10 +112,7 @@ class RtuFraming(Framing):
     def request(self, address: int, count: int) -> bytes:
         """See :class:`Framing`.
 
-        Parameters
-        ----------
-        address, count
-            First register and number of registers.
+        `address`, `count`: first register and number of registers.
         """
         return self._framer.buildFrame(self._pdu(address, count))
 
@@ -161,10 +142,7 @@ class TcpFraming(Framing):
     def request(self, address: int, count: int) -> bytes:
         """See :class:`Framing`; each request has a transaction number of its own.
 
-        Parameters
-        ----------
-        address, count
-            First register and number of registers.
+        `address`, `count`: first register and number of registers.
         """
         self._transaction = self._transaction % 0xFFFF + 1
         return self._framer.buildFrame(self._pdu(address, count, self._transaction))

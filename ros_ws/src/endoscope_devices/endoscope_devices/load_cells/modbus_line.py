@@ -24,10 +24,7 @@ class LineLostError(DeviceError):
 class Line(ABC):
     """A byte stream, used by one thread.
 
-    Parameters
-    ----------
-    name
-        What messages call it.
+    `name`: what messages call it.
     """
 
     def __init__(self, name: str) -> None:
@@ -37,19 +34,13 @@ class Line(ABC):
     def open(self) -> None:
         """Connect.
 
-        Raises
-        ------
-        LineLostError
-            It cannot be opened; the message says what to look at.
+        Raises LineLostError: it cannot be opened; the message says what to look at.
         """
 
     def write(self, data: bytes) -> None:
         """Send bytes.
 
-        Raises
-        ------
-        LineLostError
-            It went away.
+        Raises LineLostError: it went away.
         """
         try:
             self._send(data)
@@ -59,17 +50,9 @@ class Line(ABC):
     def read(self, wanted: int, deadline_ns: int) -> bytes:
         """Bytes that arrive until there are ``wanted`` or the deadline has passed.
 
-        Parameters
-        ----------
-        wanted
-            Most bytes.
-        deadline_ns
-            In ns of ``time.monotonic_ns``.
-
-        Raises
-        ------
-        LineLostError
-            It went away.
+        `wanted`: most bytes.
+        `deadline_ns`: in ns of ``time.monotonic_ns``.
+        Raises LineLostError: it went away.
         """
         data = b''
         try:
@@ -101,12 +84,8 @@ class SerialLine(Line):
 
     That is 3.5 characters, or 1.75 ms above 19200 baud.
 
-    Parameters
-    ----------
-    port
-        Device path.
-    settings
-        Baud rate, parity, stop bits.
+    `port`: device path.
+    `settings`: baud rate, parity, stop bits.
     """
 
     def __init__(self, port: str, settings: SerialSettings) -> None:
@@ -162,17 +141,9 @@ class SerialLine(Line):
 class TcpLine(Line):
     """A TCP connection.
 
-    Parameters
-    ----------
-    address
-        ``HOST`` or ``HOST:PORT``; the port is 502 by default.
-    timeout
-        For connecting, in s.
-
-    Raises
-    ------
-    DeviceError
-        The address cannot be understood.
+    `address`: ``HOST`` or ``HOST:PORT``; the port is 502 by default.
+    `timeout`: for connecting, in s.
+    Raises DeviceError: the address cannot be understood.
     """
 
     def __init__(self, address: str, timeout: float = 1.0) -> None:

@@ -11,12 +11,8 @@ from endoscope_devices.load_cells.modbus_line import LONGEST, Line
 class RegisterReading:
     """Registers with the time at which they were asked for.
 
-    Attributes
-    ----------
-    asked_ns
-        In ns of ``time.monotonic_ns``.
-    registers
-        16-bit values.
+    `asked_ns`: in ns of ``time.monotonic_ns``.
+    `registers`: 16-bit values.
     """
 
     asked_ns: int
@@ -31,19 +27,10 @@ class RegisterReader:
     are asked for in another number, and until the answer to that has come, which a transmitter
     gives in order, nothing counts.
 
-    Parameters
-    ----------
-    line
-        Opened by the caller.
-    framing
-        RTU or TCP.
-    reply_timeout
-        In s.
-
-    Attributes
-    ----------
-    unexpected
-        Bytes that came without a question.
+    `line`: opened by the caller.
+    `framing`: RTU or TCP.
+    `reply_timeout`: in s.
+    `unexpected`: bytes that came without a question.
     """
 
     def __init__(self, line: Line, framing: Framing, reply_timeout: float) -> None:
@@ -56,17 +43,9 @@ class RegisterReader:
     def read(self, address: int, count: int) -> RegisterReading:
         """Read ``count`` registers from ``address`` on.
 
-        Parameters
-        ----------
-        address, count
-            First register and number of registers.
-
-        Raises
-        ------
-        ReplyError
-            No acceptable reply in time.
-        LineLostError
-            The line went away.
+        `address`, `count`: first register and number of registers.
+        Raises ReplyError: no acceptable reply in time.
+        Raises LineLostError: the line went away.
         """
         waiting = len(self._line.read(LONGEST, 0))
         self.unexpected += waiting

@@ -25,12 +25,8 @@ class TareError(EndoscopeError, RuntimeError):
 class TareWindow:
     """Readings of the last second, of which a zero can be made.
 
-    Parameters
-    ----------
-    wires
-        Names of the W wires.
-    limits
-        When a tare is refused.
+    `wires`: names of the W wires.
+    `limits`: when a tare is refused.
     """
 
     def __init__(self, wires: Sequence[str], limits: TareLimits) -> None:
@@ -42,12 +38,8 @@ class TareWindow:
     def add(self, time_ns: int, tension: tuple[float, ...]) -> None:
         """Take a good reading.
 
-        Parameters
-        ----------
-        time_ns
-            In ns of a monotonic clock.
-        tension
-            In N, shape (W,).
+        `time_ns`: in ns of a monotonic clock.
+        `tension`: in N, shape (W,).
         """
         self._readings.append((time_ns, tension))
         while self._readings[0][0] < time_ns - WINDOW_NS:
@@ -56,12 +48,8 @@ class TareWindow:
     def note_shafts(self, time_ns: int, velocity: Sequence[float]) -> None:
         """Take the speed of the motor shafts.
 
-        Parameters
-        ----------
-        time_ns
-            In ns of the same clock.
-        velocity
-            In rad/s, shape (J,).
+        `time_ns`: in ns of the same clock.
+        `velocity`: in rad/s, shape (J,).
         """
         if any(not abs(v) <= self._limits.shaft_speed for v in velocity):
             self._moved_ns = time_ns
@@ -69,15 +57,9 @@ class TareWindow:
     def mean(self, now_ns: int) -> tuple[float, ...]:
         """Mean tension of the last second in N, shape (W,).
 
-        Parameters
-        ----------
-        now_ns
-            In ns of the same clock.
-
-        Raises
-        ------
-        TareError
-            Too few readings, the wires move, noise or drift or the tension itself is too large.
+        `now_ns`: in ns of the same clock.
+        Raises TareError: too few readings, the wires move, noise or drift or the tension itself is
+            too large.
         """
         since = now_ns - WINDOW_NS
         values = np.array([tension for time_ns, tension in self._readings if time_ns >= since])
@@ -108,12 +90,8 @@ class TareWindow:
 def with_zero(calibration: LoadCellCalibration, zero: Sequence[float]) -> LoadCellCalibration:
     """The calibration with other zeros.
 
-    Parameters
-    ----------
-    calibration
-        What it was.
-    zero
-        Counts without tension, one a wire in the calibration's order.
+    `calibration`: what it was.
+    `zero`: counts without tension, one a wire in the calibration's order.
     """
     cells = {
         name: replace(cell, zero=float(count))
@@ -125,12 +103,8 @@ def with_zero(calibration: LoadCellCalibration, zero: Sequence[float]) -> LoadCe
 def zero_after_tare(calibration: LoadCellCalibration, tension: Sequence[float]) -> list[float]:
     """Counts without tension, once ``tension`` is taken for zero.
 
-    Parameters
-    ----------
-    calibration
-        In force while the tension was measured.
-    tension
-        In N, one a wire in the calibration's order.
+    `calibration`: in force while the tension was measured.
+    `tension`: in N, one a wire in the calibration's order.
     """
     return [
         cell.zero + cell.sign * value / cell.newton_per_count

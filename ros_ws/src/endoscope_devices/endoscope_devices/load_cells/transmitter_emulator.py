@@ -21,23 +21,12 @@ class TransmitterEmulator(ClosedOnExit):
 
     Protocol and server are pymodbus's; what a test chooses is the registers' content.
 
-    Parameters
-    ----------
-    source
-        What the registers hold.
-    registers
-        Number of registers.
-    unit
-        Modbus address.
-    serial_port
-        Path of a serial port for RTU; without one a TCP port of this machine is served.
-    tcp_port
-        Which; 0 for any that is free.
-
-    Attributes
-    ----------
-    tcp_port
-        Where it listens.
+    `source`: what the registers hold.
+    `registers`: number of registers.
+    `unit`: Modbus address.
+    `serial_port`: path of a serial port for RTU; without one a TCP port of this machine is served.
+    `tcp_port`: which; 0 for any that is free.
+    `tcp_port`: where it listens.
     """
 
     def __init__(

@@ -44,20 +44,11 @@ def with_state_at_start(
 ) -> Recording:
     """Estimate from where the motors had come when a recording began.
 
-    Parameters
-    ----------
-    recording : Recording
-        Audited in all else.
-    plant : PlantDescription
-        As described.
-    findings : list of Finding
-        Gets a note where a rig did not come straight from zero.
-
-    Returns
-    -------
-    Recording
-        With `start`, and without the time until it no longer shows by more than the noise, as long
-        as enough is left.
+    `recording`: audited in all else.
+    `plant`: as described.
+    `findings`: gets a note where a rig did not come straight from zero.
+    Returns: with `start`, and without the time until it no longer shows by more than the noise, as
+        long as enough is left.
     """
     plant = plant.of_joints(recording.joints)
     observations = observe(recording, plant)

@@ -25,19 +25,10 @@ def with_held_poses(
 ) -> Recording:
     """Command the poses that the motors were held at while no commands came.
 
-    Parameters
-    ----------
-    recording : Recording
-        With increasing stamps.
-    sensors : SensorParameters
-        For the step of the motors' encoders.
-    findings : list of Finding
-        Gets a note where poses were added.
-
-    Returns
-    -------
-    Recording
-        The same if the motors went wherever they were sent last.
+    `recording`: with increasing stamps.
+    `sensors`: for the step of the motors' encoders.
+    `findings`: gets a note where poses were added.
+    Returns: the same if the motors went wherever they were sent last.
     """
     command, shaft = recording.command, recording.shaft_position
     if shaft is None or len(command.time) < 2:

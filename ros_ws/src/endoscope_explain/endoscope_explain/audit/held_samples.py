@@ -35,20 +35,12 @@ def chance_of_repeat(noise: float, resolution: float) -> float:
 def held(values: Array, noise: float, resolution: float, interval: float) -> tuple[Mask, int]:
     """Find samples that repeat the one before for longer than chance allows.
 
-    Parameters
-    ----------
-    values : array (N,)
-    noise, resolution : float
-        Noise (rms) and step of the sensor, in the values' unit.
-    interval : float
-        Between samples in s.
-
-    Returns
-    -------
-    repeated : array (N,) of bool
-        All but the first sample of every run that is too long.
-    period : int
-        Usual run length: above 1 where the sensor is published faster than it is read.
+    Shapes: `values` (N,).
+    `noise`, `resolution`: noise (rms) and step of the sensor, in the values' unit.
+    `interval`: between samples in s.
+    Returns `repeated` (N,): all but the first sample of every run that is too long.
+    Returns `period`: usual run length: above 1 where the sensor is published faster than it is
+        read.
     """
     starts, lengths = runs_of_equal(values)
     period = int(np.median(lengths))
@@ -75,18 +67,10 @@ def held_before_jump(time: Array, values: Array, resolution: float) -> Mask:
     A rig that rests starts to move by small steps; a source that repeated an old sample comes back
     where the rig has gone in the meantime.
 
-    Parameters
-    ----------
-    time : array (N,)
-        Increasing stamps in s.
-    values : array (N,)
-    resolution : float
-        Step of the sensor, in the values' unit.
-
-    Returns
-    -------
-    array (N,) of bool
-        All but the first sample of every such run.
+    Shapes: `values` (N,).
+    `time` (N,): increasing stamps in s.
+    `resolution`: step of the sensor, in the values' unit.
+    Returns (N,): all but the first sample of every such run.
     """
     repeated = np.zeros(len(values), bool)
     usual = usual_interval(time)

@@ -19,18 +19,11 @@ LAGS_S = (0.0, 0.02, 0.04, 0.06, 0.1, 0.14, 0.2, 0.3, 0.4, 0.5)
 class Criteria:
     """Numbers by which mistakes are judged, derived from recordings in which none was made.
 
-    Attributes
-    ----------
-    scales : mapping of quantity to (float, float)
-        Least and largest scale from a simulated signal to one of another rig.
-    usual : mapping of quantity to float
-        Misfit that half of the signals exceed: nothing is learnt from less.
-    follows : float
-        Misfit of a shaft that follows its command.
-    least_tension : float
-        Mean in N below which no cell reads.
-    worth : float
-        Independent samples that a signal's misfit stands for.
+    `scales`: least and largest scale from a simulated signal to one of another rig.
+    `usual`: misfit that half of the signals exceed: nothing is learnt from less.
+    `follows`: misfit of a shaft that follows its command.
+    `least_tension`: mean in N below which no cell reads.
+    `worth`: independent samples that a signal's misfit stands for.
     """
 
     scales: Mapping[str, tuple[float, float]]
@@ -44,18 +37,11 @@ class Criteria:
 class Bounds:
     """What real rigs make of a simulated quantity.
 
-    Attributes
-    ----------
-    scale : (float, float)
-        Least and largest one.
-    reach : float
-        From the lowest to the highest value that it can have.
-    noise : float
-        Of the sensor as described.
-    scatter : array (M,)
-        Of the reading from sample to sample, in its own unit.
-    least : float
-        Mean below which it never is: a wire cannot push.
+    `scale`: least and largest one.
+    `reach`: from the lowest to the highest value that it can have.
+    `noise`: of the sensor as described.
+    `scatter` (M,): of the reading from sample to sample, in its own unit.
+    `least`: mean below which it never is: a wire cannot push.
     """
 
     scale: tuple[float, float]
@@ -69,12 +55,8 @@ class Bounds:
 class Moments:
     """Second moments of M measured and P simulated columns, the latter at L lags.
 
-    Attributes
-    ----------
-    mean, variance, reach : array (M,)
-        The latter from low to high.
-    simulated_mean, simulated_variance : array (L, P)
-    covariance : array (L, M, P)
+    Shapes: `simulated_mean`, `simulated_variance` (L, P), `covariance` (L, M, P).
+    `mean`, `variance`, `reach` (M,): the latter from low to high.
     """
 
     mean: Array
@@ -105,16 +87,9 @@ class Moments:
     def misfit(self, factor: float, bounds: Bounds) -> Array:
         """Share of each measured column that no lag, offset and scale make of each simulated one.
 
-        Parameters
-        ----------
-        factor : float
-            Reading of one SI unit.
-        bounds : Bounds
-
-        Returns
-        -------
-        array (2, M, P)
-            The share, 0 where they agree, 1 where they have nothing in common; and the scale.
+        `factor`: reading of one SI unit.
+        Returns (2, M, P): the share, 0 where they agree, 1 where they have nothing in common; and
+            the scale.
         """
         mean, variance = self.mean / factor, (self.variance / factor**2)[:, None]
         covariance, power = self.covariance / factor, self.simulated_variance[:, None, :]

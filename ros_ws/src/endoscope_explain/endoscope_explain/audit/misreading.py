@@ -27,20 +27,12 @@ CONVERTER_BITS = 24
 class Misreading:
     """One way in which the columns of a quantity may be meant.
 
-    Attributes
-    ----------
-    quantity : str
-        Series of a `Recording`.
-    kind : str
-        `right`, `unit`, `sign`, `order` or `factor`, which is no unit known.
-    price : float
-        Logarithm of how many mistakes are as likely as this one; 0 for what is right.
-    source : tuple of int
-        Measured column that holds each signal.
-    factor : tuple of float
-        Reading of one SI unit in each measured column.
-    unit : str
-        In words.
+    `quantity`: series of a `Recording`.
+    `kind`: `right`, `unit`, `sign`, `order` or `factor`, which is no unit known.
+    `price`: logarithm of how many mistakes are as likely as this one; 0 for what is right.
+    `source`: measured column that holds each signal.
+    `factor`: reading of one SI unit in each measured column.
+    `unit`: in words.
     """
 
     quantity: str
@@ -101,15 +93,9 @@ def misreadings(
 ) -> Iterator[Misreading]:
     """Ways to read the columns of a quantity, the right one first.
 
-    Parameters
-    ----------
-    quantity : str
-        Series of a `Recording`, or `command`.
-    plant : PlantDescription
-    gear : float
-        Shaft angle for one radian at the joint.
-    columns : int
-        One for each joint, or for each wire.
+    `quantity`: series of a `Recording`, or `command`.
+    `gear`: shaft angle for one radian at the joint.
+    `columns`: one for each joint, or for each wire.
     """
     whole = tuple(range(columns))
     yield Misreading(quantity, 'right', 0.0, whole, (1.0,) * columns)
@@ -154,15 +140,7 @@ def _parts(columns: int, joints: int) -> list[tuple[tuple[int, ...], int]]:
 def as_findings(recording: Recording, mistakes: Sequence[Misreading]) -> list[Finding]:
     """Say each mistake in one line.
 
-    Parameters
-    ----------
-    recording : Recording
-    mistakes : sequence of Misreading
-
-    Returns
-    -------
-    list of Finding
-        None of them leaves the recording usable. An exchange of motors is said once.
+    Returns: none of them leaves the recording usable. An exchange of motors is said once.
     """
     findings: dict[tuple[str, str, tuple[int, ...]], Finding] = {}
     for mistake in mistakes:

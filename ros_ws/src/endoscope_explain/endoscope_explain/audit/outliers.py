@@ -19,18 +19,11 @@ TRAVEL_FACTOR = 1.5
 def spike_heights(values: Array, width: int = 1) -> Array:
     """Measure how far each sample sticks out beyond the samples around it.
 
-    Parameters
-    ----------
-    values : array (N,)
-    width : int
-        How many samples in a row stick out together.
-
-    Returns
-    -------
-    array (N,)
-        Distance of the first and the last of a row to the samples beside it, the smaller one, where
-        both stick out to the same side, else 0; with the sign of the spike. A sample that belongs
-        to several rows has the largest.
+    Shapes: `values` (N,).
+    `width`: how many samples in a row stick out together.
+    Returns (N,): distance of the first and the last of a row to the samples beside it, the smaller
+        one, where both stick out to the same side, else 0; with the sign of the spike. A sample
+        that belongs to several rows has the largest.
     """
     if len(values) < width + 2:
         return np.zeros(len(values))
@@ -70,19 +63,10 @@ def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
     counts only where it is larger than the motor's travel around it, and where it stands alone
     against the signal's own roughness nearby.
 
-    Parameters
-    ----------
-    values : array (N,)
-        Readings at the tracker's own rate, without gaps that matter.
-    noise : float
-        Usual noise (rms) in rad.
-    travel : array (N,)
-        How far the motor moves around each sample, as an angle of the joint in rad.
-
-    Returns
-    -------
-    array (N,) of bool
-        Empty of True unless there are more spikes than chance allows.
+    `values` (N,): readings at the tracker's own rate, without gaps that matter.
+    `noise`: usual noise (rms) in rad.
+    `travel` (N,): how far the motor moves around each sample, as an angle of the joint in rad.
+    Returns (N,): empty of True unless there are more spikes than chance allows.
     """
     wrong = np.zeros(len(values), bool)
     if len(values) < 20:
@@ -106,18 +90,10 @@ def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
 def motor_travel(tracker_time: Array, motor_time: Array, motor_angle: Array, reach: float) -> Array:
     """Return the range of the motor's angle within `reach` s of each tracker sample.
 
-    Parameters
-    ----------
-    tracker_time : array (N,)
-    motor_time : array (M,)
-        In s, increasing.
-    motor_angle : array (M,)
-        As an angle of the joint in rad.
-    reach : float
-
-    Returns
-    -------
-    array (N,)
+    Shapes: `tracker_time` (N,).
+    `motor_time` (M,): in s, increasing.
+    `motor_angle` (M,): as an angle of the joint in rad.
+    Returns (N,).
     """
     first = np.searchsorted(motor_time, tracker_time - reach)
     last = np.searchsorted(motor_time, tracker_time + reach)
@@ -132,19 +108,10 @@ def motor_travel(tracker_time: Array, motor_time: Array, motor_angle: Array, rea
 def outlier_finding(joints: Sequence[str], series: Series, wrong: Mask) -> Finding:
     """Describe the `tracker_outliers` of a recording: one tracker reads all joints.
 
-    Parameters
-    ----------
-    joints : sequence of str
-        J of them.
-    series : Series
-        The tracker's, values (N, J).
-    wrong : array (N, J) of bool
-        At least one sample.
-
-    Returns
-    -------
-    Finding
-        Of the joint that has most of them.
+    `joints`: j of them.
+    `series`: the tracker's, values (N, J).
+    `wrong` (N, J): at least one sample.
+    Returns: of the joint that has most of them.
     """
     sizes = []
     for j in range(len(joints)):

@@ -40,13 +40,8 @@ MOVES = 0.01
 class Way:
     """One way to read a quantity, and what speaks against it.
 
-    Attributes
-    ----------
-    reading : Misreading
-    misfit : float
-        Sum of the logarithms of its columns' misfits.
-    size : float
-        By how much larger or smaller they are than simulated, in what rigs usually differ by.
+    `misfit`: sum of the logarithms of its columns' misfits.
+    `size`: by how much larger or smaller they are than simulated, in what rigs usually differ by.
     """
 
     reading: Misreading
@@ -61,15 +56,9 @@ class Way:
 class Comparison:
     """A recording beside what the described plant makes of its command.
 
-    Parameters
-    ----------
-    recording : Recording
-        With increasing stamps in s.
-    plant : PlantDescription
-        Of its joints.
-    leave_out : collection of str
-        Quantities that are not compared.
-    criteria : Criteria
+    `recording`: with increasing stamps in s.
+    `plant`: of its joints.
+    `leave_out`: quantities that are not compared.
     """
 
     def __init__(

@@ -16,15 +16,8 @@ WINDOW_S = 1.0
 def delay_slope(series: Series) -> tuple[float, float] | None:
     """Measure the drift of receipt against stamp, from the quickest deliveries of each second.
 
-    Parameters
-    ----------
-    series : Series
-        With increasing stamps.
-
-    Returns
-    -------
-    (float, float) or None
-        Slope in s/s and its standard error; None where receipt is unknown or the series short.
+    `series`: with increasing stamps.
+    Returns: slope in s/s and its standard error; None where receipt is unknown or the series short.
     """
     if series.received is None or series.time[-1] - series.time[0] < 5 * WINDOW_S:
         return None
@@ -51,14 +44,7 @@ def delay_slope(series: Series) -> tuple[float, float] | None:
 def clock_skew_from_receipt(series: dict[str, Series]) -> dict[str, Estimate]:
     """Find the skew of each device's clock against the majority, where it is beyond doubt.
 
-    Parameters
-    ----------
-    series : dict of topic to Series
-
-    Returns
-    -------
-    dict of topic to Estimate
-        Relative rate of its stamps minus one; only topics whose clock runs apart.
+    Returns: relative rate of its stamps minus one; only topics whose clock runs apart.
     """
     slopes = {t: s for t, one in series.items() if (s := delay_slope(one)) is not None}
     if len(slopes) < 3:
@@ -76,13 +62,8 @@ def clock_skew_from_receipt(series: dict[str, Series]) -> dict[str, Estimate]:
 def retimed(series: Series, skew: float, start: float = 0.0) -> Series:
     """Put a series whose clock ran `1 + skew` times as fast on the common clock.
 
-    Parameters
-    ----------
-    series : Series
-    skew : float
-        Relative rate minus one.
-    start : float
-        Stamp in s at which both clocks agreed.
+    `skew`: relative rate minus one.
+    `start`: stamp in s at which both clocks agreed.
     """
     time: Array = start + (series.time - start) / (1.0 + skew)
     return replace(series, time=time)

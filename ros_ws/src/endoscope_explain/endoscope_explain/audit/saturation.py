@@ -15,17 +15,9 @@ def clipped(values: Array, noise: float, resolution: float) -> tuple[Mask, float
     Readings of an unclipped cell thin out towards their maximum; those of a clipped one pile up
     there. The pile is looked for in steps of the cell's resolution.
 
-    Parameters
-    ----------
-    values : array (N,)
-        Valid readings in N.
-    noise, resolution : float
-        Noise (rms) and step in N.
-
-    Returns
-    -------
-    (array (N,) of bool, float) or None
-        Samples at the limit, and the limit; None if the cell does not clip.
+    `values` (N,): valid readings in N.
+    `noise`, `resolution`: noise (rms) and step in N.
+    Returns (N,): samples at the limit, and the limit; None if the cell does not clip.
     """
     top = float(values.max())
     step = resolution if resolution > 0 else 1e-9 * max(1.0, abs(top))

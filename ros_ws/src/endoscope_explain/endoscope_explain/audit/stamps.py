@@ -15,18 +15,9 @@ GAP_FACTOR = 2.5
 def order_stamps(series: Series, joint: str) -> tuple[Series, list[Finding]]:
     """Sort a series by its stamps and keep the first of equal ones.
 
-    Parameters
-    ----------
-    series : Series
-        In the order of recording.
-    joint : str
-        To put into findings.
-
-    Returns
-    -------
-    Series
-        With strictly increasing stamps.
-    list of Finding
+    `series`: in the order of recording.
+    `joint`: to put into findings.
+    Returns: with strictly increasing stamps.
     """
     findings = []
     step = np.diff(series.time)
@@ -80,18 +71,10 @@ def usual_interval(time: Array) -> float:
 def find_gaps(series: Series, start: float, end: float) -> tuple[tuple[float, float], ...]:
     """Find intervals in which samples are missing.
 
-    Parameters
-    ----------
-    series : Series
-        With increasing stamps.
-    start, end : float
-        First and last stamp of the whole recording in s: a topic that begins late or ends early
-        has a gap there.
-
-    Returns
-    -------
-    tuple of (float, float)
-        From the last sample before to the first one after each gap, in s.
+    `series`: with increasing stamps.
+    `start`, `end`: first and last stamp of the whole recording in s: a topic that begins late or
+        ends early has a gap there.
+    Returns: from the last sample before to the first one after each gap, in s.
     """
     usual = usual_interval(series.time)
     step = np.diff(series.time)
@@ -154,17 +137,8 @@ def gap_findings(
 ) -> list[Finding]:
     """Make one finding of the gaps of all topics.
 
-    Parameters
-    ----------
-    gaps_by_topic : dict of topic to gaps
-    intervals : dict of topic to float
-        Usual interval of each topic in s.
-    joint : str
-
-    Returns
-    -------
-    list of Finding
-        Empty, or one `recording_gap` whose `time_s` is where the longest gap begins.
+    `intervals`: usual interval of each topic in s.
+    Returns: empty, or one `recording_gap` whose `time_s` is where the longest gap begins.
     """
     every = [(b - a, a, b, topic) for topic, gaps in gaps_by_topic.items() for a, b in gaps]
     if not every:

@@ -31,24 +31,13 @@ def frozen_findings(
 ) -> list[Finding]:
     """Find topics that repeat one reading to the end, or from first to last.
 
-    Parameters
-    ----------
-    recording : Recording
-        With increasing stamps.
-    grid : array (N,)
-        Times in s.
-    expected : mapping of quantity to array (N, columns)
-        What the plant makes of the command then.
-    noise : mapping of quantity to float
-        Of each sensor.
-    noisy : bool
-        Whether the recording shows it: without, a slack wire and a joint that is held fast may
+    `recording`: with increasing stamps.
+    `grid` (N,): times in s.
+    `expected` (N, columns): what the plant makes of the command then.
+    `noise`: of each sensor.
+    `noisy`: whether the recording shows it: without, a slack wire and a joint that is held fast may
         well give one reading.
-
-    Returns
-    -------
-    list of Finding
-        Only of what must have moved meanwhile.
+    Returns: only of what must have moved meanwhile.
     """
     findings = []
     by_topic: dict[str, list[tuple[str, Series]]] = {}

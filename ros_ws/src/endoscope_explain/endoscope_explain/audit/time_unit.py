@@ -27,17 +27,10 @@ def stamp_unit_findings(recording: Recording, sensors: SensorParameters) -> list
     A sensor's rate alone tells it where all topics agree; where one is as much longer or shorter
     than the others, that does.
 
-    Parameters
-    ----------
-    recording : Recording
-        With increasing stamps.
-    sensors : SensorParameters
-        For their rates.
-
-    Returns
-    -------
-    list of Finding
-        One for all topics of one unit; `evidence['per_second']` is by what to divide the stamps.
+    `recording`: with increasing stamps.
+    `sensors`: for their rates.
+    Returns: one for all topics of one unit; `evidence['per_second']` is by what to divide the
+        stamps.
     """
     topics = {s.topic: s for s in (recording.command, *recording.measured().values())}
     powers = _powers(topics, sensors)

@@ -18,22 +18,14 @@ from endoscope_explain.search.refit import Composition
 class MissingTerm:
     """One term that is missing from the simulation.
 
-    Attributes
-    ----------
-    term : Candidate
-        As it is modelled.
-    name : str
-        Effect of the catalogue whose physics it is; the place of the function where it is none's.
-    alternatives : tuple of str
-        Names of terms that the recording does not tell from it, nearest first.
-    gain : float
-        Logarithm of the evidence that it brings.
-    margin : float
-        By how much more than the best other name.
-    p_value : float
-        Chance that a rig in which nothing is missing shows as much.
-    formula : Composition or None
-        With the formula of `name`, where it was fitted.
+    `term`: as it is modelled.
+    `name`: effect of the catalogue whose physics it is; the place of the function where it is
+        none's.
+    `alternatives`: names of terms that the recording does not tell from it, nearest first.
+    `gain`: logarithm of the evidence that it brings.
+    `margin`: by how much more than the best other name.
+    `p_value`: chance that a rig in which nothing is missing shows as much.
+    `formula`: with the formula of `name`, where it was fitted.
     """
 
     term: Candidate
@@ -54,14 +46,9 @@ class MissingTerm:
 class Decision:
     """What is said about one joint.
 
-    Attributes
-    ----------
-    chosen : Composition
-        The joint with what is missing; the nominal plant where nothing is.
-    missing : tuple of MissingTerm
-        In the order in which they were found.
-    explained : float
-        Share of the excess misfit that the terms remove; 1 where there was none.
+    `chosen`: the joint with what is missing; the nominal plant where nothing is.
+    `missing`: in the order in which they were found.
+    `explained`: share of the excess misfit that the terms remove; 1 where there was none.
     """
 
     chosen: Composition

@@ -28,15 +28,9 @@ SETTLING_STEPS = 20
 class GivenPhysics:
     """A fitted joint without its recording.
 
-    Attributes
-    ----------
-    effects : tuple of str
-        In the order in which they were added.
-    base : array (parameters,)
-    flags : array (flags,) of bool
-    free : tuple of FreeParameter
-        As in `JointModel`.
-    theta : array (n,)
+    Shapes: `base` (parameters,), `flags` (flags,), `theta` (n,).
+    `effects`: in the order in which they were added.
+    `free`: as in `JointModel`.
     """
 
     effects: tuple[str, ...]

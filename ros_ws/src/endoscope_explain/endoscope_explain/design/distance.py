@@ -26,13 +26,7 @@ def refit(
 ) -> Fit:
     """Refit one joint of a plant, its effects included, from where it is.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-    observation : JointObservation
-    band : float
-        Relative freedom of the nominal parameters.
-    iterations : int
+    `band`: relative freedom of the nominal parameters.
     """
     base, flags = packed_joint(plant, observation.joint)
     free = nominal_parameters(base, band)
@@ -59,10 +53,7 @@ def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescriptio
 def distance(truth: Recording, rival: PlantDescription, joint: str) -> float:
     """What a rival misses of the other rival's noise-free answer after its refit.
 
-    Returns
-    -------
-    float
-        Root mean square over all samples of the joint's signals, in noise units.
+    Returns: root mean square over all samples of the joint's signals, in noise units.
     """
     observation = next(o for o in observe(truth, rival) if o.joint == joint)
     found = refit(rival, observation, NOMINAL_BAND, REFIT_STEPS)

@@ -39,10 +39,8 @@ def propose(
 ) -> NextExperiment | None:
     """Propose the motion that tells an effect, which `plant` has, from its alternatives.
 
-    Returns
-    -------
-    NextExperiment or None
-        None where there is no rival that could be fitted, or no motion is safe for all of them.
+    Returns: none where there is no rival that could be fitted, or no motion is safe for all of
+        them.
     """
     plants = {effect.id: plant} | {
         rival: fitted

@@ -17,14 +17,8 @@ SAMPLE_S = 0.01
 class Waveform:
     """A motion of one joint; the others rest.
 
-    Attributes
-    ----------
-    name : str
-    joint : str
-    time : array (N,)
-        In s.
-    angle : array (N,)
-        Desired bending angle in rad.
+    `time` (N,): in s.
+    `angle` (N,): desired bending angle in rad.
     """
 
     name: str

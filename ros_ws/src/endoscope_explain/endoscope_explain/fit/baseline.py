@@ -21,16 +21,8 @@ SAME_COMMAND_RAD = 1e-6
 def against_baseline(observation: JointObservation, healthy: Fit) -> JointObservation:
     """A joint's observation as seen against the same joint in health.
 
-    Parameters
-    ----------
-    observation : JointObservation
-    healthy : Fit
-        Of the baseline recording of the same joint.
-
-    Returns
-    -------
-    JointObservation
-        With readings or noise corrected by what the plant never explained.
+    `healthy`: of the baseline recording of the same joint.
+    Returns: with readings or noise corrected by what the plant never explained.
     """
     before = healthy.model.observation
     repeated = _same_commands(observation, before)

@@ -21,12 +21,8 @@ Array = NDArray[np.float64]
 class Misfit:
     """Misfit of one joint.
 
-    Attributes
-    ----------
-    channels : array (C,)
-        Mean squared residual of each channel in noise units.
-    total : float
-        Sum over all samples, in noise units.
+    `channels` (C,): mean squared residual of each channel in noise units.
+    `total`: sum over all samples, in noise units.
     """
 
     channels: Array
@@ -57,16 +53,9 @@ def weights(observation: JointObservation, residuals: Array) -> Array:
 def log_likelihood(squares: Array, counts: Array) -> float | Array:
     """Logarithm of the likelihood of channels with their variance as it is left.
 
-    Parameters
-    ----------
-    squares : array (..., C)
-        Mean squares in noise units.
-    counts : array (C,)
-        Samples of each channel.
-
-    Returns
-    -------
-    array (...)
+    `squares` (..., C): mean squares in noise units.
+    `counts` (C,): samples of each channel.
+    Returns (...).
     """
     variance = np.maximum(squares, 1.0)
     return -0.5 * np.sum(counts * (np.log(variance) + squares / variance), axis=-1)

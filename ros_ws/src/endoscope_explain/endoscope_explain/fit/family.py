@@ -44,19 +44,12 @@ LEAST_RANGE = 1e-6
 class Family:
     """Functions at a place.
 
-    Attributes
-    ----------
-    place : Place
-    low, high : float
-        Range of the argument; one period where functions repeat themselves.
-    basis : array (NODES, K)
-        Values at the nodes for coefficients that are normal, each with a variance of one.
-    band : (float, float), optional
-        Of the periods that functions may have that repeat themselves, or of an argument's lag.
-    multiplies : bool
-        Whether they multiply what other functions add there; see `TermSpec`.
-    lag : float, optional
-        Time constant in s of an argument that lags, which a fit may move.
+    `low`, `high`: range of the argument; one period where functions repeat themselves.
+    `basis` (NODES, K): values at the nodes for coefficients that are normal, each with a variance
+        of one.
+    `band`: of the periods that functions may have that repeat themselves, or of an argument's lag.
+    `multiplies`: whether they multiply what other functions add there; see `TermSpec`.
+    `lag`: time constant in s of an argument that lags, which a fit may move.
     """
 
     place: Place
@@ -95,11 +88,7 @@ class Family:
     def finer(self, count: int, visited: tuple[float, float] | None = None) -> 'Family':
         """Functions at the same place, of the same size, with more coefficients.
 
-        Parameters
-        ----------
-        count : int
-        visited : (float, float), optional
-            Their range, if it is another one.
+        `visited`: their range, if it is another one.
         """
         size = np.sqrt(np.mean(np.sum(self.basis**2, axis=1)))
         found = family_at(self.place, visited or (self.low, self.high), count, self.band)
@@ -127,19 +116,9 @@ def family_at(
 ) -> Family | None:
     """Functions of unit variance over the visited range; None where the state did not move.
 
-    Parameters
-    ----------
-    place : Place
-    visited : (float, float)
-        One period where functions repeat themselves.
-    count : int
-        Coefficients: the more there are, the shorter the length over which the functions vary.
-    band : (float, float), optional
-        Of their periods, if they repeat themselves, or of their argument's lag.
-
-    Returns
-    -------
-    Family or None
+    `visited`: one period where functions repeat themselves.
+    `count`: coefficients: the more there are, the shorter the length over which the functions vary.
+    `band`: of their periods, if they repeat themselves, or of their argument's lag.
     """
     low, high = visited
     if place.shape in (Shape.ODD, Shape.EVEN):
@@ -183,18 +162,10 @@ def visited_states(
 ) -> dict[tuple[str, str], Array]:
     """States along a simulation, by the symbol and unit of a place's argument.
 
-    Parameters
-    ----------
-    observation : JointObservation
-    parameters : array (parameters,)
-        Packed.
-    outputs : array (N, OUTPUTS)
-
-    Returns
-    -------
-    dict of (str, str) to array (any,)
-        Values whose ends are those of the range; time, the shaft's angle, and what arguments that
-        lag follow, on ticks (N, ...).
+    Shapes: `outputs` (N, OUTPUTS).
+    `parameters` (parameters,): packed.
+    Returns: values whose ends are those of the range; time, the shaft's angle, and what arguments
+        that lag follow, on ticks (N, ...).
     """
     angle, shaft = outputs[:, OUT_JOINT], outputs[:, OUT_MOTOR]
     speed = np.gradient(angle, observation.tick)
@@ -226,15 +197,9 @@ def visited_range(
 ) -> tuple[float, float]:
     """Range of a place's argument along a simulation.
 
-    Parameters
-    ----------
-    place : Place
-    states : dict of (str, str) to array
-        See `visited_states`.
-    tick : float
-        In s.
-    lag : float, optional
-        Time constant in s of an argument that lags.
+    `states`: see `visited_states`.
+    `tick`: in s.
+    `lag`: time constant in s of an argument that lags.
     """
     state = states[place.argument.symbol, place.argument.unit]
     if lag is not None:

@@ -68,22 +68,13 @@ BAND_SPREAD = 0.09
 class FreeParameter:
     """A number that a fit may move.
 
-    Attributes
-    ----------
-    index : int
-        Place in the packed parameters, or `LEAD`.
-    name : str
-    logarithmic : bool
-        Whether the fit's coordinate is the logarithm; else it is the value over `unit`.
-    unit : float
-        Size of one coordinate step on a scale that is not logarithmic.
-    low, high : float
-        Bounds of the value.
-    mean, spread : float
-        Gaussian prior of the coordinate; an infinite spread is no prior.
-    squared : bool
-        Whether the fit's coordinate is the square of the value over `unit`: of what does nothing
-        in the first order.
+    `index`: place in the packed parameters, or `LEAD`.
+    `logarithmic`: whether the fit's coordinate is the logarithm; else it is the value over `unit`.
+    `unit`: size of one coordinate step on a scale that is not logarithmic.
+    `low`, `high`: bounds of the value.
+    `mean`, `spread`: Gaussian prior of the coordinate; an infinite spread is no prior.
+    `squared`: whether the fit's coordinate is the square of the value over `unit`: of what does
+        nothing in the first order.
     """
 
     index: int
@@ -118,16 +109,9 @@ class FreeParameter:
 def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, ...]:
     """The nominal plant's parameters around packed values `base`, and the reading's lead.
 
-    Parameters
-    ----------
-    base : array (parameters,)
-        Packed parameters as described; those of nominal physics that it lacks are not free.
-    band : float
-        Relative deviation that the fit may not leave by more than a third.
-
-    Returns
-    -------
-    tuple of FreeParameter
+    `base` (parameters,): packed parameters as described; those of nominal physics that it lacks are
+        not free.
+    `band`: relative deviation that the fit may not leave by more than a third.
     """
     free = []
     absent = {place for each in lacking(base) for place in each.places}

@@ -30,12 +30,8 @@ DEGREES = 19
 class Intervals:
     """90 % intervals of a fit's free parameters.
 
-    Attributes
-    ----------
-    names : tuple of str
-    indices : tuple of int
-        Places in the packed parameters.
-    values, low, high : array (n,)
+    Shapes: `values`, `low`, `high` (n,).
+    `indices`: places in the packed parameters.
     """
 
     names: tuple[str, ...]

@@ -33,19 +33,10 @@ def without_isolated(
 ) -> tuple[JointObservation, ...]:
     """Leave out tracker samples that stick out of the residual, where some were wrong already.
 
-    Parameters
-    ----------
-    recording : Recording
-        As audited. Where the audit found no wrong sample, none is left out here: a spike may be
-        physics.
-    observations : tuple of JointObservation
-    fits : tuple of Fit
-        Of the nominal plant to each of them.
-
-    Returns
-    -------
-    tuple of JointObservation
-        The very same tuple where nothing was left out.
+    `recording`: as audited. Where the audit found no wrong sample, none is left out here: a spike
+        may be physics.
+    `fits`: of the nominal plant to each of them.
+    Returns: the very same tuple where nothing was left out.
     """
     if recording.bending.valid.all():
         return observations
@@ -68,16 +59,8 @@ def _without_isolated(observation: JointObservation, fit: Fit) -> JointObservati
 def with_isolated_marked(recording: Recording, plant: PlantDescription) -> Recording:
     """Mark tracker samples that stick out of what a plant predicts as wrong.
 
-    Parameters
-    ----------
-    recording : Recording
-        As audited. Where the audit found no wrong sample, none is marked here.
-    plant : PlantDescription
-        That explains the rig.
-
-    Returns
-    -------
-    Recording
+    `recording`: as audited. Where the audit found no wrong sample, none is marked here.
+    `plant`: that explains the rig.
     """
     bending = recording.bending
     if bending.valid.all():

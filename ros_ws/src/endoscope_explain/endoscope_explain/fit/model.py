@@ -32,21 +32,13 @@ _AT_BOUND = 1e-6
 class JointModel:
     """One joint with some of its numbers free.
 
-    Attributes
-    ----------
-    observation : JointObservation
-    base : array (parameters,)
-        Packed parameters; the free ones are replaced.
-    flags : array (flags,) of bool
-    free : tuple of FreeParameter
-    wide_step : float
-        Difference step of a coordinate where an effect makes the misfit rugged.
-    families : tuple of Family
-        Of functions that are free; their coefficients are free parameters, in the same order.
-    coarse : int
-        Ticks in one of the simulations from which derivatives are differences.
-    offset : array (size,), optional
-        Added to the residuals: what coarse ticks do to them, as known somewhere near.
+    Shapes: `flags` (flags,).
+    `base` (parameters,): packed parameters; the free ones are replaced.
+    `wide_step`: difference step of a coordinate where an effect makes the misfit rugged.
+    `families`: of functions that are free; their coefficients are free parameters, in the same
+        order.
+    `coarse`: ticks in one of the simulations from which derivatives are differences.
+    `offset` (size,): added to the residuals: what coarse ticks do to them, as known somewhere near.
     """
 
     observation: JointObservation
@@ -157,26 +149,16 @@ class JointModel:
 class Fit:
     """A fitted joint.
 
-    Attributes
-    ----------
-    model : JointModel
-    theta : array (n,)
-        Coordinates of the free parameters.
-    residuals : array (size,)
-        Unweighted, in noise units.
-    jacobian : array (size, n)
-        Of the residuals, at or near `theta`.
-    cost : float
-        Half weighted squares, prior included.
-    moved_by_form : array (n,), optional
-        By how much (rms) an error of form as large as what is left moves each coordinate.
-    beyond_form : float, optional
-        What is left of the worst channel over what the worst rig of another form leaves; 0 where
-        noise is left.
-    steps : int
-        Of the solver, the last time that the joint was fitted.
-    ended : Ended or None
-        Why it went no further; None where nothing was fitted.
+    `theta` (n,): coordinates of the free parameters.
+    `residuals` (size,): unweighted, in noise units.
+    `jacobian` (size, n): of the residuals, at or near `theta`.
+    `cost`: half weighted squares, prior included.
+    `moved_by_form` (n,): by how much (rms) an error of form as large as what is left moves each
+        coordinate.
+    `beyond_form`: what is left of the worst channel over what the worst rig of another form leaves;
+        0 where noise is left.
+    `steps`: of the solver, the last time that the joint was fitted.
+    `ended`: why it went no further; None where nothing was fitted.
     """
 
     model: JointModel
@@ -218,16 +200,9 @@ def jacobian(model: JointModel, theta: Array, columns: list[int] | None = None) 
     What is left of the error of coarse ticks in a difference turns a step by a few per cent; a fit
     ends where the residuals on its own ticks do.
 
-    Parameters
-    ----------
-    model : JointModel
-    theta : array (n,)
-    columns : list of int, optional
-        Coordinates to differentiate by; all if not given.
-
-    Returns
-    -------
-    array (size, n or len(columns))
+    Shapes: `theta` (n,).
+    `columns`: coordinates to differentiate by; all if not given.
+    Returns (columns).
     """
     low, high = model.bounds()
     columns = list(range(len(theta))) if columns is None else columns
@@ -268,23 +243,11 @@ def fit(
 ) -> Fit:
     """Fit the free parameters of a joint.
 
-    Parameters
-    ----------
-    model : JointModel
-    start : array (n,)
-        Coordinates to start from.
-    weight : array (size,), optional
-        Factors on the residuals (at most 1 where an error of form is allowed for).
-    iterations : int
-        Largest number of steps.
-    tolerance : float
-        Stop when a step lowers the cost by less than this share.
-    known_jacobian : array (size, n), optional
-        Used for the first step.
-
-    Returns
-    -------
-    Fit
+    `start` (n,): coordinates to start from.
+    `weight` (size,): factors on the residuals (at most 1 where an error of form is allowed for).
+    `iterations`: largest number of steps.
+    `tolerance`: stop when a step lowers the cost by less than this share.
+    `known_jacobian` (size, n): used for the first step.
     """
     objective = _OneJoint(model, weight)
     return _fit_of(model, minimise(objective, start, Effort(iterations, tolerance), known_jacobian))
@@ -299,19 +262,9 @@ def glance(
 ) -> Fit:
     """Fit by few simulations: a derivative that is known near `start` is updated, never renewed.
 
-    Parameters
-    ----------
-    model : JointModel
-    start : array (n,)
-    known_jacobian : array (size, n)
-    steps : int
-        Of the fit, at most: a simulation each.
-    weight : array (size,), optional
-        Factors on the residuals.
-
-    Returns
-    -------
-    Fit
+    Shapes: `start` (n,), `known_jacobian` (size, n).
+    `steps`: of the fit, at most: a simulation each.
+    `weight` (size,): factors on the residuals.
     """
     effort = Effort(steps, renewal=Renewal.NEVER)
     return _fit_of(model, minimise(_OneJoint(model, weight), start, effort, known_jacobian))

@@ -45,25 +45,12 @@ def anchored(
 ) -> tuple[tuple[JointObservation, ...], list[Anchors]]:
     """Fit the nominal plant, and once more where that shows isolated wrong samples.
 
-    Parameters
-    ----------
-    recording : Recording
-        Tells which samples the audit found wrong.
-    observations : tuple of JointObservation
-        Of the recording.
-    plant : PlantDescription
-        In health.
-    band : float
-        Relative tolerance of its parameters.
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    observations : tuple of JointObservation
-        Without the samples that stick out.
-    anchors : list of Anchors
-        Of each joint, beside the other as refitted.
+    `recording`: tells which samples the audit found wrong.
+    `observations`: of the recording.
+    `plant`: in health.
+    `band`: relative tolerance of its parameters.
+    Returns `observations`: without the samples that stick out.
+    Returns `anchors`: of each joint, beside the other as refitted.
     """
     packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
     anchors = all_anchors(observations, packed, jobs, band)
@@ -117,17 +104,8 @@ def nominal_anchors(
 ) -> Anchors:
     """The nominal plant refitted, and as described, each with its derivative.
 
-    Parameters
-    ----------
-    observation : JointObservation
-    base : array (parameters,), flags : array (flags,)
-        Packed plant as described, with what effects it has.
-    band : float
-        Relative deviation of a healthy rig from its description.
-
-    Returns
-    -------
-    refitted, described : Fit
+    `base` (parameters,): packed plant as described, with what effects it has.
+    `band`: relative deviation of a healthy rig from its description.
     """
     model = JointModel(observation, base, flags, nominal_parameters(base, band))
     theta = np.array([item.mean for item in model.free])

@@ -36,12 +36,8 @@ _TINY = 1e-12
 class OtherForms:
     """What rigs of another form leave, without noise.
 
-    Attributes
-    ----------
-    residuals : array (size, B)
-        In noise units, with the model fitted to each rig.
-    moved : array (n, B)
-        By how much the form moves the fit's coordinates.
+    `residuals` (size, B): in noise units, with the model fitted to each rig.
+    `moved` (n, B): by how much the form moves the fit's coordinates.
     """
 
     residuals: Array
@@ -51,17 +47,7 @@ class OtherForms:
 def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
     """Simulate rigs of another form at a fit's numbers and fit its model to them.
 
-    Parameters
-    ----------
-    found : Fit
-    count : int
-        Rigs B.
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    OtherForms
+    `count`: rigs B.
     """
     model = found.model.on_coarse_ticks()
     parameters, lead = model.packed(found.theta)
@@ -99,16 +85,7 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
 def with_form(found: Fit, jobs: int) -> Fit:
     """A fit that knows what an error of form does to it.
 
-    Parameters
-    ----------
-    found : Fit
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    Fit
-        With `moved_by_form` and `beyond_form`.
+    Returns: with `moved_by_form` and `beyond_form`.
     """
     if found.beyond_form is not None:
         return found

@@ -66,14 +66,9 @@ THOROUGH = Effort(30, 1e-4, (STEP, 10.0 * STEP, 60.0 * STEP), Renewal.ALWAYS)
 class _Layout:
     """Where the coordinates of all recordings lie in one vector.
 
-    Attributes
-    ----------
-    columns : tuple of array
-        Of each recording, the place of each of its free parameters; tied ones share theirs.
-    pools : tuple of array
-        Places of parameters that scatter around a common mean.
-    low, high : array (N,)
-        Bounds.
+    `columns`: of each recording, the place of each of its free parameters; tied ones share theirs.
+    `pools`: places of parameters that scatter around a common mean.
+    `low`, `high` (N,): bounds.
     """
 
     columns: tuple[Indices, ...]
@@ -90,19 +85,10 @@ def fit_together(
 ) -> list[Fit]:
     """Fit all recordings of a rig together.
 
-    Parameters
-    ----------
-    models : sequence of JointModel
-        Of each recording, with the parameters of devices free.
-    starts : sequence of array (n,)
-        Coordinates to start from; those of devices start from their median.
-    rough : bool
-        Whether to stop early: to tell which effect is the better one, few digits are enough.
-
-    Returns
-    -------
-    list of Fit
-        Of each recording; the cost is its own, without what it lies away from the others.
+    `models`: of each recording, with the parameters of devices free.
+    `starts` (n,): coordinates to start from; those of devices start from their median.
+    `rough`: whether to stop early: to tell which effect is the better one, few digits are enough.
+    Returns: of each recording; the cost is its own, without what it lies away from the others.
     """
     layout = _layout(models)
     whole = np.zeros(len(layout.low))
@@ -128,14 +114,8 @@ def with_common_numbers(fits: Sequence[Fit]) -> list[Array]:
 def deviations(fits: Sequence[Fit]) -> list[Array]:
     """Standard deviations (n,) of each recording's coordinates, by what is left as white noise.
 
-    Parameters
-    ----------
-    fits : sequence of Fit
-        Of `fit_together`: what they share is known by all of them.
-
-    Returns
-    -------
-    list of array (n,)
+    `fits`: of `fit_together`: what they share is known by all of them.
+    Returns (n,).
     """
     layout, whole = _laid_out(fits)
     weight = [weights(f.model.observation, f.residuals) for f in fits]
@@ -150,15 +130,9 @@ def deviations(fits: Sequence[Fit]) -> list[Array]:
 def told_alone(fits: Sequence[Fit]) -> list[Fit]:
     """Each recording's fit as it can be gone on with without the others.
 
-    Parameters
-    ----------
-    fits : sequence of Fit
-        Of `fit_together`.
-
-    Returns
-    -------
-    list of Fit
-        Devices are held as found; a pooled parameter has the others' mean and scatter for a prior.
+    `fits`: of `fit_together`.
+    Returns: devices are held as found; a pooled parameter has the others' mean and scatter for a
+        prior.
     """
     layout, whole = _laid_out(fits)
     means = {int(place): float(np.mean(whole[pool])) for pool in layout.pools for place in pool}

@@ -26,19 +26,10 @@ def simulate_joint(
 ) -> Array:
     """Noise-free readings of one joint under the recorded commands.
 
-    Parameters
-    ----------
-    observation : JointObservation
-    parameters : array (parameters,)
-        Packed parameters of this joint.
-    flags : array (flags,) of bool
-        Effects that are on.
-    inputs : array (1, N, INPUTS), optional
-        Instead of the observation's own, for cut chains.
-
-    Returns
-    -------
-    array (N, OUTPUTS)
+    `parameters` (parameters,): packed parameters of this joint.
+    `flags` (flags,): effects that are on.
+    `inputs` (1, N, INPUTS): instead of the observation's own, for cut chains.
+    Returns (N, OUTPUTS).
     """
     inputs = observation.inputs if inputs is None else inputs
     packed, on = parameters[None], flags[None]

@@ -48,16 +48,10 @@ class Ended(StrEnum):
 class Effort:
     """How long a fit goes on.
 
-    Attributes
-    ----------
-    iterations : int
-        Largest number of steps.
-    tolerance : float
-        Stop when a step lowers the cost by less than this share.
-    strides : tuple of float
-        Difference steps, each used until it leads no further: the misfit is rough on a small scale,
-        and a longer step looks over that.
-    renewal : Renewal
+    `iterations`: largest number of steps.
+    `tolerance`: stop when a step lowers the cost by less than this share.
+    `strides`: difference steps, each used until it leads no further: the misfit is rough on a small
+        scale, and a longer step looks over that.
     """
 
     iterations: int = 8
@@ -92,16 +86,9 @@ class Objective[R, D](Protocol):
 class Minimum[R, D]:
     """Where a fit ended.
 
-    Attributes
-    ----------
-    theta : array (n,)
-    residuals
-    derivative
-        At `theta`; near it where it is never renewed.
-    cost : float
-    steps : int
-        That were tried.
-    ended : Ended
+    Shapes: `theta` (n,).
+    `derivative`: at `theta`; near it where it is never renewed.
+    `steps`: that were tried.
     """
 
     theta: Array
@@ -117,17 +104,8 @@ def minimise[R, D](
 ) -> Minimum[R, D]:
     """Go down from `start`.
 
-    Parameters
-    ----------
-    objective : Objective
-    start : array (n,)
-    effort : Effort
-    known : optional
-        A derivative near `start`, used for the first step.
-
-    Returns
-    -------
-    Minimum
+    Shapes: `start` (n,).
+    `known`: a derivative near `start`, used for the first step.
     """
     low, high = objective.bounds()
     theta = np.clip(start, low, high)

@@ -9,18 +9,9 @@ NINETY_PERCENT = 1.645
 def tolerance(name: str, described: float, band: float = BAND) -> tuple[float, float]:
     """Lowest and highest value of a nominal parameter that needs no explanation.
 
-    Parameters
-    ----------
-    name : str
-    described : float
-        Its value in the plant file.
-    band : float
-        Share by which parameters may differ: they may be larger, and smaller, by the factor
-        `1 + band`. What describes a form may differ by 90 % of what healthy rigs do.
-
-    Returns
-    -------
-    low, high : float
+    `described`: its value in the plant file.
+    `band`: share by which parameters may differ: they may be larger, and smaller, by the factor `1
+        + band`. What describes a form may differ by 90 % of what healthy rigs do.
     """
     if name in FORM_SPREAD:
         reach = NINETY_PERCENT * FORM_SPREAD[name]

@@ -28,16 +28,8 @@ STRIDES = (2, 1)
 def out_of_valleys(found: Fit, weight: Array) -> Fit:
     """Look whether an onset at another time, or another whole number, leads to a better fit.
 
-    Parameters
-    ----------
-    found : Fit
-    weight : array (size,)
-        Factors on the residuals.
-
-    Returns
-    -------
-    Fit
-        The one given where nothing does.
+    `weight` (size,): factors on the residuals.
+    Returns: the one given where nothing does.
     """
     for place, item in enumerate(found.model.free):
         if item.name == ONSET:

@@ -18,17 +18,9 @@ STANDING_RAD_PER_S = 0.02
 def conditions(recording: Recording, j: int) -> dict[str, Mask]:
     """When a joint was in each state, by the state's words as they stand after "shows".
 
-    Parameters
-    ----------
-    recording : Recording
-        As audited.
-    j : int
-        Column of the joint.
-
-    Returns
-    -------
-    mapping of str to array (N,) of bool
-        On a grid of `GRID_S`: those that hold for some, not all of the time.
+    `recording`: as audited.
+    `j`: column of the joint.
+    Returns (N,): on a grid of `GRID_S`: those that hold for some, not all of the time.
     """
     grid = np.arange(0.0, recording.duration, GRID_S)
     motor = _motor(recording, j, grid)
@@ -74,18 +66,9 @@ def conditions(recording: Recording, j: int) -> dict[str, Mask]:
 def drive(recording: Recording, j: int, end: float) -> Array:
     """Measure how much was asked of a joint in windows of time.
 
-    Parameters
-    ----------
-    recording : Recording
-    j : int
-    end : float
-        In s.
-
-    Returns
-    -------
-    array (W, 3)
-        Largest angle and speed of the motor, joint-equivalent, and largest bending angle in each
-        window.
+    `end`: in s.
+    Returns (W, 3): largest angle and speed of the motor, joint-equivalent, and largest bending
+        angle in each window.
     """
     count = int(np.ceil(end / WINDOW_S))
     grid = (np.arange(count * int(WINDOW_S / GRID_S), dtype=np.float64) + 0.5) * GRID_S

@@ -17,15 +17,9 @@ Array = NDArray[np.float64]
 class SignalExcess:
     """Excess misfit of one signal.
 
-    Attributes
-    ----------
-    view : SignalView
-    excess : array (M,)
-        Squared residual without the effect minus that with it, in noise units.
-    kept : array (M,)
-        Residual with the effect.
-    missing : array (M,)
-        What the prediction lacks without the effect, in noise units.
+    `excess` (M,): squared residual without the effect minus that with it, in noise units.
+    `kept` (M,): residual with the effect.
+    `missing` (M,): what the prediction lacks without the effect, in noise units.
     """
 
     view: SignalView

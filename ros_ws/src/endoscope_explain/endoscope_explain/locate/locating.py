@@ -85,15 +85,9 @@ def place(
 ) -> Place:
     """Describe one trace in signals, time, state and frequency.
 
-    Parameters
-    ----------
-    recording : Recording
-    found : sequence of SignalExcess
-        Largest first; those of both joints.
-    stage, joint : str
-        Known already.
-    began : float, optional
-        When it began, in s, where that is known.
+    `found`: largest first; those of both joints.
+    `stage`, `joint`: known already.
+    `began`: when it began, in s, where that is known.
     """
     by_signal = shares(found)
     j = recording.joints.index(joint)

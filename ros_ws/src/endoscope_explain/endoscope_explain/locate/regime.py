@@ -24,14 +24,9 @@ def regime_in_words(
     How far a state concentrates the excess is the Kullback-Leibler divergence between its share of
     the excess and its share of the time; by chance is what shifts of the excess in time reach.
 
-    Parameters
-    ----------
-    excesses : sequence of SignalExcess
-        The signals in which it shows.
-    states : mapping of str to array (N,) of bool
-        When each holds, see `conditions`.
-    seed : int
-        Of the shifts.
+    `excesses`: the signals in which it shows.
+    `states` (N,): when each holds, see `conditions`.
+    `seed`: of the shifts.
     """
     if not states or not excesses:
         return 'throughout'
@@ -48,12 +43,8 @@ def regime_in_words(
 def information(energy: Array, active: Mask, within: Mask) -> float:
     """Return what a state says about where the energy is, in nats; 0 where it holds less.
 
-    Parameters
-    ----------
-    energy : array (N,)
-        At least 0.
-    active, within : array (N,) of bool
-        The state, and the stretch of time that is looked at.
+    `energy` (N,): at least 0.
+    `active`, `within` (N,): the state, and the stretch of time that is looked at.
     """
     total = float(energy[within].sum())
     inside = active & within

@@ -19,19 +19,10 @@ FAINT = 0.03
 def windowed(excesses: Sequence[SignalExcess], end: float) -> tuple[Array, Array]:
     """Sum the excess of several signals over windows, in standard deviations of noise alone.
 
-    Parameters
-    ----------
-    excesses : sequence of SignalExcess
-    end : float
-        In s.
-
-    Returns
-    -------
-    sums : array (W,)
-        Excess in each window.
-    spread : array (W,)
-        What the noise that is left makes of it: its squares vary with twice their number, more
-        where it is correlated.
+    `end`: in s.
+    Returns `sums` (W,): excess in each window.
+    Returns `spread` (W,): what the noise that is left makes of it: its squares vary with twice
+        their number, more where it is correlated.
     """
     count = int(np.ceil(end / WINDOW_S))
     sums, variance = np.zeros(count), np.zeros(count)
@@ -50,13 +41,8 @@ def intervals(
 ) -> tuple[tuple[float, float], ...]:
     """Find where the excess stands out of the noise, in s, in order of time.
 
-    Parameters
-    ----------
-    excesses : sequence of SignalExcess
-    end : float
-        Length of the recording in s.
-    most : int
-        Largest number of intervals; the weakest are dropped.
+    `end`: length of the recording in s.
+    `most`: largest number of intervals; the weakest are dropped.
     """
     sums, spread = windowed(excesses, end)
     found: list[list[float]] = []

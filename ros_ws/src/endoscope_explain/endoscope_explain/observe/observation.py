@@ -40,15 +40,10 @@ ANALYSIS_PERIOD = 0.01
 class Channel:
     """Readings of one sensor on the analysis grid.
 
-    Attributes
-    ----------
-    signal, quantity, unit : str
-        Name as the report writes it, series of the recording, SI unit.
-    output : int
-        Column of the compiled physics' output that this sensor reads.
-    stamps : StampsOnTicks
-    time, value, noise : array (M,)
-        Stamp in s from the first command, reading, and its known noise (rms).
+    `signal`, `quantity`, `unit`: name as the report writes it, series of the recording, SI unit.
+    `output`: column of the compiled physics' output that this sensor reads.
+    `time`, `value`, `noise` (M,): stamp in s from the first command, reading, and its known noise
+        (rms).
     """
 
     signal: str
@@ -74,18 +69,11 @@ class Channel:
 class JointObservation:
     """One joint's input and channels.
 
-    Attributes
-    ----------
-    joint : str
-    inputs : array (1, N, INPUTS)
-        Input of the compiled physics on ticks.
-    start : array (K,)
-        Shaft angles in rad to which the motor has gone one after the other; the last is its own.
-    start_speed : float
-        Of the motor at first, rad/s.
-    channels : tuple of Channel
-    tick : float
-        In s.
+    `inputs` (1, N, INPUTS): input of the compiled physics on ticks.
+    `start` (K,): shaft angles in rad to which the motor has gone one after the other; the last is
+        its own.
+    `start_speed`: of the motor at first, rad/s.
+    `tick`: in s.
     """
 
     joint: str
@@ -131,17 +119,9 @@ class JointObservation:
 def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObservation, ...]:
     """The analysis view of a cleaned recording, joint by joint.
 
-    Parameters
-    ----------
-    recording : Recording
-        Stamps increasing; samples that must not be judged are marked invalid.
-    plant : PlantDescription
-        Gives the noise of the sensors; joints that it does not have are left out.
-
-    Returns
-    -------
-    tuple of JointObservation
-        In the recording's order.
+    `recording`: stamps increasing; samples that must not be judged are marked invalid.
+    `plant`: gives the noise of the sensors; joints that it does not have are left out.
+    Returns: in the recording's order.
     """
     begin = float(recording.command.time[0])
     ticks = int(np.ceil((recording.duration - begin) / TICK)) + 2

@@ -23,17 +23,12 @@ Flags = NDArray[np.bool_]
 class SignalView:
     """One signal on the analysis grid.
 
-    Attributes
-    ----------
-    signal, joint, quantity, unit : str
-        Name as the report writes it, joint, series of the recording, SI unit.
-    time : array (M,)
-        In s from the recording's first stamp.
-    measured : array (M,)
-    noise : array (M,)
-        Known noise (rms) of each sample.
-    predicted : mapping of str to array (M,)
-        By the plant's name.
+    Shapes: `measured` (M,).
+    `signal`, `joint`, `quantity`, `unit`: name as the report writes it, joint, series of the
+        recording, SI unit.
+    `time` (M,): in s from the recording's first stamp.
+    `noise` (M,): known noise (rms) of each sample.
+    `predicted` (M,): by the plant's name.
     """
 
     signal: str
@@ -54,15 +49,9 @@ class SignalView:
 class RecordedView:
     """A recording and its predictions.
 
-    Attributes
-    ----------
-    observations : tuple of JointObservation
-    signals : mapping of str to SignalView
-        By name, joint after joint.
-    outputs : mapping of joint to array (N, OUTPUTS)
-        What the last plant given predicts on 1 ms ticks.
-    begin : float
-        First command's stamp in s from the recording's first stamp.
+    `signals`: by name, joint after joint.
+    `outputs` (N, OUTPUTS): what the last plant given predicts on 1 ms ticks.
+    `begin`: first command's stamp in s from the recording's first stamp.
     """
 
     observations: tuple[JointObservation, ...]
@@ -92,15 +81,8 @@ def packed_rig(
 def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescription) -> Array:
     """Simulate all joints of a recording side by side.
 
-    Parameters
-    ----------
-    observations : tuple of JointObservation
-        In the order of the plant's joints.
-    plant : PlantDescription
-
-    Returns
-    -------
-    array (J, N, OUTPUTS)
+    `observations`: in the order of the plant's joints.
+    Returns (J, N, OUTPUTS).
     """
     parameters, flags = packed_rig(observations, plant)
     inputs = np.concatenate([o.inputs for o in observations])
@@ -141,16 +123,8 @@ def reading_lead(observations: tuple[JointObservation, ...], outputs: Array) -> 
 def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> RecordedView:
     """Predict every signal of a recording by several plants.
 
-    Parameters
-    ----------
-    recording : Recording
-        As audited.
-    plants : mapping of str to PlantDescription
-        The last one is taken for the best one: its motor tells when readings were taken.
-
-    Returns
-    -------
-    RecordedView
+    `recording`: as audited.
+    `plants`: the last one is taken for the best one: its motor tells when readings were taken.
     """
     best = list(plants.values())[-1]
     observations = observe(recording, best)

@@ -15,14 +15,9 @@ Indices = NDArray[np.int64]
 class StampsOnTicks:
     """Raw samples between ticks, and the analysis samples that they make.
 
-    Attributes
-    ----------
-    tick : array (R,) of int, share : array (R,)
-        Place of each raw sample between simulated ticks `tick` and `tick + 1`.
-    first : array (M,) of int
-        First raw sample of each analysis sample.
-    count : array (M,)
-        Raw samples in each analysis sample.
+    `tick` (R,): place of each raw sample between simulated ticks `tick` and `tick + 1`.
+    `first` (M,): first raw sample of each analysis sample.
+    `count` (M,): raw samples in each analysis sample.
     """
 
     tick: Indices

@@ -24,17 +24,9 @@ def fast_scatter(values: Array, white: float) -> Array:
     Third differences take out what is smooth over four samples; their variance is 20 times that
     of the samples (von Neumann et al., Ann. Math. Stat. 12, 1941, for first differences).
 
-    Parameters
-    ----------
-    values : array (R,)
-        Equally spaced raw readings.
-    white : float
-        Known noise (rms), not zero.
-
-    Returns
-    -------
-    array (R,)
-        In the readings' unit; zero where they show no more than their noise.
+    `values` (R,): equally spaced raw readings.
+    `white`: known noise (rms), not zero.
+    Returns (R,): in the readings' unit; zero where they show no more than their noise.
     """
     if len(values) < WINDOW:
         return np.zeros(len(values))

@@ -18,16 +18,8 @@ class UnusableStampsError(BagError):
 def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, list[str]]:
     """Leave out messages whose stamp is far from when they were received, unlike the others'.
 
-    Parameters
-    ----------
-    series : JointStateSeries
-        In any order. Where the recorder kept no times of receipt, nothing is left out.
-
-    Returns
-    -------
-    JointStateSeries
-    list of str
-        What was left out, in words; empty where nothing was.
+    `series`: in any order. Where the recorder kept no times of receipt, nothing is left out.
+    Returns: what was left out, in words; empty where nothing was.
     """
     delay = series.log_ns - series.stamp_ns
     far = np.abs(delay - np.median(delay)) > STRAY_NS
@@ -46,10 +38,7 @@ def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, list[str]
 def require_running_stamps(path: object, series: JointStateSeries) -> None:
     """Refuse a topic all of whose messages have one stamp, zero as a rule.
 
-    Raises
-    ------
-    UnusableStampsError
-        They do; a single message passes.
+    Raises UnusableStampsError: they do; a single message passes.
     """
     if len(series) > 1 and np.ptp(series.stamp_ns) == 0:
         raise UnusableStampsError(
@@ -61,17 +50,10 @@ def require_running_stamps(path: object, series: JointStateSeries) -> None:
 def require_common_time(path: object, topics: Sequence[JointStateSeries]) -> None:
     """Refuse topics that cannot be laid beside each other.
 
-    Parameters
-    ----------
-    path : object
-        The recording, for the message.
-    topics : sequence of JointStateSeries
-        Each of two messages at least; the first one is that of the commands.
-
-    Raises
-    ------
-    UnusableStampsError
-        All messages of a topic have one stamp, or two topics no time in common.
+    `path`: the recording, for the message.
+    `topics`: each of two messages at least; the first one is that of the commands.
+    Raises UnusableStampsError: all messages of a topic have one stamp, or two topics no time in
+        common.
     """
     for one in topics:
         require_running_stamps(path, one)

@@ -23,12 +23,7 @@ MOVES_RAD = 0.01
 
 @dataclass(frozen=True)
 class Shown:
-    """A number with its interval, as text.
-
-    Attributes
-    ----------
-    name, value, low, high, unit : str
-    """
+    """A number with its interval, as text."""
 
     name: str
     value: str

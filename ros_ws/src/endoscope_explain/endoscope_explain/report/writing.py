@@ -19,10 +19,7 @@ def write_report(case: ExplainedCase, folder: Path) -> None:
 
     The folder exists, see `atomic_directory`.
 
-    Raises
-    ------
-    OSError
-        If a file cannot be written.
+    Raises OSError: if a file cannot be written.
     """
     content = json.dumps(report_mapping(case), indent=1, allow_nan=False)
     (folder / REPORT_JSON).write_text(content + '\n', encoding='utf-8')

@@ -39,14 +39,9 @@ LAGS = 3
 class Candidate:
     """One term more.
 
-    Attributes
-    ----------
-    term : Effect
-        Of the catalogue, or the place of a function.
-    start : mapping of str to float
-        Parameters of an effect at which its fit begins.
-    family : Family or None
-        Of the function.
+    `term`: of the catalogue, or the place of a function.
+    `start`: parameters of an effect at which its fit begins.
+    `family`: of the function.
     """
 
     term: Effect
@@ -162,16 +157,8 @@ def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Candidate, ...]
 def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Candidate, ...]:
     """Functions that may be added to a fit, as tall as their place allows at most.
 
-    Parameters
-    ----------
-    found : Fit
-    residuals : array (size,)
-        Weighted, without what the fitted numbers could take away.
-
-    Returns
-    -------
-    tuple of Candidate
-        One for each place whose argument has moved; one for each likely period where functions
+    `residuals` (size,): weighted, without what the fitted numbers could take away.
+    Returns: one for each place whose argument has moved; one for each likely period where functions
         repeat themselves, and for some lags where their argument lags; one more that multiplies
         those that are there. Without those of time where the joint makes no motion twice.
     """

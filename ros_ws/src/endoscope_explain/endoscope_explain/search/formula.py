@@ -40,15 +40,9 @@ _WIDTHS = (0.03, 0.05, 0.08, 0.12, 0.2, 0.35, 0.6)
 class FittedFunction:
     """A function as a fit has it.
 
-    Attributes
-    ----------
-    joint : str
-    family : Family
-    coefficients : array (K,)
-    covariance : array (K, K)
-        Of the coefficients, the other numbers free.
-    samples : int
-        That the fit has seen.
+    Shapes: `coefficients` (K,).
+    `covariance` (K, K): of the coefficients, the other numbers free.
+    `samples`: that the fit has seen.
     """
 
     joint: str
@@ -89,16 +83,10 @@ def fitted_function(found: Fit, place_id: str) -> FittedFunction:
 class Formula:
     """A formula for a function.
 
-    Attributes
-    ----------
-    expression : str
-        Of the place's symbol.
-    values : array (NODES,)
-        At the family's nodes.
-    share : float
-        Of what the function does, so much does the formula.
-    as_good : bool
-        Whether the data do not tell it from the function, and a plant takes it.
+    `expression`: of the place's symbol.
+    `values` (NODES,): at the family's nodes.
+    `share`: of what the function does, so much does the formula.
+    `as_good`: whether the data do not tell it from the function, and a plant takes it.
     """
 
     expression: str
@@ -108,16 +96,7 @@ class Formula:
 
 
 def nearest_formula(found: FittedFunction) -> Formula:
-    """The formula that costs least: what it misses, and half a logarithm for each number in it.
-
-    Parameters
-    ----------
-    found : FittedFunction
-
-    Returns
-    -------
-    Formula
-    """
+    """The formula that costs least: what it misses, and half a logarithm for each number in it."""
     family = found.family
     inverse = np.linalg.pinv(family.basis)
     metric = np.linalg.inv(found.covariance)

@@ -73,16 +73,10 @@ PARENTS = 2
 class Level:
     """Compositions with one term more.
 
-    Attributes
-    ----------
-    parent : Composition
-        The best of those that were added to.
-    found : tuple of Composition
-        Best first.
-    null : Null
-        What is shown where nothing is missing.
-    predicts : bool
-        Whether the best one predicts blocks that it has not seen better than its parent.
+    `parent`: the best of those that were added to.
+    `found`: best first.
+    `null`: what is shown where nothing is missing.
+    `predicts`: whether the best one predicts blocks that it has not seen better than its parent.
     """
 
     parent: Composition
@@ -165,12 +159,8 @@ class Level:
 class JointSearch:
     """What was tried on one joint.
 
-    Attributes
-    ----------
-    nominal : Composition
-        No term added.
-    levels : tuple of Level
-        With one, two, ... terms; the last one may have found nothing.
+    `nominal`: no term added.
+    `levels`: with one, two, ... terms; the last one may have found nothing.
     """
 
     nominal: Composition
@@ -189,20 +179,9 @@ def search(
 ) -> JointSearch:
     """Search what is missing from one joint.
 
-    Parameters
-    ----------
-    anchors : tuple of Fit
-        Nominal plant refitted, and as described if given.
-    jobs : int
-        Tasks side by side.
-    depth : int
-        Largest number of terms, beside the nominal physics that the plant lacks.
-    left_out : tuple of str
-        Effects whose formulas are not tried.
-
-    Returns
-    -------
-    JointSearch
+    `anchors`: nominal plant refitted, and as described if given.
+    `depth`: largest number of terms, beside the nominal physics that the plant lacks.
+    `left_out`: effects whose formulas are not tried.
     """
     nominal = composition((), anchors[0])
     depth += len(lacking(anchors[0].model.base))

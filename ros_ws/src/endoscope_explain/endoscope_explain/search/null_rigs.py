@@ -44,12 +44,8 @@ _TINY = 1e-12
 class Null:
     """Gains of the best term on rigs in which nothing is missing.
 
-    Attributes
-    ----------
-    drawn : array (B,)
-        On rigs in which nothing is missing, off by as much as the recording is.
-    doubt : array (B,)
-        The same where they are off by as much as the best composition leaves.
+    `drawn` (B,): on rigs in which nothing is missing, off by as much as the recording is.
+    `doubt` (B,): the same where they are off by as much as the best composition leaves.
     """
 
     drawn: Array = field(repr=False)
@@ -68,12 +64,8 @@ NOTHING_SHOWN = Null(np.zeros(1), np.zeros(1))
 class Shown:
     """Gains of all terms by the screen, as in `Null`.
 
-    Attributes
-    ----------
-    observed : array (terms,)
-    drawn, doubt : array (terms, B)
-    rigs : array (size, B)
-        What the drawn rigs are off by, in noise units.
+    Shapes: `observed` (terms,), `drawn`, `doubt` (terms, B).
+    `rigs` (size, B): what the drawn rigs are off by, in noise units.
     """
 
     observed: Array
@@ -85,20 +77,9 @@ class Shown:
 def shown(behind: Background, ways: tuple[Directions, ...], best: Fit | None, jobs: int) -> Shown:
     """Run the screen over the recording and over rigs in which nothing is missing.
 
-    Parameters
-    ----------
-    behind : Background
-        The fit without the term.
-    ways : tuple of Directions
-        Of all terms, one at least.
-    best : Fit or None
-        With the term that explains most; without one, there is no doubt about what is left.
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    Shown
+    `behind`: the fit without the term.
+    `ways`: of all terms, one at least.
+    `best`: with the term that explains most; without one, there is no doubt about what is left.
     """
     found, observation = behind.fit, behind.fit.model.observation
     generator = np.random.default_rng(_SEED)
@@ -145,11 +126,7 @@ def shown(behind: Background, ways: tuple[Directions, ...], best: Fit | None, jo
 class NullRigs:
     """Rigs in which nothing is missing, screened, and what promises most fitted where asked.
 
-    Attributes
-    ----------
-    behind, ways
-        As for `shown`.
-    screened : Shown
+    `behind`, `ways`: as for `shown`.
     """
 
     behind: Background

@@ -28,16 +28,8 @@ _PER_CYCLE = 8.0
 def period_bounds(observation: JointObservation, state: Array) -> tuple[float, float]:
     """Shortest and longest period that a recording tells of a state.
 
-    Parameters
-    ----------
-    observation : JointObservation
-    state : array (N,)
-        On its ticks.
-
-    Returns
-    -------
-    (float, float)
-        The shortest is no less than the longest where there is none.
+    `state` (N,): on its ticks.
+    Returns: the shortest is no less than the longest where there is none.
     """
     slowest = min(observation.channels, key=lambda channel: len(channel.time))
     steps = np.abs(np.diff(_at(observation, state, slowest.time)))
@@ -49,18 +41,9 @@ def period_bounds(observation: JointObservation, state: Array) -> tuple[float, f
 def likely_periods(observation: JointObservation, residuals: Array, state: Array) -> list[float]:
     """Periods of a state with which residuals repeat themselves, the most telling first.
 
-    Parameters
-    ----------
-    observation : JointObservation
-    residuals : array (size,)
-        Weighted, without what the fitted numbers could take away.
-    state : array (N,)
-        On ticks.
-
-    Returns
-    -------
-    list of float
-        `PERIODS` at most.
+    `residuals` (size,): weighted, without what the fitted numbers could take away.
+    `state` (N,): on ticks.
+    Returns: `PERIODS` at most.
     """
     shortest, longest = period_bounds(observation, state)
     if shortest >= longest:
@@ -89,12 +72,8 @@ def periodogram(at: Array, values: Array, shortest: float, longest: float) -> tu
     Sums over samples anywhere become Fourier transforms once each sample is spread over its
     neighbours on a grid (Press, Rybicki, Astrophys. J. 338, 1989).
 
-    Parameters
-    ----------
-    at, values : array (M,)
-        State of each sample, and its value.
-    shortest, longest : float
-        Periods.
+    `at`, `values` (M,): state of each sample, and its value.
+    `shortest`, `longest`: periods.
     """
     span = max(float(np.ptp(at)), longest)
     # Twice the highest frequency is in it, for the sums of products.

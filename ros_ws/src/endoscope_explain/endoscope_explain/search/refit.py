@@ -34,13 +34,8 @@ stands."""
 class Composition:
     """A fitted joint with some terms.
 
-    Attributes
-    ----------
-    terms : tuple of Candidate
-        In the order in which they were added.
-    fit : Fit
-    evidence : float
-        See `log_evidence`.
+    `terms`: in the order in which they were added.
+    `evidence`: see `log_evidence`.
     """
 
     terms: tuple[Candidate, ...]
@@ -67,16 +62,10 @@ def composition(terms: tuple[Candidate, ...], found: Fit) -> Composition:
 class Look:
     """A term after a first fit of few simulations on coarse ticks.
 
-    Attributes
-    ----------
-    candidate : Candidate
-    model : JointModel
-        On fine ticks.
-    coarse : JointModel
-        The same on coarse ones.
-    theta : array (n,)
-    cost : float
-        Half the squares, weighted by what the fit without it is off by.
+    Shapes: `theta` (n,).
+    `model`: on fine ticks.
+    `coarse`: the same on coarse ones.
+    `cost`: half the squares, weighted by what the fit without it is off by.
     """
 
     candidate: Candidate
@@ -89,18 +78,9 @@ class Look:
 def look(anchors: tuple[Fit, ...], candidate: Candidate, offset: Array) -> Look:
     """First fit of one term more.
 
-    Parameters
-    ----------
-    anchors : tuple of Fit
-        Fits of the same model without the term, to start from: what was missing has bent the
+    `anchors`: fits of the same model without the term, to start from: what was missing has bent the
         numbers of the first one, and the description may be nearer. The better one is taken.
-    candidate : Candidate
-    offset : array (size,)
-        What coarse ticks do to the residuals of the first of them.
-
-    Returns
-    -------
-    Look
+    `offset` (size,): what coarse ticks do to the residuals of the first of them.
     """
     model = candidate.added_to(anchors[0].model)
     coarse = model.on_coarse_ticks(offset)
@@ -120,20 +100,10 @@ def look(anchors: tuple[Fit, ...], candidate: Candidate, offset: Array) -> Look:
 def begun_beside(function: Fit, without: Fit, starts: Sequence[Candidate], offset: Array) -> Look:
     """The start of a formula that leaves least beside the numbers of a fit with a function.
 
-    Parameters
-    ----------
-    function : Fit
-        With the function at the formula's place.
-    without : Fit
-        The fit to which either is added.
-    starts : sequence of Candidate
-        One effect at its starting points.
-    offset : array (size,)
-        As for `look`.
-
-    Returns
-    -------
-    Look
+    `function`: with the function at the formula's place.
+    `without`: the fit to which either is added.
+    `starts`: one effect at its starting points.
+    `offset` (size,): as for `look`.
     """
     weight = weights(function.model.observation, without.residuals)
     best: Look | None = None
@@ -151,16 +121,8 @@ def begun_beside(function: Fit, without: Fit, starts: Sequence[Candidate], offse
 def polish(seen: Look, without: Composition) -> Composition:
     """Fit of a term from where its first look ended, as far as tells which term is the best.
 
-    Parameters
-    ----------
-    seen : Look
-    without : Composition
-        By what this is off, channels are weighted at first; then by what is left.
-
-    Returns
-    -------
-    Composition
-        Fitted on coarse ticks; see `until_it_stands`.
+    `without`: by what this is off, channels are weighted at first; then by what is left.
+    Returns: fitted on coarse ticks; see `until_it_stands`.
     """
     weight = weights(seen.model.observation, without.fit.residuals)
     found = _twice(seen.model, seen.coarse.offset, seen.theta, weight)
@@ -171,19 +133,10 @@ def polish(seen: Look, without: Composition) -> Composition:
 def refined(one: Composition, without: Fit, offset: Array) -> Composition:
     """A composition whose last function is as fine as the evidence is for.
 
-    Parameters
-    ----------
-    one : Composition
-        Its last term is a function.
-    without : Fit
-        The fit without that function.
-    offset : array (size,)
-        As for `look`.
-
-    Returns
-    -------
-    Composition
-        Fitted on coarse ticks.
+    `one`: its last term is a function.
+    `without`: the fit without that function.
+    `offset` (size,): as for `look`.
+    Returns: fitted on coarse ticks.
     """
     best, term = one, one.terms[-1]
     for count in FINER:

@@ -25,14 +25,6 @@ def motion_repeats(observation: JointObservation) -> bool:
 
     A smooth force that depends on time explains any single pass through the workspace, and nothing
     of the next one.
-
-    Parameters
-    ----------
-    observation : JointObservation
-
-    Returns
-    -------
-    bool
     """
     command = observation.inputs[0, :, IN_COMMAND]
     return share_seen_before(command, observation.tick) >= LEAST_SHARE
@@ -41,17 +33,9 @@ def motion_repeats(observation: JointObservation) -> bool:
 def share_seen_before(command: Array, tick: float = TICK) -> float:
     """Share of the moments at which angle and speed were near what they had been before.
 
-    Parameters
-    ----------
-    command : array (N,)
-        In rad. Near is within `NEAR_ANGLE` of its range and `NEAR_SPEED` of its largest speed;
-        before is at least `APART_S` and `APART_SHARE` of the recording earlier.
-    tick : float
-        Time between two of its values in s.
-
-    Returns
-    -------
-    float
+    `command` (N,): in rad. Near is within `NEAR_ANGLE` of its range and `NEAR_SPEED` of its largest
+        speed; before is at least `APART_S` and `APART_SHARE` of the recording earlier.
+    `tick`: time between two of its values in s.
     """
     every = max(1, round(EVERY_S / tick))
     angle = command[::every]

@@ -32,12 +32,8 @@ _NOTHING = 1e-6
 class Promised:
     """A term and what it promises.
 
-    Attributes
-    ----------
-    candidate : Candidate
-        A function has the size of its prior.
-    gain : float
-        Logarithm of the evidence with it over that without it.
+    `candidate`: a function has the size of its prior.
+    `gain`: logarithm of the evidence with it over that without it.
     """
 
     candidate: Candidate
@@ -48,16 +44,11 @@ class Promised:
 class Background:
     """A fit, and what its own numbers cannot take away.
 
-    Attributes
-    ----------
-    fit : Fit
-    weight : array (size,)
-    span : array (size + n, n)
-        Orthonormal directions in which its numbers move weighted residuals and priors' deviations.
-    coarse : JointModel
-        The same model on coarser ticks.
-    at : array (size,)
-        Residuals of `coarse`.
+    Shapes: `weight` (size,).
+    `span` (size + n, n): orthonormal directions in which its numbers move weighted residuals and
+        priors' deviations.
+    `coarse`: the same model on coarser ticks.
+    `at` (size,): residuals of `coarse`.
     """
 
     fit: Fit
@@ -94,10 +85,7 @@ def background(found: Fit) -> Background:
 class Directions:
     """Where a term moves weighted residuals once the model's own numbers are refitted.
 
-    Attributes
-    ----------
-    candidate : Candidate
-    columns : array (size, k)
+    Shapes: `columns` (size, k).
     """
 
     candidate: Candidate
@@ -107,19 +95,7 @@ class Directions:
 def directions(
     behind: Background, terms: tuple[Candidate, ...], jobs: int
 ) -> tuple[Directions, ...]:
-    """Directions of all terms that move anything.
-
-    Parameters
-    ----------
-    behind : Background
-    terms : tuple of Candidate
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    tuple of Directions
-    """
+    """Directions of all terms that move anything."""
     found = parallel_map(lambda term: _directions(behind, term), terms, jobs)
     return tuple(each for each in found if each is not None)
 
@@ -164,11 +140,8 @@ def _relative_size(behind: Background, answers: Array) -> float:
 class Gains:
     """Gains of all terms on several residuals, from inner products alone.
 
-    Attributes
-    ----------
-    values : array (terms, B)
-    left : array (terms, B, C)
-        Mean squares of each channel, weighted, that the best of each term leaves.
+    Shapes: `values` (terms, B).
+    `left` (terms, B, C): mean squares of each channel, weighted, that the best of each term leaves.
     """
 
     values: Array
@@ -178,16 +151,7 @@ class Gains:
 def gains(behind: Background, found: tuple[Directions, ...], residuals: Array) -> Gains:
     """What each term gains on each of several residuals.
 
-    Parameters
-    ----------
-    behind : Background
-    found : tuple of Directions
-    residuals : array (size, B)
-        Weighted, with what the model's own numbers can take away taken away.
-
-    Returns
-    -------
-    Gains
+    `residuals` (size, B): weighted, with what the model's own numbers can take away taken away.
     """
     observation = behind.fit.model.observation
     number = counts(observation)

@@ -37,13 +37,9 @@ _TINY = 1e-12
 class SharedChoice:
     """Effects for all recordings of a joint.
 
-    Attributes
-    ----------
-    joint : str
-    effects : tuple of str
-        In the order in which they were added.
-    recordings : tuple of anchors
-        Fits of each recording; see `search.refit.look`. One that has no use for an effect lacks it.
+    `effects`: in the order in which they were added.
+    `recordings`: fits of each recording; see `search.refit.look`. One that has no use for an effect
+        lacks it.
     """
 
     joint: str
@@ -61,16 +57,8 @@ class SharedChoice:
     def null(self, jobs: int) -> tuple[float, Null]:
         """What recordings show of one effect more, and rigs in which nothing more is missing.
 
-        Parameters
-        ----------
-        jobs : int
-            Tasks side by side.
-
-        Returns
-        -------
-        (float, Null)
-            Gains by the screen of the effect that gains most in all recordings together: one is
-            looked for that serves all of them, and the best of each recording would gain more.
+        Returns: gains by the screen of the effect that gains most in all recordings together: one
+            is looked for that serves all of them, and the best of each recording would gain more.
             Every shape of the tube has a profile of its own, so that what is drawn for one says
             nothing of another.
         """
@@ -105,16 +93,7 @@ def _shown(found: Fit, order: np.random.Generator, jobs: int) -> dict[str, Array
 def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
     """The choice with one more effect, for each of the most promising effects.
 
-    Parameters
-    ----------
-    choice : SharedChoice
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    list of SharedChoice
-        Best first.
+    Returns: best first.
     """
     looks = _looks(choice, jobs)
     variants: dict[str, Variant] = {}
@@ -196,16 +175,7 @@ def settled_together(choices: Sequence[SharedChoice], jobs: int) -> list[SharedC
 
     A fit by itself may lie in another valley than those of the same rig in other shapes.
 
-    Parameters
-    ----------
-    choices : sequence of SharedChoice
-    jobs : int
-        Tasks side by side.
-
-    Returns
-    -------
-    list of SharedChoice
-        Best first.
+    Returns: best first.
     """
     twice: list[SharedChoice] = []
     begun: list[Begun] = []

@@ -72,29 +72,13 @@ def write_answer(
     commanded answer. Where the recording has `tracker/measured_cp`, the answer has it too, at the
     stamps that it shares with `slave/measured_js`.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-    recording : Recording
-        With `motor/servo_jp` or `slave/servo_jp`.
-    out : Path
-        A folder, or a file that ends in ``.mcap``; must not exist.
-    noise_seed : int, optional
-        Seed of the sensors' noise; without it there is neither noise nor quantisation.
-    rig : Rig, optional
-        Whose gear desired angles are times; that which the recording carries by default.
-
-    Returns
-    -------
-    int
-        Number of messages written.
-
-    Raises
-    ------
-    NoCommandsError, BagError
-        If the recording has no usable commands, or `out` exists.
-    RigFileError
-        If the rig that the recording carries cannot be read.
+    `recording`: with `motor/servo_jp` or `slave/servo_jp`.
+    `out`: a folder, or a file that ends in ``.mcap``; must not exist.
+    `noise_seed`: seed of the sensors' noise; without it there is neither noise nor quantisation.
+    `rig`: whose gear desired angles are times; that which the recording carries by default.
+    Returns: number of messages written.
+    Raises NoCommandsError, BagError: if the recording has no usable commands, or `out` exists.
+    Raises RigFileError: if the rig that the recording carries cannot be read.
     """
     rig = rig or rig_of_bag(recording)
     commands = commands_of_bag(recording, plant, rig)

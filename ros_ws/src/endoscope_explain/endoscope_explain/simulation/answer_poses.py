@@ -22,21 +22,11 @@ def answer_poses(
 ) -> MessageStream:
     """Poses that a tracker which reads these angles would tell.
 
-    Parameters
-    ----------
-    recorded : PoseSeries
-        Poses of the recording: when they were told, in which frame, of how long a section.
-    stamp_ns : ndarray, shape (N,)
-        When the angles were read; a recorded pose of another time has no answer.
-    bending : ndarray, shape (N, J)
-        Angles in rad.
-    joints : sequence of str
-        Their J names; a joint that is not among them is straight.
-
-    Returns
-    -------
-    MessageStream
-        Without the poses at which the section would be bent by half a turn or more, which a
+    `recorded`: poses of the recording: when they were told, in which frame, of how long a section.
+    `stamp_ns` (N,): when the angles were read; a recorded pose of another time has no answer.
+    `bending` (N, J): angles in rad.
+    `joints`: their J names; a joint that is not among them is straight.
+    Returns: without the poses at which the section would be bent by half a turn or more, which a
         tracker cannot tell from others.
     """
     angles = np.zeros((len(stamp_ns), len(JOINT_NAMES)))

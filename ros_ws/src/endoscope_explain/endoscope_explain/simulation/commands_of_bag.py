@@ -23,16 +23,10 @@ class NoCommandsError(EndoscopeError, ValueError):
 class BagCommands:
     """Commands of some joints of a plant.
 
-    Attributes
-    ----------
-    topic : str
-        Full name of the topic they come from.
-    joints : tuple of str
-        Joints of the plant that are commanded, in the plant's order.
-    stamp_ns : array (N,) of int64
-        Not decreasing.
-    shaft : array (N, J)
-        Motor shaft angle in rad.
+    `topic`: full name of the topic they come from.
+    `joints`: joints of the plant that are commanded, in the plant's order.
+    `stamp_ns` (N,): not decreasing.
+    `shaft` (N, J): motor shaft angle in rad.
     """
 
     topic: str
@@ -44,12 +38,8 @@ class BagCommands:
 def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
     """Shaft commands of a recording; desired angles times the rig's gear where it has none.
 
-    Raises
-    ------
-    NoCommandsError
-        If neither topic is there, or no joint of the plant is commanded.
-    BagError
-        If a command is not finite or does not decode, or all are stamped alike.
+    Raises NoCommandsError: if neither topic is there, or no joint of the plant is commanded.
+    Raises BagError: if a command is not finite or does not decode, or all are stamped alike.
     """
     topic = input_topic(recording)
     if not topic:

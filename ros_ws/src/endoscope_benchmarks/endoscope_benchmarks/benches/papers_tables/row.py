@@ -12,19 +12,10 @@ FEWEST_CONFIGURATIONS = 5
 class PapersBench:
     """What every table of the bench is asked for.
 
-    Parameters
-    ----------
-    seed : int
-        Chooses tubes, rigs and noise.
-    tubes : int
-        Tube configurations for each row, at least five.
-    report : callable
-        Takes a line that says how far it has come.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer tubes than five, or the seed is negative.
+    `seed`: chooses tubes, rigs and noise.
+    `tubes`: tube configurations for each row, at least five.
+    `report`: takes a line that says how far it has come.
+    Raises ValueError: if there are fewer tubes than five, or the seed is negative.
     """
 
     seed: int
@@ -45,20 +36,12 @@ class PapersBench:
 class Row:
     """One figure.
 
-    Parameters
-    ----------
-    name : str
-        What is measured, with its unit.
-    values : sequence of float
-        Ours, one for each tube configuration (or fold, or recording).
-    paper : str
-        The papers' figure as they print it; empty where they have none.
-    at_most, at_least : float, optional
-        What the mean of `values` is to keep.
-    digits : int
-        Digits after the point.
-    note : str
-        What a reader must know to take the figure right.
+    `name`: what is measured, with its unit.
+    `values`: ours, one for each tube configuration (or fold, or recording).
+    `paper`: the papers' figure as they print it; empty where they have none.
+    `at_most`, `at_least`: what the mean of `values` is to keep.
+    `digits`: digits after the point.
+    `note`: what a reader must know to take the figure right.
     """
 
     name: str

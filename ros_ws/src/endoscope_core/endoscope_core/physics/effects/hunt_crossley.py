@@ -12,25 +12,12 @@ def push_back(
     ``stiffness depth^exponent (1 + loss inwards)``, and never a pull: Hunt, Crossley, J. Appl.
     Mech. 42, 1975.
 
-    Parameters
-    ----------
-    depth : float
-        Rad, positive.
-    inwards : float
-        Speed at which it goes deeper, rad/s.
-    stiffness : float
-        N m/rad^exponent.
-    exponent : float
-    loss : float
-        S/rad.
-
-    Returns
-    -------
-    moment : float
-    by_depth : float
-        N m/rad.
-    by_speed : float
-        N m s/rad.
+    `depth`: rad, positive.
+    `inwards`: speed at which it goes deeper, rad/s.
+    `stiffness`: n m/rad^exponent.
+    `loss`: s/rad.
+    Returns `by_depth`: n m/rad.
+    Returns `by_speed`: n m s/rad.
     """
     braked = 1.0 + loss * inwards
     if braked <= 0.0:

@@ -37,23 +37,11 @@ _NAMES = (*_FUNCTIONS, *_OF_SEVERAL, *_CONSTANTS)
 def evaluate(expression: str, symbol: str, values: Array) -> Array:
     """Values of a formula.
 
-    Parameters
-    ----------
-    expression : str
-        Of the symbol, numbers, pi, + - * / **, and exp, log, tanh, sqrt, abs, sin, cos, sign, min
-        and max.
-    symbol : str
-    values : array (N,)
-        Of the symbol.
-
-    Returns
-    -------
-    array (N,)
-
-    Raises
-    ------
-    ValueError
-        If it is not such a formula, or not finite at one of the values; says which.
+    `expression`: of the symbol, numbers, pi, + - * / **, and exp, log, tanh, sqrt, abs, sin, cos,
+        sign, min and max.
+    `values` (N,): of the symbol.
+    Returns (N,).
+    Raises ValueError: if it is not such a formula, or not finite at one of the values; says which.
     """
     if len(expression) > LONGEST:
         raise ValueError(f'a formula of {len(expression)} characters: give {LONGEST} at most')

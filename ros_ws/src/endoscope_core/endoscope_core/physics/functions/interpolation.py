@@ -25,22 +25,12 @@ def function_at(
 ) -> tuple[float, float]:
     """Value of a function, and its slope.
 
-    Parameters
-    ----------
-    p : array (parameters,)
-    first : int
-        Where its block begins.
-    argument : float
-    share, side : float
-        ``share f(side argument)`` is added to ``(1 - abs(share)) f(argument)``: the odd part with
-        -0.5 and -1, the even one with 0.5 and -1; what is left of the value at zero with -1 and 0,
-        where f itself counts whole.
-    repeats : bool
-        Whether the range is a period.
-
-    Returns
-    -------
-    (float, float)
+    Shapes: `p` (parameters,).
+    `first`: where its block begins.
+    `share`, `side`: ``share f(side argument)`` is added to ``(1 - abs(share)) f(argument)``: the
+        odd part with -0.5 and -1, the even one with 0.5 and -1; what is left of the value at zero
+        with -1 and 0, where f itself counts whole.
+    `repeats`: whether the range is a period.
     """
     low = p[first + LOW]
     per_unit = (NODES - 1) / (p[first + HIGH] - low)

@@ -30,16 +30,11 @@ class Shape(StrEnum):
 class Argument:
     """The state that a function depends on.
 
-    Attributes
-    ----------
-    symbol : str
-        In an expression.
-    words, unit : str
-    low, high : float
-        Range of the table where nobody gives one.
-    lags : bool
-        Whether it follows a state of the plant as a first-order lag does, with a time constant of
-        its own: what nobody sees (Kelvin-Voigt: Findley, Lai, Onaran, Creep and Relaxation, 1976).
+    `symbol`: in an expression.
+    `low`, `high`: range of the table where nobody gives one.
+    `lags`: whether it follows a state of the plant as a first-order lag does, with a time constant
+        of its own: what nobody sees (Kelvin-Voigt: Findley, Lai, Onaran, Creep and Relaxation,
+        1976).
     """
 
     symbol: str
@@ -122,26 +117,9 @@ def place(
 ) -> Place:
     """Define a place, whose flag and parameters follow from its shape.
 
-    Parameters
-    ----------
-    place_id : str
-    stage : Stage
-    hook : Hook
-    what : str
-        What the function is, in words.
-    argument : Argument
-    unit : str
-    largest : float
-    at : str
-    shape : Shape
-    depends_on_time : bool
-        See `Traits`.
-    **more
-        The other attributes of a `Place`.
-
-    Returns
-    -------
-    Place
+    `what`: what the function is, in words.
+    `depends_on_time`: see `Traits`.
+    `**more`: the other attributes of a `Place`.
     """
     f = f'f({argument.symbol})'
     enters = f'exp({f})' if hook.fold is Fold.FACTORS else f

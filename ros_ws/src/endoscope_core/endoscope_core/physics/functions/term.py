@@ -27,12 +27,10 @@ _ROUNDING = 1e-9
 class Table:
     """A function as the plant runs it.
 
-    Attributes
-    ----------
-    numbers : array (VALUES + NODES or one more,)
-        Both ends of the range, then the values, then the time constant of an argument that lags.
-    largest_error, rms_error : float
-        Of the table against the formula, as shares of what the formula spans; 0 for given values.
+    `numbers` (VALUES + NODES or one more,): both ends of the range, then the values, then the time
+        constant of an argument that lags.
+    `largest_error`, `rms_error`: of the table against the formula, as shares of what the formula
+        spans; 0 for given values.
     """
 
     numbers: Array
@@ -44,12 +42,9 @@ class Table:
 def tabulated(term: TermSpec) -> Table:
     """The table of an unknown term.
 
-    Raises
-    ------
-    UnknownEffectError
-        If there is no such place.
-    ValueError
-        If formula, values or range are not what the place takes; names the term and what to do.
+    Raises UnknownEffectError: if there is no such place.
+    Raises ValueError: if formula, values or range are not what the place takes; names the term and
+        what to do.
     """
     place = describe_place(term.place)
     try:

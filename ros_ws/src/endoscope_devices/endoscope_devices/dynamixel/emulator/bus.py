@@ -46,17 +46,9 @@ class EmulatedBus:
     Bytes take the time that the line's speed says, both ways; a servo that is set to another speed
     than the line hears nothing.
 
-    Parameters
-    ----------
-    servos
-        What is on the line.
-    link
-        A path that shall lead to the terminal whenever it is plugged in, as udev's do.
-
-    Attributes
-    ----------
-    faults
-        Faults in force; change them inside :meth:`paused`.
+    `servos`: what is on the line.
+    `link`: a path that shall lead to the terminal whenever it is plugged in, as udev's do.
+    `faults`: faults in force; change them inside :meth:`paused`.
     """
 
     def __init__(self, servos: Sequence[EmulatedServo], link: Path | None = None) -> None:
@@ -148,12 +140,8 @@ class EmulatedBus:
     def supply(self, device: int, volts: float) -> None:
         """Change the voltage of a servo; below 6 V it is off, and restarts when that is over.
 
-        Parameters
-        ----------
-        device
-            Its id.
-        volts
-            V.
+        `device`: its id.
+        `volts`: V.
         """
         with self.paused():
             servo = self.servos[device]

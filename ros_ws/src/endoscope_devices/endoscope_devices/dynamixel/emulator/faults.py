@@ -8,22 +8,13 @@ from random import Random
 class LineFaults:
     """Faults in force on a line.
 
-    Attributes
-    ----------
-    silent
-        Ids of servos whose cable is out.
-    damage_rate
-        Share of packets, both ways, in which bits are flipped.
-    bits
-        How many bits at most in each of them.
-    delay_s
-        By how much the next answers are late.
-    delayed
-        How many they are.
-    repeated
-        How many of the next answers are sent twice.
-    chance
-        Source of chance.
+    `silent`: ids of servos whose cable is out.
+    `damage_rate`: share of packets, both ways, in which bits are flipped.
+    `bits`: how many bits at most in each of them.
+    `delay_s`: by how much the next answers are late.
+    `delayed`: how many they are.
+    `repeated`: how many of the next answers are sent twice.
+    `chance`: source of chance.
     """
 
     silent: set[int] = field(default_factory=set)

@@ -13,21 +13,11 @@ from endoscope_core.closed_on_exit import ClosedOnExit
 class EmulatorProcess(ClosedOnExit):
     """Starts an emulated bus and commands it.
 
-    Parameters
-    ----------
-    ids
-        Of the servos.
-    baud
-        That the servos are set to, in bits per second.
-    link
-        A path that shall lead to the terminal.
-    stiffness
-        Of the spring on each shaft, in N m/rad.
-
-    Attributes
-    ----------
-    port
-        Device file for the client.
+    `ids`: of the servos.
+    `baud`: that the servos are set to, in bits per second.
+    `link`: a path that shall lead to the terminal.
+    `stiffness`: of the spring on each shaft, in N m/rad.
+    `port`: device file for the client.
     """
 
     def __init__(

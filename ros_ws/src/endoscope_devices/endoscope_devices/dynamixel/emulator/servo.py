@@ -68,25 +68,13 @@ class ErrorNumber(IntEnum):
 class EmulatedServo:
     """A servo that is advanced by the time of its bus.
 
-    Parameters
-    ----------
-    device
-        Id.
-    baud_code
-        Baud Rate(8).
-    model
-        Model number.
-    shaft
-        What it turns.
-
-    Attributes
-    ----------
-    trace
-        Time in s and shaft angle in rad, each millisecond.
-    supply
-        Input voltage in V.
-    stuck
-        Addresses of registers that acknowledge a write and do not keep it, as worn cells do.
+    `device`: id.
+    `baud_code`: baud Rate(8).
+    `model`: model number.
+    `shaft`: what it turns.
+    `trace`: time in s and shaft angle in rad, each millisecond.
+    `supply`: input voltage in V.
+    `stuck`: addresses of registers that acknowledge a write and do not keep it, as worn cells do.
     """
 
     def __init__(
@@ -128,10 +116,7 @@ class EmulatedServo:
     def advance(self, now: float) -> None:
         """Let time pass in it.
 
-        Parameters
-        ----------
-        now
-            Time of the bus in s.
+        `now`: time of the bus in s.
         """
         if not self._started:
             self._started = True

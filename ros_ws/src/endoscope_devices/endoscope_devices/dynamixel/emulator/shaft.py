@@ -14,20 +14,12 @@ class FirstOrderShaft:
     spring needs more than the allowed current.  Without torque it stays where it is, for the gear
     holds it.
 
-    Attributes
-    ----------
-    position, velocity
-        rad and rad/s.
-    time_constant
-        s; the simulated plant's servo lag.
-    stiffness
-        Spring in N m/rad about ``rest``.
-    rest
-        Where the spring pulls to, rad.
-    max_speed
-        rad/s.
-    torque_constant
-        N m/A.
+    `position`, `velocity`: rad and rad/s.
+    `time_constant`: s; the simulated plant's servo lag.
+    `stiffness`: spring in N m/rad about ``rest``.
+    `rest`: where the spring pulls to, rad.
+    `max_speed`: rad/s.
+    `torque_constant`: n m/A.
     """
 
     position: float = math.pi
@@ -41,19 +33,10 @@ class FirstOrderShaft:
     def advance(self, goal: float | None, limit: float, dt: float) -> float:
         """Move for a while.
 
-        Parameters
-        ----------
-        goal
-            rad; None without torque.
-        limit
-            Largest current in A.
-        dt
-            s.
-
-        Returns
-        -------
-        float
-            Current in A.
+        `goal`: rad; None without torque.
+        `limit`: largest current in A.
+        `dt`: s.
+        Returns: current in A.
         """
         if goal is None:
             self.velocity = 0.0

@@ -16,19 +16,10 @@ LAGS_S = (0.05, 0.3, 2.0)
 def motion_features(time: Array, angle: Array, at: Array) -> Array:
     """Describe the motion at some instants by commands alone.
 
-    Parameters
-    ----------
-    time : array (N,)
-        Stamps of the commands in s.
-    angle : array (N, J)
-        Commands in rad, joint-equivalent, the joint of interest first.
-    at : array (M,)
-        In s.
-
-    Returns
-    -------
-    array (M, J * 9)
-        For each joint: angle, speed, plays of the angle, lagging angles.
+    `time` (N,): stamps of the commands in s.
+    `angle` (N, J): commands in rad, joint-equivalent, the joint of interest first.
+    `at` (M,): in s.
+    Returns (M, J * 9): for each joint: angle, speed, plays of the angle, lagging angles.
     """
     grid = np.arange(min(time[0], at.min()), max(time[-1], at.max()) + GRID_S, GRID_S)
     columns = []

@@ -25,12 +25,8 @@ EDGE = 4.0
 def trained(kind: str, features: Array, outputs: Array) -> Predictor:
     """Train a black box.
 
-    Parameters
-    ----------
-    kind : str
-        A key of `KINDS`.
-    features : array (M, F)
-    outputs : array (M, K)
+    Shapes: `features` (M, F), `outputs` (M, K).
+    `kind`: a key of `KINDS`.
     """
     from sklearn.preprocessing import StandardScaler
 

@@ -24,16 +24,10 @@ BASE = 'refitted'
 class Exam:
     """What black boxes are trained on, and what they are judged on.
 
-    Attributes
-    ----------
-    use : callable
-        Training samples of the first recording, by their times.
-    recording : Recording
-        To judge on.
-    recorded : RecordedView
-        With the prediction `BASE`.
-    test : callable
-        Which of its samples count, by their times.
+    `use`: training samples of the first recording, by their times.
+    `recording`: to judge on.
+    `recorded`: with the prediction `BASE`.
+    `test`: which of its samples count, by their times.
     """
 
     use: Callable[[Array], Mask]
@@ -47,20 +41,9 @@ def black_box_rungs(
 ) -> list[dict[str, dict[str, ChannelFit]]]:
     """Train both black boxes for each joint and exam, and judge them.
 
-    Parameters
-    ----------
-    recording : Recording
-        To train on.
-    recorded : RecordedView
-        With the prediction `BASE`.
-    exams : sequence of Exam
-    jobs : int
-        Threads side by side.
-
-    Returns
-    -------
-    list of dict
-        For each exam by black box and signal.
+    `recording`: to train on.
+    `recorded`: with the prediction `BASE`.
+    Returns: for each exam by black box and signal.
     """
     tasks = [(e, kind, j) for e in range(len(exams)) for j in recorded.joints for kind in KINDS]
 

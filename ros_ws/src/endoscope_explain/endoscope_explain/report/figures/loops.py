@@ -36,11 +36,7 @@ STATES = {
 class State:
     """What a signal is drawn against.
 
-    Attributes
-    ----------
-    words, unit : str
-    time, values : array (N,)
-        In s, and in that unit.
+    `time`, `values` (N,): in s, and in that unit.
     """
 
     words: str
