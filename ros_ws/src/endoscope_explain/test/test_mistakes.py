@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
@@ -35,6 +35,17 @@ def test_plugs_that_were_exchanged_are_at_the_sensors(record):
     case = explain_case(inputs(plant, audit), never)
     assert case.verdict is Verdict.RECORDING_FAULT
     assert {place.stage for place in case.places} == {'sensing'}
+
+
+def test_forces_of_another_rig_are_no_counts_of_a_converter(record):
+    own = JointParameters()
+    thrice = {n: 3.0 * getattr(own, n) for n in ('pretension', 'wire_stiffness', 'joint_stiffness')}
+    plant = PlantDescription(joints={'bend_x': own})
+    other = record(PlantDescription(joints={'bend_x': replace(own, **thrice)}))
+    assert not audit_recording(other, plant).faults()
+    counts = replace(other.tension, values=2.0 * other.tension.values)
+    (finding,) = audit_recording(other.with_series({'tension': counts}), plant).faults()
+    assert 'counts of a converter' in finding.text
 
 
 def test_a_pause_that_ends_at_another_pose_is_no_gap(record):

@@ -14,6 +14,9 @@ from endoscope_explain.recording.signals import QUANTITY_UNITS, motor_name, sign
 
 LARGE = 5.0
 """Factor that no gear of this rig has, nor a servo that misses its command."""
+OTHER_RIGS = 4.0
+"""Factor by which a description may be wrong, either way: forces of another rig may all be so many
+times as large, and nothing tells that from cells that read so many times too much."""
 STANDARD_GRAVITY = 9.80665
 GEAR = 'radians of the bending joint'
 COUNTS = 'counts of the encoder'

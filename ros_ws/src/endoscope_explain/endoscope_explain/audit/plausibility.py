@@ -21,6 +21,7 @@ from endoscope_explain.audit.misfit import LONGEST_S, PERIOD_S, Bounds, Criteria
 from endoscope_explain.audit.misreading import (
     CONVERTER_BITS,
     KINDS,
+    OTHER_RIGS,
     Misreading,
     misreadings,
     scaled,
@@ -224,7 +225,8 @@ class Comparison:
         ways = CONVERTER_BITS * log(2.0) / self._criteria.usual[quantity]
         for part in dict.fromkeys(parts):
             factor = float(np.median(size[list(part)]))
-            if factor > 0.0:
+            of_a_rig = quantity == 'tension' and 1.0 / OTHER_RIGS <= factor <= OTHER_RIGS
+            if factor > 0.0 and not of_a_rig:
                 many = len(parts) - 1 if len(part) < columns else 1
                 yield scaled(quantity, 'factor', factor, part, columns, ways * many)
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import OUT_JOINT
+from endoscope_explain.audit.misreading import OTHER_RIGS
 from endoscope_explain.fit.free_parameters import (
     BAND,
     SCALED_NOMINAL,
@@ -28,8 +29,6 @@ Flags = NDArray[np.bool_]
 
 FINISHED = 20
 """Further steps of a nominal refit that may be on its way to noise."""
-FURTHEST = 4.0
-"""Factor by which a description may be wrong, either way."""
 ANY_NUMBER = 20
 """Steps of a fit with numbers that may be any."""
 AT_THE_END = 1e-3
@@ -148,4 +147,4 @@ def with_any_numbers(fitted: Fit) -> Fit:
 def _widened(item: FreeParameter) -> FreeParameter:
     if item.name not in SCALED_NOMINAL:
         return item
-    return replace(item, low=item.low / FURTHEST, high=item.high * FURTHEST)
+    return replace(item, low=item.low / OTHER_RIGS, high=item.high * OTHER_RIGS)
