@@ -5,9 +5,7 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
-from endoscope_explain.design.distance import distance
-from endoscope_explain.design.imagined import imagine, is_safe
-from endoscope_explain.design.proposal import propose
+from endoscope_explain.design.proposal import distance, imagine, is_safe, propose
 from endoscope_explain.design.waveforms import family
 from endoscope_explain.explanation import NamedEffect
 

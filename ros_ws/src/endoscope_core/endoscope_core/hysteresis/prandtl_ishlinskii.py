@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from endoscope_core.compiled_cache import njit
 from endoscope_core.hysteresis.inverse_safety import (
     GREATEST_ALPHA,
     GREATEST_INVERSE_SLOPE,
@@ -17,7 +18,28 @@ from endoscope_core.hysteresis.inverse_safety import (
     check_numbers,
     check_range,
 )
-from endoscope_core.hysteresis.play_stack_kernel import play_stack_path, play_stack_step
+
+
+@njit(cache=True)
+def play_stack_step(
+    thresholds: NDArray[np.float64], plays: NDArray[np.float64], driver: float
+) -> NDArray[np.float64]:
+    """Outputs (M,) of plays of the given thresholds (M,) after a monotone move to `driver`."""
+    return np.minimum(driver + thresholds, np.maximum(driver - thresholds, plays))
+
+
+@njit(cache=True)
+def play_stack_path(
+    thresholds: NDArray[np.float64], driver: NDArray[np.float64], start: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Outputs (N, M) along a driving angle (N,), from `start` (M,)."""
+    states = np.empty((driver.size, thresholds.size))
+    plays = start
+    for k in range(driver.size):
+        plays = play_stack_step(thresholds, plays, driver[k])
+        states[k] = plays
+    return states
+
 
 SMALLEST_FIRST_WEIGHT = 1.0 / GREATEST_INVERSE_SLOPE
 LONGEST_THRESHOLD = 3.0

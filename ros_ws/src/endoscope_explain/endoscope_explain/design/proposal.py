@@ -14,20 +14,99 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import KNOWN, describe
+from endoscope_core.physics.simulator import simulate
+from endoscope_core.rig import Rig
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.decide.conclusions import spec_of
-from endoscope_explain.design.distance import distance, refit, with_fit
-from endoscope_explain.design.imagined import imagine, is_safe
 from endoscope_explain.design.waveforms import Waveform, family
 from endoscope_explain.explanation import NamedEffect
-from endoscope_explain.observe.observation import observe
+from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
+from endoscope_explain.fit.model import Fit, JointModel, fit
+from endoscope_explain.fit.simulated_joint import joint_of, packed_joint
+from endoscope_explain.observe.observation import TICK, JointObservation, observe
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import Recording, Series
 from endoscope_explain.search.candidate import Candidate, starting_points
 from endoscope_explain.search.screen import background, directions, promises
 
 Array = NDArray[np.float64]
+
+NOMINAL_BAND = 0.05
+"""Relative freedom that nominal parameters still have after a first recording."""
+REFIT_STEPS = 3
+
+
+def refit(
+    plant: PlantDescription, observation: JointObservation, band: float, iterations: int
+) -> Fit:
+    """Refit one joint of a plant, its effects included, from where it is.
+
+    `band`: relative freedom of the nominal parameters.
+    """
+    base, flags = packed_joint(plant, observation.joint)
+    free = nominal_parameters(base, band)
+    for spec in plant.effects:
+        if spec.joint == observation.joint:
+            free += effect_parameters(spec.id)
+    model = JointModel(observation, base, flags, free)
+    start = np.array(
+        [item.coordinate(1.0 if item.index == LEAD else float(base[item.index])) for item in free]
+    )
+    return fit(model, start, iterations=iterations)
+
+
+def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescription:
+    """Put the fitted numbers of one joint back into a plant."""
+    packed, _ = found.model.packed(found.theta)
+    effects = tuple(
+        spec_of(describe(spec.id), joint, packed) if spec.joint == joint else spec
+        for spec in plant.effects
+    )
+    return replace(plant, joints={**plant.joints, joint: joint_of(packed)}, effects=effects)
+
+
+def distance(truth: Recording, rival: PlantDescription, joint: str) -> float:
+    """What a rival misses of the other rival's noise-free answer after its refit.
+
+    Returns: root mean square over all samples of the joint's signals, in noise units.
+    """
+    observation = next(o for o in observe(truth, rival) if o.joint == joint)
+    found = refit(rival, observation, NOMINAL_BAND, REFIT_STEPS)
+    return float(np.sqrt(np.mean(found.residuals**2)))
+
+
+def imagine(plant: PlantDescription, waveform: Waveform, rig: Rig) -> Recording:
+    """A plant's noise-free answer to a motion: the tracker at its rate, all else every tick."""
+    time = np.arange(0.0, waveform.time[-1], TICK)
+    joints = plant.joint_names()
+    desired = np.zeros((len(time), len(joints)))
+    desired[:, joints.index(waveform.joint)] = np.interp(time, waveform.time, waveform.angle)
+    shaft = rig.joints.gear * desired
+    answer = simulate(plant, shaft)
+    slow = slice(None, None, max(1, round(1.0 / (plant.sensors.tracker_rate * TICK))))
+    return Recording(
+        waveform.name,
+        0.0,
+        joints,
+        Series.of('motor/servo_jp', time, shaft),
+        Series.of('wires/measured_js', time, answer.tension),
+        Series.of('slave/measured_js', time[slow], answer.bending[slow]),
+        Series.of('motor/measured_js', time, answer.shaft_position),
+        Series.of('motor/measured_js', time, answer.shaft_velocity),
+        Series.of('motor/measured_js', time, answer.shaft_effort),
+        rig=rig,
+    )
+
+
+def is_safe(recording: Recording, tension_limit: float, bending_limit: float) -> bool:
+    """Tell whether an imagined motion stays within a tension in N and an angle in rad."""
+    assert recording.tension is not None
+    return bool(
+        recording.tension.values.max() <= tension_limit
+        and np.abs(recording.bending.values).max() <= bending_limit
+    )
+
 
 MOST_RIVALS = 3
 MARGIN = 1.15

@@ -1,4 +1,7 @@
-"""Writes the bag in which a plant answers the commands of another bag."""
+"""Writes the bag in which a plant answers the commands of another bag.
+
+Where that bag has tip poses beside bending angles, the answer has them too.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,10 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_bags import BagWriter, JointStateSeries, MessageStream, Recording
-from endoscope_bags.cdr_encoding import encode_joint_states
-from endoscope_bags.message_types import JOINT_STATE
+from endoscope_bags import BagWriter, JointStateSeries, MessageStream, PoseSeries, Recording
+from endoscope_bags.cdr_encoding import encode_joint_states, encode_poses
+from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED
 from endoscope_bags.rig_record import rig_of_bag, rig_record
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.kinematics import tip_pose
 from endoscope_core.physics import PlantDescription, SensorModel
 from endoscope_core.physics.on_stamps import (
     NANOSECONDS,
@@ -19,16 +24,115 @@ from endoscope_core.physics.on_stamps import (
     AnswerStamps,
     answer_commands,
 )
+from endoscope_core.physics.plant_file import JOINT_NAMES
 from endoscope_core.physics.recording import recording_faults
 from endoscope_core.physics.samples import TOPICS
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import Rig
-from endoscope_explain.recording.series import BENDING, MOTOR, WIRES
-from endoscope_explain.recording.shaft_input import INPUTS
+from endoscope_explain.recording.series import BENDING, COMMAND, DESIRED, MOTOR, WIRES
+from endoscope_explain.recording.shaft_input import INPUTS, input_topic
 from endoscope_explain.recording.signals import motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_running_stamps
-from endoscope_explain.simulation.answer_poses import answer_poses
-from endoscope_explain.simulation.commands_of_bag import BagCommands, commands_of_bag
+
+Floats = NDArray[np.float64]
+
+
+def answer_poses(
+    recorded: PoseSeries,
+    stamp_ns: NDArray[np.int64],
+    bending: Floats,
+    joints: Sequence[str],
+) -> MessageStream:
+    """Poses that a tracker which reads these angles would tell.
+
+    `recorded`: poses of the recording: when they were told, in which frame, of how long a section.
+    `stamp_ns` (N,): when the angles were read; a recorded pose of another time has no answer.
+    `bending` (N, J): angles in rad.
+    `joints`: their J names; a joint that is not among them is straight.
+    Returns: without the poses at which the section would be bent by half a turn or more, which a
+        tracker cannot tell from others.
+    """
+    angles = np.zeros((len(stamp_ns), len(JOINT_NAMES)))
+    for column, joint in enumerate(joints):
+        angles[:, JOINT_NAMES.index(joint)] = bending[:, column]
+    read = dict(zip(stamp_ns.tolist(), angles, strict=True))
+    told = [
+        (n, read[stamp])
+        for n, stamp in enumerate(recorded.stamp_ns.tolist())
+        if stamp in read and np.hypot(*read[stamp]) < np.pi
+    ]
+    kept = np.array([n for n, _ in told], dtype=np.int64)
+    length = section_length(recorded)
+    poses = [tip_pose(angle, length) for _, angle in told]
+    return MessageStream(
+        recorded.topic,
+        POSE_STAMPED,
+        encode_poses(
+            recorded.stamp_ns[kept],
+            np.array([position for position, _ in poses]).reshape(-1, 3),
+            np.array([orientation for _, orientation in poses]).reshape(-1, 4),
+            frame_id=recorded.frame_id,
+        ),
+        recorded.log_ns[kept],
+        recorded.publish_ns[kept],
+    )
+
+
+def section_length(recorded: PoseSeries) -> float:
+    """Length in m of the bending section whose tip was recorded; 0 where no pose tells it.
+
+    A circular arc of length L that turns by a has a chord of ``2 L sin(a / 2) / a``.
+    """
+    chord = np.linalg.norm(recorded.position, axis=1)
+    half_turn = np.arccos(np.clip(np.abs(recorded.orientation[:, 3]), 0.0, 1.0))
+    length = chord / np.sinc(half_turn / np.pi)
+    finite = length[np.isfinite(length)]
+    return float(np.median(finite)) if finite.size else 0.0
+
+
+class NoCommandsError(EndoscopeError, ValueError):
+    """A recording without commands for any joint of the plant."""
+
+
+@dataclass(frozen=True)
+class BagCommands:
+    """Commands of some joints of a plant.
+
+    `topic`: full name of the topic they come from.
+    `joints`: joints of the plant that are commanded, in the plant's order.
+    `stamp_ns` (N,): not decreasing.
+    `shaft` (N, J): motor shaft angle in rad.
+    """
+
+    topic: str
+    joints: tuple[str, ...]
+    stamp_ns: NDArray[np.int64]
+    shaft: NDArray[np.float64]
+
+
+def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
+    """Shaft commands of a recording; desired angles times the rig's gear where it has none.
+
+    Raises NoCommandsError: if neither topic is there, or no joint of the plant is commanded.
+    Raises BagError: if a command is not finite or does not decode, or all are stamped alike.
+    """
+    topic = input_topic(recording)
+    if not topic:
+        raise NoCommandsError(recording.lacking(COMMAND, DESIRED))
+    series = recording.joint_state(topic, finite=('position',))
+    desired = topic == DESIRED
+    names = {joint: joint if desired else motor_name(joint) for joint in plant.joints}
+    require_running_stamps(recording.path, series)
+    joints = tuple(joint for joint, name in names.items() if name in series.names)
+    if not joints:
+        raise NoCommandsError(
+            f'{recording.path}: {series.topic} commands {", ".join(series.names) or "nothing"}, '
+            f'the plant has {", ".join(names.values())}'
+        )
+    chosen = series.select([names[joint] for joint in joints])
+    scale = rig.joints.gear if desired else 1.0
+    return BagCommands(series.topic, joints, chosen.stamp_ns, scale * chosen.require('position'))
+
 
 POSE_TOPIC = 'tracker/measured_cp'
 
@@ -36,7 +140,6 @@ READ_DELAYS = (0.0, TICK)
 """Seconds from a stamp to its reading that a rig at 1 kHz may have."""
 
 Stamps = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

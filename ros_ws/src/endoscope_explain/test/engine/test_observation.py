@@ -6,9 +6,8 @@ import pytest
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_explain.fit.simulated_joint import packed_joint, residuals, simulate_joint
 from endoscope_explain.observe.held_noise import with_held_noise
-from endoscope_explain.observe.observation import observe
+from endoscope_explain.observe.observation import fast_scatter, observe
 from endoscope_explain.observe.predicted_signals import reading_lead, simulate_rig
-from endoscope_explain.observe.unresolved import fast_scatter
 
 
 @pytest.fixture(scope='module')
