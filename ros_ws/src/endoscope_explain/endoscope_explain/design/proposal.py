@@ -175,10 +175,12 @@ def rival_plant(
     observation = next(o for o in observe(recording, bare) if o.joint == effect.joint)
     behind = background(refit(bare, observation, 0.2, 2))
     terms = tuple(Candidate(describe(rival), start) for start in starting_points(describe(rival)))
-    ranked = promises(behind, directions(behind, terms, 1))
-    if not ranked:
+    ways = directions(behind, terms, 1)
+    if not ways:
         return None
-    packed = ranked[0].candidate.added_to(behind.fit.model).base
+    # Beside numbers that are bent by what was taken out, a rival may promise nothing at its starts.
+    ranked = [promised.candidate for promised in promises(behind, ways)] or [ways[0].candidate]
+    packed = ranked[0].added_to(behind.fit.model).base
     candidate = replace(bare, effects=(*others, spec_of(describe(rival), effect.joint, packed)))
     return with_fit(candidate, effect.joint, refit(candidate, observation, 0.2, 6))
 
