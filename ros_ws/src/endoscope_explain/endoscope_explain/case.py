@@ -15,90 +15,55 @@ Ladder = Mapping[str, Mapping[str, ChannelFit]]
 
 @dataclass(frozen=True)
 class Place:
-    """Where a mismatch shows.
-
-    Attributes
-    ----------
-    stage, joint : str
-    signals : tuple of str
-        Largest share of the excess misfit first.
-    intervals : tuple of (float, float)
-        In s from the first stamp.
-    regime : str
-        In words, from measured conditions.
-    band_hz : (float, float)
-        Frequencies that hold most of it.
-    shares : mapping of str to float
-        Share of the excess misfit of each of the signals.
-    onset_s : float or None
-        When it began, where it did not act from the start.
-    """
+    """Where a mismatch shows."""
 
     stage: str
     joint: str
-    signals: tuple[str, ...]
-    intervals: tuple[tuple[float, float], ...]
-    regime: str
-    band_hz: tuple[float, float]
+    signals: tuple[str, ...]  # largest share of the excess misfit first
+    intervals: tuple[tuple[float, float], ...]  # in s from the first stamp
+    regime: str  # in words, from measured conditions
+    band_hz: tuple[float, float]  # frequencies that hold most of it
+    # Share of the excess misfit of each of the signals.
     shares: Mapping[str, float] = field(default_factory=dict)
-    onset_s: float | None = None
+    onset_s: float | None = None  # when it began, where it did not act from the start
 
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """The motion that would tell rivals apart.
-
-    `separates`: ids.
-    `waveform`: name of the family's member.
-    `joint`: the joint that moves.
-    `distances`: smallest predicted distance between rivals for each motion tried, in noise units
-        rms.
-    `time`, `command`: the chosen motion: s, and rad for each joint, as rows.
-    `joints`: columns of `command`.
-    """
+    """The motion that would tell rivals apart."""
 
     why: str
-    separates: tuple[str, ...]
-    waveform: str
-    joint: str
+    separates: tuple[str, ...]  # ids
+    waveform: str  # name of the family's member
+    joint: str  # that moves
+    # Smallest predicted distance between rivals for each motion tried, in noise units rms.
     distances: Mapping[str, float]
-    time: tuple[float, ...]
-    command: tuple[tuple[float, ...], ...]
-    joints: tuple[str, ...]
+    time: tuple[float, ...]  # s
+    command: tuple[tuple[float, ...], ...]  # rad for each joint, as rows
+    joints: tuple[str, ...]  # columns of `command`
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """What a report was made from, so that anybody can make it again.
+    """What a report was made from, so that anybody can make it again."""
 
-    `bag`, `plant`: files; the plant's is empty where it came from no file.
-    `bag_sha256`, `plant_sha256`: of their bytes; of all messages' files of a bag in the order of
-        their names.
-    `version`: of the program.
-    `command`: as it was typed; empty where no command line made it.
-    `date`: ISO 8601.
-    """
-
-    bag: str
+    bag: str  # file
+    # Of its bytes; of all messages' files of a bag in the order of their names.
     bag_sha256: str
-    plant: str
+    plant: str  # file; empty where it came from none
     plant_sha256: str
-    version: str
-    command: str
-    date: str
+    version: str  # of the program
+    command: str  # as it was typed; empty where no command line made it
+    date: str  # ISO 8601
 
 
 @dataclass(frozen=True)
 class ChainCut:
-    """Misfit of wires and tip of one joint, in noise units (rms).
-
-    `by_command`: driven by the command, through the simulated servo.
-    `by_motor`: driven by the measured shaft.
-    """
+    """Misfit of wires and tip of one joint, in noise units (rms)."""
 
     joint: str
-    by_command: float
-    by_motor: float
+    by_command: float  # driven by the command, through the simulated servo
+    by_motor: float  # driven by the measured shaft
 
     @property
     def before_the_motor(self) -> bool:
@@ -108,33 +73,24 @@ class ChainCut:
 
 @dataclass(frozen=True)
 class ExplainedCase:
-    """All that is known about one recording.
+    """All that is known about one recording."""
 
-    `recording`: as audited.
-    `explanation`: the engine's own words.
-    `verdict`: of engine and audit together.
-    `effects`: of engine and audit together, most certain first.
-    `plant`: the improved plant: the engine's augmented one with what the audit found in it.
-    `ladder`: on held-out blocks of the recording.
-    `validation`: on the second recording; empty if none was given.
-    `validation_name`, `baseline_name`: empty if none was given.
-    `cuts`: whether the refitted plant does better when the measured motor drives it.
-    `band`: relative tolerance of the plant's parameters.
-    """
-
-    recording: Recording
+    recording: Recording  # as audited
     audit: AuditReport
-    explanation: Explanation
-    verdict: Verdict
-    effects: tuple[NamedEffect, ...]
+    explanation: Explanation  # the engine's own words
+    verdict: Verdict  # of engine and audit together
+    effects: tuple[NamedEffect, ...]  # of engine and audit together, most certain first
     places: tuple[Place, ...]
+    # The improved plant: the engine's augmented one with what the audit found in it.
     plant: PlantDescription
-    ladder: Ladder
+    ladder: Ladder  # on held-out blocks of the recording
+    # on the second recording; empty if none was given
     validation: Ladder = field(default_factory=dict)
-    validation_name: str = ''
-    baseline_name: str = ''
+    validation_name: str = ''  # empty if none was given
+    baseline_name: str = ''  # empty if none was given
     next_experiment: NextExperiment | None = None
+    # Whether the refitted plant does better when the measured motor drives it.
     cuts: tuple[ChainCut, ...] = ()
-    band: float = BAND
+    band: float = BAND  # relative tolerance of the plant's parameters
     provenance: Provenance | None = None
     runtime_s: float = 0.0

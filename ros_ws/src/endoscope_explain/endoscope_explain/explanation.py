@@ -34,11 +34,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted number with its 90 % interval.
-
-    `value`, `low`, `high`: in `unit`; `low <= value <= high`.
-    `unit`: SI unit.
-    """
+    """A fitted number with its 90 % interval, `low <= value <= high`, in an SI unit."""
 
     value: float
     low: float
@@ -48,31 +44,21 @@ class Estimate:
 
 @dataclass(frozen=True)
 class NominalEstimate(Estimate):
-    """A refitted parameter of the nominal plant.
+    """A refitted parameter of the nominal plant."""
 
-    `nominal`: value in the plant file.
-    `in_band`: whether the value is within the tolerance by which rigs differ from their
-        description.
-    """
-
-    nominal: float
-    in_band: bool
+    nominal: float  # value in the plant file
+    in_band: bool  # within the tolerance by which rigs differ from their description
 
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """One effect that was left out of the simulation.
+    """One effect that was left out of the simulation."""
 
-    `id`, `joint`: catalogue id and joint name.
-    `parameters`: fitted parameters by name.
-    `alternatives`: ids that the data cannot tell from this one, nearest first.
-    `evidence`: each key has its meaning in `report.sentences.EVIDENCE`.
-    """
-
-    id: str
+    id: str  # in the catalogue
     joint: str
-    parameters: Mapping[str, Estimate]
-    alternatives: tuple[str, ...] = ()
+    parameters: Mapping[str, Estimate]  # by name
+    alternatives: tuple[str, ...] = ()  # ids that the data cannot tell from this one, nearest first
+    # each key has its meaning in `report.sentences.EVIDENCE`
     evidence: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -88,15 +74,10 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class ChannelFit:
-    """How well one signal is predicted on samples that were not used for fitting.
+    """How well one signal is predicted on samples that were not used for fitting."""
 
-    `rmse`: in the signal's unit.
-    `noise`: noise of the signal, in the same unit.
-    `ratio`: `rmse / noise`; 1 where nothing is left but noise.
-    """
-
-    rmse: float
-    noise: float
+    rmse: float  # in the signal's unit
+    noise: float  # of the signal, in the same unit
 
     @staticmethod
     def of(left: Array, noise: Array) -> 'ChannelFit':
@@ -105,78 +86,54 @@ class ChannelFit:
 
     @property
     def ratio(self) -> float:
-        """Misfit in units of the noise."""
+        """Misfit in units of the noise; 1 where nothing is left but noise."""
         return self.rmse / self.noise
 
 
 @dataclass(frozen=True)
 class Fitting:
-    """How the fit of a joint ended.
+    """How the fit of a joint ended."""
 
-    `converged`: whether further steps would gain nothing.
-    `reason`: why it went no further, in words.
-    `steps`: of the last fit.
-    `at_bounds`: numbers that lie at an end of what is allowed.
-    """
-
-    converged: bool
-    reason: str
-    steps: int
-    at_bounds: tuple[str, ...]
+    converged: bool  # further steps would gain nothing
+    reason: str  # why it went no further, in words
+    steps: int  # of the last fit
+    at_bounds: tuple[str, ...]  # numbers that lie at an end of what is allowed
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One composition of effects that was tried.
-
-    `effects`: and places of functions.
-    `score`: logarithm of the evidence that it lacks against no effect, in nats; smaller is better.
-    `misfit`: mean squared residual in noise units over all channels; 1 is noise alone.
-    `beyond_band`: whether nominal numbers were let leave their band.
-    """
+    """One composition of effects that was tried."""
 
     joint: str
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  # and places of functions
+    # Logarithm of the evidence that it lacks against no effect, in nats; smaller is better.
     score: float
+    # Mean squared residual in noise units over all channels; 1 is noise alone.
     misfit: float
-    beyond_band: bool = False
+    beyond_band: bool = False  # nominal numbers were let leave their band
 
 
 @dataclass(frozen=True)
 class UnknownTerm:
-    """A function of one state that the catalogue does not have, fitted in the simulator.
+    """A function of one state that the catalogue does not have, fitted in the simulator."""
 
-    `joint`: where it acts.
-    `place`: name in the table of places.
-    `nodes`, `values`, `deviation` (N,): the state, the function and its standard deviation.
-    `expression`: the formula that comes nearest.
-    `formula` (N,): its values.
-    `formula_share`: share of what the function does that the formula does.
-    `formula_is_as_good`: whether the recording does not tell it from the function.
-    `explained`: share of the excess misfit that the function removes.
-    `rivals`: other names that the recording does not tell from it, nearest first.
-    `siblings`: nearest effects of the catalogue, nearest first.
-    `multiplies`: whether others at the same point of the chain are multiplied by one plus this
-        function.
-    `lag_s`: time constant of an argument that lags.
-    `factors`: functions of another state that multiply this one: both together are one of two
-        states.
-    """
-
-    joint: str
-    place: str
-    nodes: Array
-    values: Array
-    deviation: Array
-    expression: str
-    formula: Array
-    formula_share: float
-    formula_is_as_good: bool
-    explained: float = 1.0
+    joint: str  # where it acts
+    place: str  # name in the table of places
+    nodes: Array  # (N,), the state
+    values: Array  # (N,), the function
+    deviation: Array  # (N,), its standard deviation
+    expression: str  # the formula that comes nearest
+    formula: Array  # (N,), its values
+    formula_share: float  # share of what the function does that the formula does
+    formula_is_as_good: bool  # the recording does not tell it from the function
+    explained: float = 1.0  # share of the excess misfit that the function removes
+    # other names that the recording does not tell from it, nearest first
     rivals: tuple[str, ...] = ()
-    siblings: tuple[str, ...] = ()
+    siblings: tuple[str, ...] = ()  # nearest effects of the catalogue, nearest first
+    # Others at the same point of the chain are multiplied by one plus this function.
     multiplies: bool = False
-    lag_s: float | None = None
+    lag_s: float | None = None  # time constant of an argument that lags
+    # Functions of another state that multiply this one: both together are one of two states.
     factors: tuple['UnknownTerm', ...] = ()
 
     @property
@@ -202,33 +159,24 @@ class UnknownTerm:
 
 @dataclass(frozen=True)
 class Explanation:
-    """Everything the engine says about one recording.
+    """Everything the engine says about one recording."""
 
-    `verdict`: without the audit's findings: a caller that found a fault of the recording overrides
-        it.
-    `effects`: what was left out, most certain first; empty if nothing was.
-    `parameters`: nominal parameters of the final fit.
-    `nominal`, `refitted`, `augmented`: the plant as given, with its parameters refitted, and with
-        the named effects.
-    `fit`: signals are written `wires/measured_js:wire_x_pos`.
-    `candidates`: compositions that were refitted, best first.
-    `unknown`: the missing term for `unknown_physics`.
-    `adequate`: whether the augmented plant leaves nothing but noise and small errors of form.
-    `beyond_form`: what it leaves over what rigs of another form leave, of the worst joint.
-    `fitting`: how the final fits ended.
-    """
-
+    # Without the audit's findings: a caller that found a fault of the recording overrides it.
     verdict: Verdict
-    effects: tuple[NamedEffect, ...]
+    effects: tuple[NamedEffect, ...]  # what was left out, most certain first; empty if nothing was
+    # Nominal parameters of the final fit, by joint and parameter.
     parameters: Mapping[str, Mapping[str, NominalEstimate]]
-    nominal: PlantDescription
-    refitted: PlantDescription
-    augmented: PlantDescription
+    nominal: PlantDescription  # as given
+    refitted: PlantDescription  # with its parameters refitted
+    augmented: PlantDescription  # with the named effects
+    # By 'nominal', 'refitted', 'augmented' and signal, written `wires/measured_js:wire_x_pos`.
     fit: Mapping[str, Mapping[str, ChannelFit]]
-    candidates: tuple[Candidate, ...] = ()
-    unknown: UnknownTerm | None = None
-    adequate: bool = True
+    candidates: tuple[Candidate, ...] = ()  # compositions that were refitted, best first
+    unknown: UnknownTerm | None = None  # the missing term for `unknown_physics`
+    adequate: bool = True  # the augmented plant leaves nothing but noise and small errors of form
+    # What it leaves over what rigs of another form leave, of the worst joint.
     beyond_form: float = math.nan
+    # how the final fits ended, by joint
     fitting: Mapping[str, Fitting] = field(default_factory=dict)
 
     @staticmethod

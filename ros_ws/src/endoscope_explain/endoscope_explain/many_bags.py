@@ -46,13 +46,10 @@ class TogetherError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class Reported:
-    """A finished report.
+    """A finished report."""
 
-    `files`: by name.
-    `told`: what a person reads in the terminal; its first line is the verdict's sentence.
-    """
-
-    files: Mapping[str, bytes]
+    files: Mapping[str, bytes]  # by name
+    # What a person reads in the terminal; its first line is the verdict's sentence.
     told: str
 
     @property
@@ -88,8 +85,7 @@ def explained_cases(
 ) -> list[ExplainedCase]:
     """Explain bags side by side, of one rig where they have the `same_physics`.
 
-    Raises EndoscopeError: if a recording cannot be used, or what was asked for does not go
-        together.
+    EndoscopeError if a recording cannot be used, or what was asked for does not go together.
     """
     sources = _prepared(sources, jobs, same_physics, progress)
     if len(sources) == 1:
@@ -103,10 +99,7 @@ def explained_cases(
 
 
 def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = None) -> Reported:
-    """Explain one bag.
-
-    Raises BagError: if a recording cannot be used.
-    """
+    """Explain one bag; BagError if a recording cannot be used."""
     case = explained_case(sources, jobs, progress)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
@@ -125,18 +118,12 @@ def explain_bags(
     say: Say = print,
     progress: Progress | None = None,
 ) -> dict[str, Reported]:
-    """Explain bags and write their reports, all or none.
+    """Explain bags and write their reports by the bag's name, all or none.
 
-    `out`: new or empty folder: one report's own, or that of one folder for each bag.
-    `jobs`: processes on this machine.
-    `dask_address`: scheduler of a cluster whose workers see the bags under the same paths.
-    `same_physics`: whether all bags show one rig, so that one choice of effects has to explain all
-        of them.
-    `say`: told what was found.
-    `progress`: told in a few words what is being done.
-    Returns: by the bag's name, which is that of its folder where there are several.
-    Raises EndoscopeError: if a recording, the folder or the cluster cannot be used; nothing is
-        written then.
+    `out` is new or empty: one report's own folder, or that of one folder for each bag. Jobs are
+    processes on this machine; a dask scheduler's workers see the bags under the same paths. With
+    `same_physics` all bags show one rig, and one choice of effects has to explain all of them.
+    Nothing is written where a recording, the folder or the cluster cannot be used (EndoscopeError).
     """
     require_free_directory(out)
     if same_physics or dask_address is None:

@@ -12,14 +12,9 @@ _LOOK_S = 1.0
 def parallel_map[Task, Result](
     function: Callable[[Task], Result], tasks: Sequence[Task], jobs: int
 ) -> list[Result]:
-    """Results of `function` on every task, in order.
-
-    Threads are enough, as the compiled physics and linear algebra, where the time goes, let others
-    run meanwhile; and closures over large recordings need not travel to other processes.
-
-    Raises BaseException: what `function` raised first, in the order of the tasks; tasks that were
-        not begun are given up then.
-    """
+    """Results of `function` on every task, in order, by threads; raises what the first raised."""
+    # Threads are enough, as the compiled physics and linear algebra, where the time goes, let
+    # others run meanwhile; and closures over large recordings need not travel to other processes.
     if jobs <= 1 or len(tasks) <= 1:
         return [function(task) for task in tasks]
     waiting = deque((Future[Result](), task) for task in tasks)
@@ -30,6 +25,7 @@ def parallel_map[Task, Result](
     try:
         return [_awaited(future) for future in futures]
     finally:
+        # Tasks that were not begun are given up where one has raised.
         waiting.clear()
 
 

@@ -85,10 +85,7 @@ def write_rows(file: Path | None, rows: Sequence[Any]) -> None:
 
 
 def seeds(text: str) -> range:
-    """Read a range of seeds, `A-B` with both ends, or one.
-
-    Raises argparse.ArgumentTypeError: if it is none.
-    """
+    """Read a range of seeds, `A-B` with both ends, or one; ArgumentTypeError if it is none."""
     found = re.fullmatch(r'(\d+)(?:-(\d+))?', text)
     if not found or int(found[2] or found[1]) < int(found[1]):
         raise argparse.ArgumentTypeError(f'{text!r} are no seeds: give 1-20, or 7')

@@ -34,28 +34,18 @@ _PLAYING = {'source': 'motion', 'motion': 'periodic'}
 
 @dataclass(frozen=True)
 class ComposedFigure:
-    """All nodes in one process, in real time.
+    """All nodes in one process, in real time."""
 
-    `seconds`: length of the measurement.
-    `ticks`: share of the 1 kHz ticks that took place.
-    `latency_p50_ms`, `latency_p99_ms`: from the instant at which the console's tick was due to the
-        motor driver's obeying it.
-    `cores`: CPU time of the process per second.
-    `recorded`, `lost`: messages in the bag, and messages that publishers sent and the recorder did
-        not get.
-    `state`: operating state at the end, with the cause of a fault.
-    `load`: load average of the machine at the end.
-    """
-
-    seconds: float
-    ticks: float
+    seconds: float  # length of the measurement
+    ticks: float  # share of the 1 kHz ticks that took place
+    # From the instant at which the console's tick was due to the motor driver's obeying it.
     latency_p50_ms: float
     latency_p99_ms: float
-    cores: float
-    recorded: int
-    lost: int
-    state: str
-    load: float
+    cores: float  # CPU time of the process per second
+    recorded: int  # messages in the bag
+    lost: int  # messages that publishers sent and the recorder did not get
+    state: str  # operating state at the end, with the cause of a fault
+    load: float  # load average of the machine at the end
 
     @property
     def reached(self) -> bool:
@@ -78,10 +68,7 @@ class ComposedFigure:
 
 
 def run_graph_bench(seconds: float) -> ComposedFigure:
-    """Measure all nodes, recorder included, composed in this process in real time.
-
-    `seconds`: length of the measurement, after some seconds of settling.
-    """
+    """Measure all nodes, recorder included, composed here in real time, once they have settled."""
     with tempfile.TemporaryDirectory() as folder:
         bag = str(Path(folder) / 'bag')
         graph = _Composition(ALL_NODES, {'recorder': {'bag': bag}, 'console': _PLAYING})

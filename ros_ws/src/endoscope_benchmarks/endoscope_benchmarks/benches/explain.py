@@ -14,16 +14,12 @@ TRUTH = '.truth.json'
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was said of one case, beside its truth.
+    """What was said of one case, beside its truth."""
 
-    `right`: all that was concealed is named, or listed as an alternative where the motion tells no
-        more.
-    `exact`: and nothing else is named.
-    `numbers`: each number that could be measured another way: true value, estimate and interval.
-    """
-
+    # All that was concealed is named, or listed as an alternative where the motion tells no more.
     right: bool
-    exact: bool
+    exact: bool  # and nothing else is named
+    # Each number that could be measured another way: true value, estimate and interval.
     numbers: tuple[str, ...]
 
 
@@ -80,12 +76,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def judged(report: Mapping[str, Any], truth: Mapping[str, Any]) -> Outcome:
-    """Compare a report with the truth of its case.
+    """Compare the content of a report.json with the truth of its case.
 
-    `report`: content of report.json.
-    `truth`: `effects`: ids; `also_true`: ids that may be named as well; `verdict`: one that is
-        asked for, or None; `excitation`: `calibration` where the motion is too poor to tell rivals
-        apart; `comparable`: true values by effect and parameter.
+    The truth has `effects`: ids; `also_true`: ids that may be named as well; `verdict`: one that is
+    asked for, or None; `excitation`: `calibration` where the motion is too poor to tell rivals
+    apart; `comparable`: true values by effect and parameter.
     """
     concealed, allowed = set(truth['effects']), set(truth.get('also_true', ()))
     named = [name for name in _named(report) if name not in allowed]

@@ -20,25 +20,17 @@ _PATIENCE_S = 120.0
 
 @dataclass(frozen=True)
 class ProcessesFigure:
-    """Each node a process of its own.
+    """Each node a process of its own."""
 
-    `rate`: beats per second that were asked for.
-    `ticks`: share of them that the motor driver made.
-    `commands`: commands that it obeyed, as a share of those beats.
-    `cores`: CPU time of all processes per second.
-    `load`: load average of the machine at the end.
-    `state`: operating state at the end.
-    `hops`: what became of the commands from node to node: how many the console sent, how many of
-        them the compensator and the motor driver obeyed, and why the others were refused. What is
-        missing beyond the refusals was replaced by newer ones before it was read.
-    """
-
-    rate: int
-    ticks: float
-    commands: float
-    cores: float
-    load: float
-    state: str
+    rate: int  # beats per second that were asked for
+    ticks: float  # share of them that the motor driver made
+    commands: float  # that it obeyed, as a share of those beats
+    cores: float  # CPU time of all processes per second
+    load: float  # load average of the machine at the end
+    state: str  # operating state at the end
+    # What became of the commands from node to node: how many the console sent, how many of them the
+    # compensator and the motor driver obeyed, and why the others were refused. What is missing
+    # beyond the refusals was replaced by newer ones before it was read.
     hops: str
 
     @property
@@ -56,11 +48,9 @@ class ProcessesFigure:
 
 
 def run_processes_bench(rate: int, seconds: float) -> ProcessesFigure:
-    """Measure the graph with each node in a process of its own.
+    """Measure the graph with a process for each node, at beats per second that divide 1000.
 
-    `rate`: beats per second; a divisor of 1000.
-    `seconds`: length of the measurement.
-    Raises RuntimeError: a node does not start, or the slave cannot be enabled.
+    RuntimeError if a node does not start, or the slave cannot be enabled.
     """
     domain = 100 + (os.getpid() + rate) % 130
     with (

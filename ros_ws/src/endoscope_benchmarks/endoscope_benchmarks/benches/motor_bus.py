@@ -11,21 +11,14 @@ _STEP_S = 1e-3
 
 @dataclass(frozen=True)
 class MotorBusFigure:
-    """What one run measured.
+    """What one run measured."""
 
-    `baud`: bits per second.
-    `cycle_bytes`: bytes of a cycle.
-    `limit`, `rate`: cycles per second that the line carries, and that were run.
-    `readings`: new readings per second; a servo's clock tells milliseconds apart, no less.
-    `failed`: cycles without a valid reading.
-    """
-
-    baud: int
-    cycle_bytes: int
-    limit: float
-    rate: float
-    readings: float
-    failed: int
+    baud: int  # bits per second
+    cycle_bytes: int  # bytes of a cycle
+    limit: float  # cycles per second that the line carries
+    rate: float  # cycles per second that were run
+    readings: float  # new ones per second; a servo's clock tells milliseconds apart, no less
+    failed: int  # cycles without a valid reading
 
     def __str__(self) -> str:
         return (
@@ -71,12 +64,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def run_motor_bus_bench(baud: int, seconds: float, fast: bool = False) -> MotorBusFigure:
-    """Run two servos as fast as the bus goes.
+    """Run two servos as fast as the bus goes, by fast sync read if asked to.
 
-    `baud`: bits per second.
-    `seconds`: length of the run.
-    `fast`: whether to use fast sync read.
-    Raises RuntimeError: the servos cannot be enabled.
+    RuntimeError if the servos cannot be enabled.
     """
     from endoscope_devices.dynamixel.bus_thread import BusThread
     from endoscope_devices.dynamixel.emulator.process import EmulatorProcess

@@ -24,7 +24,7 @@ _BEGIN = 3.0
 def tracking_plot(seed: int) -> str:
     """An SVG element: three loops of 60 sin t, the motion and the errors around its reversals.
 
-    `seed`: chooses rig, tube and noise; the backlash is the 94 deg of the paper's descending colon.
+    The backlash is the 94 deg of the paper's descending colon; rig, tube and noise are the seed's.
     """
     tube = never_seen_tube(seed, 0, _SIZE_DEG)
     findings = calibrate(tube, load_classifier())

@@ -22,17 +22,13 @@ _MATCHING_TIMEOUT_S = 20.0
 
 @dataclass(frozen=True)
 class RecorderFigure:
-    """What one run measured.
+    """What one run measured."""
 
-    `asked_rate`, `sent_rate`: messages per second that were asked for, and that the sender managed.
-    `sent`, `recorded`: messages sent, and found in the bag.
-    `cpu_share`: CPU time of the recorder's process per second, in cores, while messages came.
-    """
-
-    asked_rate: int
-    sent_rate: float
-    sent: int
-    recorded: int
+    asked_rate: int  # messages per second that were asked for
+    sent_rate: float  # messages per second that the sender managed
+    sent: int  # messages sent
+    recorded: int  # messages found in the bag
+    # CPU time of the recorder's process per second, in cores, while messages came.
     cpu_share: float
 
     @property
@@ -84,11 +80,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def run_recorder_bench(rate: int, seconds: float) -> RecorderFigure:
-    """Send `rate` messages per second for `seconds` to a recorder process and measure it.
+    """Send `rate` messages per second in all for `seconds` to a recorder process and measure it.
 
-    `rate`: messages per second over all topics.
-    `seconds`: length of the run.
-    Raises RuntimeError: the recorder did not find the topics, or failed.
+    RuntimeError if the recorder did not find the topics, or failed.
     """
     from endoscope_bags import open_bag
 

@@ -10,53 +10,37 @@ from endoscope_explain.recording import Recording
 
 @dataclass(frozen=True)
 class Law:
-    """A concealed law, and what may be said of it.
+    """A concealed law, and what may be said of it."""
 
-    `name`: effect, or place of the law.
-    `joint`: on which it acts; empty where it acts on all.
-    `stage`: of the chain.
-    `ids`: effects that are a right name.
-    `places`: places that are right.
-    `is_unknown`: whether the right name is that it is unknown, wherever it is said to be.
-    """
-
-    name: str
-    joint: str
-    stage: str
-    ids: frozenset[str]
-    places: frozenset[str]
-    is_unknown: bool = False
+    name: str  # effect, or place of the law
+    joint: str  # on which it acts; empty where it acts on all
+    stage: str  # of the chain
+    ids: frozenset[str]  # effects that are a right name
+    places: frozenset[str]  # places that are right
+    is_unknown: bool = False  # the right name is that it is unknown, wherever it is said to be
 
 
 @dataclass(frozen=True)
 class Case:
-    """A rig as it was described and as it is, and its recordings.
-
-    `described`, `bare`, `true`: the rig as its engineer describes it, as it is without the laws,
-        and with them.
-    `laws`: concealed; empty where nothing is.
-    `recording`, `second`: to explain, and of another motion to judge on.
-    `baseline`: the rig before anything was concealed.
-    `left_out`: effects whose formulas are not tried.
-    `also`: effects and places that are no false names: the form of the rig itself.
-    `moved`: what the laws change, over the signal, each alone, of the channel that shows it most:
-        the least of them.
-    `note`: what else is particular.
-    """
+    """A rig as it was described and as it is, and its recordings."""
 
     stratum: str
     seed: int
+    # The rig as its engineer describes it, as it is without the laws, and with them.
     described: PlantDescription
     bare: PlantDescription
     true: PlantDescription
-    laws: tuple[Law, ...]
-    recording: Recording
-    second: Recording
-    baseline: Recording | None = None
-    left_out: tuple[str, ...] = ()
+    laws: tuple[Law, ...]  # concealed; empty where nothing is
+    recording: Recording  # to explain
+    second: Recording  # of another motion, to judge on
+    baseline: Recording | None = None  # the rig before anything was concealed
+    left_out: tuple[str, ...] = ()  # effects whose formulas are not tried
+    # Effects and places that are no false names: the form of the rig itself.
     also: frozenset[str] = frozenset()
+    # What the laws change, over the signal, each alone, of the channel that shows it most: the
+    # least of them.
     moved: float = 0.0
-    note: str = ''
+    note: str = ''  # what else is particular
 
 
 def law_of_effect(effect_id: str, joint: str) -> Law:

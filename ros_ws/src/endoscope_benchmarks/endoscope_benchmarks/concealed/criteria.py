@@ -33,20 +33,13 @@ class Criteria:
 
 @dataclass(frozen=True)
 class Bank:
-    """What the cases say, with NaN left out.
+    """What the cases say, with NaN left out."""
 
-    `truth` (n,): share of the best gain that the truth has.
-    `sizes`: shares of all names of the same cases.
-    `beyond`, `exact` (k,): what is left over what another form leaves, and whether all was said
-        rightly.
-    `errors` (l,): of numbers, over what their intervals would allow with a `REACH` of one.
-    """
-
-    truth: Array
-    sizes: list[Array]
-    beyond: Array
-    exact: NDArray[np.bool_]
-    errors: Array
+    truth: Array  # (n,), share of the best gain that the truth has
+    sizes: list[Array]  # shares of all names of the same cases
+    beyond: Array  # (k,), what is left over what another form leaves
+    exact: NDArray[np.bool_]  # (k,), whether all was said rightly
+    errors: Array  # (l,), of numbers, over what their intervals would allow with a `REACH` of one
 
 
 def bank_of(rows: Sequence[Row]) -> Bank:
@@ -64,10 +57,7 @@ def bank_of(rows: Sequence[Row]) -> Bank:
 
 
 def derived(bank: Bank) -> Criteria:
-    """Criteria from a bank of cases.
-
-    Raises ValueError: if it has too few cases for the quantiles.
-    """
+    """Criteria from a bank of cases; ValueError if it has too few for the quantiles."""
     return Criteria(
         1.0 - conformal(1.0 - bank.truth, HOLDS),
         conformal(bank.beyond[bank.exact], ADEQUATE),
@@ -76,10 +66,7 @@ def derived(bank: Bank) -> Criteria:
 
 
 def conformal(scores: Array, chance: float) -> float:
-    """Limit that the next score does not exceed with a chance.
-
-    Raises ValueError: if there are too few scores to say so.
-    """
+    """Limit that the next score does not exceed with a chance; ValueError if scores are too few."""
     rank = math.ceil((len(scores) + 1) * chance)
     if rank > len(scores):
         raise ValueError(f'{len(scores)} scores are too few for a chance of {chance}: give more')

@@ -85,13 +85,11 @@ def drawn_form(
     joint: str,
     visited: tuple[float, float],
 ) -> tuple[Form, float]:
-    """Draw a law at a place that is no line over the visited range.
+    """Draw a law at a place that is no line over the visited range of the place's argument.
 
-    `visited`: range of the place's argument; of one that repeats, the range in which the period is
-        drawn.
-    Returns `form`: the law by its strength: the rms over the range in the unit of the place.
-    Returns `largest`: strength at which it would leave what the place takes.
-    Raises RuntimeError: if no tree of a thousand will do.
+    Of an argument that repeats, the period is drawn within that range. Gives the law by its
+    strength, which is its rms over the range in the unit of the place, and the strength at which it
+    would leave what the place takes. RuntimeError if no tree of a thousand will do.
     """
     place = FUNCTIONS[place_id]
     for _ in range(_TRIES):
@@ -179,10 +177,7 @@ def _share_of_a_line(grid: Array, values: Array) -> float:
 def visited(
     plant: PlantDescription, command: Array, joint: str
 ) -> dict[Argument, tuple[float, float]]:
-    """Range of the argument of every place; of one that repeats, that of its period.
-
-    `command` (N, J): motor shaft command in rad, every ms.
-    """
+    """Range of every place's argument, or of its period, under a command (N, J) in rad, each ms."""
     names = plant.joint_names()
     distance = TermSpec(joint, 'exponent_of_distance', '0*d')
     if all((term.joint, term.place) != (joint, distance.place) for term in plant.terms):

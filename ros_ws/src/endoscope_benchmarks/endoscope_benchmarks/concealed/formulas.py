@@ -33,14 +33,10 @@ _WITHIN = (0.25, 0.7)
 def drawn_formula(
     generator: np.random.Generator, effect_id: str, joint: str, duration: float
 ) -> Formula:
-    """Draw everything about an effect but its strength.
-
-    What makes the effect vanish is its strength: some of the parameters that do so are drawn, and
-    grow together. An effect that is a limit comes the nearer the stronger it is.
-
-    `duration`: of the recording in s.
-    """
+    """Draw everything about an effect but its strength, for a recording of a duration in s."""
     effect = CATALOGUE[effect_id]
+    # What makes the effect vanish is its strength: some of the parameters that do so are drawn, and
+    # grow together. An effect that is a limit comes the nearer the stronger it is.
     sizes = [p for p in effect.parameters if math.isfinite(p.off) and p.off < p.high]
     limits = [] if sizes else [p for p in effect.parameters if p.off == p.high]
     chosen = [p for p in sizes if generator.random() < 0.5] or sizes[:1]

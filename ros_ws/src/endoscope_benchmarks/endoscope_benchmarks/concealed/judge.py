@@ -12,16 +12,12 @@ from endoscope_explain.explanation import Explanation, Verdict
 
 @dataclass(frozen=True)
 class Statement:
-    """One thing that is said to be missing.
+    """One thing that is said to be missing."""
 
-    `name`: effect, or place of an unknown term.
-    `rivals`: names that may stand for it as well.
-    """
-
-    name: str
+    name: str  # effect, or place of an unknown term
     joint: str
     stage: str
-    rivals: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()  # names that may stand for it as well
 
     @property
     def places(self) -> frozenset[str]:
@@ -33,33 +29,24 @@ class Statement:
 
 @dataclass(frozen=True)
 class Judgement:
-    """How far what is said is right.
+    """How far what is said is right."""
 
-    `first`: as many statements as there are laws, the first ones, name all of them; where nothing
-        is concealed, nothing is said.
-    `place`, `stage`: they point at the right places, and parts of the chain.
-    `exact`: all is named first, and nothing else is said.
-    `false`: names that are of no law.
-    `in_set`: each law is among the first statements or their rivals.
-    `set_size`: names of a statement with its rivals, mean of the first ones.
-    """
-
+    # As many statements as there are laws, the first ones, name all of them; where nothing is
+    # concealed, nothing is said.
     first: bool
-    place: bool
-    stage: bool
-    exact: bool
-    false: int
-    in_set: bool
-    set_size: float
+    place: bool  # they point at the right places
+    stage: bool  # and at the right parts of the chain
+    exact: bool  # all is named first, and nothing else is said
+    false: int  # names that are of no law
+    in_set: bool  # each law is among the first statements or their rivals
+    set_size: float  # names of a statement with its rivals, mean of the first ones
 
 
 def statements(said: Explanation) -> tuple[Statement, ...]:
-    """What an explanation says is missing, in its order; each name once.
-
-    The unknown term is the headline where the verdict says so, else it comes last; the function by
-    which a named effect is modelled says no more than the name.
-    """
+    """What an explanation says is missing, in its order; each name once."""
     found = [Statement(e.id, e.joint, e.stage, e.alternatives) for e in said.effects]
+    # The unknown term is the headline where the verdict says so, else it comes last; the function
+    # by which a named effect is modelled says no more than the name.
     term = said.unknown
     if term is not None and not any(
         e.joint == term.joint and e.id in term.siblings for e in said.effects
@@ -73,10 +60,9 @@ def statements(said: Explanation) -> tuple[Statement, ...]:
 def judged(
     laws: Sequence[Law], said: Sequence[Statement], also: frozenset[str] = frozenset()
 ) -> Judgement:
-    """Compare what is said with what is concealed.
+    """Compare what is concealed with what is said, the most certain first.
 
-    `said`: the most certain first.
-    `also`: effects and places that are neither right nor false.
+    Effects and places in `also` are neither right nor false.
     """
     named = [s for s in said if any(_names(s, law) for law in laws)]
     wrong = [s for s in said if s not in named and s.name not in also and not s.places & also]

@@ -13,24 +13,18 @@ SHARES = (0.1, 0.032, 0.01, 0.0032, 0.001)
 
 @dataclass(frozen=True)
 class Limit:
-    """The weakest strength at which an effect is named.
-
-    `share`: of the signal that it moves most; NaN where it is not named at any.
-    `numbers`: of the effect at that strength, one for each rig.
-    `missed_as`: what was said where it was weaker; empty for nothing.
-    """
+    """The weakest strength at which an effect is named."""
 
     effect: str
-    share: float
-    numbers: tuple[str, ...]
-    missed_as: tuple[str, ...]
+    share: float  # of the signal that it moves most; NaN where it is not named at any
+    numbers: tuple[str, ...]  # of the effect at that strength, one for each rig
+    missed_as: tuple[str, ...]  # what was said where it was weaker; empty for nothing
 
 
 def limit_of(effect: str, seeds: range) -> Limit:
-    """Make an effect weaker until it is not named on each of some rigs.
+    """Make an effect weaker until it is not named on each of some rigs, one a seed.
 
-    `seeds`: of the rigs; the effect, but for its strength, and the rig are the same for the same
-        seed.
+    The effect, but for its strength, and the rig are the same for the same seed.
     """
     found, numbers = float('nan'), tuple[str, ...]()
     for share in SHARES:

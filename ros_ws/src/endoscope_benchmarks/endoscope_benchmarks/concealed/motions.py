@@ -23,13 +23,7 @@ HAND_S = 30.0
 
 
 def commissioning(generator: np.random.Generator, joints: int) -> Array:
-    """Sinusoid, slow triangle, steps with holds, chirp and free moves: about 30 s.
-
-    They come in an order of their own for each joint; joints after the first begin later, so that
-    what appears on them meanwhile is coupling.
-
-    Returns (N, joints): motor shaft command in rad.
-    """
+    """Sinusoid, triangle, steps with holds, chirp and free moves: about 30 s (N, joints) in rad."""
     signals = []
     for k in range(joints):
         a = generator.uniform(*REACH)
@@ -41,6 +35,8 @@ def commissioning(generator: np.random.Generator, joints: int) -> Array:
             chirp(generator.uniform(0.6, 0.9) * a, 6.0, 0.3, generator.uniform(3.0, 5.0)),
             _hand(generator, 6.0, a),
         ]
+        # They come in an order of their own for each joint; joints after the first begin later, so
+        # that what appears on them meanwhile is coupling.
         order = [parts[i] for i in generator.permutation(len(parts))]
         if k:
             order[0] = hold(order[0].duration)

@@ -28,36 +28,28 @@ MEAN_OVER = 10
 
 @dataclass(frozen=True)
 class Noise:
-    """Forms of noise that the description of the sensors does not have.
+    """Forms of noise of load cells and tracker that the description of sensors does not have."""
 
-    `slow`: rms of a slow part (Ornstein-Uhlenbeck) of load cells and tracker, in their white noise.
-    `slow_s`: its correlation time.
-    `freedom`: degrees of freedom of Student's t that load cells and tracker draw from, of the same
-        rms; infinite for a normal distribution.
-    """
-
+    # Rms of a slow part (Ornstein-Uhlenbeck), in their white noise.
     slow: float = 0.0
-    slow_s: float = 2.0
+    slow_s: float = 2.0  # its correlation time
+    # Degrees of freedom of the Student's t that they draw from, of the same rms; normal if
+    # infinite.
     freedom: float = math.inf
 
 
 @dataclass(frozen=True)
 class Readings:
-    """Noise-free readings at their stamps, for J joints.
+    """Noise-free readings at their stamps in s, for J joints."""
 
-    Shapes: `command`, `shaft_position`, `shaft_velocity`, `shaft_effort` (N, J), `tension` (N, J,
-        2), `bending` (M, J).
-    `time`, `tracker_time` (N,): in s.
-    """
-
-    time: Array
-    tracker_time: Array
-    command: Array
+    time: Array  # (N,)
+    tracker_time: Array  # (M,)
+    command: Array  # (N, J), as are shaft_*
     shaft_position: Array
     shaft_velocity: Array
     shaft_effort: Array
-    tension: Array
-    bending: Array
+    tension: Array  # (N, J, 2)
+    bending: Array  # (M, J)
 
     def signals(self) -> dict[str, Array]:
         """What sensors read, by the names of a recording's series."""
@@ -80,14 +72,7 @@ class Readings:
 
 
 def read(plant: PlantDescription, command: Array) -> Readings:
-    """Simulate a rig and read it without noise.
-
-    Parameters
-    ----------
-    plant : PlantDescription
-    command : array (N, J)
-        Motor shaft command in rad, every ms.
-    """
+    """Read a rig without noise under a motor shaft command (N, J) in rad, every ms."""
     answer = simulate(plant, command)
     stamps = answer.time[::TRACKER_TICKS]
     # A clock that runs fast stamps what was read before.
@@ -155,10 +140,8 @@ def misfit(plant: PlantDescription, recording: Recording, sensors: SensorParamet
 
 
 def in_noise(signals: Mapping[str, Array], sensors: SensorParameters) -> list[Array]:
-    """Signals over the noise of the sensors, column by column: means of what is judged as one.
-
-    `signals` (N, J): as `Readings.signals`; shaft velocity is left out.
-    """
+    """`Readings.signals` over the sensors' noise, by column, as means that are judged as one."""
+    # Shaft velocity is left out.
     kinds = (
         ('shaft_position', 0.0, 2.0 * math.pi / sensors.encoder_counts),
         ('shaft_effort', sensors.effort_noise, sensors.effort_resolution),

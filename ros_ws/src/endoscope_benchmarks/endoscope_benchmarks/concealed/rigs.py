@@ -37,10 +37,7 @@ def described_rig(generator: np.random.Generator, joints: int) -> PlantDescripti
 def true_rig(
     generator: np.random.Generator, described: PlantDescription, drilled: bool = False
 ) -> PlantDescription:
-    """A rig of that description: numbers within 10 % of it, and the form of a healthy rig.
-
-    `drilled`: whether the radii are off, too.
-    """
+    """A healthy rig, its numbers within 10 % of the described ones; its radii, too, if drilled."""
     joints = {}
     for name, joint in described.joints.items():
         keys = (*SCALED_NOMINAL, 'pulley_radius', 'joint_radius') if drilled else SCALED_NOMINAL

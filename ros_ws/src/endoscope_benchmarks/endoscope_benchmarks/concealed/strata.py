@@ -187,7 +187,7 @@ def teleoperation(generator: Generator, seed: int) -> Case:
 def as_strong(effect: str, seed: int, share: float) -> Case:
     """One effect that moves a given share of the signal, on the same rig for the same seed.
 
-    Raises RuntimeError: if the effect moves no signal by as much.
+    RuntimeError if it moves no signal by as much.
     """
     generator = np.random.default_rng([len(STRATA), DRAWN.index(effect), seed])
     rig = _rig(generator, _joints_of(effect))
@@ -210,10 +210,9 @@ STRATA: dict[str, Callable[[Generator, int], Case]] = {
 
 
 def drawn_case(stratum: str, seed: int) -> Case:
-    """Draw a case; the same one for the same seed.
+    """Draw a case, the same one for the same seed; KeyError if there is no such stratum.
 
-    Raises KeyError: if there is no such stratum.
-    Raises RuntimeError: if no law of some reaches its share of the signal.
+    RuntimeError if no law of some reaches its share of the signal.
     """
     generator = np.random.default_rng([list(STRATA).index(stratum), seed])
     return replace(STRATA[stratum](generator, seed), stratum=stratum)

@@ -26,11 +26,7 @@ class OutOfReachError(RuntimeError):
 
 
 def moved(bare: Readings, other: Readings) -> float:
-    """Rms of what a law changes, over the rms of the signal about its mean, of the worst channel.
-
-    `bare`: without the law.
-    `other`: with it.
-    """
+    """Rms of what a law changes over that of the signal about its mean, in the worst channel."""
     return max(
         float(np.sqrt(np.mean((b - a) ** 2)) / max(np.std(a), 1e-12))
         for a, b in zip(bare.channels(), other.channels(), strict=True)
@@ -40,14 +36,10 @@ def moved(bare: Readings, other: Readings) -> float:
 def scaled_to(
     aim: float, seen: Callable[[float], Readings], start: float = 1.0
 ) -> tuple[float, float]:
-    """Find the strength at which a law moves what is measured by `aim`.
+    """Find the strength at which a law moves what is measured by `aim`, and the share reached.
 
-    `aim`: share, see `moved`.
-    `seen`: what is read by the law's strength, without the law at zero; raises ValueError where the
-        law cannot be as strong.
-    `start`: strength where to begin.
-    Returns `share`: that is reached.
-    Raises OutOfReachError: if no strength reaches the share.
+    What is `seen` at a strength, at zero without the law, raises ValueError where the law cannot be
+    as strong. OutOfReachError if no strength reaches the share, see `moved`.
     """
     bare = seen(0.0)
     strength, below, above = start, 0.0, math.inf
@@ -79,12 +71,11 @@ def drawn_as_strong[L](
     aims: tuple[float, float],
     draw: Callable[[], tuple[L, Callable[[float], Readings], float]],
 ) -> tuple[L, float, float]:
-    """Draw a law, and how much it moves, anew where it cannot move as much.
+    """Draw a law, its strength and the share it moves, anew where it cannot move as much as drawn.
 
-    `aims`: ends of the share of the signal, drawn by its logarithm.
-    `draw`: a law, what is read by its strength, and a strength to begin at; see `scaled_to`.
-    Returns `strength, share`: at which it is, and that it moves.
-    Raises RuntimeError: if no law of some moves its share.
+    The share lies between the aims, drawn by its logarithm. `draw` gives a law, what is read by its
+    strength, and a strength to begin at; see `scaled_to`. RuntimeError if no law of some moves its
+    share.
     """
     for _ in range(_LAWS):
         law, seen, begin = draw()
@@ -97,15 +88,10 @@ def drawn_as_strong[L](
 
 
 def left(bare: PlantDescription, true: PlantDescription, command: Array) -> float:
-    """What a refit leaves of a law, over the noise (rms), of the signal that shows it most.
+    """What a refit leaves of a law, over the noise (rms), of the signal that shows it most."""
 
-    The refit is linear, around the rig without the law, and holds the rig's numbers to the spreads
-    from which they are drawn.
-
-    `bare`, `true`: the rig without the law and with it.
-    `command` (N, J): motor shaft command in rad, every ms.
-    """
-
+    # The refit is linear, around the rig without the law, and holds the rig's numbers to the
+    # spreads from which they are drawn. Commands (N, J) are shaft angles in rad, every ms.
     def seen(plant: PlantDescription) -> list[Array]:
         return in_noise(read(plant, command).signals(), bare.sensors)
 

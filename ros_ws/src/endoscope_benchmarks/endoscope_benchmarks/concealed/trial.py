@@ -24,43 +24,31 @@ GOOD = 1.3
 
 @dataclass(frozen=True, kw_only=True)
 class Row(Judgement):
-    """What was concealed, what was said, and how far it is right.
-
-    `stratum`, `seed`: of the case.
-    `concealed`: laws with their joints.
-    `note`: what is particular to the case.
-    `moved`: what the laws change, over the signal.
-    `left`: what a refit of the rig's numbers leaves of them, over noise.
-    `said`: names with their joints, most certain first.
-    `held`, `intervals`: intervals that hold the true number, of how many: those of the plant, and
-        of the numbers of named effects that could be measured another way.
-    `nominal`, `refitted`, `augmented`: misfit of the second recording over noise, of the worst
-        signal.
-    `seconds`: that explaining took.
-    `truth_share`: gain of the truth over that of the best term; NaN where it is not one.
-    `shares`: the same of each name that was tried, the best first.
-    `beyond_form`: what is left over what rigs of another form leave, of the worst joint.
-    `errors`: error of each number over what its interval would allow on that side with a `REACH` of
-        one.
-    """
+    """What was concealed, what was said, and how far it is right."""
 
     stratum: str
     seed: int
-    concealed: tuple[str, ...]
-    note: str
-    moved: float
-    left: float
+    concealed: tuple[str, ...]  # laws with their joints
+    note: str  # what is particular to the case
+    moved: float  # what the laws change, over the signal
+    left: float  # what a refit of the rig's numbers leaves of them, over noise
     verdict: str
-    said: tuple[str, ...]
+    said: tuple[str, ...]  # names with their joints, most certain first
+    # Intervals that hold the true number, of how many: those of the plant, and of the numbers of
+    # named effects that could be measured another way.
     held: int = 0
     intervals: int = 0
+    # Misfit of the second recording over noise, of the worst signal.
     nominal: float = math.nan
     refitted: float = math.nan
     augmented: float = math.nan
-    seconds: float = math.nan
+    seconds: float = math.nan  # that explaining took
+    # gain of the truth over that of the best term; NaN where it is not one
     truth_share: float = math.nan
-    shares: tuple[float, ...] = ()
+    shares: tuple[float, ...] = ()  # the same of each name that was tried, the best first
+    # What is left over what rigs of another form leave, of the worst joint.
     beyond_form: float = math.nan
+    # Error of each number over what its interval would allow on that side with a `REACH` of one.
     errors: tuple[float, ...] = ()
 
     def line(self) -> str:

@@ -44,10 +44,7 @@ class BrowserError(EndoscopeError, RuntimeError):
 
 
 class Chromium(ClosedOnExit):
-    """A browser with a profile of its own, which ends and is removed with it.
-
-    Raises BrowserError: there is none, or it does not start.
-    """
+    """A browser with a profile of its own, which ends and is removed with it; else BrowserError."""
 
     def __init__(self) -> None:
         program = shutil.which('chromium')
@@ -89,7 +86,7 @@ class Chromium(ClosedOnExit):
     def call(self, method: str, session: str = '', **parameters: Any) -> dict[str, Any]:
         """Order something of the browser, or of the tab of a session; the answer.
 
-        Raises BrowserError: it is refused, or there is no answer within a minute.
+        BrowserError if it is refused, or there is no answer within a minute.
         """
         number = self.post(method, session, **parameters)
         end = time.monotonic() + _PATIENCE_S
@@ -133,11 +130,7 @@ class Chromium(ClosedOnExit):
 
 
 class Tab:
-    """A tab.
-
-    `browser`: to which it belongs.
-    `address`: that it shows.
-    """
+    """A tab."""
 
     def __init__(self, browser: Chromium, address: str) -> None:
         self._browser = browser
@@ -171,10 +164,7 @@ class Tab:
         )
 
     def value(self, expression: str) -> Any:
-        """What an expression, or the promise that it makes, comes to in the page.
-
-        Raises BrowserError: it throws.
-        """
+        """What an expression, or its promise, comes to in the page; BrowserError if it throws."""
         told = self.call(
             'Runtime.evaluate', expression=expression, returnByValue=True, awaitPromise=True
         )

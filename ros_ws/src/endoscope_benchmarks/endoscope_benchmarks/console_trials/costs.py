@@ -35,10 +35,9 @@ _FRAMES = """new Promise((done) => {
 
 
 def first_motion(hand: Hand, began_s: float) -> str:
-    """How long it takes from the start of the program to a slave in motion, in words.
+    """Time from a start of the program, by the monotonic clock, to a slave in motion, in words.
 
-    `hand`: whose browser was started when all nodes were heard.
-    `began_s`: when the program was started, by the monotonic clock.
+    The hand's browser was started when all nodes were heard.
     """
     hand.move()
     took_s = time.monotonic() - began_s
@@ -51,11 +50,9 @@ def first_motion(hand: Hand, began_s: float) -> str:
 
 
 def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
-    """From a key that is pressed to the first change of the handle, and of ``motor/servo_jp``.
+    """In words, from a pressed key to the first change of the handle, and of ``motor/servo_jp``.
 
-    `hand`: of the operator, who has Space down and the slave at rest before each.
-    `inputs`: how many.
-    Yields: each in words.
+    The operator has Space down and the slave at rest before each.
     """
     console = hand.console
     took_ms: dict[str, list[float]] = {'master/measured_js': [], 'motor/servo_jp': []}
@@ -85,12 +82,7 @@ def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
 
 
 def costs_of_viewers(console: ServedConsole, seconds: float) -> Iterator[str]:
-    """CPU time of the server and ticks of the graph, while no browser runs on the machine.
-
-    `console`: that nobody operates.
-    `seconds`: of each figure.
-    Yields: each figure in words.
-    """
+    """In words, the server's CPU time and the graph's ticks while this machine runs no browser."""
     yield _cost(console, seconds, 'nobody looks on')
     with ExitStack() as stack:
         for _ in range(VIEWERS):
@@ -99,11 +91,9 @@ def costs_of_viewers(console: ServedConsole, seconds: float) -> Iterator[str]:
 
 
 def costs_with_browser(hand: Hand, seconds: float) -> Iterator[str]:
-    """CPU time of the server, ticks of the graph and frames of a page beside the browser.
+    """In words, the server's CPU time, the graph's ticks and a page's frames beside the browser.
 
-    `hand`: of the operator, whose page is the first client.
-    `seconds`: of each figure.
-    Yields: each figure in words.
+    The operator's page is the first client. Each figure takes so many seconds.
     """
     console = hand.console
     hand.take_controls()

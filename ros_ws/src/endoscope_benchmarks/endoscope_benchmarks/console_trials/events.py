@@ -14,30 +14,23 @@ _RELEASED_S = 10.0
 
 @dataclass(frozen=True)
 class Event:
-    """Something that ends the motion.
+    """Something that ends the motion."""
 
-    `happens`: makes it happen, and waits for no answer.
-    `is_over`: brings the page back, or another one, in front of an operator who still holds on.
-    """
-
+    # Makes it happen, and waits for no answer.
     happens: Callable[[Hand], object]
+    # Brings the page back, or another one, in front of an operator who still holds on.
     is_over: Callable[[Hand], object]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one event led to.
+    """What one event led to."""
 
-    `last_change_ms`: from the event to the last change of ``motor/servo_jp``.
-    `clutch_ms`: from the event to the word that the clutch is free.
-    `crept`: how far a shaft's goal went in the time watched, rad.
-    `load`: load average of the machine.
-    """
-
+    # From the event to the last change of ``motor/servo_jp``.
     last_change_ms: float
-    clutch_ms: float
-    crept: float
-    load: float
+    clutch_ms: float  # from the event to the word that the clutch is free
+    crept: float  # how far a shaft's goal went in the time watched, rad
+    load: float  # load average of the machine
 
 
 def _stay(hand: Hand) -> None:
@@ -108,11 +101,8 @@ EVENTS = {
 def undergo(event: Event, hand: Hand, settled_s: float, watched_s: float) -> Outcome:
     """Let something happen to an operator who holds the slave in motion.
 
-    `event`: that happens.
-    `hand`: of the operator.
-    `settled_s`: after the word on the clutch, s: what moves within it still counts to the motion.
-    `watched_s`: for how long the motors are watched after that, s.
-    Raises ConsoleError: the clutch is not released.
+    What moves within `settled_s` of the word on the clutch still counts to the motion; the motors
+    are watched for `watched_s` after that. ConsoleError if the clutch is not released.
     """
     console = hand.console
     for _ in range(_TRIES):

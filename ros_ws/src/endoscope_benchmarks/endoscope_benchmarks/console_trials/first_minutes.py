@@ -127,16 +127,12 @@ def _hold_until(hand: Hand, code: str, begun: Callable[[], bool]) -> None:
 
 @dataclass(frozen=True)
 class LongMotion:
-    """What became of a motion that was played for long.
+    """What became of a motion that was played for long."""
 
-    `trouble`: the fault that ended it; empty where none did.
-    `recorded`, `lost`: messages.
-    `factors`: simulated seconds in a real one, as told each second, in order of size.
-    """
-
-    trouble: str
-    recorded: int
-    lost: int
+    trouble: str  # the fault that ended it; empty where none did
+    recorded: int  # messages
+    lost: int  # messages
+    # Simulated seconds in a real one, as told each second, in order of size.
     factors: tuple[float, ...]
 
 

@@ -26,18 +26,13 @@ _TEXT = 'document.body?.innerText'
 
 
 class Hand(ClosedOnExit):
-    """An operator at a page.
-
-    `console`: that serves the page.
-    `network`: between the page and it.
-    `browser`, `tab`: in which the page is.
-    `page_processes`: numbers of the processes that ran pages when the slave was last set in motion.
-    """
+    """An operator at a page, with a network between it and its console."""
 
     def __init__(self, console: ServedConsole, network: Relay) -> None:
         self.console = console
         self.network = network
         self._address = f'{network.address}/#token={console.token}'
+        # Numbers of the processes that ran pages when the slave was last set in motion.
         self.page_processes: list[int] = []
         self.browser = Chromium()
         self._held: list[str] = []
@@ -102,10 +97,7 @@ class Hand(ClosedOnExit):
         self._held = []
 
     def hold(self, *codes: str) -> None:
-        """Hold keys until the lamp says that the slave follows; anew where it did not.
-
-        The controls are taken first, where they were lost meanwhile.
-        """
+        """Hold keys until the lamp says that the slave follows; anew where it did not."""
         end = time.monotonic() + PATIENCE_S
         since = -_FOLLOWED_S
         while self._seen(_LAMP) != 'FOLLOWING':
@@ -115,6 +107,7 @@ class Hand(ClosedOnExit):
             if self._held and now - since > _FOLLOWED_S:
                 self.let_go()
             elif not self._held:
+                # They may have been lost meanwhile.
                 self.take_controls()
                 if self._seen(_STEP) in _MAY_MOVE:
                     for code in codes:

@@ -16,18 +16,13 @@ _AT_ONCE = struct.pack('ii', 1, 0)
 
 
 class Relay(ClosedOnExit):
-    """Passes TCP connections of 127.0.0.1 on to a port, both ways.
-
-    `port`: at which it listens.
-    `target`: to which it passes on.
-    `silent`: whether it passes nothing on: what is sent meanwhile arrives late.
-    """
+    """Passes TCP connections of 127.0.0.1 on to a port, both ways."""
 
     def __init__(self) -> None:
         self._listening = socket.create_server(('127.0.0.1', 0))
         self.port: int = self._listening.getsockname()[1]
-        self.target = 0
-        self.silent = False
+        self.target = 0  # port to which it passes on
+        self.silent = False  # passes nothing on: what is sent meanwhile arrives late
         self._open = True
         self._cut = False
         self._peers: dict[socket.socket, socket.socket] = {}

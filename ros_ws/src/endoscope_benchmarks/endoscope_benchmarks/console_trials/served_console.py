@@ -42,17 +42,12 @@ class ConsoleError(EndoscopeError, RuntimeError):
 
 
 class Heard:
-    """Angles of a topic as they came.
-
-    `names`: the J joints or motors.
-    `at_ns`: when each message was received, ns since the epoch.
-    `angles`: what it said, in rad, each of shape (J,).
-    """
+    """Angles of a topic's J joints or motors as they came."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._reader = JointReader(names)
-        self.at_ns: list[int] = []
-        self.angles: list[tuple[float, ...]] = []
+        self.at_ns: list[int] = []  # when each message was received, ns since the epoch
+        self.angles: list[tuple[float, ...]] = []  # rad, each of shape (J,)
 
     def take(self, data: bytes, received_ns: int) -> None:
         """Take a message."""
@@ -87,14 +82,8 @@ class Heard:
 class ServedConsole(ClosedOnExit):
     """The program in a process of its own, and a node that looks on.
 
-    `folder`: where it is started, and writes its bag.
-    `domain`: ROS domain.
-    `origins`: addresses of relays under which the page is reached, too.
-    `real_time`: whether the graph goes by the wall clock.
-    `address`, `token`, `viewer_token`: by which one operates, and looks on.
-    `client`: the node's side of the graph.
-    `handle`, `motors`: where the handle was said to be, and what the motors were told.
-    `clutches`: when the clutch was spoken of, and whether it was held.
+    It is started in the folder, and writes its bag there. The origins are addresses of relays under
+    which the page is reached, too.
     """
 
     def __init__(
@@ -117,8 +106,9 @@ class ServedConsole(ClosedOnExit):
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )
+        # Where the handle was said to be, and what the motors were told.
         self.handle, self.motors = Heard(JOINTS), Heard(MOTORS)
-        self.clutches: list[tuple[int, bool]] = []
+        self.clutches: list[tuple[int, bool]] = []  # when it was spoken of, and whether it was held
         self._stack = ExitStack()
         self._stack.callback(self._end)
         try:
@@ -170,10 +160,7 @@ class ServedConsole(ClosedOnExit):
     def until(
         self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
     ) -> None:
-        """Listen until something has come true.
-
-        Raises ConsoleError: it has not in time, or the program has ended.
-        """
+        """Listen until something is true; ConsoleError if not in time, or the program has ended."""
         end = time.monotonic() + patience_s
         while not self.client.wait_until(condition, 0.5):
             if time.monotonic() > end or self._process.poll() is not None:

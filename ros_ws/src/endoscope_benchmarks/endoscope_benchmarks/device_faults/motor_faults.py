@@ -18,47 +18,31 @@ AFTERMATH_S = 2.0
 
 @dataclass(frozen=True)
 class MotorFault:
-    """Something that goes wrong in motion.
+    """Something that goes wrong in motion."""
 
-    `what`: in words.
-    `inject`: makes it happen.
-    `ends_in`: operating state that follows; ``ENABLED`` for a fault that motion survives or that
-        only ends it.
-    `stops`: whether the shafts stand still afterwards.
-    `cause`: pattern of words that the cause of the FAULT must hold.
-    `apart`: nodes that must be processes of their own.
-    """
-
-    what: str
-    inject: Callable[[MotorRig], object]
+    what: str  # in words
+    inject: Callable[[MotorRig], object]  # makes it happen
+    # Operating state that follows; ``ENABLED`` for a fault that motion survives or that only ends
+    # it.
     ends_in: str = 'FAULT'
-    stops: bool = True
-    cause: str = ''
-    apart: tuple[str, ...] = ()
+    stops: bool = True  # the shafts stand still afterwards
+    cause: str = ''  # pattern of words that the cause of the FAULT must hold
+    apart: tuple[str, ...] = ()  # nodes that must be processes of their own
 
 
 @dataclass(frozen=True)
 class FaultOutcome:
-    """What followed a fault.
+    """What followed a fault."""
 
-    `what`: the fault.
-    `state`: operating state at the end.
-    `cause`: of the FAULT; empty without one.
-    `fault_s`, `stopped_s`: seconds from the fault to FAULT and to the shafts' standing still; None
-        if they never did.
-    `longest_gap_s`: longest silence of `motor/measured_js` in the bag after the fault.
-    `faults_in_bag`: FAULT messages in the bag after the fault.
-    `largest_error`: largest difference in rad between a reading in the bag and where the servo was
-        at its stamp.
-    """
-
-    what: str
-    state: str
-    cause: str
+    what: str  # the fault
+    state: str  # operating state at the end
+    cause: str  # of the FAULT; empty without one
+    # Seconds from the fault to FAULT and to the shafts' standing still; None if they never did.
     fault_s: float | None
     stopped_s: float | None
-    longest_gap_s: float
-    faults_in_bag: int
+    longest_gap_s: float  # longest silence of `motor/measured_js` in the bag after the fault
+    faults_in_bag: int  # FAULT messages in the bag after the fault
+    # Largest difference in rad between a reading in the bag and where the servo was at its stamp.
     largest_error: float
 
     def __str__(self) -> str:
@@ -145,13 +129,10 @@ def undergo(
     patience: float | None = None,
     domain: int | None = None,
 ) -> FaultOutcome:
-    """Make a fault happen in motion, and look at what follows.
+    """Make a fault happen in motion, and look at what follows, for `aftermath` s at least.
 
-    `fault`: which.
-    `folder`: for the bag.
-    `aftermath`: how long to look at least, in s.
-    `patience`: silence of the servos in s that is a fault, instead of the usual.
-    `domain`: ROS domain; by default one that goes with the process.
+    Silence of the servos for `patience` s is a fault; the usual is meant if None. The ROS domain
+    goes with the process if None.
     """
     with MotorRig(folder, fault.apart, patience, domain) as rig:
         rig.enable_and_move()

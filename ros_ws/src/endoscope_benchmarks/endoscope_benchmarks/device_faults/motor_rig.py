@@ -53,13 +53,10 @@ _NODES: dict[str, type] = {
 class MotorRig(ClosedOnExit):
     """Console, compensator, motor driver, supervisor and recorder, with two emulated servos.
 
-    The console plays ``60 sin t``, which passes uncompensated.  The tension of the wires is the
-    rig's own to say.
-
-    `folder`: for the terminal's link and the bag.
-    `apart`: nodes that live in processes of their own, so that they can be killed.
-    `patience`: silence of the servos in s that is a fault, instead of the usual.
-    `domain`: ROS domain; by default one that goes with the process.
+    The console plays ``60 sin t``, which passes uncompensated. The tension of the wires is the
+    rig's own to say. Nodes `apart` live in processes of their own, so that they can be killed.
+    Silence of the servos for `patience` s is a fault. The folder takes the terminal's link and the
+    bag.
     """
 
     def __init__(
@@ -121,10 +118,7 @@ class MotorRig(ClosedOnExit):
         return parameters
 
     def node(self, name: str) -> Node:
-        """Give a node of this process.
-
-        Raises StopIteration: there is none of that name.
-        """
+        """Give a node of this process; StopIteration if there is none of that name."""
         return next(node for node in self.runtime.nodes if node.get_name() == name)
 
     @property
@@ -151,11 +145,7 @@ class MotorRig(ClosedOnExit):
         return next((text for _, which, text in reversed(self.messages) if which == name), '')
 
     def wait(self, condition: Callable[[], bool], patience: float = PATIENCE_S) -> bool:
-        """Serve the nodes until something has come true; whether it did in time.
-
-        `condition`: looked at every few milliseconds.
-        `patience`: how long to wait, in s.
-        """
+        """Serve the nodes until something has come true; whether it did within `patience` s."""
         future = Future()
 
         def look() -> None:
@@ -172,10 +162,7 @@ class MotorRig(ClosedOnExit):
         self._orders.publish(String(data=text))
 
     def enable_and_move(self) -> None:
-        """Enable the slave and wait until the shafts swing.
-
-        Raises RuntimeError: they do not.
-        """
+        """Enable the slave and wait until the shafts swing; RuntimeError if they do not."""
         tried = [0.0]
 
         def moving() -> bool:
@@ -204,10 +191,7 @@ class MotorRig(ClosedOnExit):
         self._processes[name].wait()
 
     def stopped_after(self, since: float) -> float | None:
-        """Seconds from ``since`` until both shafts stood still for good; None if they move.
-
-        `since`: monotonic time in s.
-        """
+        """Seconds from ``since`` (monotonic) until both shafts stood still for good; else None."""
         last = since
         for device in (1, 2):
             trace = self.emulator.do('trace', device, since)

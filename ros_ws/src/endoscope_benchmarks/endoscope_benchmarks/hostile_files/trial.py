@@ -66,19 +66,13 @@ class HostileCase(Protocol):
 
 @dataclass
 class Outcomes:
-    """What became of files of one kind.
-
-    `kind`: one of `KINDS`.
-    `counts`: files by outcome, one of `OUTCOMES`.
-    `peak`: most memory that a process took, in bytes, with all libraries that it needs.
-    `longest`: longest time that a file took, in s.
-    `bad`: the first files that ended otherwise than they must: number and what happened.
-    """
+    """What became of files of one kind of `KINDS`."""
 
     kind: str
-    counts: Counter[str] = field(default_factory=Counter)
-    peak: int = 0
-    longest: float = 0.0
+    counts: Counter[str] = field(default_factory=Counter)  # files by outcome, one of `OUTCOMES`
+    peak: int = 0  # most memory that a process took, in bytes, with its libraries
+    longest: float = 0.0  # longest time that a file took, in s
+    # The first files that ended otherwise than they must: number and what happened.
     bad: list[tuple[int, str]] = field(default_factory=list)
 
     @property
@@ -104,12 +98,9 @@ class _OvertimeError(BaseException):
 
 
 def try_files(kind: str, cases: int, seed: int, jobs: int) -> Iterator[Outcomes]:
-    """Try so many files of a kind; yield what became of each batch.
+    """Try so many files of one of `KINDS`; yield what became of each batch.
 
-    `kind`: one of `KINDS`.
-    `cases`: how many.
-    `seed`: another seed draws other files; one file depends on its kind, its number and the seed
-        only.
+    A file depends on its kind, its number and the seed only.
     """
     with worker_pool(jobs) as pool:
         batches: dict[Future[Outcomes], range] = {}
@@ -162,11 +153,9 @@ def _case(kind: str, folder: Path) -> HostileCase:
 
 
 def _limit_memory() -> None:
-    """Allow `MEMORY` in all: what is in use now, and address space for the rest.
-
-    Libraries map files of several gigabytes of which they never use most, so that address space
-    as such says little.
-    """
+    """Allow `MEMORY` in all: what is in use now, and address space for the rest."""
+    # Libraries map files of several gigabytes of which they never use most, so that address space
+    # as such says little.
     mapped, resident = (
         int(pages) * resource.getpagesize()
         for pages in Path('/proc/self/statm').read_text().split()[:2]

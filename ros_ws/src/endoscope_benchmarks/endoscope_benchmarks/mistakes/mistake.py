@@ -17,16 +17,12 @@ Said = tuple[tuple[str, str, str], ...]
 
 @dataclass(frozen=True)
 class Mistake:
-    """What was done to a recording, and what the audit may say of it.
+    """What was done to a recording, and what the audit may say of it."""
 
-    `change`: from a recording and a random generator to the recording as it was mistaken.
-    `said`: id, topic and words of each finding; any one of the tuples will do.
-    `joints`: how many the recording must have.
-    """
-
-    change: Change
+    change: Change  # from a recording and a random generator to it as it was mistaken
+    # Id, topic and words of each finding; any one of the tuples will do.
     said: tuple[Said, ...]
-    joints: int = 1
+    joints: int = 1  # how many the recording must have
 
 
 def scaled(

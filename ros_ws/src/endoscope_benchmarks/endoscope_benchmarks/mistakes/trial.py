@@ -13,14 +13,11 @@ from endoscope_explain.audit import audit_recording
 
 @dataclass(frozen=True)
 class Row:
-    """What was said.
+    """What was said."""
 
-    `name`: of the mistake; empty where none was made.
-    `right`: whether the mistake and nothing else was said, or nothing where none was made.
-    """
-
-    name: str
+    name: str  # of the mistake; empty where none was made
     seed: int
+    # The mistake and nothing else was said, or nothing where none was made.
     right: bool
     unusable: bool
     seconds: float

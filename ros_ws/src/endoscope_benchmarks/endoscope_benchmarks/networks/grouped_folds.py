@@ -13,13 +13,10 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Accuracy on recordings whose tube configuration was not trained with.
+    """Accuracy on recordings whose tube configuration was not trained with."""
 
-    `accuracy`: share of right classes of each fold.
-    `confusion` (7, 7): rows are true classes, columns named ones, over all folds.
-    """
-
-    accuracy: tuple[float, ...]
+    accuracy: tuple[float, ...]  # share of right classes of each fold
+    # (7, 7): rows are true classes, columns named ones, over all folds.
     confusion: NDArray[np.int64]
 
     @property
@@ -48,9 +45,7 @@ def grouped_folds(
     """Rows to train with and rows to test with, of each fold.
 
     Classes are as frequent in every fold, and each tube configuration is on one side only.
-
-    Raises DatasetError: if there are fewer than two folds, or a class has fewer configurations than
-        there are folds.
+    DatasetError if folds are fewer than two, or more than a class has configurations.
     """
     classes = np.unique(dataset.class_deg)
     least = min(len(set(dataset.configuration[dataset.class_deg == c])) for c in classes)

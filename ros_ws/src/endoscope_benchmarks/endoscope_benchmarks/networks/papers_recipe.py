@@ -46,13 +46,10 @@ def train_network(
     settings: TrainingSettings | None = None,
     kind: str = 'cnn',
 ) -> Network:
-    """Train a network; the same seed on the same machine gives the same weights.
+    """Train one of `NETWORKS` with tensions (R, 9000, 4) in N of classes (R,).
 
-    Shapes: `class_deg` (R,).
-    `tension` (R, 9000, 4): N.
-    `seed`: of the first weights and of the order of the batches.
-    `kind`: one of `NETWORKS`.
-    Returns: in evaluation mode.
+    It comes in evaluation mode. The same seed, of first weights and order of batches, gives the
+    same weights on the same machine.
     """
     settings = settings or TrainingSettings()
     torch.manual_seed(seed)
@@ -94,8 +91,7 @@ def cross_validate(
 ) -> CrossValidation:
     """Stratified k-fold cross-validation that keeps each tube configuration on one side.
 
-    Raises DatasetError: if there are fewer than two folds, or a class has fewer configurations than
-        there are folds.
+    DatasetError as of `grouped_folds`.
     """
     named = np.zeros_like(dataset.class_deg)
     split = grouped_folds(dataset, seed, folds)

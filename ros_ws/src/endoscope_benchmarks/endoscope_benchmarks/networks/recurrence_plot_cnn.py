@@ -15,8 +15,6 @@ class RecurrencePlotCnn(nn.Module):
     After Hatami, Gavet, Debayle, ICMV 2017: the plot is the distance of every two states of the
     series, not thresholded; each of two stages has 32 filters of 3 x 3, ReLU, pooling and dropout,
     then follow 128 units. A state here is the tension averaged over 150 ms.
-
-    `classes`: number of classes.
     """
 
     offset: Tensor
@@ -54,9 +52,7 @@ class RecurrencePlotCnn(nn.Module):
 
 
 def recurrence_plots(tension: Tensor) -> Tensor:
-    """Distances in N (R, 4, P, P) of the states of recordings (R, 4, N).
-
-    Eckmann, Kamphorst, Ruelle, Europhys. Lett. 4(9), 1987, without the threshold.
-    """
+    """Distances in N (R, 4, P, P) of the states of recordings (R, 4, N)."""
+    # Eckmann, Kamphorst, Ruelle, Europhys. Lett. 4(9), 1987, without the threshold.
     states = nn.functional.avg_pool1d(tension, CALIBRATION_SAMPLES // PIXELS)
     return (states[..., :, None] - states[..., None, :]).abs()

@@ -15,8 +15,6 @@ class TensionMlp(StandardisedTension):
 
     The paper says no more than "MLP"; this is the usual one for time series (Wang, Yan, Oates,
     IJCNN 2017, section II-A). It reads means over ten samples: 3600 numbers a recording.
-
-    `classes`: number of classes.
     """
 
     def __init__(self, classes: int) -> None:

@@ -26,19 +26,14 @@ NOMINAL = 0.5
 
 @dataclass(frozen=True)
 class Case:
-    """One recording.
-
-    `joint`: of the slave.
-    `actions`: names in `ACTIONS`.
-    `calibration`: motion by which the tube is calibrated.
-    `cut`: share of the recording that is left out at its beginning and at its end.
-    """
+    """One recording."""
 
     seed: int
     lock_step: bool
-    joint: JointParameters
-    actions: tuple[str, ...]
-    calibration: str
+    joint: JointParameters  # of the slave
+    actions: tuple[str, ...]  # names in `ACTIONS`
+    calibration: str  # motion by which the tube is calibrated
+    # Share of the recording that is left out at its beginning and at its end.
     cut: tuple[float, float]
 
 

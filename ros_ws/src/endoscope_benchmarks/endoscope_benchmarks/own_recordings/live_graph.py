@@ -31,13 +31,10 @@ RATE = {True: 500, False: 1000}
 class LiveGraph(ClosedOnExit):
     """All nodes, recorder included, in this process.
 
-    `bag`: where the recording goes, which lasts from the beginning to :meth:`stop`; None for none.
-    `domain`: ROS domain of the graph; by default one of this process's own.
-    `lock_step`: whether simulated time goes on as the nodes follow, or the wall clock gives the
-        time.
-    `overrides`: parameter values by node name.
-    `rate`: beats a second; by default that of `RATE`.
-    `rig`: what stands on the table; as shipped if not given.
+    The recording lasts from the beginning to :meth:`stop`; there is none without a bag. In
+    lock-step simulated time goes on as the nodes follow, else the wall clock gives it. The rate is
+    in beats a second. By default domain is this process's own, rate that of `RATE`, rig the shipped
+    one.
     """
 
     def __init__(
@@ -103,11 +100,9 @@ class LiveGraph(ClosedOnExit):
     def hold_handle(
         self, angles: Callable[[float], Sequence[float]], rate: float, seconds: float
     ) -> None:
-        """Let the slave follow a handle.
+        """Let the slave follow a handle that sends at a `rate` in Hz, its clutch held so long.
 
-        `angles`: where the handle is so many s after its clutch was engaged, rad, shape (J,).
-        `rate`: messages of the handle in a second.
-        `seconds`: how long its clutch is held.
+        The angles (J,) in rad are those of so many s after the clutch was engaged.
         """
         self.set('console', source='master')
         hand = HandleSender(self.node)

@@ -24,21 +24,15 @@ UNNAMED = (Verdict.CONSISTENT, Verdict.PARAMETERS_DIFFER, Verdict.INSUFFICIENT_D
 
 @dataclass(frozen=True)
 class Row:
-    """What was said of one recording.
-
-    `way`: how it was made.
-    `length`: in s, once cut.
-    `load`: of the machine while it was made.
-    `seconds`: time to make and explain it.
-    """
+    """What was said of one recording."""
 
     seed: int
-    way: str
-    length: float
+    way: str  # how it was made
+    length: float  # in s, once cut
     verdict: str
     sentence: str
-    load: float
-    seconds: float
+    load: float  # of the machine while it was made
+    seconds: float  # time to make and explain it
 
     @property
     def names_physics(self) -> bool:

@@ -47,24 +47,18 @@ class OwnExample:
 
 @dataclass(frozen=True)
 class Problem:
-    """One joint of a case, M samples on a common grid.
+    """One joint of a case, M samples on a common grid."""
 
-    `joint`: the one of which the refitted plant leaves most.
-    `refitted`, `described`: of the nominal plant.
-    `left_out`: effects whose formulas are not tried.
-    `time` (M,): in s from the first command.
-    `residuals` (M, 5): measured less simulated, in noise units, of each of `SIGNALS`.
-    `states` (M,): along the simulation, in SI units: time t, command u, servo error e, shaft angle
-        m with its derivatives dm, ddm, bending angle q with dq, ddq, sliding speed v, distance slid
-        d, tensions at the motor ta and tb, their mean T and difference D, the other joint's angle.
-    """
-
-    joint: str
-    refitted: Fit
-    described: Fit
-    left_out: tuple[str, ...]
-    time: Array
+    joint: str  # the one of which the refitted plant leaves most
+    refitted: Fit  # of the nominal plant
+    described: Fit  # of the nominal plant
+    left_out: tuple[str, ...]  # effects whose formulas are not tried
+    time: Array  # (M,), in s from the first command
+    # (M, 5): measured less simulated, in noise units, of each of `SIGNALS`.
     residuals: Array
+    # (M,) each along the simulation, in SI units: time t, command u, servo error e, shaft angle m
+    # with its derivatives dm, ddm, bending angle q with dq, ddq, sliding speed v, distance slid d,
+    # tensions at the motor ta and tb, their mean T and difference D, the other joint's angle.
     states: Mapping[str, Array]
 
     @property
@@ -115,9 +109,9 @@ def is_held_out(time: Array) -> Mask:
 def predicts(time: Array, before: Array, after: Array) -> bool:
     """Whether a model leaves less of held-out blocks: a t-test of the logarithm of their ratio.
 
-    One rule for all peers, since few have one of their own by which they say nothing.
     `before` and `after` (K,) are squares of held-out samples at `time` (K,) without and with it.
     """
+    # One rule for all peers, since few have one of their own by which they say nothing.
     block = (time // BLOCK_S).astype(int)
     means = [(np.mean(before[block == b]), np.mean(after[block == b])) for b in np.unique(block)]
     gains = np.array([np.log(without / left) for without, left in means])

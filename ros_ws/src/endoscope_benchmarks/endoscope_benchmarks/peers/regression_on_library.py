@@ -21,11 +21,9 @@ RIDGE = 0.05
 
 
 def by_forward_selection(problem: Problem) -> Statement | None:
-    """The name whose terms explain most after a few steps of matching pursuit.
-
-    Pati, Rezaiifar, Krishnaprasad, Asilomar 1993, with a price for each coefficient (Schwarz, Ann.
-    Stat. 6, 1978).
-    """
+    """The name whose terms explain most after a few steps of matching pursuit."""
+    # Pati, Rezaiifar, Krishnaprasad, Asilomar 1993, with a price for each coefficient (Schwarz,
+    # Ann. Stat. 6, 1978).
     terms = terms_of(problem)
     design = np.stack([term.values for term in terms], axis=1)
     seen, left = design[~problem.held_out], problem.residuals[~problem.held_out]
@@ -38,10 +36,8 @@ def by_forward_selection(problem: Problem) -> Statement | None:
 
 
 def by_sindy(problem: Problem) -> Statement | None:
-    """The name whose terms carry most of an ensemble of sparse models.
-
-    Fasel, Kutz, Brunton, Brunton, Proc. R. Soc. A 478, 2022.
-    """
+    """The name whose terms carry most of an ensemble of sparse models."""
+    # Fasel, Kutz, Brunton, Brunton, Proc. R. Soc. A 478, 2022.
     terms = terms_of(problem)
     design = np.stack([term.values for term in terms], axis=1)
     spread = problem.residuals.std(axis=0) + 1e-9

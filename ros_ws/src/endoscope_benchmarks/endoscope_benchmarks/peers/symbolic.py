@@ -94,14 +94,11 @@ def elite(states: Array, target: Array, effort: float) -> Predictor:
 
 
 def bayesian(states: Array, target: Array, effort: float) -> Predictor:
-    """The Bayesian machine scientist: Guimera et al., Sci. Adv. 6, 2020, from AutoRA.
-
-    Of the formulas that its Markov chain draws from their posterior, that of the shortest
-    description. It stops on complex numbers, so roots and logarithms are left out.
-    """
+    """The Bayesian machine scientist: Guimera et al., Sci. Adv. 6, 2020, from AutoRA."""
     import pandas
     from autora.theorist.bms import Parallel, get_priors
 
+    # It stops on complex numbers, so roots and logarithms are left out.
     prior, operations = get_priors()
     names = [f'x{k}' for k in range(states.shape[1])]
     random.seed(1)
@@ -111,6 +108,8 @@ def bayesian(states: Array, target: Array, effort: float) -> Predictor:
         prior_par={f'Nopi_{each}': prior[f'Nopi_{each}'] for each in REAL},
         x=pandas.DataFrame(states, columns=names), y=pandas.Series(target),
     )  # fmt: skip
+    # Of the formulas that its Markov chain draws from their posterior, that of the shortest
+    # description.
     best, shortest = chain.t1, np.inf
     for _ in range(round(effort * STEPS)):
         chain.mcmc_step()

@@ -35,10 +35,7 @@ PEERS: dict[str, Peer] = {
 
 @dataclass(frozen=True)
 class Answer:
-    """What one peer said of one case, and how right it is: see `Judgement`.
-
-    The seconds (s) are without refitting the nominal plant, which all peers need.
-    """
+    """What one peer said of one case, and how right it is: see `Judgement`."""
 
     peer: str
     stratum: str
@@ -47,7 +44,7 @@ class Answer:
     first: bool
     place: bool
     false: int
-    seconds: float
+    seconds: float  # without refitting the nominal plant, which all peers need
 
     def line(self) -> str:
         """The answer in one line."""

@@ -32,8 +32,7 @@ _FORK = multiprocessing.get_context('forkserver')
 class NodeProcesses(ClosedOnExit):
     """Processes of nodes, by name; ``graph`` is that of all nodes composed.
 
-    `domain`: ROS domain.
-    `folder`: for what each process says, ``NAME.log``.
+    What each process says goes to ``NAME.log`` in the folder.
     """
 
     def __init__(self, domain: int, folder: Path) -> None:
@@ -53,10 +52,7 @@ class NodeProcesses(ClosedOnExit):
         return tuple(map(self._pid, self._processes))
 
     def start(self, name: str, parameters: Mapping[str, Mapping[str, object]]) -> None:
-        """Start a node, or all of them, with parameters by node.
-
-        Raises ValueError: it runs already.
-        """
+        """Start a node, or all of them, with parameters by node; ValueError if it runs already."""
         if name in self._processes:
             raise ValueError(f'{name} runs already')
         file = self._folder / f'{name}.yaml'

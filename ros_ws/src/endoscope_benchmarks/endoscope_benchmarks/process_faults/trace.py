@@ -25,12 +25,7 @@ _SPEED_NS = 10_000_000
 
 
 def goal_step(goals: Sequence[JointSample], motors: MotorFacts) -> tuple[float, float]:
-    """Largest step of goals that follow each other in a session, in rad, and what is over a bound.
-
-    `goals`: in the order of their stamps.
-    `motors`: their `speed` times the time between two stamps bounds a step.
-    Returns: largest step, and the largest step in parts of its bound.
-    """
+    """Largest step in rad of goals, in stamp order, in a session; and largest over its bound."""
     largest, share = 0.0, 0.0
     for before, after in itertools.pairwise(goals):
         period = after.stamp_ns - before.stamp_ns
@@ -38,15 +33,13 @@ def goal_step(goals: Sequence[JointSample], motors: MotorFacts) -> tuple[float, 
             continue
         step = max(abs(a - b) for a, b in zip(after.position, before.position, strict=True))
         largest = max(largest, step)
+        # A step is bounded by the motors' speed times the time between the stamps.
         share = max(share, step / (motors.speed * period * 1e-9))
     return largest, share
 
 
 class ShaftTrace:
-    """Readings of the shafts by stamp.
-
-    `samples`: in any order.
-    """
+    """Readings of the shafts by stamp, given in any order."""
 
     def __init__(self, samples: Sequence[JointSample]) -> None:
         samples = sorted(samples, key=lambda sample: sample.stamp_ns)
@@ -81,11 +74,10 @@ class ShaftTrace:
     def standstill(self, since_ns: int, open_ns: int, until_ns: int) -> tuple[float | None, float]:
         """When the shafts came to rest, and how far they went without anybody's enable.
 
-        `since_ns`, `open_ns`, `until_ns`: stamps of the fault, of the last word that a session was
-            open, and of the next enable.
-        Returns: seconds from ``since_ns`` to the first reading from which on the shafts stayed for
-            0.3 s, None if they never did; and the largest distance in rad that they went until the
-            enable once they had come to rest and no session had been open for `HELD_S`.
+        The stamps are those of the fault, of the last word that a session was open, and of the next
+        enable. Rest comes, in s from the fault, at the first reading from which on the shafts
+        stayed for 0.3 s, or never (None). The way, in rad, is the largest until the enable once
+        they had come to rest and no session had been open for `HELD_S`.
         """
         inside = (self._stamps >= since_ns) & (self._stamps < until_ns)
         stamps, angles = self._stamps[inside], self._angles[inside]

@@ -33,58 +33,49 @@ NODES, FEW_NODES = 30, 12
 
 @dataclass(frozen=True)
 class Laws:
-    """What acts in a rig beside its nominal physics; by default nothing does.
+    """What acts in a rig beside its nominal physics; by default nothing does."""
 
-    `late_s`: commands take effect so much later.
-    `play_rad`: between the gear's flanks.
-    `eccentric_rad`, `eccentric_cycles`, `eccentric_phase`: the pulley runs ahead by eccentric_rad
-        (sin(cycles shaft + phase) - sin phase).
-    `drag_nm`, `drag_speed`: the motor also turns a gear: drag_nm (2 / pi) atan(speed / drag_speed),
-        N m and rad/s.
-    `sticking`, `sticking_speed`: the exponent is 1 + sticking / (1 + (v / sticking_speed)^1.5)
-        times as large where the wire is wound at v, m/s.
-    `bent_anew`, `bent_at_s`, `bent_within_s`: it grows by the share bent_anew around a time, as a
-        hyperbolic tangent.
-    `running_in`, `running_in_m`: it is larger by the share running_in / (1 + way / running_in_m)^2
-        after some way wound.
-    `weight_nm`, `weight_rad`, `stop_rad`, `stop_stiffness`: see `Acting`.
-    `breath_nm`, `breath_hz`, `breath_phase`: moment of a breath that dwells at its end: breath_nm
-        (1 - 2 |cos|^3) of half the cycle (Lujan et al., Med. Phys. 26, 1999).
-    `push_nm`, `push_at_s`, `push_within_s`: moment from a time on, as a hyperbolic tangent.
-    `filter_s`: the tracker tells the mean of so long.
-    `field_rad`, `field_width`: the tracker reads more by field_rad (1 - exp(-(angle /
-        field_width)^2)).
-    `gain`, `warming_n`, `warming_s`, `neighbour`: the first cell reads this factor, and warms up by
-        warming_n (1 - exp(-t / warming_s)); both read a share of their neighbour.
-    """
-
-    late_s: float = 0.0
-    play_rad: float = 0.0
+    late_s: float = 0.0  # commands take effect so much later
+    play_rad: float = 0.0  # between the gear's flanks
+    # The pulley runs ahead by eccentric_rad (sin(cycles shaft + phase) - sin phase).
     eccentric_rad: float = 0.0
     eccentric_cycles: float = 1.0
     eccentric_phase: float = 0.0
+    # The motor also turns a gear: drag_nm (2 / pi) atan(speed / drag_speed), N m and rad/s.
     drag_nm: float = 0.0
     drag_speed: float = 1.0
+    # The exponent is 1 + sticking / (1 + (v / sticking_speed)^1.5) times as large where the wire is
+    # wound at v, m/s.
     sticking: float = 0.0
     sticking_speed: float = 1.0
+    # The exponent grows by the share bent_anew around a time, as a hyperbolic tangent.
     bent_anew: float = 0.0
     bent_at_s: float = 0.0
     bent_within_s: float = 1.0
+    # The exponent is larger by the share running_in / (1 + way / running_in_m)^2 after some way
+    # wound.
     running_in: float = 0.0
     running_in_m: float = 1.0
+    # See `Acting`.
     weight_nm: float = 0.0
     weight_rad: float = 0.0
     stop_rad: float = math.inf
     stop_stiffness: float = 0.0
+    # Moment of a breath that dwells at its end: breath_nm (1 - 2 |cos|^3) of half the cycle (Lujan
+    # et al., Med. Phys. 26, 1999).
     breath_nm: float = 0.0
     breath_hz: float = 1.0
     breath_phase: float = 0.0
+    # Moment from a time on, as a hyperbolic tangent.
     push_nm: float = 0.0
     push_at_s: float = 0.0
     push_within_s: float = 1.0
-    filter_s: float = 0.0
+    filter_s: float = 0.0  # the tracker tells the mean of so long
+    # The tracker reads more by field_rad (1 - exp(-(angle / field_width)^2)).
     field_rad: float = 0.0
     field_width: float = 1.0
+    # The first cell reads this factor, and warms up by warming_n (1 - exp(-t / warming_s)); both
+    # read a share of their neighbour.
     gain: float = 1.0
     warming_n: float = 0.0
     warming_s: float = 1.0
@@ -93,20 +84,15 @@ class Laws:
 
 @dataclass(frozen=True)
 class Form:
-    """How a law is drawn.
+    """How a law is drawn."""
 
-    `words`: what it is, as a mechanic says it.
-    `strength`: the number of `Laws` by which it is strong.
-    `begin`: by how much that differs from nothing where the search for a strength begins.
-    `ranges`: ends between which its other numbers are drawn by their logarithm, phases evenly.
-    `within`, `reached`: the same in shares of the recording's length, and of the largest angle that
-        the tip reaches.
-    """
-
-    words: str
-    strength: str
+    words: str  # what it is, as a mechanic says it
+    strength: str  # the number of `Laws` by which it is strong
+    # By how much that differs from nothing where the search for a strength begins.
     begin: float
+    # Ends between which its other numbers are drawn by their logarithm, phases evenly.
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    # The same in shares of the recording's length, and of the largest angle that the tip reaches.
     within: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     reached: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -176,8 +162,7 @@ def drawn_laws(
 ) -> Callable[[float], Laws]:
     """Draw everything about a law but its strength: at zero there is none, at one its `begin`.
 
-    `name`: of `FORMS`.
-    `duration`, `reached`: of the recording in s, and the largest angle of its tip in rad.
+    The recording's duration is in s, the largest angle reached by its tip in rad.
     """
     form = FORMS[name]
     chosen: dict[str, Any] = {}
@@ -196,17 +181,7 @@ def drawn_laws(
 
 
 def read(joint: JointParameters, laws: Laws, command: Array, nodes: int = NODES) -> Readings:
-    """What sensors of a rig of one joint read without noise, as `concealed.readings.read`.
-
-    Parameters
-    ----------
-    joint : JointParameters
-    laws : Laws
-    command : array (N, 1)
-        Motor shaft command in rad, every ms.
-    nodes : int
-        Of each wire.
-    """
+    """Read a rig of one joint without noise under a motor shaft command (N, 1) in rad, every ms."""
     numbers: dict[str, Any] = asdict(joint)
     time = np.arange(len(command), dtype=np.float64) * TICK
     asked = _late(command[:, 0], laws.late_s)

@@ -17,10 +17,7 @@ BEGIN_NS = 1_000_000_000
 
 
 def write_bag(recording: Recording, out: Path) -> None:
-    """Write a recording's commands, motors, wires and tip at their stamps.
-
-    Raises BagError: if `out` exists or cannot be written.
-    """
+    """Write commands, motors, wires and tip at their stamps; BagError if it exists or cannot be."""
     motors = [motor_name(joint) for joint in recording.joints]
     wires = [wire for joint in recording.joints for wire in wire_names(joint)]
     sensors = recording.measured()

@@ -41,10 +41,7 @@ class NoSuchEffectError(EndoscopeError, ValueError):
 
 
 def require_drawn(effect: str, form: str) -> None:
-    """Refuse an effect that is not drawn.
-
-    Raises NoSuchEffectError.
-    """
+    """Raise NoSuchEffectError of an effect that is not among those drawn."""
     known = list(FORMS if form == OTHER else DRAWN)
     if form == SLAVE:
         known = [each for each in known if describe(each).stage is not Stage.RECORDING]
@@ -55,13 +52,7 @@ def require_drawn(effect: str, form: str) -> None:
 
 
 def drawn(form: str, seed: int, number: int, effect: str | None = None) -> tuple[Case, dict]:
-    """Draw a rig.
-
-    `form`: of `SIMULATORS`, or `SLAVE`.
-    `seed`, `number`: the same rig for the same of both.
-    `effect`: what is concealed; drawn if not given.
-    Returns: the truth as plain data.
-    """
+    """Draw a rig of `SIMULATORS` or `SLAVE` and, unless given, its effect; its truth as data."""
     generator = np.random.default_rng([seed, number])
     if form == OTHER:
         return _other(generator, effect)

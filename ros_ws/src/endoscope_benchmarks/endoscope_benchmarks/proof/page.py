@@ -28,10 +28,7 @@ PLANTS = ('nominal', 'refitted', 'augmented')
 
 
 def page(outcomes: Sequence[Outcome], facts: Mapping[str, str]) -> str:
-    """HTML of the proof: a page that needs no other file, with links to the reports beside it.
-
-    `facts`: how it was made.
-    """
+    """HTML of the proof: a page that needs no other file, with links to the reports beside it."""
     environment = Environment(
         loader=PackageLoader('endoscope_benchmarks', 'proof/templates'),
         autoescape=True,

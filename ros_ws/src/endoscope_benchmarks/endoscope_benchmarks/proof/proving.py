@@ -24,27 +24,20 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Proof:
-    """What is to be proven.
+    """What is to be proven."""
 
-    `count`: rigs.
-    `form`: of `SIMULATORS`, or `SLAVE`.
-    `effect`: what is concealed; drawn if None.
-    `jobs`: rigs side by side.
-    `command`: as it was typed.
-    """
-
-    count: int
-    form: str
+    count: int  # rigs
+    form: str  # of `SIMULATORS`, or `SLAVE`
     seed: int
-    effect: str | None
-    jobs: int
-    command: str
+    effect: str | None  # what is concealed; drawn if None
+    jobs: int  # rigs side by side
+    command: str  # as it was typed
 
 
 def prove(proof: Proof, folder: Path, say: Say) -> list[Outcome]:
     """Record rigs into a folder, explain them, and compare what is said with what was sealed.
 
-    Raises EndoscopeError: if nothing can be written, or a seal was broken.
+    EndoscopeError if nothing can be written, or a seal was broken.
     """
     with worker_pool(min(proof.jobs, proof.count)) as pool:
         rigs = _recorded(proof, folder, pool, say)

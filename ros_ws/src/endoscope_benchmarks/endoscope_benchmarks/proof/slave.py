@@ -32,15 +32,11 @@ LATEST_S = 4.0
 
 @dataclass(frozen=True)
 class Tracking:
-    """How the tip follows a motion under a command that was planned with a plant.
+    """How the tip follows a motion under a command that was planned with a plant."""
 
-    `time` (N,): in s.
-    `desired`, `measured` (N, J): in rad.
-    """
-
-    time: Array
-    desired: Array
-    measured: Array
+    time: Array  # (N,), s
+    desired: Array  # (N, J), rad
+    measured: Array  # (N, J), rad
 
     @property
     def rmse(self) -> float:
@@ -51,21 +47,7 @@ class Tracking:
 def record(plant: PlantDescription, motion: str, bag: Path, seed: int) -> None:
     """Record a motion of the console, played on the slave that a plant describes.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-        As the slave is.
-    motion : str
-        Of the console.
-    bag : Path
-        Folder to write.
-    seed : int
-        Of the sensors' noise.
-
-    Raises
-    ------
-    EndoscopeError
-        The graph refuses the motion, or a fault ended it.
+    EndoscopeError if the graph refuses the motion, or a fault ended it.
     """
 
     def play(graph: LiveGraph) -> None:
@@ -76,13 +58,7 @@ def record(plant: PlantDescription, motion: str, bag: Path, seed: int) -> None:
 
 
 def tracked(slave: PlantDescription, known: PlantDescription, folder: Path, seed: int) -> Tracking:
-    """Move the slave by the inverse of a plant.
-
-    `slave`: as the slave is.
-    `known`: that the command is planned with.
-    `folder`: for the command and the recording; made here.
-    `seed`: of the sensors' noise.
-    """
+    """Move the slave by the inverse of the plant that is known; `folder` is made here."""
     folder.mkdir()
     motion = motion_by_name(TRACKED)
     time = np.arange(0.0, SLOWER * motion.duration, TICK)

@@ -54,19 +54,15 @@ BALANCED = 1e-12  # N m
 
 @dataclass(frozen=True)
 class Acting:
-    """What acts on wires and joint beside what `NOMINAL` has.
+    """What acts on wires and joint beside what `NOMINAL` has."""
 
-    `rubbing` (N,): factor on the exponent of all nodes before each row.
-    `moment` (N,): on the joint from outside before each row, N m.
-    `weight_nm`, `weight_rad`: moment -weight_nm sin(angle + weight_rad).
-    `stop_rad`, `stop_stiffness`: contact of two round bodies beyond an angle on either side (Hertz
-        1882): its moment is stop_stiffness (|angle| - stop_rad)^1.5, N m/rad^1.5.
-    """
-
-    rubbing: Array
-    moment: Array
+    rubbing: Array  # (N,), factor on the exponent of all nodes before each row
+    moment: Array  # (N,), on the joint from outside before each row, N m
+    # Moment -weight_nm sin(angle + weight_rad).
     weight_nm: float = 0.0
     weight_rad: float = 0.0
+    # Contact of two round bodies beyond an angle on either side (Hertz 1882): its moment is
+    # stop_stiffness (|angle| - stop_rad)^1.5, N m/rad^1.5.
     stop_rad: float = math.inf
     stop_stiffness: float = 0.0
 
@@ -74,24 +70,11 @@ class Acting:
 def simulate(
     plant: Plant, shaft_command: ArrayLike, tick: float, cells: int
 ) -> tuple[Array, Array, Array, Array]:
-    """Let a plant follow commands, each held for one tick.
+    """Shaft (N,) in rad, tensions at motor and joint (N, 2) in N and bending angle (N,) in rad.
 
-    Parameters
-    ----------
-    plant
-        By the keys of `NOMINAL`, SI units.
-    shaft_command
-        Commanded angle of the motor's shaft in rad, shape (N,).
-    tick
-        In s.
-    cells
-        Nodes of each wire.
-
-    Returns
-    -------
-    shaft, at_motor, at_joint, angle
-        Angle of the shaft in rad (N,), tensions of wires a and b in N at the motor (N, 2) and at
-        the joint (N, 2), bending angle in rad (N,). Row k is the state before command k acts.
+    The plant has the keys of `NOMINAL`, in SI units, and each wire so many cells (nodes). Tensions
+    are those of wires a and b. Each commanded shaft angle (N,) in rad is held for one tick in s.
+    Row k is the state before command k acts.
     """
     shaft = motor_angle(plant, shaft_command, tick)
     return shaft, *follow(plant, shaft, tick, cells)
@@ -189,12 +172,10 @@ def _wire(plant: Plant, cells: int) -> tuple[Array, Array, Array]:
 
 @compiled
 def _relax(before: Array, slip: Array, grip: Array, springs: Array, tension: Array) -> bool:
-    """Find the slip of all nodes of a taut wire, given that of its ends; `tension` is written.
-
-    Every node stays where it was at the start of the tick if the springs beside it allow that;
-    otherwise it slips to where they just do. Node by node, swept until nothing moves, with
-    over-relaxation (projected, Cryer 1971: it cannot carry a node across where it stood).
-    """
+    """Find the slip of all nodes of a taut wire, given that of its ends; `tension` is written."""
+    # Every node stays where it was at the start of the tick if the springs beside it allow that;
+    # otherwise it slips to where they just do. Node by node, swept until nothing moves, with
+    # over-relaxation (projected, Cryer 1971: it cannot carry a node across where it stood).
     nodes = len(grip)
     for i in range(nodes + 1):
         tension[i] = before[i] + springs[i] * (slip[i] - slip[i + 1])
@@ -279,11 +260,7 @@ def _imbalance(
     extension: Array,
     deflection: Array,
 ) -> float:
-    """Torque in N m that a joint step in rad would leave over; it rises with the step.
-
-    Both wires are moved by the motor's `turn` in rad and by the step. Not a number if a wire's
-    nodes do not settle.
-    """
+    """Torque in N m that a joint step in rad would leave over; it rises with the step."""
     pulley, radius, stiffness, rest, friction, damping = p
     left_over = damping * step / tick + stiffness * (angle + step - rest)
     left_over += load[0] * math.sin(angle + step + load[1]) - moment
@@ -292,6 +269,8 @@ def _imbalance(
         left_over += math.copysign(load[3] * beyond**1.5, angle + step)
     for i in range(len(presliding)):
         left_over += friction * _rubbed(deflection[i], step, presliding[i]) / len(presliding)
+    # Both wires are moved by the motor's turn in rad and by the step; not a number if a wire's
+    # nodes do not settle.
     for wire in range(2):
         sign = 1.0 - 2.0 * wire
         if not _pull(

@@ -34,87 +34,54 @@ PASSAGE_S = 6.0
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig that was recorded, with what is concealed in it sealed.
-
-    Attributes
-    ----------
-    number : int
-    folder : Path
-        With the recordings, the described plant and the sealed truth.
-    sha256 : str
-        Of the truth.
-    laws : tuple of Law
-        What is concealed; nobody looks at it until the seals are opened.
-    also : frozenset of str
-        Effects and places that are neither right nor false.
-    moved : float
-        Share of the signal that the laws move.
-    """
+    """A rig that was recorded, with what is concealed in it sealed."""
 
     number: int
-    folder: Path
-    sha256: str
+    folder: Path  # with the recordings, the described plant and the sealed truth
+    sha256: str  # of the truth
+    # What is concealed; nobody looks at it until the seals are opened.
     laws: tuple[Law, ...]
-    also: frozenset[str]
-    moved: float
+    also: frozenset[str]  # effects and places that are neither right nor false
+    moved: float  # share of the signal that the laws move
 
 
 @dataclass(frozen=True)
 class Passage:
-    """The signal of the second recording in which most is left when only numbers are refitted.
-
-    Shapes: `measured` (N,).
-    `time` (N,): in s.
-    `predicted` (N,): by the plant as described, refitted and improved.
-    """
+    """The signal of the second recording in which most is left when only numbers are refitted."""
 
     signal: str
     unit: str
-    time: Array
-    measured: Array
-    predicted: dict[str, Array]
+    time: Array  # (N,), s
+    measured: Array  # (N,)
+    predicted: dict[str, Array]  # (N,) by the plant as described, refitted and improved
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What was said of a rig before its seal was opened.
-
-    Attributes
-    ----------
-    number : int
-    sentence : str
-    said : tuple of Statement
-    before, refitted, after : float
-        Misfit of the second recording over its noise, of the worst signal, with the plant as
-        described, refitted and improved.
-    passage : Passage
-    seconds : float
-        That it took.
-    """
+    """What was said of a rig before its seal was opened."""
 
     number: int
     sentence: str
     said: tuple
+    # Misfit of the second recording over its noise, of the worst signal, with the plant as
+    # described, refitted and improved.
     before: float
     refitted: float
     after: float
     passage: Passage
-    seconds: float
+    seconds: float  # that it took
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Truth beside answer.
-
-    `truth`: as it was sealed.
-    `tracking`: how the slave follows a motion that is planned with the plant as described, and as
-        improved; empty of a rig that does not run.
-    """
+    """Truth beside answer."""
 
     rig: Rig
     answer: Answer
-    truth: dict
+    truth: dict  # as it was sealed
     judgement: Judgement
+    # How the slave follows a motion that is planned with the plant as described, and as improved;
+    # empty of a rig that does not run.
     tracking: dict[str, slave.Tracking] = field(default_factory=dict)
 
 
@@ -169,10 +136,7 @@ def explained(number: int, folder: Path, command: str) -> Answer:
 
 
 def compared(rig: Rig, answer: Answer) -> Outcome:
-    """Open a rig's seal and judge what was said of it.
-
-    Raises BrokenSealError: the truth was changed after it was sealed.
-    """
+    """Open a rig's seal and judge what was said of it; BrokenSealError if it was changed since."""
     truth = opened(rig.folder / TRUTH, rig.sha256)
     return Outcome(rig, answer, truth, judged(rig.laws, answer.said, rig.also))
 

@@ -54,18 +54,13 @@ Number = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Tubes:
-    """The five tubes.
+    """The five tubes."""
 
-    `told`: judged on the second cycle.
-    `effects`: that are missing from all of them together; where none can be named, the best one.
-    `named`: whether they are named.
-    `search`: what it said.
-    """
-
-    told: tuple[Told, ...]
+    told: tuple[Told, ...]  # judged on the second cycle
+    # Missing from all of them together; where none can be named, the best one.
     effects: tuple[str, ...]
-    named: bool
-    search: tuple[str, ...]
+    named: bool  # the effects are named
+    search: tuple[str, ...]  # what it said
     wide: tuple[Fit, ...]
     explained: tuple[Fit, ...]
 
@@ -129,18 +124,13 @@ def numbers(fits: Sequence[Fit], jobs: int) -> dict[str, list[Number | None]]:
 
 @dataclass(frozen=True)
 class State:
-    """The rig in another state.
+    """The rig in another state."""
 
-    `told`: the recording that was fitted, then those that are predicted from it.
-    `fit`: with the tubes' effects.
-    `needed`: logarithm of the evidence that is lost without each of the tubes' effects.
-    `alone`: what would be named by this recording alone.
-    """
-
-    told: tuple[Told, ...]
-    fit: Fit
+    told: tuple[Told, ...]  # the recording that was fitted, then those that are predicted from it
+    fit: Fit  # with the tubes' effects
+    # Logarithm of the evidence that is lost without each of the tubes' effects.
     needed: Mapping[str, float]
-    alone: tuple[str, ...]
+    alone: tuple[str, ...]  # what would be named by this recording alone
 
 
 def explained_state(folder: Path, tubes: Tubes, jobs: int, tell: Tell) -> State:
@@ -191,10 +181,8 @@ def _plants(before: Fit, after: Fit, seen: JointObservation) -> dict[str, Plant]
 
 
 def unknown_tubes(folder: Path, tubes: Tubes, tell: Tell) -> list[Told]:
-    """Recordings of tubes that nobody described: only a tube's numbers are refitted.
-
-    Every tube is tried as a start; the first cycles are fitted, the others are judged.
-    """
+    """Recordings of tubes that nobody described: only a tube's numbers are refitted."""
+    # Every tube is tried as a start; the first cycles are fitted, the others are judged.
     found = []
     for name in UNKNOWN_TUBES:
         tell(f'{name}: refitting the tube')

@@ -78,14 +78,10 @@ def as_described(model: JointModel) -> Array:
 
 @dataclass(frozen=True)
 class Plant:
-    """A fitted plant, without a recording.
+    """A fitted plant, without a recording."""
 
-    Shapes: `theta` (n,).
-    `model`: whatever it was fitted to.
-    """
-
-    model: JointModel
-    theta: Array
+    model: JointModel  # whatever it was fitted to
+    theta: Array  # (n,)
 
     @staticmethod
     def of(found: Fit) -> 'Plant':
@@ -138,16 +134,12 @@ def best_refitted(plants: Sequence[Plant]) -> Fit:
 
 @dataclass(frozen=True)
 class Told:
-    """What plants say of one recording.
-
-    `begin`, `end`: between which it is judged, s.
-    `plants`: on the whole recording; keys are those of the report's plants.
-    """
+    """What plants say of one recording."""
 
     take: Take
-    begin: float
-    plants: Mapping[str, Plant]
-    end: float = math.inf
+    begin: float  # s; it is judged from here
+    plants: Mapping[str, Plant]  # on the whole recording; keys are those of the report's plants
+    end: float = math.inf  # s; to here
 
     def left(self, name: str) -> tuple[float, ...]:
         """Rms of what a plant is off by: angle in rad, then tensions in N."""

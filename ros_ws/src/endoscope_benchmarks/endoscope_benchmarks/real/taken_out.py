@@ -20,21 +20,16 @@ from endoscope_explain.search.levels import search
 
 @dataclass(frozen=True)
 class TakenOut:
-    """What was made of a tube whose plant lacks a piece.
-
-    `lost`: logarithm of the evidence that the piece's lack costs.
-    `named`: what is missing, in the order in which it was found.
-    `number`: the piece's first number and its interval as found; None where it was not.
-    `whole`: the same of the whole plant, fitted to the same cycle.
-    `told`: without the piece, with what was found, and whole; on the second cycle.
-    """
+    """What was made of a tube whose plant lacks a piece."""
 
     tube: str
     piece: str
-    lost: float
-    named: tuple[str, ...]
+    lost: float  # logarithm of the evidence that the piece's lack costs
+    named: tuple[str, ...]  # what is missing, in the order in which it was found
+    # The piece's first number and its interval as found; None where it was not.
     number: Number | None
-    whole: Number
+    whole: Number  # the same of the whole plant, fitted to the same cycle
+    # Without the piece, with what was found, and whole; on the second cycle.
     told: Told
 
     @property

@@ -45,24 +45,16 @@ _PHASE_DIGITS = 1e-4
 
 @dataclass(frozen=True)
 class Take:
-    """One recording, M values of the tracker.
-
-    `cycle_s`: of the phase.
-    `time`, `command` (N,): s, and desired bending in rad; in force until the next one.
-    `seen` (M,): when the tracker gave a new value, s.
-    `angle` (M,): rad.
-    `tension` (M, 2): N.
-    `latency_s`: by how much tensions are older than their rows.
-    """
+    """One recording, M values of the tracker."""
 
     name: str
-    cycle_s: float
-    time: Array
-    command: Array
-    seen: Array
-    angle: Array
-    tension: Array | None
-    latency_s: float
+    cycle_s: float  # of the phase
+    time: Array  # (N,), s
+    command: Array  # (N,), desired bending in rad, in force until the next one
+    seen: Array  # (M,), when the tracker gave a new value, s
+    angle: Array  # (M,), rad
+    tension: Array | None  # (M, 2), N
+    latency_s: float  # by how much tensions are older than their rows
 
     def until(self, end: float) -> 'Take':
         """The first `end` seconds."""
@@ -100,23 +92,14 @@ class Take:
 
 
 def require_recordings(folder: Path) -> None:
-    """Refuse a folder that lacks a recording.
-
-    Raises EndoscopeError: names those that it lacks.
-    """
+    """Raise an EndoscopeError that names the recordings which a folder lacks, if any."""
     lacking = [name for name in NAMES if not (folder / f'{name}.txt').is_file()]
     if lacking:
         raise EndoscopeError(f'{folder}: lacks {", ".join(f"{n}.txt" for n in lacking)}')
 
 
 def read(path: Path) -> Take:
-    """Read a recording.
-
-    Raises
-    ------
-    ValueError
-        If the file has none of the known layouts.
-    """
+    """Read a recording; ValueError if the file has none of the known layouts."""
     # One file ends with an empty line of blanks.
     table = np.genfromtxt(path, delimiter=',', invalid_raise=False)
     columns = table.shape[1]
@@ -149,10 +132,8 @@ def read(path: Path) -> Take:
 
 
 def _on_a_clock(table: Array, seconds: float) -> tuple[Array, Array]:
-    """Rows that do not repeat the one before, and their seconds.
-
-    Once the command stands, so does the phase: rows are counted, by what they took before.
-    """
+    """Rows that do not repeat the one before, and their seconds."""
+    # Once the command stands, so does the phase: rows are counted, by what they took before.
     moving = int(np.flatnonzero(np.diff(table[:, DESIRED]))[-1]) + 1
     time = seconds * table[:, PHASE]
     time[moving:] = time[moving - 1] * np.arange(moving + 1, len(table) + 1) / moving
@@ -162,10 +143,8 @@ def _on_a_clock(table: Array, seconds: float) -> tuple[Array, Array]:
 
 
 def _noise(values: Array) -> float:
-    """Rms of white noise by third differences, which take out what is smooth; slips do not count.
-
-    A third difference has 20 times the variance (von Neumann et al., Ann. Math. Stat. 12, 1941).
-    """
+    """Rms of white noise by third differences, which take out what is smooth, slips apart."""
+    # A third difference has 20 times the variance (von Neumann et al., Ann. Math. Stat. 12, 1941).
     return float(1.4826 * np.median(np.abs(np.diff(values, 3, axis=0))) / np.sqrt(20.0))
 
 

@@ -27,14 +27,10 @@ _UNSEEN = 515_151
 
 @dataclass(frozen=True)
 class SizeTrial:
-    """One tube of any size.
+    """One tube of any size."""
 
-    `size`: true backlash size in rad, mean of the joints.
-    `result`: none where the classifier refused.
-    """
-
-    size: float
-    result: ClassificationResult | None
+    size: float  # true backlash size in rad, mean of the joints
+    result: ClassificationResult | None  # None where the classifier refused
 
 
 def random_tube(generator: np.random.Generator) -> PlantDescription:

@@ -43,30 +43,22 @@ FAULTS: dict[str, Spoil] = {
 
 @dataclass(frozen=True)
 class Tubes:
-    """R tubes of known size and their tensions without noise.
+    """R tubes of known size and their tensions without noise."""
 
-    `size` (R,): rad.
-    `tension` (R, N, 4): n at 1 kHz, what the classifier reads of the record.
-    """
-
-    size: NDArray[np.float64]
-    tension: Single
+    size: NDArray[np.float64]  # (R,), rad
+    tension: Single  # (R, N, 4) in N at 1 kHz, what the classifier reads of the record
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a classifier says of R tubes.
+    """What a classifier says of R tubes."""
 
-    `right`, `wrong`, `refused`: shares; right and wrong by the class nearest to the true size.
-    `rmse`: error of the size in rad of what was not refused.
-    `holds`: share of sizes in their 90 % interval, of what was not refused.
-    """
-
+    # Shares; right and wrong by the class nearest to the true size.
     right: float
     wrong: float
     refused: float
-    rmse: float
-    holds: float
+    rmse: float  # error of the size in rad of what was not refused
+    holds: float  # share of sizes in their 90 % interval, of what was not refused
 
 
 def tubes_of_sizes(seed: int, sizes_deg: tuple[float, ...], each: int, motion: str) -> Tubes:

@@ -28,23 +28,18 @@ _MOST_RIGS = 1000
 
 @dataclass(frozen=True)
 class NeverSeenTube:
-    """One random rig in one random tube.
-
-    `size`: true backlash size in rad, mean of the joints.
-    `noise`: seed of the sensors.
-    """
+    """One random rig in one random tube."""
 
     plant: PlantDescription
-    size: float
-    noise: int
+    size: float  # true backlash size in rad, mean of the joints
+    noise: int  # seed of the sensors
 
 
 def never_seen_tube(seed: int, number: int, size_deg: float | None = None) -> NeverSeenTube:
     """Draw a rig, how evenly its tube is bent, and bend it until the backlash has its size.
 
-    `seed`, `number`: together they choose rig, tube and noise.
-    `size_deg`: backlash size in deg; uniform between 42 and 98 if not given.
-    Raises RuntimeError: if no rig of a thousand reaches the size.
+    The size is uniform between 42 and 98 deg if not given. RuntimeError if no rig of a thousand
+    reaches it.
     """
     generator = np.random.default_rng([_UNSEEN, seed, number])
     drawn = float(generator.uniform(SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG))

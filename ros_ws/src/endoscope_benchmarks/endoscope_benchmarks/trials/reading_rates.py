@@ -35,30 +35,21 @@ _NO_LIMIT_NS = 1_000_000_000
 
 @dataclass(frozen=True)
 class ReadTube:
-    """A tube of one class, and its tensions without noise.
-
-    `tension` (N, 4): in N at 1 kHz.
-    """
+    """A tube of one class, and its tensions without noise."""
 
     class_deg: int
     configuration: TubeConfiguration
-    tension: Array
+    tension: Array  # (N, 4), in N at 1 kHz
 
 
 @dataclass(frozen=True)
 class RateTrial:
-    """What became of one calibration.
+    """What became of one calibration."""
 
-    `class_deg`: true class.
-    `size`: true backlash size in rad.
-    `result`: none where it was refused.
-    `reason`: of the refusal.
-    """
-
-    class_deg: int
-    size: float
-    result: ClassificationResult | None
-    reason: str
+    class_deg: int  # true class
+    size: float  # true backlash size in rad
+    result: ClassificationResult | None  # None where it was refused
+    reason: str  # of the refusal
 
 
 def tubes_of_all_classes(seed: int, per_class: int, motion: CalibrationMotion) -> list[ReadTube]:
@@ -88,12 +79,11 @@ def judged_at_rate(
     gap: float = 0.0,
     delay: float = 0.0,
 ) -> RateTrial:
-    """Read, resample and judge one calibration.
+    """Read, resample and judge one calibration at a rate of readings a second.
 
-    `rate`: readings a second; each comes up to `JITTER` of the interval early or late.
-    `seed`: of phase, jitter and noise.
-    `gap`: time in s without readings, where the tension bends most; however long, it is bridged.
-    `delay`: time in s by which a reading is older than its stamp.
+    Each comes up to `JITTER` of the interval early or late, and is older than its stamp by `delay`
+    s. There are none for `gap` s where the tension bends most; however long, that is bridged. The
+    seed is that of phase, jitter and noise.
     """
     generator = np.random.default_rng([_UNSEEN, seed, round(rate)])
     motion = calibration_motion(classifier.motion)

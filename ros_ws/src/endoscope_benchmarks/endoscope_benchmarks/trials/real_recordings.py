@@ -41,19 +41,13 @@ _SETTLED = (0.5 * np.pi, 2.5 * np.pi)
 
 @dataclass(frozen=True)
 class RealRecording:
-    """One tube, N samples.
+    """One tube, N samples."""
 
-    `bend`: of the tube, deg.
-    `phase` (N,): rad, which at 0.159 Hz is s.
-    `desired`, `actual` (N,): rad.
-    `tension` (N, 2): N.
-    """
-
-    bend: int
-    phase: Array
-    desired: Array
-    actual: Array
-    tension: Array
+    bend: int  # of the tube, deg
+    phase: Array  # (N,), rad, which at 0.159 Hz is s
+    desired: Array  # (N,), rad
+    actual: Array  # (N,), rad
+    tension: Array  # (N, 2), N
 
     def within(self, begin: float, end: float) -> slice:
         """Samples between two phases in rad."""
@@ -133,26 +127,18 @@ def models_on_real_recordings(
 
 @dataclass(frozen=True)
 class LeftOneOut:
-    """A tube whose parameters come from the others.
+    """A tube whose parameters come from the others."""
 
-    `bend`: of the tube left out, deg.
-    `left`: rad rms by which the model at the predicted size misses the actual angle: what its
-        inverse as feed-forward would leave. None where the table does not reach.
-    `uncompensated`: rad rms, actual less desired angle.
-    `size_error`: rad, predicted less true backlash size.
-    """
-
-    bend: int
+    bend: int  # of the tube left out, deg
+    # rad rms by which the model at the predicted size misses the actual angle: what its inverse as
+    # feed-forward would leave. None where the table does not reach.
     left: float | None
-    uncompensated: float
-    size_error: float
+    uncompensated: float  # rad rms, actual less desired angle
+    size_error: float  # rad, predicted less true backlash size
 
 
 def left_one_out(recordings: Sequence[RealRecording], model: str, seed: int) -> list[LeftOneOut]:
-    """Leave each tube out, predict its size from its tension and its parameters from a table.
-
-    The table holds the other tubes; size over tension is a straight line through them.
-    """
+    """Leave each tube out, predict its size from its tension and its parameters from a table."""
     fits: Mapping[int, HysteresisParameters] = {
         recording.bend: fit_first_cycle(recording, model, seed).parameters
         for recording in recordings
@@ -162,6 +148,7 @@ def left_one_out(recordings: Sequence[RealRecording], model: str, seed: int) -> 
         others = [recording for recording in recordings if recording is not left_out]
         widths = [recording.tension_width for recording in others]
         sizes = [recording.backlash_size for recording in others]
+        # The table holds the other tubes; size over tension is a straight line through them.
         slope, intercept = np.polyfit(widths, sizes, 1)
         size = float(slope * left_out.tension_width + intercept)
         table = UpdatedTable.of(

@@ -24,21 +24,15 @@ TICK = 1.0e-3
 
 @dataclass(frozen=True)
 class TrackingTrial:
-    """What came of it, N ticks of 1 ms, J joints; angles in rad.
+    """What came of it, N ticks of 1 ms, J joints; angles in rad."""
 
-    Shapes: `time`, `desired` (N,).
-    `bending` (N, J): true bending angle.
-    `command` (N, J): joint-equivalent motor command.
-    `tension` (N, J, 2): true tensions of the positive and the negative wire at the motor, N.
-    `rmse`: of all joints in the signal's steady part.
-    """
-
-    time: NDArray[np.float64]
-    desired: NDArray[np.float64]
-    bending: NDArray[np.float64]
-    command: NDArray[np.float64]
+    time: NDArray[np.float64]  # (N,)
+    desired: NDArray[np.float64]  # (N,)
+    bending: NDArray[np.float64]  # (N, J), true angle
+    command: NDArray[np.float64]  # (N, J), joint-equivalent, of the motor
+    # (N, J, 2), true, of the positive and the negative wire at the motor, N
     tension: NDArray[np.float64]
-    rmse: float
+    rmse: float  # of all joints in the signal's steady part
 
     def peak(self, begin: float, end: float) -> float:
         """Largest error in rad of any joint from `begin` to `end` in s."""
@@ -54,19 +48,14 @@ def run_tracking_trial(
     seed: int,
     controller: AdaptiveBacklashController | RecursiveHysteresisController | None = None,
 ) -> TrackingTrial:
-    """Drive every joint of a rig along a signal.
-
-    `signal`: desired angle of every joint.
-    `feedback`: whether the tracker's noisy readings are used: learnt from by the law in mode
-        'adaptive_physical', otherwise by the controller.
-    `seed`: of the tracker's noise.
-    `controller`: what corrects from the tracker; the adaptive law of the second paper if not given.
-    """
+    """Drive every joint of a rig along a signal; feedback is by the tracker's noisy readings."""
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, seed)
     joints = len(rig.joints)
     gear = shipped_limits().gear
     motion, feedforward = DesiredMotion(joints), Feedforward(joints)
     feedforward.select(law)
+    # In mode 'adaptive_physical' the law learns from them, otherwise the controller, by default the
+    # adaptive law of the second paper.
     learns = law.mode == ADAPTIVE_PHYSICAL
     if controller is None:
         controller = AdaptiveBacklashController(joints)

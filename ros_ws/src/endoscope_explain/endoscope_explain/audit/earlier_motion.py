@@ -42,13 +42,10 @@ FLIGHT = np.array([1e-3, 0.1])
 def with_state_at_start(
     recording: Recording, plant: PlantDescription, findings: list[Finding]
 ) -> Recording:
-    """Estimate from where the motors had come when a recording began.
+    """Estimate from where the motors had come when a recording began, as its `start`.
 
-    `recording`: audited in all else.
-    `plant`: as described.
-    `findings`: gets a note where a rig did not come straight from zero.
-    Returns: with `start`, and without the time until it no longer shows by more than the noise, as
-        long as enough is left.
+    The time until it no longer shows by more than the noise is left out, as long as enough is left.
+    A rig that did not come straight from zero gets a note.
     """
     plant = plant.of_joints(recording.joints)
     observations = observe(recording, plant)
@@ -224,10 +221,8 @@ class _Past:
         return best
 
     def _refined(self, begun: '_Start', turning: bool) -> tuple['_Start', float]:
-        """The best start near one, and its misfit; ways back move by their logarithms.
-
-        By less than a count of its encoder a motor that is turning is off shows in the wires.
-        """
+        """The best start near one, and its misfit; ways back move by their logarithms."""
+        # By less than a count of its encoder a motor that is turning is off shows in the wires.
         own = 2 if turning else 0
 
         def start(numbers: Array) -> _Start:

@@ -23,13 +23,7 @@ _THERE_RAD = 1e-6
 def with_held_poses(
     recording: Recording, sensors: SensorParameters, findings: list[Finding]
 ) -> Recording:
-    """Command the poses that the motors were held at while no commands came.
-
-    `recording`: with increasing stamps.
-    `sensors`: for the step of the motors' encoders.
-    `findings`: gets a note where poses were added.
-    Returns: the same if the motors went wherever they were sent last.
-    """
+    """Command the poses that the motors were held at while no commands came, and note it."""
     command, shaft = recording.command, recording.shaft_position
     if shaft is None or len(command.time) < 2:
         return recording
@@ -64,11 +58,7 @@ def with_held_poses(
 def _held_pose(
     shaft: Series, begin: float, end: float, last: Array, count: float, rig: Rig
 ) -> tuple[float, Array] | None:
-    """When the shafts were told to hold, and where; None if they went to the last command.
-
-    A pose is held if the shafts end at it although they were sent on, and if they came by it no
-    later than the driver gives a stream up: as a rule at that very moment.
-    """
+    """When the shafts were told to hold, and where; None if they went to the last command."""
     given_up = begin + rig.timeouts.command
     if end <= given_up:
         return None
@@ -81,6 +71,8 @@ def _held_pose(
     if np.abs(rest - last).max() <= 1.5 * count:
         return None
     beat = usual_interval(shaft.time)
+    # A pose is held if the shafts end at it although they were sent on, and if they came by it no
+    # later than the driver gives a stream up: as a rule at that very moment.
     there = (np.abs(angle - rest) < 1.5 * count).all(axis=1) & (time <= given_up + 2.0 * beat)
     if not there.any():
         return None

@@ -33,14 +33,11 @@ def chance_of_repeat(noise: float, resolution: float) -> float:
 
 
 def held(values: Array, noise: float, resolution: float, interval: float) -> tuple[Mask, int]:
-    """Find samples that repeat the one before for longer than chance allows.
+    """Samples (N,) that repeat the one before for longer than chance allows, and the usual run.
 
-    Shapes: `values` (N,).
-    `noise`, `resolution`: noise (rms) and step of the sensor, in the values' unit.
-    `interval`: between samples in s.
-    Returns `repeated` (N,): all but the first sample of every run that is too long.
-    Returns `period`: usual run length: above 1 where the sensor is published faster than it is
-        read.
+    The first of each run is none of them. Noise (rms) and step are in the unit of the values (N,),
+    the interval is in s. The usual run is longer than 1 where the sensor is published faster than
+    it is read.
     """
     starts, lengths = runs_of_equal(values)
     period = int(np.median(lengths))
@@ -62,16 +59,9 @@ def held(values: Array, noise: float, resolution: float, interval: float) -> tup
 
 
 def held_before_jump(time: Array, values: Array, resolution: float) -> Mask:
-    """Find a noiseless sensor's samples that stand still until the reading jumps.
-
-    A rig that rests starts to move by small steps; a source that repeated an old sample comes back
-    where the rig has gone in the meantime.
-
-    Shapes: `values` (N,).
-    `time` (N,): increasing stamps in s.
-    `resolution`: step of the sensor, in the values' unit.
-    Returns (N,): all but the first sample of every such run.
-    """
+    """A noiseless sensor's samples (N,), after the first of a run, held until the reading jumps."""
+    # A rig that rests starts to move by small steps; a source that repeated an old sample comes
+    # back where the rig has gone in the meantime.
     repeated = np.zeros(len(values), bool)
     usual = usual_interval(time)
     starts, lengths = runs_of_equal(values)

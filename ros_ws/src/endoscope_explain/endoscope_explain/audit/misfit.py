@@ -17,54 +17,38 @@ LAGS_S = (0.0, 0.02, 0.04, 0.06, 0.1, 0.14, 0.2, 0.3, 0.4, 0.5)
 
 @dataclass(frozen=True)
 class Criteria:
-    """Numbers by which mistakes are judged, derived from recordings in which none was made.
+    """Numbers by which mistakes are judged, derived from recordings in which none was made."""
 
-    `scales`: least and largest scale from a simulated signal to one of another rig.
-    `usual`: misfit that half of the signals exceed: nothing is learnt from less.
-    `follows`: misfit of a shaft that follows its command.
-    `least_tension`: mean in N below which no cell reads.
-    `worth`: independent samples that a signal's misfit stands for.
-    """
-
+    # Least and largest scale from a simulated signal of each quantity to one of another rig.
     scales: Mapping[str, tuple[float, float]]
+    # Misfit that half of a quantity's signals exceed: nothing is learnt from less.
     usual: Mapping[str, float]
-    follows: float
-    least_tension: float
-    worth: float
+    follows: float  # misfit of a shaft that follows its command
+    least_tension: float  # mean in N below which no cell reads
+    worth: float  # independent samples that a signal's misfit stands for
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """What real rigs make of a simulated quantity.
+    """What real rigs make of a simulated quantity."""
 
-    `scale`: least and largest one.
-    `reach`: from the lowest to the highest value that it can have.
-    `noise`: of the sensor as described.
-    `scatter` (M,): of the reading from sample to sample, in its own unit.
-    `least`: mean below which it never is: a wire cannot push.
-    """
-
-    scale: tuple[float, float]
-    reach: float
-    noise: float
-    scatter: Array
-    least: float
+    scale: tuple[float, float]  # least and largest
+    reach: float  # from the lowest to the highest value that it can have
+    noise: float  # of the sensor as described
+    scatter: Array  # (M,), of the reading from sample to sample, in its own unit
+    least: float  # mean below which it never is: a wire cannot push
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Second moments of M measured and P simulated columns, the latter at L lags.
+    """Second moments of M measured and P simulated columns, the latter at L lags."""
 
-    Shapes: `simulated_mean`, `simulated_variance` (L, P), `covariance` (L, M, P).
-    `mean`, `variance`, `reach` (M,): the latter from low to high.
-    """
-
-    mean: Array
-    variance: Array
-    reach: Array
-    simulated_mean: Array
-    simulated_variance: Array
-    covariance: Array
+    mean: Array  # (M,)
+    variance: Array  # (M,)
+    reach: Array  # (M,), from low to high
+    simulated_mean: Array  # (L, P)
+    simulated_variance: Array  # (L, P)
+    covariance: Array  # (L, M, P)
 
     @staticmethod
     def of(measured: Array, simulated: Array) -> 'Moments':
@@ -87,9 +71,8 @@ class Moments:
     def misfit(self, factor: float, bounds: Bounds) -> Array:
         """Share of each measured column that no lag, offset and scale make of each simulated one.
 
-        `factor`: reading of one SI unit.
-        Returns (2, M, P): the share, 0 where they agree, 1 where they have nothing in common; and
-            the scale.
+        Gives the share, 0 where they agree and 1 where they have nothing in common, and the scale:
+        (2, M, P). `factor` is the reading of one SI unit.
         """
         mean, variance = self.mean / factor, (self.variance / factor**2)[:, None]
         covariance, power = self.covariance / factor, self.simulated_variance[:, None, :]

@@ -17,16 +17,11 @@ TRAVEL_FACTOR = 1.5
 
 
 def spike_heights(values: Array, width: int = 1) -> Array:
-    """Measure how far each sample sticks out beyond the samples around it.
-
-    Shapes: `values` (N,).
-    `width`: how many samples in a row stick out together.
-    Returns (N,): distance of the first and the last of a row to the samples beside it, the smaller
-        one, where both stick out to the same side, else 0; with the sign of the spike. A sample
-        that belongs to several rows has the largest.
-    """
+    """How far samples (N,) stick out, up to `width` in a row, with the sign of the spike."""
     if len(values) < width + 2:
         return np.zeros(len(values))
+    # The smaller distance of the first and the last of a row to the samples beside it where both
+    # stick out to the same side, else 0. A sample that belongs to several rows has the largest.
     before = values[1:-width] - values[: -width - 1]
     after = values[width:-1] - values[width + 1 :]
     same_side = before * after > 0
@@ -42,11 +37,9 @@ def _larger(one: Array, other: Array) -> Array:
 
 
 def spike_chance(height: Array, noise: float) -> Array:
-    """Return the probability that white noise (rms `noise`) makes a spike of at least |height|.
-
-    For three independent normal readings of a constant: integral over the middle one of both
-    neighbours lying beyond it by `height`, on either side.
-    """
+    """Return the probability that white noise (rms `noise`) makes a spike of at least |height|."""
+    # For three independent normal readings of a constant: integral over the middle one of both
+    # neighbours lying beyond it by `height`, on either side.
     grid = np.linspace(-10.0, 10.0, 801)
     weight = norm.pdf(grid) * (grid[1] - grid[0])
     h = np.abs(np.asarray(height, float)) / noise
@@ -57,21 +50,17 @@ def spike_chance(height: Array, noise: float) -> Array:
 
 
 def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
-    """Find samples that stick out of their surroundings as noise and motion never do.
+    """Samples (N,) in rad that stick out as noise (rms) and motion never do, beyond chance.
 
-    A bending section may jump there and back within three samples where its motor does: a spike
-    counts only where it is larger than the motor's travel around it, and where it stands alone
-    against the signal's own roughness nearby.
-
-    `values` (N,): readings at the tracker's own rate, without gaps that matter.
-    `noise`: usual noise (rms) in rad.
-    `travel` (N,): how far the motor moves around each sample, as an angle of the joint in rad.
-    Returns (N,): empty of True unless there are more spikes than chance allows.
+    Travel is the motor's (N,), in rad of the joint; gaps between the readings must not matter.
     """
     wrong = np.zeros(len(values), bool)
     if len(values) < 20:
         return wrong
     scale = max(noise, _quiet_noise(values))
+    # A bending section may jump there and back within three samples where its motor does: a spike
+    # counts only where it is larger than the motor's travel around it, and where it stands alone
+    # against the signal's own roughness nearby.
     for _ in range(3):
         kept = np.flatnonzero(~wrong)
         heights = _larger(spike_heights(values[kept], 2), spike_heights(values[kept]))
@@ -88,13 +77,7 @@ def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
 
 
 def motor_travel(tracker_time: Array, motor_time: Array, motor_angle: Array, reach: float) -> Array:
-    """Return the range of the motor's angle within `reach` s of each tracker sample.
-
-    Shapes: `tracker_time` (N,).
-    `motor_time` (M,): in s, increasing.
-    `motor_angle` (M,): as an angle of the joint in rad.
-    Returns (N,).
-    """
+    """Range (N,) of the motor's angle (M,), in rad of the joint, within `reach` s of samples."""
     first = np.searchsorted(motor_time, tracker_time - reach)
     last = np.searchsorted(motor_time, tracker_time + reach)
     last = np.maximum(last, first + 1)
@@ -106,13 +89,7 @@ def motor_travel(tracker_time: Array, motor_time: Array, motor_angle: Array, rea
 
 
 def outlier_finding(joints: Sequence[str], series: Series, wrong: Mask) -> Finding:
-    """Describe the `tracker_outliers` of a recording: one tracker reads all joints.
-
-    `joints`: j of them.
-    `series`: the tracker's, values (N, J).
-    `wrong` (N, J): at least one sample.
-    Returns: of the joint that has most of them.
-    """
+    """`tracker_outliers` of the joint with most wrong samples (N, J): one tracker reads all."""
     sizes = []
     for j in range(len(joints)):
         bad, values = wrong[:, j], series.values[:, j]

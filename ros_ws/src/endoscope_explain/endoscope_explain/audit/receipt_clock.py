@@ -14,14 +14,11 @@ WINDOW_S = 1.0
 
 
 def delay_slope(series: Series) -> tuple[float, float] | None:
-    """Measure the drift of receipt against stamp, from the quickest deliveries of each second.
-
-    `series`: with increasing stamps.
-    Returns: slope in s/s and its standard error; None where receipt is unknown or the series short.
-    """
+    """Drift of receipt against stamp and its standard error in s/s, None if it is unknown."""
     if series.received is None or series.time[-1] - series.time[0] < 5 * WINDOW_S:
         return None
     delay = series.received - series.time
+    # The quickest deliveries of each second tell the drift.
     window = ((series.time - series.time[0]) / WINDOW_S).astype(int)
     slope, error = 0.0, np.inf
     # Against a drift the quickest delivery is the window's last or first: it is taken out first.
@@ -42,10 +39,7 @@ def delay_slope(series: Series) -> tuple[float, float] | None:
 
 
 def clock_skew_from_receipt(series: dict[str, Series]) -> dict[str, Estimate]:
-    """Find the skew of each device's clock against the majority, where it is beyond doubt.
-
-    Returns: relative rate of its stamps minus one; only topics whose clock runs apart.
-    """
+    """Skew (relative rate minus one) of topics whose clock surely runs apart from most."""
     slopes = {t: s for t, one in series.items() if (s := delay_slope(one)) is not None}
     if len(slopes) < 3:
         return {}
@@ -60,11 +54,7 @@ def clock_skew_from_receipt(series: dict[str, Series]) -> dict[str, Estimate]:
 
 
 def retimed(series: Series, skew: float, start: float = 0.0) -> Series:
-    """Put a series whose clock ran `1 + skew` times as fast on the common clock.
-
-    `skew`: relative rate minus one.
-    `start`: stamp in s at which both clocks agreed.
-    """
+    """Put a series on the common clock; its own ran `1 + skew` times as fast from `start` s."""
     time: Array = start + (series.time - start) / (1.0 + skew)
     return replace(series, time=time)
 

@@ -10,17 +10,11 @@ from endoscope_explain.recording.series import Array, Mask
 
 
 def clipped(values: Array, noise: float, resolution: float) -> tuple[Mask, float] | None:
-    """Find the samples at the upper end of a clipped signal.
-
-    Readings of an unclipped cell thin out towards their maximum; those of a clipped one pile up
-    there. The pile is looked for in steps of the cell's resolution.
-
-    `values` (N,): valid readings in N.
-    `noise`, `resolution`: noise (rms) and step in N.
-    Returns (N,): samples at the limit, and the limit; None if the cell does not clip.
-    """
+    """Find readings (N,) at the limit of a clipped cell, and the limit in N; None if none clips."""
     top = float(values.max())
     step = resolution if resolution > 0 else 1e-9 * max(1.0, abs(top))
+    # Readings of an unclipped cell thin out towards their maximum; those of a clipped one pile up
+    # there. The pile is looked for in steps of the cell's resolution.
     at_limit = values >= top - 0.5 * step
     pile = int(at_limit.sum())
     if pile < 20:

@@ -13,12 +13,7 @@ GAP_FACTOR = 2.5
 
 
 def order_stamps(series: Series, joint: str) -> tuple[Series, list[Finding]]:
-    """Sort a series by its stamps and keep the first of equal ones.
-
-    `series`: in the order of recording.
-    `joint`: to put into findings.
-    Returns: with strictly increasing stamps.
-    """
+    """Sort a series by its stamps and keep the first of equal ones; findings name the joint."""
     findings = []
     step = np.diff(series.time)
     backward = step < 0
@@ -69,19 +64,14 @@ def usual_interval(time: Array) -> float:
 
 
 def find_gaps(series: Series, start: float, end: float) -> tuple[tuple[float, float], ...]:
-    """Find intervals in which samples are missing.
-
-    `series`: with increasing stamps.
-    `start`, `end`: first and last stamp of the whole recording in s: a topic that begins late or
-        ends early has a gap there.
-    Returns: from the last sample before to the first one after each gap, in s.
-    """
+    """From the last sample before to the first one after each gap, in s."""
     usual = usual_interval(series.time)
     step = np.diff(series.time)
     # A stream that jitters as a matter of course is not full of gaps.
     threshold = max(GAP_FACTOR * usual, 3.0 * float(np.quantile(step, 0.99)))
     at = np.flatnonzero(step > threshold)
     gaps = [(float(series.time[i]), float(series.time[i + 1])) for i in at]
+    # A topic that begins late or ends early in the recording has a gap there, too.
     margin = max(threshold, 0.1)
     if series.time[0] - start > margin:
         gaps.insert(0, (start, float(series.time[0])))
@@ -135,11 +125,7 @@ def gap_findings(
     intervals: dict[str, float],
     joint: str,
 ) -> list[Finding]:
-    """Make one finding of the gaps of all topics.
-
-    `intervals`: usual interval of each topic in s.
-    Returns: empty, or one `recording_gap` whose `time_s` is where the longest gap begins.
-    """
+    """At most one `recording_gap`, of all topics, whose `time_s` is where the longest begins."""
     every = [(b - a, a, b, topic) for topic, gaps in gaps_by_topic.items() for a, b in gaps]
     if not every:
         return []

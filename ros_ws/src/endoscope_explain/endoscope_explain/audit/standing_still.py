@@ -29,15 +29,9 @@ def frozen_findings(
     noise: Mapping[str, float],
     noisy: bool,
 ) -> list[Finding]:
-    """Find topics that repeat one reading to the end, or from first to last.
+    """Find topics that repeat one reading to the end, or from first to last, though they must move.
 
-    `recording`: with increasing stamps.
-    `grid` (N,): times in s.
-    `expected` (N, columns): what the plant makes of the command then.
-    `noise`: of each sensor.
-    `noisy`: whether the recording shows it: without, a slack wire and a joint that is held fast may
-        well give one reading.
-    Returns: only of what must have moved meanwhile.
+    `expected` (N, columns) is what the plant makes of the command at the grid's times (N,) in s.
     """
     findings = []
     by_topic: dict[str, list[tuple[str, Series]]] = {}
@@ -50,6 +44,8 @@ def frozen_findings(
         columns = [
             (quantity, c) for quantity, _ in held for c in range(expected[quantity].shape[1])
         ]
+        # Of a recording that shows no noise, a slack wire and a joint that is held fast may well
+        # give one reading.
         sure = noisy or held[0][1].topic == MOTOR
         if (
             sure

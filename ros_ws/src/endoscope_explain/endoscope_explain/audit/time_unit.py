@@ -22,17 +22,10 @@ AS_LONG = 4.0
 
 
 def stamp_unit_findings(recording: Recording, sensors: SensorParameters) -> list[Finding]:
-    """Find topics whose stamps are a power of a thousand too fast or too slow.
-
-    A sensor's rate alone tells it where all topics agree; where one is as much longer or shorter
-    than the others, that does.
-
-    `recording`: with increasing stamps.
-    `sensors`: for their rates.
-    Returns: one for all topics of one unit; `evidence['per_second']` is by what to divide the
-        stamps.
-    """
+    """Topics whose stamps are a power of 1000 off: to be divided by `evidence['per_second']`."""
     topics = {s.topic: s for s in (recording.command, *recording.measured().values())}
+    # A sensor's rate alone tells it where all topics agree; where one is as much longer or shorter
+    # than the others, that does.
     powers = _powers(topics, sensors)
     return [
         _finding(recording, [topics[t] for t in powers if powers[t] == power], power)

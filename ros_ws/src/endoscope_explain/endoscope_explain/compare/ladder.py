@@ -25,11 +25,7 @@ def ladders(
     black_boxes: bool,
     jobs: int,
 ) -> tuple[Ladder, Ladder]:
-    """Judge all fits, on held-out blocks and on a second recording.
-
-    The black boxes, if asked for, see all of the first recording before they are judged on the
-    second one; without a second one its ladder is empty.
-    """
+    """Judge all fits, on held-out blocks and on a second recording, if there is one."""
     plants = {name: getattr(explanation, name) for name in PHYSICS}
     held_out: dict[str, Mapping[str, ChannelFit]] = {
         name: dict(explanation.fit.get(name, {})) for name in PHYSICS
@@ -50,6 +46,8 @@ def ladders(
         )
         exams = [blocks]
         if validation is not None and seen is not None:
+            # The black boxes see all of the first recording before they are judged on the second
+            # one.
             exams.append(Exam(_all, validation, seen, _all))
         rungs = black_box_rungs(recording, recorded, exams, jobs)
         for ladder, found in zip((held_out, second), rungs, strict=False):

@@ -15,16 +15,12 @@ SAMPLE_S = 0.01
 
 @dataclass(frozen=True)
 class Waveform:
-    """A motion of one joint; the others rest.
-
-    `time` (N,): in s.
-    `angle` (N,): desired bending angle in rad.
-    """
+    """A motion of one joint; the others rest."""
 
     name: str
     joint: str
-    time: Array
-    angle: Array
+    time: Array  # (N,), s
+    angle: Array  # (N,), desired bending angle in rad
 
 
 def family(joint: str, others: tuple[str, ...], reach: float) -> list[Waveform]:

@@ -20,10 +20,7 @@ BEHIND = ('tension', 'bending')
 
 
 def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCut, ...]:
-    """Compare both ways of driving wires and joint, by a plant to which nothing was added.
-
-    Empty where the shaft was not recorded.
-    """
+    """Compare both ways to drive wires and joint by a plain plant; none without shaft reading."""
     shaft = recording.shaft_position
     if shaft is None:
         return ()

@@ -16,11 +16,9 @@ STANDING_RAD_PER_S = 0.02
 
 
 def conditions(recording: Recording, j: int) -> dict[str, Mask]:
-    """When a joint was in each state, by the state's words as they stand after "shows".
+    """When joint `j` was in each state (N,), by the state's words as they stand after "shows".
 
-    `recording`: as audited.
-    `j`: column of the joint.
-    Returns (N,): on a grid of `GRID_S`: those that hold for some, not all of the time.
+    On a grid of `GRID_S`, those states that hold for some, not all of the time.
     """
     grid = np.arange(0.0, recording.duration, GRID_S)
     motor = _motor(recording, j, grid)
@@ -64,12 +62,7 @@ def conditions(recording: Recording, j: int) -> dict[str, Mask]:
 
 
 def drive(recording: Recording, j: int, end: float) -> Array:
-    """Measure how much was asked of a joint in windows of time.
-
-    `end`: in s.
-    Returns (W, 3): largest angle and speed of the motor, joint-equivalent, and largest bending
-        angle in each window.
-    """
+    """Largest motor angle and speed, joint-equivalent, and bending angle in windows (W, 3)."""
     count = int(np.ceil(end / WINDOW_S))
     grid = (np.arange(count * int(WINDOW_S / GRID_S), dtype=np.float64) + 0.5) * GRID_S
     motor = _motor(recording, j, grid)

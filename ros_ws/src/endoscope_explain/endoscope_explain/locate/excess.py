@@ -15,17 +15,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SignalExcess:
-    """Excess misfit of one signal.
-
-    `excess` (M,): squared residual without the effect minus that with it, in noise units.
-    `kept` (M,): residual with the effect.
-    `missing` (M,): what the prediction lacks without the effect, in noise units.
-    """
+    """Excess misfit of one signal."""
 
     view: SignalView
+    # (M,): squared residual without the effect minus that with it, in noise units.
     excess: Array
-    kept: Array
-    missing: Array
+    kept: Array  # (M,), residual with the effect
+    missing: Array  # (M,), what the prediction lacks without the effect, in noise units
 
     @property
     def total(self) -> float:
@@ -36,10 +32,7 @@ class SignalExcess:
 def excess_between(
     recording: Recording, without: PlantDescription, with_it: PlantDescription | None
 ) -> list[SignalExcess]:
-    """Compare what two plants miss of each signal, largest excess first.
-
-    No second plant stands for noise alone.
-    """
+    """What two plants, or one plant and noise alone, miss of each signal, largest excess first."""
     plants = {'without': without} if with_it is None else {'without': without, 'with': with_it}
     found = []
     for one in view(recording, plants).signals.values():

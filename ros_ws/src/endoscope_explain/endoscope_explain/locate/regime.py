@@ -19,19 +19,14 @@ SHIFTS = 99
 def regime_in_words(
     excesses: Sequence[SignalExcess], states: Mapping[str, Mask], seed: int = 0
 ) -> str:
-    """Name the one or two states that hold most of the excess in the least time.
-
-    How far a state concentrates the excess is the Kullback-Leibler divergence between its share of
-    the excess and its share of the time; by chance is what shifts of the excess in time reach.
-
-    `excesses`: the signals in which it shows.
-    `states` (N,): when each holds, see `conditions`.
-    `seed`: of the shifts.
-    """
+    """Name the one or two states, of `conditions`, that hold most of the excess in least time."""
     if not states or not excesses:
         return 'throughout'
     energy = _energy_on_grid(excesses, len(next(iter(states.values()))))
     everywhere = np.ones(len(energy), bool)
+    # How far a state concentrates the excess is the Kullback-Leibler divergence between its share
+    # of the excess and its share of the time; by chance is what shifts of the excess in time (drawn
+    # by the seed) reach.
     first = _best(energy, states, everywhere, seed)
     if first is None:
         return 'throughout'
@@ -41,11 +36,7 @@ def regime_in_words(
 
 
 def information(energy: Array, active: Mask, within: Mask) -> float:
-    """Return what a state says about where the energy is, in nats; 0 where it holds less.
-
-    `energy` (N,): at least 0.
-    `active`, `within` (N,): the state, and the stretch of time that is looked at.
-    """
+    """What a state says about where the energy (N,), >= 0, is, in nats; 0 where it holds less."""
     total = float(energy[within].sum())
     inside = active & within
     time_share = int(inside.sum()) / max(int(within.sum()), 1)

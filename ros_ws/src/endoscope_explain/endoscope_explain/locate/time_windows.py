@@ -17,19 +17,15 @@ FAINT = 0.03
 
 
 def windowed(excesses: Sequence[SignalExcess], end: float) -> tuple[Array, Array]:
-    """Sum the excess of several signals over windows, in standard deviations of noise alone.
-
-    `end`: in s.
-    Returns `sums` (W,): excess in each window.
-    Returns `spread` (W,): what the noise that is left makes of it: its squares vary with twice
-        their number, more where it is correlated.
-    """
+    """Sum the excess of several signals in windows (W,) up to `end` s; and its spread by noise."""
     count = int(np.ceil(end / WINDOW_S))
     sums, variance = np.zeros(count), np.zeros(count)
     for one in excesses:
         index = np.clip((one.view.time / WINDOW_S).astype(int), 0, count - 1)
         sums += np.bincount(index, one.excess, count)
         level = max(1.0, float(np.mean(one.kept**2)))
+        # The squares of the noise that is left vary with twice their number, more where it is
+        # correlated.
         inflation = 2.0 * level**2 * _correlation_time(one.kept)
         # A difference of predictions d meets noise as 2 d times noise, beside its own square.
         variance += np.bincount(index, inflation + 4.0 * one.missing**2 * level, count)
@@ -39,11 +35,7 @@ def windowed(excesses: Sequence[SignalExcess], end: float) -> tuple[Array, Array
 def intervals(
     excesses: Sequence[SignalExcess], end: float, most: int = 12
 ) -> tuple[tuple[float, float], ...]:
-    """Find where the excess stands out of the noise, in s, in order of time.
-
-    `end`: length of the recording in s.
-    `most`: largest number of intervals; the weakest are dropped.
-    """
+    """Where the excess stands out of the noise, in s and in order: the strongest `most`."""
     sums, spread = windowed(excesses, end)
     found: list[list[float]] = []
     for w in _strong(sums, spread):
@@ -58,19 +50,19 @@ def intervals(
 
 
 def onset(excesses: Sequence[SignalExcess], driven: Array, end: float) -> float | None:
-    """Find when, in s, a mismatch began that was not there from the start.
+    """When, in s, a mismatch began that was not there from the start.
 
-    A change point of the windowed excess (Page, Biometrika 41, 1954, for one upward change). It
-    counts only where nothing stands out before it over at least a tenth of the recording, and
-    where the rig moved as much before as it did when the mismatch showed: what no motion called
-    for has not begun. `driven` (W, K) are K measures of how much the rig was driven in each window
-    of `WINDOW_S`; the recording ends at `end` s.
+    A change point of the windowed excess (Page, Biometrika 41, 1954, for one upward change), where
+    `driven` (W, K) are K measures of how much the rig was driven in each window.
     """
     sums, spread = windowed(excesses, end)
     strong = _strong(sums, spread)
     if not len(strong) or strong[0] * WINDOW_S < 0.1 * end:
         return None
     before = slice(0, strong[0])
+    # It counts only where nothing stands out before it over at least a tenth of the recording, and
+    # where the rig moved as much before as it did when the mismatch showed: what no motion called
+    # for has not begun.
     quiet = sums[before].sum() < 3.0 * np.sqrt(np.sum(spread[before] ** 2))
     usual = np.quantile(driven[strong], 0.25, axis=0)
     called_for = bool((driven[before].max(axis=0) > usual).all())

@@ -18,12 +18,10 @@ WITH_NOISE = frozenset({'tension', 'bending', 'shaft_effort'})
 
 
 def with_held_noise(observations: tuple[JointObservation, ...]) -> tuple[JointObservation, ...]:
-    """Scale the known noise of each kind of sensor by what is seen in holds.
-
-    Coloured noise averages out less than white noise does, and a sensor may be worse than its
-    description. Third differences of the readings in holds tell, without any model of the plant.
-    Sensors of one kind are taken together; where there is no hold, the description stands.
-    """
+    """Scale the known noise of each kind of sensor by what is seen in holds."""
+    # Coloured noise averages out less than white noise does, and a sensor may be worse than its
+    # description. Third differences of the readings in holds tell, without any model of the plant.
+    # Sensors of one kind are taken together; where there is no hold, the description stands.
     squares: dict[str, list[Array]] = {}
     for observation in observations:
         still = held(observation)

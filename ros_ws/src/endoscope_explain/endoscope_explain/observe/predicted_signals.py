@@ -21,24 +21,16 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class SignalView:
-    """One signal on the analysis grid.
+    """One signal on the analysis grid."""
 
-    Shapes: `measured` (M,).
-    `signal`, `joint`, `quantity`, `unit`: name as the report writes it, joint, series of the
-        recording, SI unit.
-    `time` (M,): in s from the recording's first stamp.
-    `noise` (M,): known noise (rms) of each sample.
-    `predicted` (M,): by the plant's name.
-    """
-
-    signal: str
+    signal: str  # as the report writes it
     joint: str
-    quantity: str
-    unit: str
-    time: Array
-    measured: Array
-    noise: Array
-    predicted: Mapping[str, Array]
+    quantity: str  # series of the recording
+    unit: str  # SI
+    time: Array  # (M,), in s from the recording's first stamp
+    measured: Array  # (M,)
+    noise: Array  # (M,), known noise (rms) of each sample
+    predicted: Mapping[str, Array]  # (M,) by the plant's name
 
     def residual(self, name: str) -> Array:
         """Return measured minus predicted in noise units."""
@@ -47,17 +39,13 @@ class SignalView:
 
 @dataclass(frozen=True)
 class RecordedView:
-    """A recording and its predictions.
-
-    `signals`: by name, joint after joint.
-    `outputs` (N, OUTPUTS): what the last plant given predicts on 1 ms ticks.
-    `begin`: first command's stamp in s from the recording's first stamp.
-    """
+    """A recording and its predictions."""
 
     observations: tuple[JointObservation, ...]
-    signals: Mapping[str, SignalView]
+    signals: Mapping[str, SignalView]  # by name, joint after joint
+    # (N, OUTPUTS): what the last plant given predicts on 1 ms ticks, by joint.
     outputs: Mapping[str, Array]
-    begin: float
+    begin: float  # first command's stamp in s from the recording's first stamp
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -79,11 +67,7 @@ def packed_rig(
 
 
 def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescription) -> Array:
-    """Simulate all joints of a recording side by side.
-
-    `observations`: in the order of the plant's joints.
-    Returns (J, N, OUTPUTS).
-    """
+    """Simulate all joints of a recording, in the plant's order, side by side: (J, N, OUTPUTS)."""
     parameters, flags = packed_rig(observations, plant)
     inputs = np.concatenate([o.inputs for o in observations])
     start = np.stack([o.start for o in observations])
@@ -95,12 +79,10 @@ def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescrip
 
 
 def reading_lead(observations: tuple[JointObservation, ...], outputs: Array) -> float:
-    """Estimate by how much of a tick readings are younger than their stamps.
-
-    From the angle of a motor, which moves fast and is read without noise: of that one which is
-    predicted best, as another one's parameters may never have been learnt; 0 where none was
-    recorded.
-    """
+    """Estimate by how much of a tick readings are younger than their stamps."""
+    # From the angle of a motor, which moves fast and is read without noise: of that one which is
+    # predicted best, as another one's parameters may never have been learnt; 0 where none was
+    # recorded.
     best, lead = np.inf, 0.0
     for observation, out in zip(observations, outputs, strict=True):
         for channel in observation.channels:
@@ -123,8 +105,7 @@ def reading_lead(observations: tuple[JointObservation, ...], outputs: Array) -> 
 def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> RecordedView:
     """Predict every signal of a recording by several plants.
 
-    `recording`: as audited.
-    `plants`: the last one is taken for the best one: its motor tells when readings were taken.
+    The last one is taken for the best one: its motor tells when readings were taken.
     """
     best = list(plants.values())[-1]
     observations = observe(recording, best)

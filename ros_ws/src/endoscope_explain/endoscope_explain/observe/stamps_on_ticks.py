@@ -13,17 +13,13 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class StampsOnTicks:
-    """Raw samples between ticks, and the analysis samples that they make.
+    """Raw samples between ticks, and the analysis samples that they make."""
 
-    `tick` (R,): place of each raw sample between simulated ticks `tick` and `tick + 1`.
-    `first` (M,): first raw sample of each analysis sample.
-    `count` (M,): raw samples in each analysis sample.
-    """
-
+    # (R,): place of each raw sample between simulated ticks `tick` and `tick + 1`.
     tick: Indices
-    share: Array
-    first: Indices
-    count: Array
+    share: Array  # (R,), of the way from the one to the other
+    first: Indices  # (M,), first raw sample of each analysis sample
+    count: Array  # (M,), raw samples in each analysis sample
 
     def read(self, column: Array, lead: float = 0.0, skew: float = 0.0) -> Array:
         """Analysis samples (M,) of a simulated output (N,); see `Channel.predicted`."""

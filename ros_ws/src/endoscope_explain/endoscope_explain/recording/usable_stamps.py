@@ -16,11 +16,7 @@ class UnusableStampsError(BagError):
 
 
 def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, list[str]]:
-    """Leave out messages whose stamp is far from when they were received, unlike the others'.
-
-    `series`: in any order. Where the recorder kept no times of receipt, nothing is left out.
-    Returns: what was left out, in words; empty where nothing was.
-    """
+    """Leave out messages stamped far from their receipt, unlike the others; and say so."""
     delay = series.log_ns - series.stamp_ns
     far = np.abs(delay - np.median(delay)) > STRAY_NS
     # Where most are far, the clock runs at another rate, or counts in another unit: see the audit.
@@ -36,10 +32,7 @@ def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, list[str]
 
 
 def require_running_stamps(path: object, series: JointStateSeries) -> None:
-    """Refuse a topic all of whose messages have one stamp, zero as a rule.
-
-    Raises UnusableStampsError: they do; a single message passes.
-    """
+    """Raise UnusableStampsError where several messages of a topic all have one stamp."""
     if len(series) > 1 and np.ptp(series.stamp_ns) == 0:
         raise UnusableStampsError(
             f'{path}: all {len(series)} messages of {series.topic} are stamped '
@@ -48,12 +41,10 @@ def require_running_stamps(path: object, series: JointStateSeries) -> None:
 
 
 def require_common_time(path: object, topics: Sequence[JointStateSeries]) -> None:
-    """Refuse topics that cannot be laid beside each other.
+    """Refuse topics that cannot be laid beside each other; the first one is that of the commands.
 
-    `path`: the recording, for the message.
-    `topics`: each of two messages at least; the first one is that of the commands.
-    Raises UnusableStampsError: all messages of a topic have one stamp, or two topics no time in
-        common.
+    UnusableStampsError if all of a topic's messages, two at least, have one stamp, or two topics no
+    time in common.
     """
     for one in topics:
         require_running_stamps(path, one)

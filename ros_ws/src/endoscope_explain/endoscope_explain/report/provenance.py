@@ -9,10 +9,7 @@ from endoscope_explain.case import Provenance
 
 
 def provenance(bag: Path, plant: Path | None, command: str) -> Provenance:
-    """Note what a report is made from, now: the bag's files and the plant's by their hashes.
-
-    Raises OSError: a file cannot be read.
-    """
+    """Note what a report is made from, now: the bag's files and the plant's by their hashes."""
     messages = sorted(p for p in bag.iterdir() if p.suffix != '.yaml') if bag.is_dir() else [bag]
     return Provenance(
         str(bag),

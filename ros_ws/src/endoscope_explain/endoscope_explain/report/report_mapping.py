@@ -16,7 +16,7 @@ EXPERIMENT_FILE = 'next_experiment.csv'
 def report_mapping(case: ExplainedCase) -> dict[str, Any]:
     """Return the content of report.json: plain, with finite numbers only.
 
-    Raises ValueError: if a number that has no bound to fall back on is not finite.
+    ValueError if a number that has no bound to fall back on is not finite.
     """
     term, experiment = case.explanation.unknown, case.next_experiment
     content = {

@@ -15,12 +15,7 @@ PLANT_YAML = 'plant.yaml'
 
 
 def write_report(case: ExplainedCase, folder: Path) -> None:
-    """Write report.json, report.html, plant.yaml and the next experiment's motion, if any.
-
-    The folder exists, see `atomic_directory`.
-
-    Raises OSError: if a file cannot be written.
-    """
+    """Write report.json, report.html, plant.yaml and any next motion to a folder that exists."""
     content = json.dumps(report_mapping(case), indent=1, allow_nan=False)
     (folder / REPORT_JSON).write_text(content + '\n', encoding='utf-8')
     (folder / REPORT_HTML).write_text(html_page(case), encoding='utf-8')

@@ -6,11 +6,7 @@ TITLE = 'Calibration, from request to compensated motion, s'
 
 
 def rows(settings: PapersBench) -> list[Row]:
-    """Rest, motion and way back as the calibration node commands them, and the time of computing.
-
-    The motion is in the rig's time; what is computed (class, size and plant) is measured on this
-    machine, once for each tube.
-    """
+    """Rest, motion and way back as the calibration node commands them, and computing time."""
     import time
 
     import numpy as np
@@ -23,6 +19,8 @@ def rows(settings: PapersBench) -> list[Row]:
     from endoscope_core.rig import shipped_rig
     from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 
+    # The motion is in the rig's time; what is computed (class, size and plant) is measured on this
+    # machine, once for each tube.
     rest, gear = 0.5, shipped_rig().joints.gear
     found = []
     for name in CALIBRATION_MOTIONS:

@@ -38,10 +38,7 @@ def rows(settings: PapersBench) -> list[Row]:
 
 
 def _of_the_network(recordings: 'Sequence[RealRecording]') -> Row:
-    """The shipped network, which knows 90 deg where these tubes were moved by 60.
-
-    One joint was moved: its two wires stand for those of both.
-    """
+    """The shipped network, which knows 90 deg where these tubes were moved by 60."""
     from endoscope_core.classifier.cnn_classifier import course
     from endoscope_core.classifier.shipped import load_classifier
     from endoscope_core.signals import CALIBRATION_RATE, calibration_motion
@@ -51,6 +48,7 @@ def _of_the_network(recordings: 'Sequence[RealRecording]') -> Row:
     errors, told = [], []
     for recording in recordings:
         wires = [np.interp(phase, recording.phase, wire) for wire in recording.tension.T]
+        # One joint was moved: its two wires stand for those of both.
         judgement = classifier.judged(course(np.stack(2 * wires, axis=1)[None], motion.name))
         true, [size] = np.rad2deg(recording.backlash_size), np.rad2deg(judgement.size)
         errors.append(size - true)

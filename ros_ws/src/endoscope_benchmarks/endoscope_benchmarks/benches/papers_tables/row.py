@@ -10,17 +10,11 @@ FEWEST_CONFIGURATIONS = 5
 
 @dataclass(frozen=True)
 class PapersBench:
-    """What every table of the bench is asked for.
+    """What every table of the bench is asked for; ValueError for < 5 tubes or a seed < 0."""
 
-    `seed`: chooses tubes, rigs and noise.
-    `tubes`: tube configurations for each row, at least five.
-    `report`: takes a line that says how far it has come.
-    Raises ValueError: if there are fewer tubes than five, or the seed is negative.
-    """
-
-    seed: int
-    tubes: int
-    report: Callable[[str], None]
+    seed: int  # chooses tubes, rigs and noise
+    tubes: int  # tube configurations for each row, at least five
+    report: Callable[[str], None]  # takes a line that says how far it has come
 
     def __post_init__(self) -> None:
         if self.tubes < FEWEST_CONFIGURATIONS:
@@ -34,23 +28,15 @@ class PapersBench:
 
 @dataclass(frozen=True)
 class Row:
-    """One figure.
+    """One figure."""
 
-    `name`: what is measured, with its unit.
-    `values`: ours, one for each tube configuration (or fold, or recording).
-    `paper`: the papers' figure as they print it; empty where they have none.
-    `at_most`, `at_least`: what the mean of `values` is to keep.
-    `digits`: digits after the point.
-    `note`: what a reader must know to take the figure right.
-    """
-
-    name: str
-    values: Sequence[float]
-    paper: str = ''
-    at_most: float | None = None
-    at_least: float | None = None
-    digits: int = 2
-    note: str = ''
+    name: str  # what is measured, with its unit
+    values: Sequence[float]  # ours, one for each tube configuration (or fold, or recording)
+    paper: str = ''  # the papers' figure as they print it; empty where they have none
+    at_most: float | None = None  # to be kept by the mean of `values`
+    at_least: float | None = None  # to be kept by the mean of `values`
+    digits: int = 2  # after the point
+    note: str = ''  # what a reader must know to take the figure right
 
     @property
     def reached(self) -> bool | None:

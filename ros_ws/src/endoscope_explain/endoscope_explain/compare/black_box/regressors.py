@@ -23,11 +23,7 @@ EDGE = 4.0
 
 
 def trained(kind: str, features: Array, outputs: Array) -> Predictor:
-    """Train a black box.
-
-    Shapes: `features` (M, F), `outputs` (M, K).
-    `kind`: a key of `KINDS`.
-    """
+    """Train a black box of `KINDS` on features (M, F) and outputs (M, K)."""
     from sklearn.preprocessing import StandardScaler
 
     inputs, targets = StandardScaler().fit(features), StandardScaler().fit(outputs)
@@ -59,14 +55,12 @@ def training() -> Iterator[None]:
 
 
 def _gaussian_process(x: Array, y: Array) -> Any:
-    """One length scale for each feature, on an even subsample.
-
-    The length scales are tuned by marginal likelihood on a coarser subsample still; Rasmussen,
-    Williams, Gaussian Processes for Machine Learning, 2006, ch. 5.
-    """
+    """One length scale for each feature, on an even subsample."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, WhiteKernel
 
+    # The length scales are tuned by marginal likelihood on a coarser subsample still; Rasmussen,
+    # Williams, Gaussian Processes for Machine Learning, 2006, ch. 5.
     few, many = (
         np.linspace(0, len(x) - 1, min(count, len(x))).astype(int)
         for count in (TUNING_POINTS, GAUSSIAN_PROCESS_POINTS)

@@ -31,10 +31,7 @@ def experiment_figure(experiment: NextExperiment) -> str:
 
 
 def unknown_figure(term: UnknownTerm) -> str:
-    """Plot the missing function, and those that multiply it, each with its 90 % band.
-
-    The formula that comes near is drawn, too, if there is one.
-    """
+    """Plot the missing function and those that multiply it, with 90 % bands, and a near formula."""
     every = (term, *term.factors)
     return figure_html([_function(one, columns=12 // len(every)) for one in every])
 

@@ -34,15 +34,12 @@ STATES = {
 
 @dataclass(frozen=True)
 class State:
-    """What a signal is drawn against.
-
-    `time`, `values` (N,): in s, and in that unit.
-    """
+    """What a signal is drawn against."""
 
     words: str
     unit: str
-    time: Array
-    values: Array
+    time: Array  # (N,), s
+    values: Array  # (N,), in that unit
 
 
 def state_of(
@@ -62,13 +59,11 @@ def state_of(
 
 
 def telling_signals(recorded: RecordedView, joint: str) -> tuple[SignalView, ...]:
-    """Signals of a joint in which the best plant gains most on the described one.
-
-    Angle and tensions, where there is nothing to gain.
-    """
+    """Signals of a joint in which the best plant gains most on the described one."""
     views = recorded.of_joint(joint)
     described, best = ends_of(views[0])
     if described == best:
+        # There is nothing to gain: angle and tensions are shown.
         chosen = [v for v in views if v.quantity in ('bending', 'tension')]
     else:
 
@@ -98,10 +93,7 @@ def telling_passage(views: tuple[SignalView, ...]) -> tuple[float, float]:
 
 
 def passage_figure(views: tuple[SignalView, ...], over: State, passage: tuple[float, float]) -> str:
-    """Plot signals, measured and predicted: against a state, and over time.
-
-    Beside them, what each plant misses.
-    """
+    """Plot signals, measured and predicted, by a state and in time, with each plant's misses."""
     loops, signals = [], []
     for one in views:
         inside = (one.time >= passage[0]) & (one.time <= passage[1])

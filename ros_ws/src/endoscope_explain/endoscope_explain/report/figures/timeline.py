@@ -63,10 +63,7 @@ def timeline_figure(
 
 
 def _misfit(views: Sequence[SignalView]) -> tuple[Array, dict[str, Array]]:
-    """Root mean square over the signals of each window's mean squared residual.
-
-    Returns the edges of the windows, one more than there are values.
-    """
+    """Edges of the windows, and the rms over the signals of each window's mean squared residual."""
     end = max(float(v.time[-1]) for v in views)
     count = int(np.ceil(end / WINDOW_S)) + 1
     levels = {}
