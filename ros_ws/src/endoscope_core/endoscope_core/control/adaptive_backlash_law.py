@@ -113,16 +113,13 @@ class AdaptiveBacklashSettings:
 
 @dataclass(frozen=True)
 class AdaptationState:
-    """Estimates of one joint.
+    """Estimates of one joint."""
 
-    ``g``, ``D`` (rad), ``r`` (rad), ``lambda integral(e)`` (rad) and the surface ``w`` (rad).
-    """
-
-    gain: float = 0.0
-    backlash: float = 0.0
-    bound: float = 0.0
-    integral: float = 0.0
-    surface: float = 0.0
+    gain: float = 0.0  # g
+    backlash: float = 0.0  # D, rad
+    bound: float = 0.0  # r, rad
+    integral: float = 0.0  # lambda integral(e), rad
+    surface: float = 0.0  # w, rad
 
 
 def adapt(
@@ -133,11 +130,10 @@ def adapt(
     direction: float,
     dt: float,
 ) -> AdaptationState:
-    """Estimates after one tracker measurement.
+    """Estimates after one tracker measurement, `dt` s after the one before.
 
-    `error`: measured less desired angle at the instant of the measurement, rad.
-    `desired`, `direction`: ``theta`` (rad) and ``s`` that the measured angle answers to.
-    `dt`: s since the measurement before.
+    `error` in rad is the measured less the desired angle at the instant of the measurement;
+    `desired` (``theta``, rad) and `direction` (``s``) are what the measured angle answers to.
     """
     c = settings
     bounded = limited(error, c.error_limit)

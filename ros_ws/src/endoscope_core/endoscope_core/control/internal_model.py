@@ -44,11 +44,9 @@ _MOST_TURNS = 12
 class TurningPoints:
     """Where a motion turned round, as far as hysteresis without speed remembers it.
 
-    A loop within a larger one is forgotten once it is closed: the pair of turning points between
-    two larger swings, as in the counting of rainflow cycles (ASTM E1049). Should more than twelve
-    be left, the smallest swing goes.
-
-    `values`: begin, turning points and present value.
+    `values` are its begin, turning points and present value. A loop within a larger one is
+    forgotten once it is closed: the pair of turning points between two larger swings, as in the
+    counting of rainflow cycles (ASTM E1049). Of more than twelve, the smallest swing goes.
     """
 
     def __init__(self, values: Sequence[float]) -> None:
@@ -269,10 +267,7 @@ class InternalModel:
         advance_tick(self._state, *self._arrays[1:], dt)
 
     def seek(self, angle: float, dt: float) -> bool:
-        """Turn the shaft so that the joint is at `angle` (rad) after `dt` s.
-
-        Returns: whether it is; otherwise the shaft has gone as far as its limits allow.
-        """
+        """Turn the shaft for `dt` s within its limits; whether the joint is then at `angle` rad."""
         m, way = self._limits, self._limits.speed * dt
         # A shaft that is beyond its travel may stay there, and come back.
         low = min(self.shaft, max(-m.travel, self.shaft - way))
@@ -281,10 +276,7 @@ class InternalModel:
         return abs(self.angle - angle) <= 2.0 * PRECISION
 
     def go_through(self, angles: Sequence[float]) -> list[float]:
-        """Begin at rest and bend the joint to one angle (rad) after the other, slowly.
-
-        Returns: shaft angle in rad at each.
-        """
+        """Bend slowly from rest to one angle (rad) after the other; the shaft's angle at each."""
         path = np.array(angles, dtype=float)
         _go_through_angles(
             self._state, *self._arrays, path, self._limits.travel, self._limits.tension

@@ -32,30 +32,22 @@ SMOOTHING_S = 0.012
 
 @dataclass(frozen=True)
 class PlannedCommand:
-    """A command for a known motion.
+    """A command for a known motion."""
 
-    `command` (N, J): joint-equivalent, rad, one for each tick of 1 ms.
-    `bending` (N, J): what the plant's tip is expected to do, rad.
-    `rmse`: of the expected tip, rad.
-    """
-
-    command: Array
-    bending: Array
-    rmse: float
+    command: Array  # joint-equivalent (N, J), rad, one for each tick of 1 ms
+    bending: Array  # what the plant's tip is expected to do (N, J), rad
+    rmse: float  # of the expected tip, rad
 
 
 def iterated_inverse(
     plant: PlantDescription, desired: Array, velocity: Array, iterations: int = ITERATIONS
 ) -> PlannedCommand:
-    """Find the command under which a plant's tip moves as desired.
+    """Command under which a plant, with its effects, moves as desired: that of the best iteration.
 
-    `plant`: with its effects.
-    `desired`, `velocity` (N, J): rad and rad/s at every tick of 1 ms, from rest at zero.
-    `iterations`: how often to simulate and correct.
-    Returns: the best of all iterations; within the motor's travel, so that an angle that cannot be
-        reached does not wind it up.
-    Raises ValueError: if the motion is not finite, has not a column for each joint, or the plant is
-        invalid.
+    `desired` (N, J) in rad and `velocity` (N, J) in rad/s are at every tick of 1 ms, from rest at
+    zero. The command stays within the motor's travel, so that an angle that cannot be reached does
+    not wind it up. A ValueError if the motion is not finite, has not a column for each joint, or
+    the plant is invalid.
     """
     desired, velocity = np.asarray(desired, dtype=float), np.asarray(velocity, dtype=float)
     names = plant.joint_names()

@@ -31,10 +31,7 @@ class JointInverse(Protocol):
 
 
 class Passing:
-    """No compensation: the desired angle passes, its direction is remembered.
-
-    `travel`: rad over which the memory of the direction builds up.
-    """
+    """No compensation: the desired angle passes, its direction is remembered over `travel` rad."""
 
     def __init__(self, travel: float) -> None:
         self._travel = travel
@@ -65,10 +62,8 @@ class Passing:
 class HysteresisInverse:
     """Inverse of a hysteresis model, driven by the desired angle as it will be `lead` s later.
 
-    `lead`: s.
-    `dead_band`: rad by which the foreseen angle may turn back without any effect, half of it either
-        way: the lead makes a motion the other way of every slowing down, and the inverse amplifies
-        it.
+    The foreseen angle may turn back by `dead_band` rad without any effect, half of it either way:
+    the lead makes a motion the other way of every slowing down, and the inverse amplifies it.
     """
 
     def __init__(self, parameters: HysteresisParameters, lead: float, dead_band: float) -> None:

@@ -5,12 +5,7 @@ from collections.abc import Sequence
 
 
 def check_settings(settings: object, positive: Sequence[str]) -> None:
-    """Refuse a setting that is no number, or negative, or zero where that cannot be.
-
-    `settings`: its attributes are the settings.
-    `positive`: those that must not be zero.
-    Raises ValueError: names the setting.
-    """
+    """Refuse a setting that is not finite, or negative, or zero though among `positive`."""
     for name, value in vars(settings).items():
         if not (math.isfinite(value) and value >= 0.0):
             raise ValueError(f'{name} = {value} must be finite and not negative')

@@ -16,14 +16,11 @@ that was asked for, and nothing moves while nothing is asked for.
 
 
 class Play:
-    """Follows a value as soon as it leaves a band around the last one.
+    """Follows a value, from `value` on, as soon as it leaves a band around the last one.
 
     Noise within the band stays without any effect, and a motion one way comes out as a motion one
     way. What comes out is never further from the value than half the band (Visintin, Differential
     Models of Hysteresis, 1994, section III.2).
-
-    `half_width`: half the band, in the unit of the value.
-    `value`: to begin with.
     """
 
     def __init__(self, half_width: float, value: float) -> None:
@@ -41,15 +38,13 @@ class Play:
 
 
 class SmoothFollower:
-    """Critically damped second-order low-pass, position and velocity at once.
+    """Critically damped second-order low-pass, position and velocity at once, at rest at first.
 
     ``p'' = w**2 (u - p) - 2 w p'``, solved exactly for an input `u` that is held for a period of
     any length. A steady motion is followed ``2 / w`` late. The impulse response, ``w**2 t`` times
     ``exp(-w t)``, is nowhere negative: a motion one way comes out as a motion one way, and a step
-    is approached without overshoot.
-
-    `bandwidth`: `w` in rad/s; half the power is left at ``0.64 w``.
-    `position`: to begin with, at rest.
+    is approached without overshoot. `w` is the `bandwidth` in rad/s; half the power is left at
+    ``0.64 w``.
     """
 
     def __init__(self, bandwidth: float, position: float) -> None:
@@ -73,12 +68,10 @@ def limited(value: float, bound: float) -> float:
 
 
 def worked_off(value: float, travel: float, bound: float) -> float:
-    """What is left of a value of which each step takes off some, until nothing is left.
+    """What a step leaves of a value in rad that is taken off bit by bit, until nothing is left.
 
-    `value`: rad.
-    `travel`: way in rad, either way, that the desired angle has moved: `SHARE_OF_TRAVEL` of it is
-        taken off at most.
-    `bound`: most in rad that may be taken off.
+    At most `bound` rad, and at most `SHARE_OF_TRAVEL` of the `travel` in rad that the desired angle
+    has moved either way, are taken off.
     """
     most = min(bound, SHARE_OF_TRAVEL * travel)
     return value - limited(value, most)

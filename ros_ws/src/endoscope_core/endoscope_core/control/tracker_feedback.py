@@ -68,12 +68,11 @@ class JointLaw(Protocol):
     def learn(
         self, error: float, correction: float, desired: float, direction: float, dt: float
     ) -> None:
-        """Learn from one measurement.
+        """Learn from one measurement, `dt` s after the one before.
 
-        `error`: measured less desired angle at the instant of the measurement, rad.
-        `correction`, `desired`, `direction`: correction in force (rad), desired angle (rad) and
-            direction memory that it answers to.
-        `dt`: s since the measurement before.
+        `error` in rad is the measured less the desired angle at the instant of the measurement; the
+        correction in force (rad), the desired angle (rad) and the direction memory are what it
+        answers to.
         """
         ...
 

@@ -49,26 +49,19 @@ def _exact_linear(g: float, rho: float, distance: float) -> float:
 
 @njit(cache=True)
 def bouc_wen_normalised_step(y: float, delta: float, travel: float, rho: float, n: float) -> float:
-    """Normalised hysteresis state after the driving angle has moved by `delta`.
+    """Normalised state in [-1, 1] after the driving angle has moved by `delta` rad, one way.
 
-    Every substep has the form ``1 - g_new = (1 - g) exp(-kappa dx)`` with ``kappa > 0`` taken at
-    the middle of the substep, which is a convex combination of `g` and 1. Hence ``g <= g_new <= 1``
-    for a step of any size: the state cannot leave [-1, 1], whatever the sampling. For n = 1 the
-    step is exact.
-
-    `y`: state in [-1, 1].
-    `delta`: change of the driving angle in rad, monotone within the step.
-    `travel`: ``h_max / A`` in rad: distance over which the state builds up.
-    `rho`: ``(B - C) / (B + C)``, in (-1, 1].
-    `n`: sharpness, at least 1.
-    Returns: new state in [-1, 1].
+    `travel` is ``h_max / A`` in rad, over which the state builds up; `rho` is in (-1, 1], the
+    sharpness `n` at least 1. Every substep has the form ``1 - g_new = (1 - g) exp(-kappa dx)`` with
+    ``kappa > 0`` taken at the middle of the substep, which is a convex combination of `g` and 1.
+    Hence ``g <= g_new <= 1`` for any step: the state stays in [-1, 1], whatever the sampling.
     """
     if delta == 0.0:
         return y
     side = 1.0 if delta > 0.0 else -1.0
     g = side * y
     distance = abs(delta) / travel
-    if n == 1.0:
+    if n == 1.0:  # the step is exact
         return side * min(1.0, _exact_linear(g, rho, distance))
     substeps = min(_MOST_SUBSTEPS, max(1, math.ceil(min(distance, 1e6) / _LONGEST_SUBSTEP)))
     dx = distance / substeps

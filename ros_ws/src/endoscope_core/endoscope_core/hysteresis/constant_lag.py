@@ -12,10 +12,7 @@ class _WithLag(Protocol):
 
 
 class ConstantLag:
-    """The lag of a :class:`~endoscope_core.hysteresis.memory_model.MemoryModel` with one ``lag``.
-
-    That is the half-width of a saturated loop along the actual angle, in rad.
-    """
+    """One `lag` of a `MemoryModel`: a saturated loop's half-width along the actual angle, rad."""
 
     def lag_at(self: _WithLag, angle: float) -> float:
         """Half-width of the loop, rad."""

@@ -21,12 +21,10 @@ from endoscope_core.compiled_cache import njit
 
 @njit(cache=True)
 def dahl_step(y: float, delta: float, travel: float, exponent: float) -> float:
-    """State in [-1, 1] after the driving angle has moved by `delta` rad, exactly, for any step.
+    """State in [-1, 1] after the driving angle has moved by `delta` rad, one way, exactly.
 
-    `y`: state in [-1, 1].
-    `delta`: monotone change of the driving angle, rad.
-    `travel`: rad over which the state builds up.
-    `exponent`: shape, positive; below 1 saturation is reached in a finite distance, above 1 slowly.
+    It builds up over `travel` rad: with an `exponent` in (0, 1) it saturates after a finite
+    distance, above 1 slowly.
     """
     if delta == 0.0:
         return y

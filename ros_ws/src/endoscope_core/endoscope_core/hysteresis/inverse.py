@@ -53,8 +53,7 @@ class Inverse(Protocol):
 class DirectInverse:
     """Inverse of a model with one memory, which the desired angle drives.
 
-    `direction`: memory to begin with, in [-1, 1].
-    `angle`: desired angle to begin with, rad.
+    It begins with a memory `direction` in [-1, 1] and a desired `angle` in rad.
     """
 
     def __init__(self, model: MemoryModel, direction: float, angle: float) -> None:
@@ -82,8 +81,7 @@ class DirectInverse:
 class PlayStackInverse:
     """Exact inverse of the Prandtl-Ishlinskii model.
 
-    `direction`: in [-1, 1]; the plays begin as far on their sides as this says.
-    `angle`: desired angle to begin with, rad.
+    At a desired `angle` in rad, its plays begin as far on their sides as `direction` in [-1, 1].
     """
 
     def __init__(

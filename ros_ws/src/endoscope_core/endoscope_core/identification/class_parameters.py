@@ -39,17 +39,12 @@ class ClassParameterError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class ClassIdentification:
-    """What has been identified for one class.
-
-    `feedforward`: what the compensator works with.
-    `model`: what was fitted; the same for the plant.
-    `rmse`: rad, or N for the plant, that the model leaves of the recordings.
-    """
+    """What has been identified for one class."""
 
     class_deg: int
-    feedforward: LawParameters
-    model: LawParameters
-    rmse: float
+    feedforward: LawParameters  # what the compensator works with
+    model: LawParameters  # what was fitted; the same for the plant
+    rmse: float  # that the model leaves of the recordings, rad, or N for the plant
 
 
 def identify_classes(

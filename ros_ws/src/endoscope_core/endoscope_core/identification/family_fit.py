@@ -65,22 +65,14 @@ class FamilyFitError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class TubeRecording:
-    """One tube of a rig, moved from rest, sampled evenly: N samples.
+    """One tube of a rig, moved from rest, sampled evenly: N samples."""
 
-    `bend`: of the tube, rad.
-    `tick`: between samples, s.
-    `desired`, `angle` (N,): commanded and measured bending angle, rad; the measured one is zero at
-        the start.
-    `tension` (N, 2): load cells of the positive and the negative wire, N.
-    `cycles`: samples at which the first cycle, the second and so on begin, and at which the last
-        ends.
-    """
-
-    bend: float
-    tick: float
-    desired: Array
-    angle: Array
-    tension: Array
+    bend: float  # of the tube, rad
+    tick: float  # between samples, s
+    desired: Array  # commanded bending angle (N,), rad
+    angle: Array  # measured bending angle (N,), rad, zero at the start
+    tension: Array  # load cells of the positive and the negative wire (N, 2), N
+    # Samples at which the first cycle, the second and so on begin, and at which the last ends.
     cycles: tuple[int, ...]
 
     def cycle(self, number: int) -> slice:
@@ -133,24 +125,10 @@ class Misfit:
 
 
 def read(family: TubeFamily, bend: float, desired: Array, tick: float) -> tuple[Array, Array]:
-    """What the recorded rig would have read.
+    """Angle (N,) in rad and tensions (N, 2) in N that the recorded rig would have read.
 
-    Parameters
-    ----------
-    family : TubeFamily
-    bend : float
-        Of the tube, rad.
-    desired : array (N,)
-        Commanded bending angle, rad.
-    tick : float
-        S.
-
-    Returns
-    -------
-    angle : array (N,)
-        Rad, from where the joint was at the start.
-    tension : array (N, 2)
-        N.
+    `bend` is the tube's in rad, `desired` (N,) the commanded bending angle in rad, `tick` in s. The
+    angle counts from where the joint was at the start.
     """
     plant = PlantDescription(joints={_JOINT: family.joint(bend)})
     made = simulate(plant, (shipped_rig().joints.gear * desired)[:, None], tick)
@@ -187,20 +165,15 @@ def fit_family(
     number: tubes that are alike cannot tell a wire's stiffness from its joint's, and a line through
     five tubes should say something of those between. Differences for its slopes are taken over a
     few hundredths of a prior, since the plant has a kink where a wire becomes slack; for the same
-    reason the search is begun again from places near the best. A load cell shows no less than its
-    offset, which the least tension therefore bounds.
-
-    `priors`: as `PRIORS`; keys left out are nominal.
-    `friction_profile`: held, instead of fitted.
-    `starts`: searches.
-    `seed`: of where they begin.
-    Raises FamilyFitError: if there is no recording, or one is short, or holds what is not finite.
+    reason the search is begun again, `starts` times in all, from places near the best. Keys without
+    a prior are nominal; a friction profile that is given is held instead of fitted.
     """
     _check(recordings)
     free = {k: v for k, v in priors.items() if friction_profile is None or k != 'friction_profile'}
     begin = np.concatenate([_unknowns(key, line) for key, (line, _) in free.items()])
     spread = np.concatenate([np.array(widths, dtype=float) for _, widths in free.values()])
     high = np.full(len(begin), _REACH)
+    # A load cell shows no less than its offset, which the least tension therefore bounds.
     if 'load_cell_offset' in free:
         least = np.min([recording.tension.min(axis=0) for recording in recordings], axis=0)
         at = _places(free)['load_cell_offset']

@@ -30,10 +30,7 @@ Bounds = list[tuple[float, float]]
 
 @dataclass(frozen=True)
 class Candidates:
-    """A box and what a point of it means.
-
-    `make`: ``make(x) -> parameters``, safe for every point of the box.
-    """
+    """A box, and the parameters that `make` makes of a point of it: safe for every point."""
 
     bounds: Bounds
     make: Callable[[Sequence[float]], HysteresisParameters]
@@ -45,10 +42,10 @@ def candidates_for(model: HysteresisParameters) -> Candidates:
     The steeper the inverse, the better it crosses the dead zone; it is therefore nearly as steep as
     its class allows, and the travel follows from that, so that every candidate is safe by
     construction. Gain, lag and sharpness are free; offset and skew are the model's. `rho` hardly
-    matters and is kept where the state leaves saturation gently. For Prandtl-Ishlinskii, whose
-    inverse is exact, only the scales of its weights and thresholds are free.
+    matters and is kept where the state leaves saturation gently.
     """
     if isinstance(model, PrandtlIshlinskiiParameters):
+        # Its inverse is exact: only the scales of its weights and thresholds are free.
         return _play_stack(model)
     gain_and_lag = [
         (max(0.7 * model.alpha, SMALLEST_ALPHA), min(1.4 * model.alpha, GREATEST_ALPHA)),

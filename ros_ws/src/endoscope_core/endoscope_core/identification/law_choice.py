@@ -30,27 +30,20 @@ class LawChoiceError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class CalibrationFindings:
-    """What a calibration found out about the tube.
+    """What a calibration found out about the tube."""
 
-    `class_deg`: hysteresis class, backlash size in deg.
-    `size`: backlash size in rad.
-    `plants`: of each joint; empty where the plant was not identified.
-    `reaches`: how far each joint can be bent in this tube; empty where that is not known.
-    """
-
-    class_deg: int | None = None
-    size: float | None = None
-    plants: tuple[PhysicalParameters, ...] = ()
+    class_deg: int | None = None  # hysteresis class: backlash size in deg
+    size: float | None = None  # backlash size in rad
+    plants: tuple[PhysicalParameters, ...] = ()  # of each joint; empty where not identified
+    # How far each joint can be bent in this tube; empty where that is not known.
     reaches: tuple[Reach, ...] = ()
 
 
 class LawChoice:
     """Finds the parameters of a mode, and keeps the files that it has read.
 
-    `joints`: number of joints.
-    `parameter_sets`: file with a parameter set for each class; empty for those that come with the
-        project.
-    `table`: updated table; empty for one made of the class parameters.
+    Without a file of `parameter_sets`, classes have those that come with the project; without a
+    `table`, the updated table is made of the class parameters.
     """
 
     def __init__(self, joints: int, parameter_sets: str = '', table: str = '') -> None:
@@ -61,14 +54,13 @@ class LawChoice:
         self._tables: dict[str, UpdatedTable] = {}
 
     def law(self, mode: str, selected_by: str, findings: CalibrationFindings) -> FeedforwardLaw:
-        """The law of a mode after a calibration.
+        """The law of a mode (one of `endoscope_core.control.MODES`) after a calibration.
 
-        `mode`: one of `endoscope_core.control.MODES`.
-        `selected_by`: 'class' takes the class's set (first paper), 'size' blends the updated table
-            at the regressed backlash size, 'plant' takes the plant that the calibration identified.
-        Raises LawChoiceError: if the calibration does not say what is needed: nothing is guessed.
-        Raises ClassParameterError, UpdatedTableError: if a file cannot be used, or has nothing for
-            this class or size.
+        By 'class' it takes the class's set (first paper), by 'size' it blends the updated table at
+        the regressed backlash size, by 'plant' it takes the plant that the calibration identified.
+        A LawChoiceError says what is needed and was not found, since nothing is guessed; a file
+        that cannot be used, or has nothing for this class or size, is a ClassParameterError or an
+        UpdatedTableError.
         """
         if mode == 'none':
             return FeedforwardLaw()

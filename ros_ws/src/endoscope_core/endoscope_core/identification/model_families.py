@@ -41,23 +41,16 @@ _SLOPE = 0.99 * GREATEST_INVERSE_SLOPE
 
 @dataclass(frozen=True)
 class ModelFamily:
-    """How a model is fitted by variable projection (Golub and Pereyra 1973).
+    """How a model is fitted by variable projection (Golub and Pereyra 1973)."""
 
-    `shape_bounds`: of the parameters that are searched.
-    `linear_bounds`: of the factors of `columns`.
-    `path`: ``path(driver, y0, shape) -> y (N,)``.
-    `columns`: ``columns(driver, y) -> (N, K)``.
-    `build`: ``build(shape, factors, offset) -> parameters``, safe whatever the arguments within
-        their bounds: where the inverse would be too steep, the travel is lengthened.
-    `has_offset`: whether the model itself has an offset.
-    """
-
-    shape_bounds: tuple[tuple[float, float], ...]
-    linear_bounds: tuple[tuple[float, float], ...]
-    path: Callable[[Array, float, Array], Array]
-    columns: Callable[[Array, Array], Array]
+    shape_bounds: tuple[tuple[float, float], ...]  # of the parameters that are searched
+    linear_bounds: tuple[tuple[float, float], ...]  # of the factors of `columns`
+    path: Callable[[Array, float, Array], Array]  # from driver, y0 and shape to y (N,)
+    columns: Callable[[Array, Array], Array]  # from driver and y to (N, K)
+    # From shape, factors and offset; safe whatever they are within their bounds: where the inverse
+    # would be too steep, the travel is lengthened.
     build: Callable[[Array, Array, float], MemoryParameters]
-    has_offset: bool
+    has_offset: bool  # of the model itself
 
 
 def _two_columns(driver: Array, y: Array) -> Array:

@@ -81,10 +81,7 @@ Point = tuple[float, ...]
 
 
 def blend_joints(first: JointParameters, second: JointParameters, weight: float) -> JointParameters:
-    """Joint at `weight` in [0, 1] of the way between two.
-
-    By the logarithms of its parameters; those that may have either sign go straight.
-    """
+    """Joint at `weight` in [0, 1] between two: by logarithms, straight what may have any sign."""
     blended = {}
     for key in NOMINAL_KEYS:
         a, b = getattr(first, key), getattr(second, key)

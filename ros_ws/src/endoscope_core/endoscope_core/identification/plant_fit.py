@@ -151,17 +151,13 @@ def _rms(values: Array) -> float:
 
 @dataclass(frozen=True)
 class _Search:
-    """The numbers of a rig whose tubes are bent, sought from a motion.
+    """The numbers of a rig whose tubes are bent, sought from a motion."""
 
-    `in_tube`: the joint by the bend in rad.
-    `held` (K,): shaft command on ticks, rad.
-    `wires`, `angle` (M, 2): where they are scored, N and rad; NaN where there is no angle.
-    """
-
-    in_tube: Callable[[float], JointParameters]
-    held: Array
-    wires: Array
-    angle: Array
+    in_tube: Callable[[float], JointParameters]  # the joint by the bend in rad
+    held: Array  # shaft command on ticks (K,), rad
+    # Where they are scored.
+    wires: Array  # (M, 2), N
+    angle: Array  # (M,), rad; NaN where there is none
 
     @classmethod
     def of(
@@ -244,13 +240,11 @@ def plants_of_calibration(
 ) -> tuple[PhysicalParameters, ...]:
     """Plants of all joints from a calibration, the joints side by side.
 
-    Where friction lets the joint go to one side only a little, the way to the other shows where it
-    rests: a motion to one side and back tells a tight tube's reach worse than one to both.
-
-    `command` (N,): joint-equivalent motor command of every joint at 1 kHz, rad.
-    `tension` (N, 2 J): positive and negative wire of each joint in turn, N.
-    `gear`: shaft angle for one radian at the joint.
-    Raises PlantFitError: if the recording shows no plant.
+    All have the same joint-equivalent motor command (N,) in rad at 1 kHz; `gear` is the shaft's
+    angle for one radian at the joint. Tensions (N, 2 J) in N are of the positive and the negative
+    wire of each joint in turn. Where friction lets the joint go to one side only a little, the way
+    to the other shows where it rests: a motion to one side and back tells a tight tube's reach
+    worse than one to both. A PlantFitError if the recording shows no plant.
     """
     u = np.asarray(command, dtype=float)
     wires = np.asarray(tension, dtype=float)

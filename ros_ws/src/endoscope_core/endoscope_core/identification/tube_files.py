@@ -18,11 +18,7 @@ PHASE, DESIRED, ACTUAL, POSITIVE, NEGATIVE = 0, 1, 3, 4, 5
 
 
 def tube_recordings(folder: Path) -> list[TubeRecording]:
-    """All tubes of a folder with two cycles each in real time, sorted by bend.
-
-    `folder`: with a file `BEND.txt` for each tube, bend in deg.
-    Raises IdentificationError: if there is none, or one has no two cycles.
-    """
+    """Two cycles in real time of each tube of a folder, from its `BEND.txt` (deg), by bend."""
     found = []
     for path in folder.glob('[0-9]*.txt'):
         table = np.loadtxt(path, delimiter=',')

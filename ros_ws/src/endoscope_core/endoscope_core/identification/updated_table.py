@@ -187,11 +187,7 @@ def parameters_to_dict(parameters: LawParameters) -> dict[str, Any]:
 
 
 def parameters_from_dict(model: str, values: Mapping[str, Any]) -> LawParameters:
-    """Parameters of a model from a mapping of exactly their names.
-
-    Raises ValueError: if the model is unknown, a name missing or unknown, or the parameters are
-        unsafe.
-    """
+    """Parameters of a model from exactly their names; a ValueError if not so, or if unsafe."""
     if model not in KINDS:
         raise ValueError(f'unknown model {model!r}: choose one of {", ".join(KINDS)}')
     return KINDS[model].from_dict(values)

@@ -26,38 +26,26 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of an effect.
+    """One parameter of an effect, in SI units."""
 
-    `name`, `unit`: name in plant.yaml and SI unit.
-    `low`, `high`: bounds within which the physics is defined and a fit may move.
-    `typical`: value where plant.yaml gives none.
-    `off`: value at which the effect vanishes, or NaN where no value of this parameter does that.
-    `choices`: all admissible values of a parameter that is not continuous (a wire's number); else
-        empty.
-    `words`: what each choice, or each whole number from `low` on, stands for.
-    `starts`: where a fit begins; the typical value if empty.
-    `comparable`: whether a person could measure the parameter another way.
-    `phase`: whether half a turn more reverses the effect.
-    `scale`: where the effect is far from linear in this parameter, the change over which it nearly
-        is; else 0.
-    `counted`: whether it is a whole number, which a fit steps through one by one.
-    `is_duration`: whether it is the length of the recording, which nobody has to look for.
-    """
-
-    name: str
+    name: str  # in plant.yaml
     unit: str
+    # Bounds within which the physics is defined and a fit may move.
     low: float
     high: float
-    typical: float
-    off: float = math.nan
+    typical: float  # where plant.yaml gives none
+    off: float = math.nan  # at which the effect vanishes; NaN where no value does that
+    # All admissible values of a parameter that is not continuous (a wire's number); else empty.
     choices: tuple[float, ...] = ()
+    # What each choice, or each whole number from `low` on, stands for.
     words: tuple[str, ...] = ()
-    starts: tuple[float, ...] = ()
-    comparable: bool = False
-    phase: bool = False
+    starts: tuple[float, ...] = ()  # where a fit begins; the typical value if empty
+    comparable: bool = False  # a person could measure it another way
+    phase: bool = False  # half a turn more reverses the effect
+    # Where the effect is far from linear in it, the change over which it nearly is; else 0.
     scale: float = 0.0
-    counted: bool = False
-    is_duration: bool = False
+    counted: bool = False  # a whole number, which a fit steps through one by one
+    is_duration: bool = False  # the length of the recording, which nobody has to look for
 
     def __post_init__(self) -> None:
         if not self.low <= self.typical <= self.high:
@@ -95,29 +83,20 @@ class Symptom(StrEnum):
 
 @dataclass(frozen=True)
 class Traits:
-    """What a search for missing physics must know of an effect.
+    """What a search for missing physics must know of an effect."""
 
-    `depends_on_time`: it is told from others only where a motion is made twice.
-    `of_device`: it belongs to a device that all joints share.
-    `of_shape`: it belongs to the shape of the tube, and is another in each recording.
-    `rugged`: its misfit has many valleys: a fit needs many starts and wide difference steps.
-    `audited`: no simulation shows it: it is found in the recording itself.
-    `symptom`: by which the recording itself shows it; None for most.
-    `resembles_time`: what it does is not told from a change with time where a motion is made once.
-    `rescales`: nominal parameter that it scales by so much that a described value is ambiguous, and
-        by how much; None for most.
-    `families`: places whose smooth functions hold its formula as one of many.
-    """
-
-    depends_on_time: bool = False
-    of_device: bool = False
-    of_shape: bool = False
-    rugged: bool = False
-    audited: bool = False
-    symptom: Symptom | None = None
+    depends_on_time: bool = False  # told from others only where a motion is made twice
+    of_device: bool = False  # belongs to a device that all joints share
+    of_shape: bool = False  # belongs to the tube's shape, and is another in each recording
+    rugged: bool = False  # many valleys: a fit needs many starts and wide difference steps
+    audited: bool = False  # no simulation shows it: it is found in the recording itself
+    symptom: Symptom | None = None  # by which the recording itself shows it
+    # What it does is not told from a change with time where a motion is made once.
     resembles_time: bool = False
+    # Nominal parameter that it scales by so much that a described value is ambiguous, and by how
+    # much.
     rescales: tuple[str, float] | None = None
-    families: tuple[str, ...] = ()
+    families: tuple[str, ...] = ()  # places whose functions hold its formula as one of many
 
 
 @dataclass(frozen=True)

@@ -43,33 +43,23 @@ class FamilyError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class Readings:
-    """How the recorded rig reads its plant.
+    """How the recorded rig reads its plant."""
 
-    `load_cell_offset`: what each load cell shows without tension, N.
-    `load_cell_delay`, `tracker_delay`: by how much tensions and angle are recorded late, s.
-    """
-
-    load_cell_offset: tuple[float, float] = (0.0, 0.0)
-    load_cell_delay: float = 0.0
-    tracker_delay: float = 0.0
+    load_cell_offset: tuple[float, float] = (0.0, 0.0)  # of each cell without tension, N
+    load_cell_delay: float = 0.0  # by how much tensions are recorded late, s
+    tracker_delay: float = 0.0  # by how much the angle is recorded late, s
 
 
 @dataclass(frozen=True)
 class TubeFamily:
-    """Joints of one rig over the bend of its tube.
+    """Joints of one rig over the bend of its tube; a FamilyError if a line is not valid."""
 
-    `lines`: of a nominal key: its value at `CENTRE`, then by how much it, or its logarithm, grows
-        with the bend and with its square, counted in `SPAN` from `CENTRE`. Keys left out are
-        nominal.
-    `friction_profile`: of all tubes.
-    `provenance`: where the numbers are from and what they leave; carried along, not used.
-    Raises FamilyError: if a key is unknown, or a line has no number, too many, or one that is not
-        finite.
-    """
-
+    # Of a nominal key: its value at `CENTRE`, then by how much it, or its logarithm, grows with the
+    # bend and with its square, counted in `SPAN` from `CENTRE`. Keys left out are nominal.
     lines: Mapping[str, tuple[float, ...]]
-    friction_profile: tuple[float, ...] = ()
+    friction_profile: tuple[float, ...] = ()  # of all tubes
     readings: Readings = field(default_factory=Readings)
+    # Where the numbers are from and what they leave; carried along, not used.
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -82,12 +72,7 @@ class TubeFamily:
                 raise FamilyError(f'{key} is {line[0]} at the centre: it must be positive')
 
     def joint(self, bend: float) -> JointParameters:
-        """The joint of a tube.
-
-        `bend`: of the tube, rad.
-        Raises FamilyError: if the bend is outside of 0 to `MOST_BENT`, or a number is out of its
-            bounds there.
-        """
+        """The joint of a tube bent by `bend` rad; a FamilyError outside of 0 to `MOST_BENT`."""
         if not 0.0 <= bend <= MOST_BENT:
             raise FamilyError(
                 f'a tube bent by {math.degrees(bend):.0f} deg: the family reaches from 0 to '
@@ -119,10 +104,7 @@ class TubeFamily:
 
 
 def load_family(path: str | Path = SHIPPED) -> TubeFamily:
-    """Read a family; the one that is shipped if no path is given.
-
-    Raises FamilyError: if the file cannot be read or is no family; names the file and the key.
-    """
+    """Read a family; a FamilyError names the file and the key at fault."""
     try:
         content = load_yaml(path)
     except YamlError as error:

@@ -147,10 +147,7 @@ def sum_of(hook: Hook) -> Function:
 
 
 def some_of(hook: Hook) -> Function:
-    """Compiled function of the flags that tells whether a hook's places have any function.
-
-    It belongs behind `functions_act`.
-    """
+    """Compiled test of the flags: has any of a hook's places a function? Behind `functions_act`."""
     function: Function = getattr(_MODULE, f'{hook.name}_functions_act')
     return function
 

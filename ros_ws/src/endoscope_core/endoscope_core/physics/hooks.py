@@ -27,17 +27,14 @@ class Fold(StrEnum):
 
 @dataclass(frozen=True)
 class Hook:
-    """A place in the chain.
-
-    `arguments`: of the hook and of every link, separated by commas. `p`, `x`: arrays of parameters
-        and states. Of a value that goes through, the first argument after them is the value.
-    `results`: how many numbers a link gives.
-    """
+    """A place in the chain."""
 
     name: str
     fold: Fold
+    # Of the hook and of every link, separated by commas. `p`, `x`: arrays of parameters and states.
+    # Of a value that goes through, the first argument after them is the value.
     arguments: str
-    results: int = 1
+    results: int = 1  # how many numbers a link gives
 
     @property
     def value(self) -> str:
@@ -135,10 +132,7 @@ def on_samples(
 
 
 def hook(effect: Effect, at: Hook) -> Callable[[Function], Function]:
-    """Link a compiled function of an effect to a hook, whose arguments it has.
-
-    Returns: a decorator that gives the function back.
-    """
+    """Link the decorated compiled function of an effect to a hook, whose arguments it has."""
 
     def link(function: Function) -> Function:
         LINKS[at.name].append((effect, function))

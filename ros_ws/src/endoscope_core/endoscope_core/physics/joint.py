@@ -198,13 +198,10 @@ def bend(
     time: float,
     tick: float,
 ) -> None:
-    """Bend the joint to where it comes to rest at the end of a tick.
+    """Bend the joint to where it comes to rest at the end of a tick of length `tick` s.
 
-    Shapes: `table` (TABLE_ROWS, CELLS + 1), `p`, `on` (parameters,).
-    `x` (states,): changed in place.
-    `way`: by how much the pulley has wound up the positive wire in this tick, m.
-    `other`: the other joint's angle, rad.
-    `time`, `tick`: middle of the tick and its length, s.
+    `way`: by how much the pulley has wound up the positive wire in this tick, m. `other`: the other
+    joint's angle, rad. `time`: the middle of the tick, s. Only `x` is changed.
     """
     # The way at the joint is not known yet: it will be much like the last one.
     ahead = p[JOINT_RADIUS] * x[JOINT_STEP]

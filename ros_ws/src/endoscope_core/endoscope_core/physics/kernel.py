@@ -138,10 +138,8 @@ def settle(
 ) -> None:
     """Bring a joint to rest, its wires tightened at angle zero and the motor gone to `shaft` since.
 
-    Shapes: `p`, `on` (parameters,).
-    `x`, `history`, `sheath` (states,): written.
-    `shaft`: rad.
-    `tick`: that of all ticks to come, s.
+    `shaft` in rad. Fills `x` (states,), `history` (HISTORIES, HISTORY) and `sheath`
+    (SHEATH_ROWS, CELLS + 1) from `p` (parameters,) and `on` (flags,), for ticks of `tick` s.
     """
     x[:] = 0.0
     a11, a12, a21, a22 = transition(p[MOTOR_BANDWIDTH], p[MOTOR_DAMPING_RATIO], tick)
@@ -169,9 +167,7 @@ def settle(
 def turn_to(x: Array, history: Array, sheath: Array, p: Array, on: Flags, shaft: float) -> None:
     """Turn the motor of a joint at rest to `shaft`, so slowly that nothing but friction remembers.
 
-    Shapes: `p`, `on` (parameters,).
-    `x`, `history`, `sheath` (states,): as `settle` leaves them; written.
-    `shaft`: rad.
+    `shaft` in rad; `x`, `history` and `sheath` are as `settle` leaves them, and changed.
     """
     table = sheath[:TABLE_ROWS]
     begin = x[MOTOR]
@@ -224,10 +220,8 @@ def _way(tick: float, lag: float) -> float:
 
 @compiled
 def _lay_out(sheath: Array, p: Array) -> None:
-    """Places of the nodes along the wire, and the capstan exponent from the motor to each.
-
-    The places are those of Clenshaw and Curtis (Numer. Math. 2, 1960): closest at the ends.
-    """
+    """Places of the nodes along the wire, and the capstan exponent from the motor to each."""
+    # Clenshaw and Curtis (Numer. Math. 2, 1960): closest at the ends.
     total = 0.0
     for i in range(CELLS + 1):
         sheath[PLACES, i] = 0.5 - 0.5 * math.cos(math.pi * i / CELLS)
@@ -392,13 +386,7 @@ def _yield(x: Array, table: Array, p: Array, on: Flags, step: float, tick: float
 def advance_tick(
     x: Array, history: Array, sheath: Array, p: Array, on: Flags, inputs: Array, tick: float
 ) -> None:
-    """Advance one joint by one tick with a row of inputs in force.
-
-    Shapes: `p`, `on` (parameters,).
-    `x`, `history`, `sheath` (states,): changed in place; from `settle`.
-    `inputs` (INPUTS,): see `layout.INPUTS`.
-    `tick`: that of `settle`, s.
-    """
+    """Advance one joint, as `settle` left it, by one tick with `inputs` (INPUTS,) in force."""
     table = sheath[:TABLE_ROWS]
     time = (x[TICKS] + 0.5) * tick
     other = inputs[IN_OTHER_JOINT]
@@ -491,13 +479,11 @@ def advance_joints(
     tick: float,
     out: Array,
 ) -> None:
-    """Advance all joints side by side by some ticks, with the same input in each.
+    """Advance J joints side by side by some ticks, with `inputs` (J, INPUTS) in each.
 
-    Shapes: `p`, `on` (J, parameters).
-    `x`, `histories`, `sheaths` (J, ...): as in `advance_tick`; changed in place.
-    `inputs` (J, INPUTS): two joints see each other's angle, which is written into it.
-    `ticks`: 0 only reads the sensors.
-    `out` (J, OUTPUTS): what the sensors read after the ticks.
+    The joints are rows of `settle`'s arrays. Their readings after the last tick go into `out`
+    (J, OUTPUTS); 0 ticks only read the sensors. Of two joints, each one's angle is written into the
+    other's input.
     """
     joints = inputs.shape[0]
     for n in range(ticks + 1):
@@ -521,13 +507,10 @@ def run_joints(
     tick: float,
     out: Array,
 ) -> None:
-    """Run all joints side by side over a whole input.
+    """Run J joints side by side over `inputs` (J, N, INPUTS), into `out` (J, N, OUTPUTS).
 
-    Shapes: `p`, `on` (J, parameters).
-    `x`, `histories`, `sheaths` (J, ...): as in `advance_tick`; changed in place.
-    `inputs` (J, N, INPUTS): changed where `coupled`.
-    `coupled`: whether each joint sees the other's angle, which is then written into its input.
-    `out` (J, N, OUTPUTS): row k is what the sensors read at tick k, before command k acts.
+    The joints are rows of `settle`'s arrays. Row k of `out` is what the sensors read at tick k,
+    before command k acts. Where `coupled`, each joint's angle is written into the other's input.
     """
     joints, ticks = inputs.shape[0], inputs.shape[1]
     for n in range(ticks):

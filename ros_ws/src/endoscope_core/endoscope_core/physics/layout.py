@@ -53,17 +53,13 @@ ELEMENTS = 3
 
 
 class Slots:
-    """Hands out consecutive indices of the flag, parameter and state arrays.
-
-    `flags`, `parameters`, `states`: how many there are so far.
-    `shaft_angles`: states that begin at the shaft's angle.
-    """
+    """Hands out consecutive indices of the flag, parameter and state arrays."""
 
     def __init__(self) -> None:
         self.flags = 0
         self.parameters = FRICTION_PROFILE + PROFILE_TERMS
         self.states = 0
-        self.shaft_angles: list[int] = []
+        self.shaft_angles: list[int] = []  # states that begin at the shaft's angle
 
     def flag(self) -> int:
         """Index of the next effect's on/off flag."""

@@ -31,31 +31,20 @@ class AnswerStamps:
 
 @dataclass(frozen=True)
 class Answer:
-    """Noise-free readings at the stamps asked for, for J joints.
+    """Noise-free readings at the stamps asked for, for J joints."""
 
-    Attributes
-    ----------
-    shaft_position, shaft_velocity, shaft_effort : array (N_motor, J)
-    tension : array (N_wires, J, 2)
-    bending : array (N_tracker, J)
-    """
-
+    # Of motors, (N_motor, J).
     shaft_position: Array
     shaft_velocity: Array
     shaft_effort: Array
-    tension: Array
-    bending: Array
+    tension: Array  # (N_wires, J, 2)
+    bending: Array  # (N_tracker, J)
 
 
 def hold_on_ticks(times: Array, values: Array, ticks: int, tick: float = TICK) -> Array:
-    """Commands that are each in force until the next one, as the mean over each tick.
+    """Commands (N, J) that each hold until the next, as the mean (M, J) over each tick from 0 s on.
 
-    Shapes: `values` (N, J).
-    `times` (N,): seconds, not decreasing. Before the first one, the first command is in force.
-    `ticks`: number of ticks M, the first one beginning at zero.
-    `tick`: in s.
-    Returns (M, J).
-    Raises ValueError: if the stamps decrease.
+    Stamps (N,) in s must not decrease. Before the first one, the first command is in force.
     """
     if np.any(np.diff(times) < 0):
         raise ValueError('the stamps of the commands decrease')
@@ -89,16 +78,11 @@ def answer_commands(
     """What the noise-free sensors of a rig read at given stamps under recorded commands.
 
     The stamps are what the devices' clocks say: a plant whose tracker's clock is skewed answers
-    with the angle of the time at which that clock said so.
-
-    `plant`: j joints, in the order of the commands' columns.
-    `command_stamps` (N,): stamps in ns, not decreasing.
-    `shaft_commands` (N, J): motor shaft angle in rad, in force from its stamp until the next one.
-    `start_shaft` (J,): shaft angle in rad at which the rig rests at first; the first command if not
-        given.
-    `read_delay`: seconds from a stamp to the reading that carries it: zero, or the length of a
-        cycle where a rig stamps the cycle's beginning, sends the command and then reads.
-    Raises ValueError: if the stamps decrease, or a command is not finite.
+    with the angle of the time at which that clock said so. Commands (N, J) are shaft angles in rad,
+    each in force from its stamp in ns, which must not decrease, until the next one. The rig rests
+    at `start_shaft` (J,) in rad at first, or at the first command. `read_delay`: s from a stamp to
+    the reading that carries it: zero, or the length of a cycle where a rig stamps the cycle's
+    beginning, sends the command and then reads.
     """
     origin = min(answer_stamps.first(), int(command_stamps[0]))
     faults = recording_faults(plant)

@@ -32,10 +32,7 @@ from endoscope_core.physics.layout import (
 
 
 def with_nominal_in_place(plant: PlantDescription) -> PlantDescription:
-    """The same plant with nominal physics that is among its effects as numbers of its joints.
-
-    Raises UnknownEffectError, ValueError: as for `pack`.
-    """
+    """The same plant with nominal physics that is among its effects as numbers of its joints."""
     pack(plant)
     joints, kept = dict(plant.joints), []
     for spec in plant.effects:
@@ -49,12 +46,7 @@ def with_nominal_in_place(plant: PlantDescription) -> PlantDescription:
 
 
 def effect_values(spec: EffectSpec) -> Array:
-    """Values of an effect's parameters in slot order, typical where the spec gives none.
-
-    Raises UnknownEffectError: if the effect or one of its parameters is unknown.
-    Raises ValueError: if a value is not finite, outside the parameter's bounds or, where it must
-        be, not whole.
-    """
+    """Checked values of an effect's parameters in slot order, typical where none are given."""
     definition = describe(spec.id)
     names = [parameter.name for parameter in definition.parameters]
     for name in spec.parameters:
@@ -82,12 +74,11 @@ def effect_values(spec: EffectSpec) -> Array:
 
 
 def pack(plant: PlantDescription) -> tuple[Array, Flags]:
-    """Parameter and flag arrays of a plant.
+    """Parameters (J, parameters) and flags (J, flags) of a plant.
 
-    Returns `parameters` (J, parameters).
-    Returns `flags` (J, flags).
-    Raises UnknownEffectError, ValueError: if an effect or place is unknown, on an unknown joint,
-        given twice, or out of bounds.
+    The flags are of bool, or of `FLAGS_OF_FUNCTIONS` where the plant has terms. An effect or place
+    that is unknown, on an unknown joint, given twice or out of bounds is an UnknownEffectError or a
+    ValueError.
     """
     names = plant.joint_names()
     parameters = np.zeros((len(names), SLOTS.parameters))
@@ -154,16 +145,12 @@ def rest_state(
     shaft: Array | None = None,
     speed: Array | None = None,
 ) -> tuple[Array, Array, Array]:
-    """States, histories and sheaths of joints at rest, or just set in motion.
+    """States, histories and sheaths of J joints at rest, or just set in motion.
 
-    `parameters`, `on` (J, parameters): from `pack`.
-    `tick`: in s.
-    `shaft` (J,): shaft angle in rad to which each motor has gone since the wires were tightened at
-        zero, or K angles to which it has gone one after the other; zero if not given.
-    `speed` (J,): of each motor, which is on its way to its command, in rad/s; zero if not given.
-    Returns `states` (J, states).
-    Returns `histories` (J, HISTORIES, HISTORY).
-    Returns `sheaths` (J, SHEATH_ROWS, CELLS + 1).
+    Row j of each is joint j's array as `settle` has it. `parameters` and `on` are from `pack`,
+    `tick` is in s. `shaft` (J,) or (J, K) in rad: where each motor has gone since the wires were
+    tightened at zero, or K angles one after the other. `speed` (J,) in rad/s: of each motor, which
+    is on its way to its command. Both are zero if not given.
     """
     joints = len(parameters)
     states = np.zeros((joints, SLOTS.states))

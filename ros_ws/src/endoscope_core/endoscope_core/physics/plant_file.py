@@ -98,12 +98,7 @@ def load_plant(path: str | Path) -> PlantDescription:
 
 
 def plant_from_mapping(content: Any) -> PlantDescription:
-    """A plant description from the content of a plant.yaml.
-
-    `content`: with the keys `joints`, `sensors` and `effects`, each optional.
-    Raises ValueError: if a key is unknown or a value invalid; the message names it and the nearest
-        valid one.
-    """
+    """Plant from a plant.yaml's content; a ValueError names a wrong key and the nearest one."""
     sections = _section(content, 'the plant')
     _check_keys(sections, ('joints', 'sensors', 'effects'), 'the plant')
     joints_given: Mapping[str, Any] = dict.fromkeys(JOINT_NAMES)

@@ -11,9 +11,7 @@ def transition(
 ) -> tuple[float, float, float, float]:
     """Exact transition of the servo over `step` s: rows of the matrix on (m - u, m').
 
-    `bandwidth`: rad/s.
-    `step`: s.
-    Returns: ogata, Modern Control Engineering, 5th ed. 2010, sec. 5-3.
+    `bandwidth` in rad/s. Ogata, Modern Control Engineering, 5th ed. 2010, sec. 5-3.
     """
     sigma = damping_ratio * bandwidth
     discriminant = damping_ratio * damping_ratio - 1.0

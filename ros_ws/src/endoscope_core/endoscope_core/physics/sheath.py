@@ -40,15 +40,11 @@ def wire_states(cells: int) -> int:
 
 @compiled
 def tabulate(table: Array, places: Array, exponents: Array, falling: float, rising: float) -> None:
-    """Work out the shapes of a sliding wire's tension.
+    """Work out the shapes of a sliding wire's tension, into `table` (TABLE_ROWS, N + 1).
 
-    `table` (TABLE_ROWS, N + 1): written: both shapes at the nodes, their weighted sums from the
-        motor to each node and from each node to the joint (a difference of the former would be lost
-        in rounding where friction is great), and the nodes' weights.
-    `places` (N + 1,): the nodes' places along the wire, from 0 at the motor to 1 at the joint.
-    `exponents` (N + 1,): nominal capstan exponent from the motor to each node.
-    `falling`, `rising`: factors on it where the wire slides towards the motor, and towards the
-        joint.
+    `places` (N + 1,) of the nodes along the wire go from 0 at the motor to 1 at the joint, the
+    nominal capstan `exponents` (N + 1,) from the motor to each; `falling` and `rising` are factors
+    on them where the wire slides towards the motor, and towards the joint.
     """
     nodes = table.shape[1]
     fallen, risen = 0.0, 0.0
@@ -65,6 +61,8 @@ def tabulate(table: Array, places: Array, exponents: Array, falling: float, risi
         table[RISING_SUM, i] = risen
         table[WEIGHT, i] = weight
     fallen, risen = 0.0, 0.0
+    # From each node to the joint: a difference of the sums from the motor on would be lost in
+    # rounding where friction is great.
     for i in range(nodes - 1, -1, -1):
         fallen += table[WEIGHT, i] * table[FALLING, i]
         risen += table[WEIGHT, i] * table[RISING, i]
@@ -100,20 +98,11 @@ def _shape(end: int, force: float) -> int:
 def moved(
     x: Array, wire: int, table: Array, end: int, force: float, floor: float
 ) -> tuple[float, float, int, float, float, float]:
-    """What moving one end would do to a wire.
+    """What moving one end by `force` N, positive out of the sheath, would do to a wire in `x`.
 
-    Shapes: `table` (TABLE_ROWS, N + 1).
-    `x` (states,): not changed.
-    `wire`: where the wire's states begin.
-    `end`: `MOTOR_END` or `JOINT_END`.
-    `force`: stiffness times the way of the end, positive where it pulls the wire out of the sheath,
-        N.
-    `floor`: least tension that a node can have, N: zero, or what load-independent friction adds.
-    Returns `tension`: at that end, N.
-    Returns `slope`: of the tension by the force.
-    Returns `count`: nodes behind the front.
-    Returns `amplitude`: behind the front, N.
-    Returns `gap, other_gap`: slack left at this and at the other end, N.
+    Returns its tension at that end in N and the slope of that by the force; count of nodes behind
+    the front and amplitude there in N; slack left at this and at the other end in N. No node's
+    tension can be less than `floor` N: zero, or what load-independent friction adds.
     """
     nodes = table.shape[1]
     own = x[wire + GAP + end]
@@ -255,10 +244,7 @@ def sliding_load(x: Array, wire: int, table: Array) -> float:
 
 @compiled
 def slide_on(x: Array, wire: int, table: Array, load: float) -> None:
-    """Go over to less steep shapes with a wire that slides as a whole and keeps its mean tension.
-
-    All of it slips: see `relax`.
-    """
+    """Take less steep shapes for a wire that all slips, with the same mean tension: see `relax`."""
     for end in range(2):
         if int(x[wire + COUNT + end]) == table.shape[1]:
             shape = int(x[wire + SHAPE + end])
@@ -272,11 +258,7 @@ def relax(x: Array, wire: int, table: Array, work: Array) -> None:
     A stretch that slips keeps its extension and ends on the limit; a stretch next to it that is
     then too steep slips with it. That is the pooling of adjacent violators (Barlow et al.,
     Statistical Inference under Order Restrictions, 1972, sec. 1.2) of tension over shape, once for
-    each way.
-
-    Shapes: `x` (states,).
-    `table` (TABLE_ROWS, N + 1): with the new shapes.
-    `work` (3, N + 1): overwritten.
+    each way. `table` has the new shapes; `work` (3, N + 1) is overwritten.
     """
     nodes = table.shape[1]
     for shape in range(2):

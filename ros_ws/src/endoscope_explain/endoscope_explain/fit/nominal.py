@@ -103,7 +103,7 @@ def nominal_anchors(
 ) -> Anchors:
     """The nominal plant refitted, and as described, each with its derivative.
 
-    `base` (parameters,): packed plant as described, with what effects it has.
+    `base` (parameters,), `flags` (flags,): packed plant as described, with what effects it has.
     `band`: relative deviation of a healthy rig from its description.
     """
     model = JointModel(observation, base, flags, nominal_parameters(base, band))

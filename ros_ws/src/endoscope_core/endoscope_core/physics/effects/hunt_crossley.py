@@ -7,17 +7,10 @@ from endoscope_core.compiled import compiled
 def push_back(
     depth: float, inwards: float, stiffness: float, exponent: float, loss: float
 ) -> tuple[float, float, float]:
-    """Moment in N m of what is pressed in by `depth` at a speed, and its slopes.
+    """Moment in N m at a depth > 0 in rad, and its slopes by depth and by speed inwards in rad/s.
 
     ``stiffness depth^exponent (1 + loss inwards)``, and never a pull: Hunt, Crossley, J. Appl.
-    Mech. 42, 1975.
-
-    `depth`: rad, positive.
-    `inwards`: speed at which it goes deeper, rad/s.
-    `stiffness`: n m/rad^exponent.
-    `loss`: s/rad.
-    Returns `by_depth`: n m/rad.
-    Returns `by_speed`: n m s/rad.
+    Mech. 42, 1975. Stiffness in N m/rad^exponent, loss in s/rad.
     """
     braked = 1.0 + loss * inwards
     if braked <= 0.0:

@@ -28,10 +28,8 @@ LAGGED, BEFORE, READ_AT = SLOTS.state_block(2), SLOTS.state_block(2), SLOTS.stat
 @hook(EFFECT, CELL_INPUT)
 @compiled
 def lagged(p: Array, x: Array, tension: float, cell: int, history: Array, tick: float) -> float:
-    """Tension in N as a cell reads it that went straight from the last tick's to `tension`.
-
-    Sensors may be read twice in a tick, and a lag goes on once.
-    """
+    """Tension in N as a cell reads it that went straight from the last tick's to `tension`."""
+    # Sensors may be read twice in a tick, and a lag goes on once.
     now = x[TICKS] + 1.0
     if p[TIME_CONSTANT] <= 0.0 or x[READ_AT + cell] == 0.0:
         x[LAGGED + cell] = tension

@@ -10,11 +10,10 @@ STARTS = tuple(0.75 * k for k in range(1, 54))
 
 @compiled
 def share_after(onset: float, duration: float, smooth: float, time: float, tick: float) -> float:
-    """Share in [0, 1] that has begun, in the mean over the tick around `time`.
+    """Share in [0, 1] that has begun, in the mean over the tick around `time`; all in s.
 
-    What begins rises for `duration` around `onset`, all in s: evenly, or if `smooth` is 1 along a
-    half cosine. Samples come once a tick: a step that takes as long shows in their sum wherever it
-    lies.
+    It rises for `duration` around `onset`: evenly, or along a half cosine if `smooth` is 1.
     """
+    # Samples come once a tick: a step that takes as long shows in their sum wherever it lies.
     share = min(1.0, max(0.0, 0.5 + (time - onset) / (tick + duration)))
     return share if smooth == 0.0 else 0.5 - 0.5 * math.cos(math.pi * share)

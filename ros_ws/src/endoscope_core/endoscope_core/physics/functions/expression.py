@@ -35,13 +35,10 @@ _NAMES = (*_FUNCTIONS, *_OF_SEVERAL, *_CONSTANTS)
 
 
 def evaluate(expression: str, symbol: str, values: Array) -> Array:
-    """Values of a formula.
+    """Values (N,) of a formula of `symbol` at `values` (N,).
 
-    `expression`: of the symbol, numbers, pi, + - * / **, and exp, log, tanh, sqrt, abs, sin, cos,
-        sign, min and max.
-    `values` (N,): of the symbol.
-    Returns (N,).
-    Raises ValueError: if it is not such a formula, or not finite at one of the values; says which.
+    It may hold numbers, pi, + - * / **, and exp, log, tanh, sqrt, abs, sin, cos, sign, min and max.
+    A ValueError says what else is in it, or at which value it is not finite.
     """
     if len(expression) > LONGEST:
         raise ValueError(f'a formula of {len(expression)} characters: give {LONGEST} at most')

@@ -23,14 +23,11 @@ LAG = VALUES + NODES
 def function_at(
     p: Array, first: int, argument: float, share: float, side: float, repeats: bool
 ) -> tuple[float, float]:
-    """Value of a function, and its slope.
+    """Value and slope of the function whose block begins at `first`.
 
-    Shapes: `p` (parameters,).
-    `first`: where its block begins.
-    `share`, `side`: ``share f(side argument)`` is added to ``(1 - abs(share)) f(argument)``: the
-        odd part with -0.5 and -1, the even one with 0.5 and -1; what is left of the value at zero
-        with -1 and 0, where f itself counts whole.
-    `repeats`: whether the range is a period.
+    ``share f(side argument)`` is added to ``(1 - abs(share)) f(argument)``: the odd part with -0.5
+    and -1, the even one with 0.5 and -1; what is left of the value at zero with -1 and 0, where f
+    itself counts whole. If it `repeats`, its range is a period.
     """
     low = p[first + LOW]
     per_unit = (NODES - 1) / (p[first + HIGH] - low)

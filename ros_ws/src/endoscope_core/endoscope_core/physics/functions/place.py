@@ -28,20 +28,16 @@ class Shape(StrEnum):
 
 @dataclass(frozen=True)
 class Argument:
-    """The state that a function depends on.
+    """The state that a function depends on."""
 
-    `symbol`: in an expression.
-    `low`, `high`: range of the table where nobody gives one.
-    `lags`: whether it follows a state of the plant as a first-order lag does, with a time constant
-        of its own: what nobody sees (Kelvin-Voigt: Findley, Lai, Onaran, Creep and Relaxation,
-        1976).
-    """
-
-    symbol: str
+    symbol: str  # in an expression
     words: str
     unit: str
+    # Range of the table where nobody gives one.
     low: float
     high: float
+    # It follows a state of the plant as a first-order lag does, with a time constant of its own:
+    # what nobody sees (Kelvin-Voigt: Findley, Lai, Onaran, Creep and Relaxation, 1976).
     lags: bool = False
 
 
@@ -115,12 +111,7 @@ def place(
     depends_on_time: bool = False,
     **more: str | bool,
 ) -> Place:
-    """Define a place, whose flag and parameters follow from its shape.
-
-    `what`: what the function is, in words.
-    `depends_on_time`: see `Traits`.
-    `**more`: the other attributes of a `Place`.
-    """
+    """A place, whose flag and parameters follow from its shape; `more` are fields of `Place`."""
     f = f'f({argument.symbol})'
     enters = f'exp({f})' if hook.fold is Fold.FACTORS else f
     kind = '' if shape is Shape.ANY else f', {shape}'

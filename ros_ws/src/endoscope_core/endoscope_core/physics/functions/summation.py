@@ -59,8 +59,7 @@ def sum_of_functions(
 ) -> tuple[float, float, float, float]:
     """Functions of `count` places from `number` of their row on, with the arguments `a0` to `a6`.
 
-    Returns `value, slope`: sum of those that are terms.
-    Returns `factor, steep`: product of one plus each of those that multiply, and its slope.
+    Sum of the terms and its slope; product of one plus each that multiplies, and its slope.
     """
     value, slope, factor, steep = 0.0, 0.0, 1.0, 0.0
     # Both are whole, but numba would compile this anew for every integer that stands in a call.

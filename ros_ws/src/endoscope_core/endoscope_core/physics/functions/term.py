@@ -25,27 +25,19 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Table:
-    """A function as the plant runs it.
+    """A function as the plant runs it."""
 
-    `numbers` (VALUES + NODES or one more,): both ends of the range, then the values, then the time
-        constant of an argument that lags.
-    `largest_error`, `rms_error`: of the table against the formula, as shares of what the formula
-        spans; 0 for given values.
-    """
-
+    # (VALUES + NODES or one more,): both ends of the range, then the values, then the time constant
+    # of an argument that lags.
     numbers: Array
+    # Of the table against the formula, as shares of what the formula spans; 0 for given values.
     largest_error: float = 0.0
     rms_error: float = 0.0
 
 
 @functools.lru_cache(maxsize=256)
 def tabulated(term: TermSpec) -> Table:
-    """The table of an unknown term.
-
-    Raises UnknownEffectError: if there is no such place.
-    Raises ValueError: if formula, values or range are not what the place takes; names the term and
-        what to do.
-    """
+    """The table of an unknown term; errors name the term and what to do."""
     place = describe_place(term.place)
     try:
         return _tabulated(term, place)
