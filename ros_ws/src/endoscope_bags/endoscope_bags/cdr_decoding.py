@@ -24,16 +24,11 @@ _MOST_LAYOUTS = 1 << 19
 
 @dataclass(frozen=True)
 class Payloads:
-    """The bytes of N messages, one after another.
-
-    `data`: all bytes.
-    `start`: where each message begins in `data`, shape (N,).
-    `size`: bytes of each message, shape (N,).
-    """
+    """The bytes of N messages, one after another in `data`."""
 
     data: bytes | bytearray
-    start: npt.NDArray[np.int64]
-    size: npt.NDArray[np.int64]
+    start: npt.NDArray[np.int64]  # (N,), where each begins in `data`
+    size: npt.NDArray[np.int64]  # (N,), in bytes
 
     def __len__(self) -> int:
         return len(self.start)
@@ -52,11 +47,7 @@ class Payloads:
 
 
 def stamps_of_heads(data: bytes, start: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """Stamps in ns of messages that begin with a header, shape (N,).
-
-    `data`: holds the messages.
-    `start`: where each begins, shape (N,); at least `HEAD_WITH_STAMP` bytes before the end.
-    """
+    """Header stamps (N,) in ns; from each `start` (N,), `HEAD_WITH_STAMP` bytes are there."""
     bytes_ = np.frombuffer(data, dtype=np.uint8)
     field = bytes_[start[:, None] + np.arange(4, HEAD_WITH_STAMP)]
     big = bytes_[start + 1] == 0
@@ -65,16 +56,11 @@ def stamps_of_heads(data: bytes, start: npt.NDArray[np.int64]) -> npt.NDArray[np
 
 @dataclass(frozen=True)
 class LayoutGroup:
-    """Messages of one layout.
+    """M messages of one layout."""
 
-    `rows`: their indices among all messages, shape (M,), ascending.
-    `layout`: where their fields lie.
-    `matrix`: their bytes, shape (M, size).
-    """
-
-    rows: npt.NDArray[np.int64]
+    rows: npt.NDArray[np.int64]  # (M,), ascending, indices among all messages
     layout: Layout
-    matrix: npt.NDArray[np.uint8]
+    matrix: npt.NDArray[np.uint8]  # (M, size), their bytes
 
     def stamp_ns(self) -> npt.NDArray[np.int64]:
         """Return the header stamps in ns, shape (M,)."""
@@ -101,12 +87,7 @@ def _stamps(field: npt.NDArray[np.uint8], order: str) -> npt.NDArray[np.int64]:
 def grouped_by_layout(
     payloads: Payloads, find_layout: Callable[[bytes], Layout]
 ) -> Iterator[LayoutGroup]:
-    """Split messages into groups of equal layout.
-
-    `payloads`: the messages.
-    `find_layout`: `joint_state_layout` or `pose_layout`.
-    Raises MalformedMessageError: a message does not decode; the message is counted from 1.
-    """
+    """Split messages into groups of equal layout; errors count the messages from 1."""
     for size in np.unique(payloads.size):
         rows = np.flatnonzero(payloads.size == size)
         matrix = payloads.matrix(rows)

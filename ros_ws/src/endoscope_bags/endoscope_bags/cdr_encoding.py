@@ -29,17 +29,7 @@ def encode_joint_states(
     effort: npt.ArrayLike | None = None,
     frame_id: str = '',
 ) -> list[bytes]:
-    """Encode a series of `sensor_msgs/msg/JointState`.
-
-    `names`: the J joint names, the same in every message.
-    `stamp_ns`: header stamps in ns since the epoch, shape (N,).
-    `position`, `velocity`, `effort`: shape (N, J) in rad, rad/s, N m (or N for wires); None leaves
-        the field empty.
-    `frame_id`: frame of the header.
-    Returns: n messages.
-    Raises MalformedMessageError: a shape does not fit, or a stamp is outside what
-        `builtin_interfaces/msg/Time` can hold.
-    """
+    """Encode N JointStates: stamps in ns since the epoch, (N, J) in rad, rad/s, N m (wires: N)."""
     stamps = _checked_stamps(stamp_ns)
     shape = (len(stamps), len(names))
     prefix = bytearray(_LITTLE_ENDIAN + bytes(8))
@@ -88,14 +78,7 @@ def encode_poses(
     *,
     frame_id: str = '',
 ) -> list[bytes]:
-    """Encode a series of `geometry_msgs/msg/PoseStamped`.
-
-    `stamp_ns`: header stamps in ns since the epoch, shape (N,).
-    `position`: metres, shape (N, 3).
-    `orientation`: unit quaternions x, y, z, w, shape (N, 4).
-    `frame_id`: frame of the header.
-    Raises MalformedMessageError: a shape does not fit, or a stamp is out of range.
-    """
+    """Encode N PoseStamped: ns since the epoch, (N, 3) in m, (N, 4) unit quaternions x, y, z, w."""
     stamps = _checked_stamps(stamp_ns)
     parts = (np.asarray(position, dtype=np.float64), np.asarray(orientation, dtype=np.float64))
     if parts[0].shape != (len(stamps), 3) or parts[1].shape != (len(stamps), 4):
@@ -112,10 +95,7 @@ def encode_poses(
 
 
 class TransformEncoder:
-    """Writes `tf2_msgs/msg/TFMessage` about the same frames again and again.
-
-    `frames`: parent and child of each of the N transforms.
-    """
+    """Writes `tf2_msgs/msg/TFMessage` about the same N frames (parent, child) again and again."""
 
     def __init__(self, frames: Sequence[tuple[str, str]]) -> None:
         self._message = bytearray(_LITTLE_ENDIAN)
@@ -133,12 +113,7 @@ class TransformEncoder:
     def encode(
         self, stamp_ns: int, poses: Sequence[tuple[Sequence[float], Sequence[float]]]
     ) -> bytes:
-        """Write one message.
-
-        `stamp_ns`: of all transforms, ns since the epoch.
-        `poses`: translation in m, shape (3,), and unit quaternion x, y, z, w, shape (4,), of each
-            child in its parent's frame; N of them.
-        """
+        """Write one message; poses, in the parent: (3,) in m, (4,) unit quaternion x, y, z, w."""
         stamp = divmod(stamp_ns, _NANOSECONDS)
         for (at, values), (translation, rotation) in zip(self._places, poses, strict=True):
             _STAMP.pack_into(self._message, at, *stamp)

@@ -10,20 +10,15 @@ QUANTITIES = ('position', 'velocity', 'effort')
 
 @dataclass(frozen=True)
 class Layout:
-    """Fields of one message as offsets into its bytes.
-
-    `big_endian`: byte order of the encapsulation.
-    `frame_id`: frame of the header.
-    `names`: joint names; empty for a pose.
-    `columns`: for each quantity that the message has, the offset of its doubles and their number.
-    `fixed`: spans ``(start, stop)`` that have to be equal in another message for this layout to
-        hold there too: everything but the stamp, the numbers and the padding.
-    """
+    """Fields of one message as offsets into its bytes."""
 
     big_endian: bool
     frame_id: str
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the joints; empty for a pose
+    # For each quantity that the message has, the offset of its doubles and their number.
     columns: dict[str, tuple[int, int]]
+    # Spans (start, stop) that have to be equal in another message for this layout to hold there
+    # too: everything but the stamp, the numbers and the padding.
     fixed: tuple[tuple[int, int], ...]
 
 
@@ -67,11 +62,7 @@ class _Cursor:
 
 
 def joint_state_layout(data: bytes) -> Layout:
-    """Find the fields of a `sensor_msgs/msg/JointState`.
-
-    Raises MalformedMessageError: the bytes end early, or a quantity has another number of values
-        than there are names.
-    """
+    """Find the fields of a `sensor_msgs/msg/JointState`."""
     cursor = _Cursor(data)
     cursor.skip(8, 4)
     frame_id = cursor.string()
@@ -93,10 +84,7 @@ def joint_state_layout(data: bytes) -> Layout:
 
 
 def pose_layout(data: bytes) -> Layout:
-    """Find the fields of a `geometry_msgs/msg/PoseStamped`: columns position and orientation.
-
-    Raises MalformedMessageError: the bytes end early.
-    """
+    """Find the fields of a `geometry_msgs/msg/PoseStamped`: columns position and orientation."""
     cursor = _Cursor(data)
     cursor.skip(8, 4)
     frame_id = cursor.string()

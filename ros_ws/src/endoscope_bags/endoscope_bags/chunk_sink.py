@@ -36,24 +36,13 @@ class TopicRecord:
 
 
 class ChunkSink:
-    """The file of a recording while it is written.
-
-    Room for a chunk and for the summary is asked for before the chunk is written, so that a file
-    on a full disk can always be finished.
-
-    `path`: the file to make.
-    `records`: metadata records that stand first.
-    `threaded`: encode and write in a thread; errors then come with a later call.
-    `lost_counts`: messages by topic id of the chunks that found no room.
-    `start_ns`, `end_ns`: first and last receipt in the file; 0 while it has none.
-    Raises BagWriteError: there is no room for the beginning.
-    """
+    """The file of a recording while it is written; with a thread, errors come with a later call."""
 
     def __init__(
         self, path: Path, records: Mapping[str, dict[str, str]], *, threaded: bool
     ) -> None:
-        self.lost_counts: Counter[int] = Counter()
-        self.start_ns = 0
+        self.lost_counts: Counter[int] = Counter()  # by topic id, of the chunks that found no room
+        self.start_ns = 0  # first receipt; 0, like the last in `end_ns`, while the file is empty
         self.end_ns = 0
         self._path = path
         self._n_topics = 0
@@ -75,13 +64,7 @@ class ChunkSink:
     def write(
         self, topics: Sequence[TopicRecord], messages: Sequence[ChunkMessage], size: int
     ) -> None:
-        """Write new topics and a chunk of messages.
-
-        `topics`: those that are not in the file yet.
-        `messages`: the chunk; may be empty.
-        `size`: upper bound of its bytes.
-        Raises BagWriteError: there is no room for this chunk, or was not for an earlier one.
-        """
+        """Write new topics and a chunk of at most `size` bytes; may raise for an earlier chunk."""
         if self._worker is None:
             self._write(topics, messages, size)
             return
@@ -152,15 +135,14 @@ class ChunkSink:
         self._n_chunks += 1
 
     def _require_room(self, size: int) -> None:
+        # Asked for before a chunk is written, with room for the summary, so that a file on a full
+        # disk can always be finished.
         per_chunk = _CHUNK_OVERHEAD + 10 * self._n_topics
         summary = per_chunk * (self._n_chunks + 2) + _TOPIC_OVERHEAD * (self._n_topics + 2)
         require_room(self._file.fileno(), str(self._path), size + summary)
 
     def finish(self, metadata: Mapping[str, dict[str, str]]) -> None:
-        """Write metadata records and the summary, hand all to the disk, close.
-
-        Raises BagWriteError: the room for it was taken by somebody else; the file can be recovered.
-        """
+        """Write metadata records and the summary, hand all to the disk, close."""
         if self._worker is not None:
             self._worker.shutdown()
         try:

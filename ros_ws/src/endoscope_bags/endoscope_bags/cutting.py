@@ -20,14 +20,10 @@ class NoSuchStretchError(BagError, ValueError):
 
 @dataclass(frozen=True)
 class CutReport:
-    """What `cut` wrote.
-
-    `message_count`: messages of the stretch.
-    `latched`: topics whose last message before the stretch is kept at its beginning.
-    `seconds`: length of the stretch.
-    """
+    """What `cut` wrote."""
 
     message_count: int
+    # Topics whose last message before the stretch is kept at its beginning.
     latched: tuple[str, ...]
     seconds: float
 
@@ -39,17 +35,7 @@ class CutReport:
 
 
 def cut(source: str | Path, target: str | Path, begin: float, end: float | None) -> CutReport:
-    """Write the messages that were received in a stretch of a recording to a new one.
-
-    Of latched topics, the last message before the stretch comes first, as a subscriber who joined
-    then would have heard it; its receipt is the beginning of the stretch.
-
-    `source`: rosbag2 folder, ``.mcap`` or ``.db3`` file. It is not changed.
-    `target`: the new recording, a folder or ``.mcap`` file; must not exist.
-    `begin`, `end`: in s from the first receipt; `end` may be None for all that follows.
-    Raises NoSuchStretchError: the stretch is empty, or not within the recording.
-    Raises BagError: `source` cannot be read, or `target` exists or cannot be written.
-    """
+    """Write what came from `begin` to `end`, in s from the first receipt, to a new recording."""
     recording = open_bag(source)
     length = (recording.end_ns - recording.start_ns) * 1e-9
     last = length if end is None else end
@@ -64,6 +50,8 @@ def cut(source: str | Path, target: str | Path, begin: float, end: float | None)
         for name, topic in recording.topics.items()
         if topic.qos and all(q.durability == 'transient_local' for q in topic.qos)
     }
+    # Of latched topics, the last message before the stretch comes first, as a subscriber who joined
+    # then would have heard it; its receipt is the beginning of the stretch.
     in_force: dict[str, RawMessage] = {}
     with BagWriter(target, records=copied_rig_record(recording)) as writer:
         for topic in recording.topics.values():

@@ -44,42 +44,28 @@ class TableError(BagError, ValueError):
 
 @dataclass(frozen=True)
 class Heading:
-    """What stands above a column.
+    """What stands above a column."""
 
-    `title`: as it is in the file; empty where there is none.
-    `name`: without the unit.
-    `unit`: as `units.UNITS` has it; None where the heading tells none that is known.
-    """
-
-    title: str = ''
-    name: str = ''
+    title: str = ''  # as in the file; empty where there is none
+    name: str = ''  # without the unit
+    # As `units.UNITS` has it; None where the heading tells none that is known.
     unit: str | None = None
 
 
 @dataclass(frozen=True)
 class DelimitedText:
-    """The cells of a table.
-
-    `separator`: one character, or `WHITESPACE`.
-    `headings`: one for each column.
-    `rows`: cut when they are asked for: held as lists of texts, a table takes thirty times its
-        size. Without the lines above the numbers, without empty lines and comments.
-    `lines`: number of each row's line in the file, from 1.
-    """
+    """The cells of a table, without the lines above the numbers, empty lines and comments."""
 
     path: Path
-    separator: str
+    separator: str  # one character, or `WHITESPACE`
     decimal_comma: bool
-    headings: tuple[Heading, ...]
+    headings: tuple[Heading, ...]  # one for each column
+    # Cut when they are asked for: held as lists of texts, a table takes thirty times its size.
     rows: Sequence[Sequence[str]]
-    lines: Sequence[int]
+    lines: Sequence[int]  # number of each row's line in the file, from 1
 
     def column(self, which: int | str) -> int:
-        """Return the index of a column, from 0, that a mapping gives by number or by name.
-
-        `which`: from 1; or its title in the file, or its name without the unit, in any case.
-        Raises TableError: there is no such column, or more than one.
-        """
+        """Return the index of a column given by number (from 1), or title or name in any case."""
         if isinstance(which, int):
             return which - 1
         wanted = which.strip().casefold()
@@ -106,10 +92,7 @@ class DelimitedText:
         return f'column {index + 1}' + (f' ({title})' if title else '')
 
     def cells(self, index: int) -> list[str]:
-        """Return the texts of a column.
-
-        Raises TableError: a row is too short; names the line.
-        """
+        """Return the texts of a column."""
         try:
             return [row[index] for row in self.rows]  # one column at a time
         except IndexError:
@@ -123,12 +106,7 @@ class DelimitedText:
             ) from None
 
     def numbers(self, index: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the numbers of a column.
-
-        Returns `numbers` (N,): naN where the cell is empty.
-        Returns `empty` (N,).
-        Raises TableError: a cell holds something else; names line and column.
-        """
+        """Return the numbers (N,) of a column, NaN where a cell is empty, and which are (N,)."""
         cells = self.cells(index)
         empty = np.array([not cell for cell in cells], dtype=np.bool_)
         try:
@@ -149,13 +127,7 @@ class DelimitedText:
         return float(cell.replace(',', '.') if self.decimal_comma else cell)
 
     def nanoseconds(self, index: int, unit_ns: Decimal) -> NDArray[np.int64]:
-        """Return the times of a column of numbers, exactly, however long ago the epoch is.
-
-        `unit_ns`: nanoseconds in one of its unit.
-        Returns (N,).
-        Raises TableError: a cell is no finite number, or beyond what stamps can say; names the
-            line.
-        """
+        """Return times (N,) counted in `unit_ns` as ns, exactly, however long ago the epoch is."""
         times = []
         for line, cell in zip(self.lines, self.cells(index), strict=True):
             text = cell.replace(',', '.') if self.decimal_comma else cell
@@ -174,12 +146,7 @@ class DelimitedText:
         return np.array(times, dtype=np.int64)
 
     def dates(self, index: int) -> NDArray[np.int64]:
-        """Return the nanoseconds since the epoch of a column of dates and times (ISO 8601).
-
-        A time without a zone is taken as UTC, one without a date as since midnight.
-
-        Raises TableError: a cell is neither; names the line.
-        """
+        """Return the ns since the epoch (N,) of dates and times (ISO 8601), UTC without a zone."""
         times = []
         for line, cell in zip(self.lines, self.cells(index), strict=True):
             try:
@@ -197,16 +164,14 @@ def _shown(cell: str) -> str:
 
 
 def date_ns(text: str) -> int:
-    """Return the nanoseconds since the epoch of a date and time (ISO 8601).
-
-    Raises ValueError: it is none.
-    """
+    """Return the ns since the epoch of a date and time (ISO 8601); ValueError if it is none."""
     fraction = _FRACTION.fullmatch(text)
     ns = int(fraction['digits'][:9].ljust(9, '0')) if fraction else 0
     whole = fraction['before'] + fraction['after'] if fraction else text
     if ':' not in whole:
         raise ValueError('no time of day')
     if '-' not in whole[:5]:
+        # A time without a date is since midnight.
         clock = time.fromisoformat(whole)
         moment = datetime.combine(date(1970, 1, 1), clock)
     else:
@@ -242,15 +207,7 @@ def read_table(
     header_lines: int | None = None,
     decimal_comma: bool | None = None,
 ) -> DelimitedText:
-    """Read a text table.
-
-    `path`: UTF-8 with or without a byte order mark, or UTF-16 with one.
-    `separator`: one character or `WHITESPACE`; found from the lines if not given.
-    `header_lines`: lines above the numbers, of which the last names the columns; found if not
-        given.
-    `decimal_comma`: found if not given: never where commas separate.
-    Raises TableError: it cannot be read or holds no two rows of numbers; names the line.
-    """
+    """Read a table in UTF-8, or UTF-16 with a byte order mark; what is None is found from it."""
     path = Path(path)
     lines = _lines(path)
     above = lines[:header_lines] if header_lines is not None else []

@@ -27,54 +27,37 @@ _REGULAR = 0.5
 
 @dataclass(frozen=True)
 class TopicInformation:
-    """One topic of a recording.
-
-    `name`, `type`: full name and message type.
-    `message_count`: number of messages.
-    `rate_hz`: one over the median interval; over the mean where the topic is not periodic; None for
-        fewer than two messages.
-    `duration_s`: first to last message.
-    `pauses`: silences longer than 2.5 periods in which nothing was published: the numbers of the
-        messages go on, or the topic is latched and has news now and then. By header stamp (by
-        publication where there is none); 0 for topics that are not periodic.
-    `paused_s`: total of the pauses, each less one period.
-    `gaps`: silences in which messages were lost or, where nothing numbers them, may have been.
-    `missing_s`: total of the gaps, each less one period.
-    `longest_silence_s`: the longest interval; None for fewer than two messages.
-    `lost`: messages that were published and did not arrive; None where the recorder did not tell.
-    """
+    """One topic of a recording; pauses and gaps are of periodic ones, others have none."""
 
     name: str
     type: str
     message_count: int
+    # One over the median interval; over the mean where the topic is not periodic; None for fewer
+    # than two messages.
     rate_hz: float | None
-    duration_s: float
+    duration_s: float  # first to last message
+    # Silences longer than 2.5 periods, by header stamp (by publication where there is none), in
+    # which nothing was published: the numbers of the messages go on, or the topic is latched and
+    # has news now and then.
     pauses: int
-    paused_s: float
-    gaps: int
-    missing_s: float
-    longest_silence_s: float | None
-    lost: int | None
+    paused_s: float  # total of the pauses, each less one period
+    gaps: int  # silences in which messages were lost or, where nothing numbers them, may have been
+    missing_s: float  # total of the gaps, each less one period
+    longest_silence_s: float | None  # None for fewer than two messages
+    lost: int | None  # published, but not arrived; None where the recorder did not tell
 
 
 @dataclass(frozen=True)
 class BagInformation:
-    """A recording at a glance; prints itself as a table.
-
-    `path`, `library`: what was opened, and which program wrote it.
-    `start_ns`, `duration_s`: first receipt (ns since the epoch) and time until the last.
-    `topics`: by name.
-    `notes`: what the recorder wrote about the recording.
-    `damage`: what is wrong with the file; empty for a sound one.
-    """
+    """A recording at a glance; prints itself as a table."""
 
     path: str
-    library: str
-    start_ns: int
-    duration_s: float
-    topics: tuple[TopicInformation, ...]
-    notes: dict[str, str]
-    damage: tuple[str, ...]
+    library: str  # the program that wrote it
+    start_ns: int  # first receipt, since the epoch
+    duration_s: float  # first to last receipt
+    topics: tuple[TopicInformation, ...]  # by name
+    notes: dict[str, str]  # what the recorder wrote about the recording
+    damage: tuple[str, ...]  # empty for a sound file
 
     @property
     def message_count(self) -> int:

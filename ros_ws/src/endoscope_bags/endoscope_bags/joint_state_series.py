@@ -164,10 +164,7 @@ class PoseSeries:
 def decode_joint_states(
     topic: str, payloads: Payloads, log_ns: IntArray, publish_ns: IntArray, sequence: IntArray
 ) -> JointStateSeries:
-    """Decode all messages of a topic; joints may come in another order in every message.
-
-    Raises MalformedMessageError: a message does not decode.
-    """
+    """Decode all messages of a topic; joints may come in another order in every message."""
     groups = _groups(topic, payloads, joint_state_layout)
     names = tuple(dict.fromkeys(name for group in groups for name in group.layout.names))
     n = len(payloads)
@@ -195,10 +192,7 @@ def decode_joint_states(
 def decode_poses(
     topic: str, payloads: Payloads, log_ns: IntArray, publish_ns: IntArray, sequence: IntArray
 ) -> PoseSeries:
-    """Decode all poses of a topic.
-
-    Raises MalformedMessageError: a message does not decode.
-    """
+    """Decode all poses of a topic."""
     n = len(payloads)
     stamp_ns = np.zeros(n, dtype=np.int64)
     decoded = {'position': np.full((n, 3), np.nan), 'orientation': np.full((n, 4), np.nan)}

@@ -42,25 +42,15 @@ _EPOCH = ((1e17, 'ns'), (1e14, 'us'), (1e11, 'ms'), (1e8, 's'))
 
 @dataclass(frozen=True)
 class ColumnGuess:
-    """What a column holds and what it is taken for.
+    """What a column holds and what it is taken for."""
 
-    `number`: from 1.
-    `title`: as in the table; empty where it has none.
-    `low`, `high`, `step`: range, and median change from row to row; None for dates and for what is
-        no number.
-    `first`: the first cell.
-    `role`: `time`, or `TOPIC QUANTITY JOINT`; None where nothing fits.
-    `unit`: none where it is not known.
-    `why`: in words.
-    """
-
-    number: int
-    title: str
-    low: float | None
+    number: int  # from 1
+    title: str  # as in the table; empty where it has none
+    low: float | None  # None, like `high` and `step`, for dates and for what is no number
     high: float | None
-    step: float | None
-    first: str
-    role: str | None = None
+    step: float | None  # median change from row to row
+    first: str  # the first cell
+    role: str | None = None  # `time`, or `TOPIC QUANTITY JOINT`; None where nothing fits
     unit: str | None = None
     why: str = ''
 
@@ -71,16 +61,13 @@ class ColumnGuess:
 
 @dataclass(frozen=True)
 class Proposal:
-    """Guesses for all columns of a table.
-
-    `first_line`: line of the first row of numbers.
-    """
+    """Guesses for all columns of a table."""
 
     table: str
     rows: int
     separator: str
     decimal_comma: bool
-    first_line: int
+    first_line: int  # of the first row of numbers
     columns: tuple[ColumnGuess, ...]
 
     def as_json(self) -> dict[str, Any]:
@@ -151,10 +138,7 @@ class Proposal:
 
 
 def propose_mapping(text: DelimitedText) -> Proposal:
-    """Guess what the columns of a table are, by their names, ranges and steps.
-
-    Returns: nothing is taken for two things, and nothing for what the table does not suggest.
-    """
+    """Guess what columns are by name, range and step; none is taken for two things."""
     width = min(len(row) for row in text.rows)
     columns = [_described(text, index) for index in range(width)]
     time = _time_column(text, columns)

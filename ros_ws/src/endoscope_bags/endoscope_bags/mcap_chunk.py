@@ -42,17 +42,12 @@ def chunk_message(
 
 @dataclass(frozen=True)
 class EncodedChunk:
-    """A chunk as it goes into the file.
+    """A chunk as it goes into the file."""
 
-    `chunk`, `indexes`: the chunk record, and the message index records that follow it.
-    `index`: its entry for the summary, with offsets relative to the beginning of the chunk record.
-    `counts`: messages by channel.
-    """
-
-    chunk: bytes
-    indexes: bytes
-    index: ChunkIndex
-    counts: dict[int, int]
+    chunk: bytes  # the chunk record
+    indexes: bytes  # the message index records that follow it
+    index: ChunkIndex  # for the summary; offsets relative to the beginning of the chunk record
+    counts: dict[int, int]  # messages by channel
 
 
 def encode_chunk(messages: Sequence[ChunkMessage]) -> EncodedChunk:

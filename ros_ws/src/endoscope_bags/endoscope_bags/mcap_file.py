@@ -27,17 +27,11 @@ _FOOTER_HEAD_AND_OFFSETS = 1 + 8 + 8 + 8
 
 
 class McapFile:
-    """Writes the records around the chunks, with checksums, and the summary at the end.
-
-    `stream`: unbuffered binary file, empty.
-    `library`: name of the writing program for the header.
-    `position`: bytes of all records that were written whole.
-    Raises OSError: from the file; so in every method that writes.
-    """
+    """Writes the records around chunks, with checksums, and the summary to an unbuffered stream."""
 
     def __init__(self, stream: BinaryIO, library: str) -> None:
         self._stream = stream
-        self.position = 0
+        self.position = 0  # bytes of all records that were written whole
         self._crc = 0
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
@@ -47,10 +41,7 @@ class McapFile:
         self._write(MAGIC + _encoded(Header(profile='ros2', library=library)))
 
     def add_schema(self, name: str, definition: str) -> Schema:
-        """Write a `ros2msg` schema.
-
-        Schemas and channels stay outside the chunks, so that no damaged chunk takes them along.
-        """
+        """Write a `ros2msg` schema outside the chunks, so that no damaged one takes it along."""
         schema = Schema(
             id=len(self._schemas) + 1, name=name, encoding='ros2msg', data=definition.encode()
         )

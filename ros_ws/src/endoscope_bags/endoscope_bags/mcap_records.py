@@ -48,10 +48,7 @@ class Descriptions:
     _bodies: dict[tuple[int, bytes], bytes] = field(default_factory=dict)
 
     def add(self, opcode: int, body: bytes) -> None:
-        """Take a description, unless it was given before.
-
-        Raises ValueError: another one was given for the same id.
-        """
+        """Take a description, unless it was given before; ValueError if its id has another one."""
         key = (opcode, body[:2])
         if self._bodies.get(key) == body:
             return

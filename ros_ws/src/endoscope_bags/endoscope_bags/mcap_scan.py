@@ -73,28 +73,21 @@ class Messages:
 
 @dataclass
 class McapScan:
-    """What one pass over a file found.
-
-    `path`: the file.
-    `header`: its first record (profile and library).
-    `schemas`, `channels`: by their ids.
-    `messages`: all messages.
-    `blocks`: spans ``(start, stop)`` of the file that hold messages: bodies of chunk records, and
-        runs of messages outside chunks (marked by `chunked` false).
-    `metadata`: metadata records by name; the last one of a name counts.
-    `damage`: what is wrong with the file, one line each; empty for a sound one.
-    `truncated`: whether the end of the file is missing.
-    """
+    """What one pass over a file found."""
 
     path: Path
+    # Its first record (profile and library).
     header: Header = field(default_factory=lambda: Header('', ''))
-    schemas: dict[int, Schema] = field(default_factory=dict)
+    schemas: dict[int, Schema] = field(default_factory=dict)  # by id, like the channels
     channels: dict[int, Channel] = field(default_factory=dict)
     messages: Messages = field(default_factory=lambda: Messages(*[np.empty(0, np.int64)] * 7))
+    # Spans (start, stop) of the file that hold messages: bodies of chunk records (True), and runs
+    # of messages outside chunks (False).
     blocks: list[tuple[int, int, bool]] = field(default_factory=list)
+    # By name; the last record of a name counts.
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
-    damage: list[str] = field(default_factory=list)
-    truncated: bool = False
+    damage: list[str] = field(default_factory=list)  # one line each; empty for a sound file
+    truncated: bool = False  # the end of the file is missing
 
     def block_data(self, indices: npt.NDArray[np.int64]) -> Iterator[tuple[int, bytes]]:
         """Read blocks again and yield each with its index, decompressed."""
@@ -112,17 +105,7 @@ class McapScan:
 
 
 def scan_mcap(path: str | Path, *, salvage: bool = False) -> McapScan:
-    """Find all messages of an MCAP file.
-
-    `path`: the file.
-    `salvage`: keep what is sound of a damaged file, and note the rest in `damage`, instead of
-        raising.
-    Raises BagNotFoundError: there is no such file.
-    Raises NotABagError: the file is empty or does not begin as an MCAP file.
-    Raises TruncatedBagError: the end is missing.
-    Raises CorruptBagError: something does not agree with its checksum, its length, or what the file
-        says elsewhere, or a chunk holds more than is read (see `endoscope_bags.unpacking`).
-    """
+    """Find all messages of an MCAP file; `salvage` notes what is damaged instead of raising."""
     path = Path(path)
     if not path.is_file():
         raise BagNotFoundError(f'{path}: no such file')

@@ -33,25 +33,16 @@ _NAME = re.compile('[A-Za-z][A-Za-z0-9_]{0,99}/msg/[A-Za-z][A-Za-z0-9_]{0,99}')
 
 @dataclass(frozen=True)
 class MessageType:
-    """A message type as a recording needs it.
+    """A message type as a recording needs it."""
 
-    `name`: for example ``'sensor_msgs/msg/JointState'``.
-    `definition`: `ros2msg` text, complete with the definitions of all types that it contains.
-    `type_hash`: RIHS01 hash by REP-2016, for example ``'RIHS01_a13ee3...'``.
-    """
-
-    name: str
-    definition: str
-    type_hash: str
+    name: str  # for example 'sensor_msgs/msg/JointState'
+    definition: str  # `ros2msg` text with the definitions of all types that it contains
+    type_hash: str  # RIHS01 hash by REP-2016, for example 'RIHS01_a13ee3...'
 
 
 @functools.cache
 def message_type(name: str) -> MessageType:
-    """Return definition and hash of a message type.
-
-    Raises UnknownTypeError: neither `rosbags` nor an installed ROS package defines the type or one
-        that it contains.
-    """
+    """Return definition and hash of a type that `rosbags` or an installed ROS package defines."""
     store = typestore()
     require_type(store, name)
     definition, _ = store.generate_msgdef(name, ros_version=2)
@@ -75,10 +66,7 @@ def begins_with_header(definition: str) -> bool:
 
 
 def require_type(store: Typestore, name: str) -> None:
-    """Add a type and all that it contains to `store` from the installed packages where it lacks.
-
-    Raises UnknownTypeError: no installed ROS package defines the type.
-    """
+    """Add a type and all that it contains to `store` from the installed packages where it lacks."""
     if name in store.fielddefs:
         return
     path = _definition_file(name)

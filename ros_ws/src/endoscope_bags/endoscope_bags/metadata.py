@@ -24,18 +24,12 @@ _ROOT = 'rosbag2_bagfile_information'
 
 
 def bag_files(path: Path) -> list[Path]:
-    """Return the ``.mcap`` or ``.db3`` files of a recording in their order.
-
-    `path`: such a file, or a rosbag2 folder. A folder without ``metadata.yaml`` (its recorder was
-        killed) is taken with all the ``.mcap``, or else all the ``.db3``, in it.
-    Raises BagNotFoundError: the path, or a file that the metadata lists, does not exist.
-    Raises NotABagError: the folder holds no recording, or its metadata are not rosbag2's.
-    Raises UnsupportedBagError: the recording is in a storage of its own or compressed as a whole.
-    """
+    """Return the ``.mcap`` or ``.db3`` files, in order, of a recording that is one or a folder."""
     if not path.exists():
         raise BagNotFoundError(f'{path}: no such file or folder')
     if path.is_file():
         return [path]
+    # The recorder of a folder without metadata was killed.
     if not (path / METADATA).is_file():
         found = sorted(path.glob('*.mcap')) or sorted(path.glob('*.db3'))
         if not found:
@@ -97,14 +91,7 @@ def metadata_document(
     end_ns: int,
     custom_data: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Return the document that `ros2 bag` expects.
-
-    `files`: names of the ``.mcap`` files; this project writes one.
-    `topics`: all topics, also those without messages.
-    `start_ns`, `end_ns`: first and last receipt, ns since the epoch; both 0 for a recording without
-        messages.
-    `custom_data`: free text by free keys.
-    """
+    """Return the document that `ros2 bag` expects; `start_ns`, `end_ns` are 0 without messages."""
     count = sum(topic.message_count for topic in topics)
     start = {'nanoseconds_since_epoch': start_ns}
     duration = {'nanoseconds': end_ns - start_ns}

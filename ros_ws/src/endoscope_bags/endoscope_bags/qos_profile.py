@@ -13,18 +13,12 @@ _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
 @dataclass(frozen=True)
 class QosProfile:
-    """What a publisher offered.
+    """What a publisher offered."""
 
-    `reliability`: ``'reliable'`` or ``'best_effort'``.
-    `durability`: ``'volatile'`` or ``'transient_local'``.
-    `depth`: length of the history; 0 where the publisher did not say.
-    `history`: ``'keep_last'``, ``'keep_all'`` or ``'unknown'``.
-    """
-
-    reliability: str = 'reliable'
-    durability: str = 'volatile'
-    depth: int = 10
-    history: str = 'keep_last'
+    reliability: str = 'reliable'  # or 'best_effort'
+    durability: str = 'volatile'  # or 'transient_local'
+    depth: int = 10  # of the history; 0 where the publisher did not say
+    history: str = 'keep_last'  # or 'keep_all', 'unknown'
 
     def as_rosbag2(self) -> dict[str, Any]:
         """Return the mapping that rosbag2 writes; the time limits are unset (infinite)."""
@@ -54,12 +48,7 @@ def qos_as_yaml(profiles: Sequence[QosProfile]) -> str:
 
 
 def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
-    """Return the profiles in the channel metadata of any rosbag2 version; none for no text.
-
-    Before version 9 rosbag2 wrote the policies as the numbers of rmw; both are understood.
-
-    Raises YamlError: the text is no list of profiles.
-    """
+    """Return the profiles in the channel metadata of any rosbag2 version; none for no text."""
     entries = parse_yaml(text, 'the quality of service') if text.strip() else []
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise YamlError(f'the quality of service is {text!r}: not a list of profiles')
@@ -69,6 +58,7 @@ def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
 def _from_entry(entry: dict[str, Any]) -> QosProfile:
     def named(key: str, names: tuple[str, ...]) -> str:
         value = entry.get(key)
+        # Before version 9 rosbag2 wrote the policies as the numbers of rmw.
         if isinstance(value, int):
             return names[value] if 0 <= value < len(names) else 'unknown'
         if value is not None and not isinstance(value, str):

@@ -18,38 +18,24 @@ _STALE_CHUNK_NS = round(1.25e9 * CHUNK_SECONDS)
 
 
 class Arrival(NamedTuple):
-    """A message that arrived; the order of the fields is the order of recording.
+    """A message that arrived; the order of the fields is the order of recording."""
 
-    `received_ns`: receipt, ns since the epoch.
-    `topic`: number that `RecordingSession.add_topic` gave.
-    `sequence`: the publisher's message counter.
-    `published_ns`: publication, ns since the epoch.
-    `data`: the message in CDR.
-    """
-
-    received_ns: int
-    topic: int
-    sequence: int
-    published_ns: int
-    data: bytes
+    received_ns: int  # since the epoch
+    topic: int  # number that `RecordingSession.add_topic` gave
+    sequence: int  # the publisher's message counter
+    published_ns: int  # since the epoch
+    data: bytes  # CDR
 
 
 @dataclass(frozen=True)
 class SessionReport:
-    """How a recording went.
-
-    `path`: the recording.
-    `counts`: messages recorded, by topic.
-    `lost`: messages published and not recorded, by topic; topics without loss have 0.
-    `full`: why recording ended early (the disk was full); empty otherwise.
-    `finished`: whether the recording is complete with its summary; if not, `recover` completes it.
-    """
+    """How a recording went."""
 
     path: Path
-    counts: dict[str, int]
-    lost: dict[str, int]
-    full: str
-    finished: bool
+    counts: dict[str, int]  # messages recorded, by topic
+    lost: dict[str, int]  # published and not recorded, by topic; 0 for topics without loss
+    full: str  # why recording ended early (the disk was full); else empty
+    finished: bool  # complete with its summary; if not, `recover` completes it
 
     @property
     def message_count(self) -> int:
@@ -79,24 +65,15 @@ class SessionReport:
 class _Source:
     topic: str
     type: str
+    # Asked once, when the first message has come: the publishers are known then.
     offered_qos: Callable[[], Sequence[QosProfile]]
-    count_publishers: Callable[[], int]
+    count_publishers: Callable[[], int]  # asked when a message has an unexpected number
     gaps: SequenceGaps
     announced: bool = False
 
 
 class RecordingSession:
-    """One recording while it is made.
-
-    A full disk does not end the session: what was recorded is finished at once, and what still
-    arrives is counted as lost.
-
-    `path`: folder or ``.mcap`` to write; what is there when the process is killed can be recovered.
-    `rig`: what is recorded; None where it is not known.
-    `threaded`: compress and write in a thread.
-    Raises BagExistsError: `path` is taken.
-    Raises BagWriteError: there is no room even for the beginning.
-    """
+    """One recording while it is made; what a kill leaves at `path` can be recovered."""
 
     def __init__(self, path: str | Path, *, rig: Rig | None = None, threaded: bool = True) -> None:
         records = {} if rig is None else rig_record(rig)
@@ -123,12 +100,7 @@ class RecordingSession:
         offered_qos: Callable[[], Sequence[QosProfile]] = tuple,
         count_publishers: Callable[[], int] = lambda: 1,
     ) -> int:
-        """Announce a topic and return its number.
-
-        `topic`, `type_name`: full name and message type.
-        `offered_qos`: asked once, when the first message has come: the publishers are known then.
-        `count_publishers`: asked when a message has an unexpected number.
-        """
+        """Announce a topic and return its number."""
         self._sources.append(
             _Source(topic, type_name, offered_qos, count_publishers, SequenceGaps())
         )
@@ -155,10 +127,7 @@ class RecordingSession:
         source.announced = True
 
     def flush_stale(self, now_ns: int) -> None:
-        """Hand a chunk to the operating system that no later message has closed.
-
-        `now_ns`: time by the clock of the receipts, ns since the epoch.
-        """
+        """Hand a chunk to the operating system that no later message has closed by `now_ns`."""
         waiting_since = self._writer.waiting_since_ns
         if self._full or waiting_since is None or now_ns - waiting_since < _STALE_CHUNK_NS:
             return
@@ -168,6 +137,7 @@ class RecordingSession:
             self._end_full(error)
 
     def _end_full(self, error: BagWriteError) -> None:
+        # What was recorded is finished at once; what still arrives is counted as lost.
         self._full = str(error)
         self._finish()
 
@@ -198,10 +168,7 @@ class RecordingSession:
         )
 
     def close(self, ended: str = 'on request') -> SessionReport:
-        """Finish the recording and say how it went; again is harmless.
-
-        `ended`: why, as it is written into the recording.
-        """
+        """Finish the recording, noting in it why, and say how it went; again is harmless."""
         if not self._writer.closed:
             self._ended = ended
             for source in self._sources:
@@ -212,16 +179,10 @@ class RecordingSession:
 
 
 def simulated_receipt_ns(stamp_ns: int | None, last_tick_ns: int, now_ns: int) -> int:
-    """Return when a message was received in simulated time.
-
-    Messages are collected at a tick of the clock, `now_ns`; what is found then came during the
-    tick before, or was sent already in this one by a node that heard the clock earlier. Its stamp
-    tells which, so that the same simulation is recorded the same whoever was faster.
-
-    `stamp_ns`: header stamp; None for types without one.
-    `last_tick_ns`: the tick before; 0 if this is the first one.
-    `now_ns`: this tick.
-    """
+    """Return when a message was received in simulated time; `last_tick_ns` is 0 at the first."""
     if not last_tick_ns:
         return now_ns
+    # What is found at a tick came during the tick before, or was sent already in this one by a node
+    # that heard the clock earlier. The stamp (None for types without one) tells which, so that the
+    # same simulation is recorded the same whoever was faster.
     return min(now_ns, max(last_tick_ns, stamp_ns or 0))

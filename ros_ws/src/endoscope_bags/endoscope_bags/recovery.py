@@ -12,19 +12,13 @@ from endoscope_core.errors import printable
 
 @dataclass(frozen=True)
 class RecoveryReport:
-    """What `recover` did.
-
-    `message_count`: messages that were saved.
-    `counts`: the same by topic.
-    `start_ns`, `end_ns`: first and last receipt of what was saved, ns since the epoch.
-    `damage`: what was wrong, one line each; empty if the recording was sound.
-    """
+    """What `recover` saved."""
 
     message_count: int
-    counts: dict[str, int]
-    start_ns: int
-    end_ns: int
-    damage: tuple[str, ...]
+    counts: dict[str, int]  # messages by topic
+    start_ns: int  # first receipt, since the epoch
+    end_ns: int  # last receipt
+    damage: tuple[str, ...]  # one line each; empty if the recording was sound
 
     def __str__(self) -> str:
         lines = [f'damage: {what}' for what in self.damage] or ['no damage found']
@@ -35,13 +29,7 @@ class RecoveryReport:
 
 
 def recover(source: str | Path, target: str | Path) -> RecoveryReport:
-    """Write all messages of the sound chunks of a recording to a new one.
-
-    `source`: rosbag2 folder (also without metadata) or ``.mcap`` file. It is not changed.
-    `target`: the new recording, a folder or ``.mcap`` file; must not exist.
-    Raises BagError: `source` is no recording or not a single message of it is sound; `target`
-        exists; the disk is full. Nothing is left at `target` then.
-    """
+    """Write all messages of the sound chunks of a recording to a new one; on an error to none."""
     recording = open_bag(source, salvage=True)
     with BagWriter(target, records=copied_rig_record(recording)) as writer:
         _copy(recording, writer)

@@ -18,9 +18,6 @@ def copied_rig_record(recording: Recording) -> dict[str, dict[str, str]]:
 
 
 def rig_of_bag(recording: Recording) -> Rig:
-    """The rig that a recording carries; as shipped where it carries none.
-
-    Raises RigFileError: it is of no form known here.
-    """
+    """Return the rig that a recording carries; as shipped where it carries none."""
     text = recording.metadata.get(_NAME, {}).get(_KEY)
     return shipped_rig() if text is None else rig_from_text(text, f'the rig of {recording.path}')

@@ -10,19 +10,11 @@ _NOT_OFFERED = {errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
 
 
 def require_room(descriptor: int, name: str, n_bytes: int) -> None:
-    """Check that a file can grow by `n_bytes`.
-
-    The room is allocated and given back at once: that alone asks the disk, the quota and the limit
-    of file sizes together.
-
-    `descriptor`: of a file open for writing, positioned at its end.
-    `name`: for the message.
-    `n_bytes`: how much it shall be able to grow.
-    Raises BagFullError: it cannot grow that much.
-    Raises BagWriteError: the disk refuses for another reason.
-    """
+    """Raise BagFullError unless a file, positioned at its end, can grow by `n_bytes`."""
     end = os.lseek(descriptor, 0, os.SEEK_CUR)
     try:
+        # Given back at once: this alone asks the disk, the quota and the limit of file sizes
+        # together.
         os.posix_fallocate(descriptor, end, n_bytes)
     except OSError as error:
         if error.errno in _NOT_OFFERED:

@@ -17,27 +17,17 @@ class SequenceGaps:
 
     DDS numbers the messages of every publisher from 1. Where several publish on a topic, their
     numbers arrive mixed and unlabelled; each number is taken for the publisher that expects it.
-
-    `received`: messages seen.
-    `lost`: messages that never came, between the first and the last that did; those that came late
-        are none.
     """
 
     def __init__(self) -> None:
         self.received = 0
-        self.lost = 0
+        self.lost = 0  # between the first and the last that came; late ones are none
         self._last: list[int] = []
         # First and last number of what is missing; the latest gaps only.
         self._missing: list[tuple[int, int]] = []
 
     def add(self, sequence: int, count_publishers: Callable[[], int] = one_publisher) -> int:
-        """Note a message and return how many were lost directly before it.
-
-        `sequence`: number that its publisher gave it.
-        `count_publishers`: tells how many publish on this topic at the moment; asked in case of
-            doubt only. An unexpected number begins a new publisher as long as fewer were seen, and
-            is a loss after that.
-        """
+        """Note a message and return how many were lost directly before it."""
         self.received += 1
         last = self._last
         for k, before in enumerate(last):
@@ -50,6 +40,8 @@ class SequenceGaps:
         if not earlier and len(last) >= _MOST_PUBLISHERS:
             last[min(range(len(last)), key=last.__getitem__)] = sequence
             return 0
+        # Asked in case of doubt only. An unexpected number begins a new publisher as long as fewer
+        # were seen, and is a loss after that.
         if not earlier or len(last) < count_publishers():
             last.append(sequence)
             return 0

@@ -44,12 +44,7 @@ _Damage = (sqlite3.Error, UnicodeDecodeError)
 
 @dataclass
 class Sqlite3Scan:
-    """What one pass over a file found; attributes as in `McapScan`.
-
-    `path`, `header`, `schemas`, `channels`, `messages`, `metadata`, `damage`, `truncated`: see
-        `McapScan`.
-    `row_ids`: key of each message in the file, in file order, shape (N,).
-    """
+    """What one pass over a file found; fields as in `McapScan`."""
 
     path: Path
     header: Header = field(default_factory=lambda: Header('ros2', LIBRARY))
@@ -59,6 +54,7 @@ class Sqlite3Scan:
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
     truncated: bool = False
+    # (N,), key of each message, in file order.
     row_ids: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
 
     def block_data(self, indices: IntArray) -> Iterator[tuple[int, bytes]]:
@@ -90,16 +86,7 @@ def is_sqlite3(path: Path) -> bool:
 
 
 def scan_sqlite3(path: str | Path, *, salvage: bool = False) -> Sqlite3Scan:
-    """Find all messages of a rosbag2 file in sqlite3 storage.
-
-    `path`: the ``.db3`` file.
-    `salvage`: keep the messages before the first damaged page, and note it in `damage`, instead of
-        raising.
-    Raises BagNotFoundError: there is no such file.
-    Raises NotABagError: it is no database, or not one of rosbag2.
-    Raises TruncatedBagError: the end is missing.
-    Raises CorruptBagError: it is damaged, or holds more than its size allows.
-    """
+    """Find all messages of a ``.db3`` file; `salvage` keeps those before the first damaged page."""
     path = Path(path)
     try:
         with path.open('rb') as file:

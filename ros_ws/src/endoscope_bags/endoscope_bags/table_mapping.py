@@ -86,50 +86,35 @@ class TableMappingError(BagError, ValueError):
 
 @dataclass(frozen=True)
 class Column:
-    """One column of the table.
+    """One column of the table: `scale` times its number plus `offset` is the value in the unit."""
 
-    `source`: its number, from 1, or its name.
-    `unit`: none for that of the table's heading.
-    `scale`, `offset`: `scale` times the number in the table plus `offset` is the value in the unit.
-    """
-
-    source: int | str
-    unit: str | None = None
+    source: int | str  # its number, from 1, or its name
+    unit: str | None = None  # None for that of the table's heading
     scale: float = 1.0
     offset: float = 0.0
 
 
 @dataclass(frozen=True)
 class TableMapping:
-    """A whole mapping file.
-
-    `delimiter`: one character or `whitespace`; None where it is to be found.
-    `decimal_comma`: none where it is to be found.
-    `header_lines`: none where they are to be found.
-    `sample_and_hold`: rows of one time lie evenly between it and the next one, and a topic has a
-        message where one of its columns changes.
-    `drop_incomplete`: whether a topic has no message, instead of an error, where some of its cells
-        are empty or not finite.
-    """
+    """A whole mapping file; what is None is to be found from the table."""
 
     time: Column
-    topics: Mapping[str, Mapping[str, Mapping[str, Column]]]
-    delimiter: str | None = None
+    topics: Mapping[str, Mapping[str, Mapping[str, Column]]]  # columns by topic, quantity and name
+    delimiter: str | None = None  # one character or `whitespace`
     decimal_comma: bool | None = None
     header_lines: int | None = None
     namespace: str = '/endoscope'
     start_s: float = 0.0
     drop_repeats: bool = True
+    # Rows of one time lie evenly between it and the next one, and a topic has a message where one
+    # of its columns changes.
     sample_and_hold: bool = False
+    # A topic has no message, instead of an error, where some of its cells are empty or not finite.
     drop_incomplete: bool = False
 
 
 def load_table_mapping(path: str | Path) -> TableMapping:
-    """Read a mapping file.
-
-    Raises TableMappingError: if the file cannot be read, or a key is unknown, missing or has a
-        wrong value.
-    """
+    """Read a mapping file."""
     try:
         content = load_yaml(path)
     except YamlError as error:

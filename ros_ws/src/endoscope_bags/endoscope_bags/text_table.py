@@ -29,20 +29,16 @@ _ROWS_AT_ONCE = 20_000
 
 @dataclass(frozen=True)
 class Converted:
-    """What was converted.
-
-    `rows`: rows of the table.
-    `repeated`: those of them that were dropped because their time is that of the row before or,
-        where the table samples and holds, because no topic has a new number in them.
-    `incomplete`: rows by topic that were dropped because a part of its cells is empty or not
-        finite.
-    `gaps`: cells that are empty or not finite, by the name of the column.
-    """
+    """What was converted."""
 
     rows: int
+    # Rows that were dropped because their time is that of the row before or, where the table
+    # samples and holds, because no topic has a new number in them.
     repeated: int
     messages: int
+    # Rows by topic that were dropped because a part of its cells is empty or not finite.
     incomplete: dict[str, int] = field(default_factory=dict)
+    # Cells that are empty or not finite, by the name of the column.
     gaps: dict[str, int] = field(default_factory=dict)
 
 
@@ -52,16 +48,7 @@ def convert_table(
     out: str | Path,
     progress: Callable[[str, float], None] = lambda step, share: None,
 ) -> Converted:
-    """Convert a text table to a bag.
-
-    `mapping`: what its columns are.
-    `out`: rosbag2 folder, or `.mcap`; must not exist.
-    `progress`: called with what is done and the share that is done already.
-    Raises TableError: if the table cannot be read, lacks a column, or its time runs backwards;
-        names the line.
-    Raises NonFiniteError: if a number is NaN or infinite, unless the mapping drops such rows.
-    Raises BagExistsError: if `out` exists.
-    """
+    """Convert a text table to a new bag; `progress` gets what is done and the share done."""
     table = Path(table)
     progress('reading the table', 0.0)
     text = read_table(
@@ -152,10 +139,7 @@ def _values(
     incomplete: dict[str, int],
     gaps: dict[str, int],
 ) -> tuple[dict[str, Array], Mask]:
-    """Values of a topic by quantity, each (N, J) in SI, and the rows that have a sample, (N,).
-
-    Counts rows that are dropped into `incomplete`, and cells without a number into `gaps`.
-    """
+    """Values (N, J) in SI and rows (N,) with a sample; fills `incomplete` and `gaps`."""
     values, absent, unusable = {}, [], []
     for quantity, columns in quantities.items():
         read = []

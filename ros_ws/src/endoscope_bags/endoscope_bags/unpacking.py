@@ -42,10 +42,7 @@ class ChunkHead(NamedTuple):
 
 
 def chunk_head(data: object, start: int, stop: int) -> ChunkHead:
-    """Read the head of the chunk whose record body is ``data[start:stop]``.
-
-    Raises ChunkError: its parts do not add up to its length.
-    """
+    """Read the head of the chunk whose record body is ``data[start:stop]``."""
     end = start + _HEAD.size
     if end + _SIZE.size > stop:
         raise ChunkError('its head is cut')
@@ -62,10 +59,7 @@ def chunk_head(data: object, start: int, stop: int) -> ChunkHead:
 
 @dataclass
 class Allowance:
-    """What the chunks of a file may still hold.
-
-    `n_bytes`, `n_records`: decompressed bytes, and records in them.
-    """
+    """What the chunks of a file may still hold: decompressed bytes, and records in them."""
 
     n_bytes: int
     n_records: int
@@ -78,10 +72,7 @@ class Allowance:
         )
 
     def take(self, n_bytes: int, n_records: int) -> None:
-        """Take from it.
-
-        Raises ChunkTooLargeError: there is not so much left.
-        """
+        """Take from it; ChunkTooLargeError if there is not so much left."""
         self.n_bytes -= n_bytes
         self.n_records -= n_records
         if self.n_bytes < 0 or self.n_records < 0:
@@ -89,14 +80,7 @@ class Allowance:
 
 
 def unpacked(body: bytes, allowance: Allowance | None = None) -> bytes:
-    """Return the records in a chunk, of the size and checksum that it declares.
-
-    `body`: of the chunk record.
-    `allowance`: what is decompressed is taken from it, be it of use or not.
-    Raises ChunkError: they have not, or do not decompress, or the compression is neither zstd nor
-        LZ4.
-    Raises ChunkTooLargeError: they are, or claim to be, more than `LARGEST_CHUNK`.
-    """
+    """Return the records in a chunk; what is decompressed for it is taken from the allowance."""
     head = chunk_head(body, 0, len(body))
     if head.size > LARGEST_CHUNK:
         raise ChunkTooLargeError(

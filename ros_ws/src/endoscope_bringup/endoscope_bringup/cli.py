@@ -64,10 +64,7 @@ def build_parser() -> OneLineParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `endoscope` with `argv` (default: the command line) and return its exit status.
-
-    As `exit_status` says, and 143 when terminated.
-    """
+    """Run `endoscope`; the exit status as `exit_status` says, and 143 when terminated."""
     return exit_status('endoscope', lambda: _run(sys.argv[1:] if argv is None else argv))
 
 

@@ -18,14 +18,9 @@ _ENTRY = re.compile(r'^(\S+) *= *([\w.]+) *$', re.MULTILINE)
 
 
 def commands_of_other_packages() -> dict[str, str]:
-    """Find them by reading `entry_points.txt` of every package that is installed.
-
-    `importlib.metadata` finds the same, but takes ten times as long, at every start. Of two
-    packages with the same command the one that stands first in `sys.path` counts.
-
-    Returns: names of modules by that of the command, sorted.
-    """
+    """Find module names by command in `entry_points.txt` of all installed packages, sorted."""
     found: dict[str, str] = {}
+    # `importlib.metadata` finds the same, but takes ten times as long, at every start.
     for folder in sys.path:
         try:
             with os.scandir(folder or os.curdir) as entries:
@@ -36,6 +31,8 @@ def commands_of_other_packages() -> dict[str, str]:
             continue
         for package in installed:
             for command, module in _entries(f'{package}/entry_points.txt'):
+                # Of two packages with the same command the one that stands first in `sys.path`
+                # counts.
                 found.setdefault(command, module)
     return dict(sorted(found.items()))
 

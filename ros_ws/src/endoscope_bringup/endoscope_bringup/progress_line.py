@@ -14,10 +14,9 @@ REDRAWN_S = 1.0
 class ProgressLine:
     """A bar of one line that says which step is under way, and for how long already.
 
-    `steps`: how many steps there are, about: a bar is full only when all is done.
-    `first`: the step that begins at once. It is no line where there is no bar: bad input is refused
-        in it, with one line alone.
-    `stream`: where to write; stderr if none is given. Where it is no terminal, each step is a line.
+    `steps` is about how many there are: a bar is full only when all is done. Where `stream`
+    (default: stderr) is no terminal, each step is a line, but not the `first`, which begins at
+    once: bad input is refused in it, with one line alone.
     """
 
     def __init__(self, steps: int, first: str, stream: TextIO | None = None) -> None:
@@ -87,10 +86,7 @@ class ProgressLine:
 
 
 class ShareBar:
-    """Shows how far something is: one line that changes, or where nobody looks on, one a step.
-
-    It goes to stderr: stdout is for the result.
-    """
+    """Shows on stderr how far something is: one line that changes or, unwatched, one a step."""
 
     def __init__(self) -> None:
         self._shows = sys.stderr.isatty()

@@ -4,11 +4,7 @@ import argparse
 
 
 def seed(text: str) -> int:
-    """Read a seed.
-
-    Raises argparse.ArgumentTypeError: it is no whole number from 0 to 2^32 - 1, as numpy's and
-        torch's generators need it.
-    """
+    """Read a seed: a whole number below 2^32, as numpy's and torch's generators need it."""
     if not text.isdecimal() or int(text) >= 2**32:
         raise argparse.ArgumentTypeError(f'{text!r} is no seed: give 0 to {2**32 - 1}')
     return int(text)

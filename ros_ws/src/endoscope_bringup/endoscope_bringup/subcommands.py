@@ -52,13 +52,7 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def add_subcommands(parser: argparse.ArgumentParser, modules: Iterable[str], *, dest: str) -> None:
-    """Add one subparser to `parser` for each module.
-
-    `parser`: the parser whose first positional argument shall choose the subcommand.
-    `modules`: their full names, for example ``'endoscope_bringup.commands.demo'``, in the order of
-        the help.
-    `dest`: attribute of the parsed arguments that will hold the choice; see `run_chosen`.
-    """
+    """Add one subparser for each module, in this order; `dest` of the arguments is the choice."""
     subparsers = parser.add_subparsers(dest=dest, metavar=dest.upper(), required=True)
     for name in modules:
         module = importlib.import_module(name)
@@ -98,11 +92,7 @@ def add_json_option(parser: argparse.ArgumentParser) -> None:
 
 
 def print_json(content: object) -> None:
-    """Print what a table shows as one JSON document, numbers as numbers.
-
-    `content`: mappings, sequences, texts, numbers, truth values and None. What is not finite
-        becomes null, which JSON has; paths become texts.
-    """
+    """Print what a table shows as JSON, numbers as numbers, what is not finite as null."""
     print(json.dumps(_plain(content), indent=1, ensure_ascii=False, allow_nan=False))
 
 

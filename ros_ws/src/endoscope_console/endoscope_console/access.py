@@ -56,34 +56,20 @@ class TokenFileError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why somebody does not get in.
+    """Why somebody does not get in."""
 
-    Attributes
-    ----------
-    status
-        Of the answer to a request.
-    check
-        Name of the check, by which it is counted.
-    why
-        In words.
-    """
-
-    status: int
-    check: str
+    status: int  # of the answer to a request
+    check: str  # name of the check, by which it is counted
     why: str
 
 
 @dataclass(frozen=True)
 class Admission:
-    """What a request must carry to get in.
+    """What a request must carry to get in."""
 
-    `origins`: the page's own, for example ``http://127.0.0.1:8765``; a ``Host`` is the rest of one
-        of them.
-    `without_origin`: whether a program may open a socket without naming an origin.
-    """
-
+    # The page's own, for example ``http://127.0.0.1:8765``; a ``Host`` is the rest of one of them.
     origins: frozenset[str]
-    without_origin: bool = False
+    without_origin: bool = False  # a program may open a socket without naming an origin
 
     @property
     def hosts(self) -> frozenset[str]:
@@ -91,10 +77,7 @@ class Admission:
         return frozenset(origin.partition('://')[2] for origin in self.origins)
 
     def refusal(self, scope: Mapping[str, Any]) -> Refusal | None:
-        """Judge a request or a socket; None where it may pass.
-
-        `scope`: of ASGI.
-        """
+        """Judge a request or a socket by its ASGI scope; None where it may pass."""
         if scope['type'] not in ('http', 'websocket'):
             return Refusal(404, 'kind', f'nothing here is of kind {scope["type"]}')
         hosts = _values(scope, b'host')
@@ -121,12 +104,7 @@ def _values(scope: Mapping[str, Any], name: bytes) -> list[str]:
 
 
 class Gate:
-    """Lets in what an :class:`Admission` admits, and gives every answer its headers.
-
-    `app`: what lies behind.
-    `admission`: what may pass; all else is refused.
-    `counts`: refusals are counted here, by the name of the check.
-    """
+    """Lets in what an :class:`Admission` admits, counts the refused by check, and sets headers."""
 
     def __init__(self, app: App, admission: Admission, counts: Counter[str]) -> None:
         self._app = app
@@ -173,12 +151,9 @@ async def _answer(refusal: Refusal, send: Send) -> None:
 
 @dataclass(frozen=True)
 class Tokens:
-    """Two secrets: who knows the one may operate, who knows the other may look on.
+    """Two secrets: who knows the one may operate, who knows the other may look on."""
 
-    `operator`, `viewer`: at least 32 random bytes, as text that fits into an address.
-    """
-
-    operator: str
+    operator: str  # at least 32 random bytes, as text that fits into an address
     viewer: str
 
     @classmethod
@@ -188,10 +163,7 @@ class Tokens:
 
     @classmethod
     def of_file(cls, path: Path) -> 'Tokens':
-        """Read them from a file, or write new ones there that this user alone can read.
-
-        Raises TokenFileError: it is no file of two tokens, or others can read it.
-        """
+        """Read them from a file, or write new ones there that this user alone can read."""
         if not path.exists():
             tokens = cls.new()
             with atomic_file(path) as part:

@@ -21,18 +21,12 @@ class Level(StrEnum):
 
 @dataclass(frozen=True)
 class Alarm:
-    """What asks for attention.
+    """What asks for attention."""
 
-    `id`: by which it is acknowledged.
-    `level`: how urgent it is.
-    `text`: in words.
-    `latched`: whether it stays until it was acknowledged.
-    """
-
-    id: str
+    id: str  # by which it is acknowledged
     level: Level
     text: str
-    latched: bool = False
+    latched: bool = False  # stays until it was acknowledged
 
 
 class Alarms:
@@ -56,10 +50,7 @@ class Alarms:
         return tuple(sorted(shown.values(), key=lambda a: (order.index(a.level), a.id)))
 
     def acknowledge(self, name: str) -> None:
-        """Take note that an alarm was seen, which ends it.
-
-        Raises AlarmStandsError: its cause is still present, or there is none.
-        """
+        """Take note that an alarm was seen, which ends it unless its cause is still present."""
         if name not in self._kept:
             raise AlarmStandsError('there is nothing to acknowledge')
         if name in self._present:

@@ -26,48 +26,31 @@ _UNTIL_STOPPED_S = 2.0
 
 @dataclass(frozen=True)
 class Situation(Conditions):
-    """What the graph and the lease are like, as the other threads last said.
+    """What the graph and the lease are like, as the other threads last said."""
 
-    `speaks`: whether the handle's place is free and its own: only then it is a sender.
-    `wanted`, `wanted_ns`: angles in rad that the console asks of the slave, shape (J,), and when
-        they were heard.
-    `scale`: slave motion for one radian of the handle.
-    """
-
-    speaks: bool = False
-    wanted: tuple[float, ...] | None = None
-    wanted_ns: int = 0
-    scale: float = 1.0
+    speaks: bool = False  # the handle's place is free and its own: only then it is a sender
+    wanted: tuple[float, ...] | None = None  # (J,), asked of the slave by the console, in rad
+    wanted_ns: int = 0  # when they were heard
+    scale: float = 1.0  # slave motion for one radian of the handle
 
 
 @dataclass(frozen=True)
 class Said:
-    """Where the dead-man is, as of a beat.
-
-    `state`, `reason`, `missing`: see :class:`OperatorDeadMan`.
-    `counts`: how often each reason has ended a grip.
-    `speaks`: whether the handle is spoken for.
-    """
+    """Where the dead-man is, as of a beat; see :class:`OperatorDeadMan`."""
 
     state: DeadManState = DeadManState.OPEN
     reason: Reason | None = None
     missing: Reason | None = Reason.LOST
-    counts: dict[str, int] = field(default_factory=dict)
-    speaks: bool = False
+    counts: dict[str, int] = field(default_factory=dict)  # how often each reason has ended a grip
+    speaks: bool = False  # whether the handle is spoken for
 
 
 class Beat:
-    """The thread; it shares one-slot mailboxes and a queue of arrivals with the others.
-
-    `node`: by which to speak.
-    `handle`: turns frames into angles.
-    `situation`: to be replaced by whoever knows a newer one.
-    `said`: what the dead-man said in the last beat in which it changed.
-    """
+    """The thread; it shares one-slot mailboxes and a queue of arrivals with the others."""
 
     def __init__(self, node: Node, handle: PadHandle) -> None:
-        self.situation = Situation()
-        self.said = Said()
+        self.situation = Situation()  # to be replaced by whoever knows a newer one
+        self.said = Said()  # by the dead-man in the last beat in which it changed
         self._node = node
         self._handle = handle
         self._dead_man = OperatorDeadMan()

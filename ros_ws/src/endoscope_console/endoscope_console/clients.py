@@ -26,10 +26,7 @@ _SECOND_NS = 1_000_000_000
 
 
 class FrameRate:
-    """Whether a client sends more than it may: an allowance that fills up again.
-
-    `limit`: frames a second, and at once.
-    """
+    """Whether a client sends more than `limit` frames a second: an allowance that refills."""
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
@@ -47,13 +44,10 @@ class FrameRate:
 
 
 class Outbox:
-    """What waits to be sent to a client: the newest pictures, and the newest state.
-
-    `dropped`: pictures that it never got, since newer ones came.
-    """
+    """What waits to be sent to a client: the newest pictures, and the newest state."""
 
     def __init__(self) -> None:
-        self.dropped = 0
+        self.dropped = 0  # pictures that it never got, since newer ones came
         self._pictures: deque[bytes] = deque()
         self._state = ''
         self._filled = asyncio.Event()
@@ -85,25 +79,17 @@ class Outbox:
 
 @dataclass(eq=False)
 class Client:
-    """A socket that has said hello.
+    """A socket that has said hello."""
 
-    `id`: its name, ``c3``.
-    `kind`, `role`: which socket, and what its bearer may be.
-    `address`: of the machine it comes from.
-    `rate`: what it may send.
-    `outbox`: what waits for it, on the socket for telemetry.
-    `tell`: sends it an object that it did not ask for, on the socket for commands.
-    `orders`: how many of its orders are not answered yet.
-    """
-
-    id: str
-    kind: Kind
-    role: str
-    address: str
+    id: str  # its name, ``c3``
+    kind: Kind  # which socket
+    role: str  # what its bearer may be
+    address: str  # of the machine it comes from
     rate: FrameRate = field(default_factory=lambda: FrameRate(FRAMES_A_SECOND))
-    outbox: Outbox = field(default_factory=Outbox)
+    outbox: Outbox = field(default_factory=Outbox)  # what waits for it, on the socket for telemetry
+    # Sends it an object that it did not ask for, on the socket for commands.
     tell: Callable[[dict[str, object]], None] = lambda message: None
-    orders: int = 0
+    orders: int = 0  # not answered yet
 
     @property
     def label(self) -> str:
@@ -112,10 +98,7 @@ class Client:
 
 
 class Clients:
-    """All sockets, within the limits.
-
-    `counts`: what is refused and dropped is counted here.
-    """
+    """All sockets, within the limits; `counts` is of what is refused and dropped."""
 
     def __init__(self, counts: Counter[str]) -> None:
         self.counts = counts

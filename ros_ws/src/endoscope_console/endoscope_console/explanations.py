@@ -42,34 +42,20 @@ class ExplanationRefusedError(EndoscopeError):
 
 @dataclass
 class Explanation:
-    """One recording being explained, or explained.
+    """One recording being explained, or explained."""
 
-    `id`: by which a page speaks of it.
-    `bag`: name of the recording.
-    `folder`: where report and improved plant are.
-    `secret`: part of the report's address that nobody can guess.
-    `running`: whether it is under way.
-    `step`: what is being done.
-    `progress`: share that is done.
-    `sentence`: what was found; empty before.
-    `error`: why nothing was; empty where something was.
-    `experiment`: whether there is a motion that would tell more.
-    `plant`: by which plant it is explained.
-    `report`: path of its report's address; None where there is none.
-    """
-
-    id: str
-    bag: str
-    folder: Path
-    secret: str
+    id: str  # by which a page speaks of it
+    bag: str  # name of the recording
+    folder: Path  # where report and improved plant are
+    secret: str  # part of the report's address that nobody can guess
     running: bool = True
-    step: str = 'reading'
-    progress: float = 0.0
-    sentence: str = ''
-    error: str = ''
-    experiment: bool = False
-    plant: str = ''
-    report: str | None = None
+    step: str = 'reading'  # what is being done
+    progress: float = 0.0  # share that is done
+    sentence: str = ''  # what was found; empty before
+    error: str = ''  # why nothing was; empty where something was
+    experiment: bool = False  # there is a motion that would tell more
+    plant: str = ''  # by which it is explained
+    report: str | None = None  # path of its address; None where there is none
 
     def ended(self, sentence: str = '') -> None:
         """Take what was found from its folder, in words where the program has said none."""
@@ -102,15 +88,12 @@ class Explanation:
 
 
 class Explanations:
-    """Recordings of one folder, and what explains them.
-
-    `folder`: where recordings and plants are, and explanations: those that are there can be read
-        again.
-    """
+    """Recordings of one folder, and what explains them."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._all: dict[str, Explanation] = {}
+        # Those that are there can be read again.
         found = sorted(folder.glob(f'*/{_RESULT_FILE}'), key=lambda file: file.stat().st_mtime)
         for file in found:
             self._new(file.parent.name, file.parent).ended()
@@ -154,10 +137,7 @@ class Explanations:
         return None
 
     def experiment_of(self, name: str) -> Path:
-        """File with the motion that would tell more.
-
-        Raises ExplanationRefusedError: there is none.
-        """
+        """File with the motion that would tell more; ExplanationRefusedError if there is none."""
         one = self._all.get(name)
         if one is None or not one.experiment:
             raise ExplanationRefusedError(f'there is no experiment of an explanation {name}')
@@ -171,11 +151,7 @@ class Explanations:
         validate: str | None,
         own: str = '',
     ) -> Mapping[str, Any]:
-        """Begin to explain a recording by a plant, the graph's own where none is named.
-
-        Raises ExplanationRefusedError: there is no such recording or plant, or another is being
-            explained.
-        """
+        """Begin to explain a recording by a plant, the graph's own where none is named."""
         bags, plants = self._bags(), self._plants()
         for kind, name, known in (
             *(('recording', name, bags) for name in (bag, baseline, validate)),
@@ -255,10 +231,7 @@ class Explanations:
                 one.step, one.progress = text, min(done / _STEPS, 0.95)
 
     async def cancel(self, name: str) -> str:
-        """End one that is under way.
-
-        Raises ExplanationRefusedError: none of that name is.
-        """
+        """End one that is under way."""
         one = self._all.get(name)
         if one is None or not one.running:
             raise ExplanationRefusedError(f'no explanation {name} is under way')

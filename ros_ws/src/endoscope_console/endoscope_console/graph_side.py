@@ -65,34 +65,24 @@ def identified(calibration: Health | None) -> bool:
 
 @dataclass(frozen=True)
 class Settings:
-    """What the console node was last known to be set to.
+    """What the console node was last known to be set to."""
 
-    `source`: where its commands come from; empty before it was asked.
-    `scale`: slave motion for one radian of the handle.
-    """
-
-    source: str = ''
-    scale: float = 1.0
+    source: str = ''  # where its commands come from; empty before it was asked
+    scale: float = 1.0  # slave motion for one radian of the handle
 
 
 class GraphSide:
-    """What the server hears of a graph, and asks of it.
-
-    `client`: heard here.
-    `pictures`: taken here.
-    `services`: the thread that takes answers of services.
-    `settings`: of the console node; asked for once a second, and by whoever has changed them.
-    `heard_ns`: when the operating state was heard, by a steady clock.
-    `ended`: status with which the graph of this program has ended; None while it runs, or is
-        another's.
-    """
+    """What the server hears of a graph, and asks of it."""
 
     def __init__(self, client: _Client, pictures: Pictures, services: threading.Thread) -> None:
         self._services = services
         self.client = client
         self.pictures = pictures
+        # Of the console node; asked for each second, and by whoever changed them.
         self.settings = Settings()
-        self.heard_ns = 0
+        self.heard_ns = 0  # operating state, by a steady clock
+        # Status with which the graph of this program has ended; None while it runs, or is
+        # another's.
         self.ended: int | None = None
         self._state_ns = 0
         self._asking: Future | None = None
@@ -100,11 +90,7 @@ class GraphSide:
         self._log = client.node.create_publisher(DiagnosticArray, CONSOLE_LOG, EVENT)
 
     def hear(self, now_ns: int) -> None:
-        """Take all that has come until now, a steady time in ns, and ask for the settings.
-
-        Raises RuntimeError: the thread that takes answers of services has ended, which it never
-            should.
-        """
+        """Take all that has come until now, a steady time in ns, and ask for the settings."""
         if not self._services.is_alive():
             raise RuntimeError('the thread that takes answers of services has ended')
         client = self.client
@@ -138,10 +124,7 @@ class GraphSide:
         return self.settings.source in PLAYS and (said is None or said.values[FINISHED] != 'True')
 
     def others_at_the_handle(self) -> list[str]:
-        """Names of nodes that speak for the handle while this one does not.
-
-        Another server of a page has the same name.
-        """
+        """Names of other nodes that speak for the handle; another server of a page has the same."""
         return handle_senders(self.client.node)
 
     def plant(self) -> str:
@@ -193,11 +176,7 @@ class GraphSide:
 
 @contextmanager
 def graph_side(namespace: str, section_length: float) -> Iterator[GraphSide]:
-    """Join the graph of a namespace, to be heard by the calling thread.
-
-    `namespace`: of the graph.
-    `section_length`: length of the bending section in m.
-    """
+    """Join a graph, heard by the calling thread; the bending section is `section_length` m long."""
     with ExitStack() as stack:
         node = stack.enter_context(joined_node(NODE, namespace))
         executor = SingleThreadedExecutor(context=node.context)

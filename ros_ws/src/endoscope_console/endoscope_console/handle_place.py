@@ -29,15 +29,11 @@ class Ask(Protocol):
 
 
 class HandlePlace:
-    """Lives in the thread of the sockets; `ask` waits for the graph in another.
-
-    `lock`: of whoever changes what the console follows.
-    `speaks`: whether the server is the one who speaks for the handle.
-    """
+    """Lives in the thread of the sockets; `ask` waits for the graph in another."""
 
     def __init__(self, graph: GraphSide, beat: Beat, ask: Ask) -> None:
-        self.lock = asyncio.Lock()
-        self.speaks = False
+        self.lock = asyncio.Lock()  # of whoever changes what the console follows
+        self.speaks = False  # the server is the one who speaks for the handle
         self._graph, self._beat, self._ask = graph, beat, ask
         self._found = FOLLOW_THE_HANDLE
 

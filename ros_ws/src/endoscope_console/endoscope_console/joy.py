@@ -21,12 +21,7 @@ _LET_GO_NS = 10_000_000_000
 
 
 class JoyHand:
-    """Reads the topic; its dead-man claims the lease where nobody has it.
-
-    `graph`: in whose namespace the topic is.
-    `operations`: hear it.
-    `mapping`: of axes and buttons.
-    """
+    """Reads the topic; its dead-man claims the lease where nobody has it."""
 
     def __init__(self, graph: GraphSide, operations: Operations, mapping: JoyMapping) -> None:
         self._operations = operations

@@ -63,32 +63,24 @@ class _Holder:
 
 @dataclass
 class _Played:
-    """An experiment that the console plays while the operator holds on.
-
-    `before` is what the console was set to for a file of its own.
-    """
+    """An experiment that the console plays while the operator holds on."""
 
     begun_ns: int
-    before: Mapping[str, Any]
+    before: Mapping[str, Any]  # what the console was set to for a file of its own
     ends: bool = False
 
 
 @dataclass
 class Operations:
-    """Obeys orders, one operator's at a time; lives in the thread of the sockets.
-
-    `graph`, `beat`, `clients`, `explanations`, `alarms`: which it is done with.
-    `counts`: refusals are counted here.
-    `lease`: of the one operator.
-    """
+    """Obeys orders, one operator's at a time; lives in the thread of the sockets."""
 
     graph: GraphSide
     beat: Beat
     clients: Clients
     explanations: Explanations
     alarms: Alarms
-    counts: Counter[str]
-    lease: Lease = field(default_factory=Lease)
+    counts: Counter[str]  # of refusals
+    lease: Lease = field(default_factory=Lease)  # of the one operator
 
     def __post_init__(self) -> None:
         self._pool = ThreadPoolExecutor(_WAITING_ORDERS, thread_name_prefix='order')
@@ -230,11 +222,7 @@ class Operations:
         return await asyncio.get_running_loop().run_in_executor(self._pool, ask)
 
     async def claim(self, client: Client, take: bool) -> str:
-        """Make a client the operator; what became of it.
-
-        Raises OrderRefusedError: somebody else is, or somebody else speaks for the handle.
-        Raises GraphRefusedError: the console node does not follow a handle.
-        """
+        """Make a client the operator; what became of it."""
         if self._closing:
             raise OrderRefusedError('the server of the page ends')
         claim = self.lease.claim(client.id, take, time.monotonic_ns())

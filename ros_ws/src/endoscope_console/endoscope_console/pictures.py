@@ -51,22 +51,14 @@ _NOTHING = np.full((POINTS, 3), np.nan)
 
 
 class Stream:
-    """A topic of joints, whose waiting samples are taken all at once.
-
-    `node`: by which to listen.
-    `topic`: its name.
-    `names`: the J joints, motors or wires.
-    `last`: the newest sample; None before the first.
-    `heard_ns`: when it came, by this machine's clock.
-    `malformed`: messages that were none.
-    """
+    """A topic of J joints, motors or wires, whose waiting samples are taken all at once."""
 
     def __init__(self, node: Node, topic: str, names: tuple[str, ...]) -> None:
         self._reader = JointReader(names)
         self._subscription = RawSubscription(node, JointState, topic, _QUEUE)
         self._of_effort = names == WIRES
-        self.last: JointSample | None = None
-        self.heard_ns = 0
+        self.last: JointSample | None = None  # the newest sample; None before the first
+        self.heard_ns = 0  # when it came, by this machine's clock
         self.malformed = 0
 
     def take(self) -> list[tuple[float, ...]]:
@@ -96,36 +88,25 @@ class Stream:
 
 
 class Pictures:
-    """Takes what waits on all streams and makes a picture of it.
-
-    `node`: by which to listen.
-    `length`: of the bending section in m.
-    `seq`: number of the newest picture.
-    `made`: numbers of the last pictures and when each was made by a steady clock, shape (N, 2).
-    `tensions`: newest tension of each wire in N, shape (4,); empty before the first.
-    `wanted`, `wanted_ns`: angles in rad that the console asks of the slave, shape (J,), and when by
-        a steady clock they were found here; None where it asks for nothing.
-    `drives`: whether the compensator puts out commands for the motors: what is wanted is obeyed.
-    `tracked_age_s`: how long ago the tracker was heard, in s; infinite before.
-    """
+    """Takes what waits on all streams and makes a picture of it, for a section of `length` m."""
 
     def __init__(self, node: Node, length: float) -> None:
         self._length = length
         self._streams = [Stream(node, topic, names) for topic, names, _, _ in _STREAMS]
         self._envelope = Envelope(len(SIGNALS))
-        self.seq = 0
+        self.seq = 0  # number of the newest picture
+        # (N, 2), the last pictures by number and steady time in ns.
         self.made: tuple[tuple[int, int], ...] = ()
-        self.tensions: tuple[float, ...] = ()
+        self.tensions: tuple[float, ...] = ()  # (4,), newest in N; empty before the first
+        # (J,), asked of the slave by the console, in rad.
         self.wanted: tuple[float, ...] | None = None
-        self.wanted_ns = 0
+        self.wanted_ns = 0  # when they were found here, by a steady clock
+        # The compensator puts out commands for the motors: what is wanted is obeyed.
         self.drives = False
-        self.tracked_age_s = math.inf
+        self.tracked_age_s = math.inf  # since the tracker was heard; infinite before
 
     def make(self, now_ns: int, wall_ns: int) -> bytes:
-        """Make one of all that has come since the last one.
-
-        `now_ns`, `wall_ns`: now in ns, by a steady clock and by this machine's.
-        """
+        """Make one of all that has come since the last; now in ns, `now_ns` by a steady clock."""
         for signal, stream in self._of_signals():
             values = stream.take()
             if values:

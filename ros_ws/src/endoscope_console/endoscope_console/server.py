@@ -46,22 +46,16 @@ _MALFORMED, _AGAIN, _TOO_LARGE = 1008, 1013, 1009
 
 @dataclass
 class Console:
-    """Everything that the sockets need; lives in the thread of the sockets.
-
-    `graph`, `operations`, `clients`, `view`, `joy`: what is heard, done and told.
-    `tokens`: who may do what.
-    `rig`: whose limits and measures a page is told.
-    `counts`: of what was refused and dropped.
-    """
+    """Everything that the sockets need; lives in the thread of the sockets."""
 
     graph: GraphSide
     operations: Operations
     clients: Clients
     view: View
     joy: JoyHand
-    tokens: Tokens
-    rig: Rig
-    counts: Counter[str]
+    tokens: Tokens  # who may do what
+    rig: Rig  # whose limits and measures a page is told
+    counts: Counter[str]  # of what was refused and dropped
 
     def app(self, admission: Admission) -> Gate:
         """The application, behind the one layer that all passes."""
@@ -232,10 +226,7 @@ class Console:
         await _tell(socket, answer)
 
     async def make_pictures(self) -> None:
-        """Hear the graph, and show it to all, until cancelled.
-
-        Raises RuntimeError: the thread of the handle has ended, which it never should.
-        """
+        """Hear the graph, and show it to all, until cancelled."""
         due_ns = time.monotonic_ns()
         while True:
             now_ns = time.monotonic_ns()

@@ -125,10 +125,7 @@ class _Graph:
 
 
 def serve(args: argparse.Namespace) -> int:
-    """Serve the page until a signal asks to end; 0.
-
-    Raises EndoscopeError: what was asked for cannot be; with what to do instead.
-    """
+    """Serve the page until a signal asks to end; 0."""
     rig = load_rig(args.rig)
     mapping = JoyMapping(_joy_parameters(args.joy))
     tokens = Tokens.of_file(args.token_file) if args.token_file else Tokens.new()

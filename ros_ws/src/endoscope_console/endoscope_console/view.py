@@ -25,12 +25,7 @@ _encode = msgspec.json.Encoder().encode
 
 
 class View:
-    """Puts the state together, and says when there is news.
-
-    `operations`: what is told of.
-    `rig`: whose limits hold.
-    `counts`: of what was refused and dropped.
-    """
+    """Puts the state together, and says when there is news."""
 
     def __init__(self, operations: Operations, rig: Rig, counts: Counter[str]) -> None:
         self._operations = operations
@@ -40,10 +35,7 @@ class View:
         self._told_ns = 0
 
     def news(self, now_ns: int) -> str:
-        """The state as JSON where it has changed, and once a second; else empty.
-
-        `now_ns`: now, by a steady clock.
-        """
+        """The state as JSON where it has changed, and once a second; else empty."""
         now = self._steady(now_ns)
         if now == self._told and now_ns - self._told_ns < _REPEATED_NS:
             return ''

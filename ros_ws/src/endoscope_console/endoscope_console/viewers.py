@@ -34,12 +34,7 @@ _EVENTS = Qos(100)
 
 
 class ViewedTopic:
-    """A topic that viewers can see, and that is heard while one of them does.
-
-    `node`: by which it is heard.
-    `topic`: what is shown.
-    `context`: of the server.
-    """
+    """A topic that viewers can see, and that is heard while one of them does."""
 
     def __init__(self, node: Node, topic: Topic, context: Context) -> None:
         self._node = node
@@ -104,13 +99,7 @@ class _Listener(ServerListener):
 
 @contextmanager
 def viewers(namespace: str, port: int) -> Iterator[str]:
-    """Let viewers read the topics of a graph, a hundred times a second at most.
-
-    `namespace`: of the graph.
-    `port`: at 127.0.0.1; 0 for any that is free.
-    Yields: the address, which viewers are given as a Foxglove WebSocket.
-    Raises EndoscopeError: the port is taken.
-    """
+    """Let viewers read a graph's topics, at up to 100 Hz; yields the address of the WebSocket."""
     context = Context()
     with joined_node(NODE, namespace) as node:
         topics = [ViewedTopic(node, topic, context) for topic in TOPICS if topic.recorded]
@@ -119,6 +108,7 @@ def viewers(namespace: str, port: int) -> Iterator[str]:
             server = foxglove.start_server(
                 name=f'endoscope {node.get_namespace()}',
                 host=HOST,
+                # 0 is any that is free.
                 port=port,
                 capabilities=[],
                 server_listener=listener,

@@ -18,10 +18,7 @@ _PATIENCE_LOOKS = 25
 class Announcement:
     """Says once that the nodes of a process can be operated, and what to do next.
 
-    That is when they have found each other and none of them waits for anything.  Where that takes
-    longer than 5 s, it says what is waited for.
-
-    `runtime`: with all its nodes.
+    That is when they have found each other and none of them waits for anything.
     """
 
     def __init__(self, runtime: 'Runtime') -> None:

@@ -37,14 +37,10 @@ def successful_result(
     plants: Sequence[PhysicalParameters] = (),
     zeros: 'NDArray[np.float64] | None' = None,
 ) -> DiagnosticArray:
-    """Say which class was found.
+    """Say which class was found; `backlash`, in rad, is None where the tracker could not measure.
 
-    `stamp_ns`: of the message, in ns.
-    `verdict`: what the classifier said.
-    `backlash`: size in rad as the tracker measured it; None where it could not.
-    `duration`: of the whole calibration, in s.
-    `plants`: identified parameters of each joint; empty where they were not asked for.
-    `zeros`: what the zero of each load cell is off by, in N.
+    `duration`, of the whole calibration, is in s; `zeros` is what the zero of each load cell is off
+    by, in N.
     """
     values: dict[str, object] = {'class_deg': verdict.class_deg, 'probability': verdict.probability}
     values |= {f'probability_{size}_deg': p for size, p in verdict.probabilities.items()}
@@ -108,19 +104,14 @@ def _zero_values(zeros: 'NDArray[np.float64] | None') -> dict[str, object]:
 
 
 def numbers_of(result: DiagnosticArray) -> JointState:
-    """Return the figures of a result as numbers, which programs that plot can show.
-
-    `result`: of a success, an abort or a refusal.
-    Returns: `name` is a figure's key, `position` its value in SI: ``class`` in rad, the others as
-        in the result; ``success`` is 1 or 0. What is no number, and what is there in degrees once
-        more, is left out.
-    """
+    """Return the figures of a result as numbers in SI, which programs that plot can show."""
     [status] = result.status
     numbers = {'success': float(status.level == OK)}
     for item in status.values:
         with contextlib.suppress(ValueError):
             if item.key == 'class_deg':
                 numbers['class'] = math.radians(float(item.value))
+            # What is there in degrees once more, and what is no number, is left out.
             elif item.key != 'backlash_size_deg':
                 numbers[item.key] = float(item.value)
     return JointState(

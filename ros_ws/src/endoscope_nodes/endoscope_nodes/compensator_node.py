@@ -180,10 +180,7 @@ class CompensatorNode(EndoscopeNode):
             self._select_law()
 
     def _load(self) -> str:
-        """Read what the mode needs and load what is compiled: the first command must not wait.
-
-        Returns why the mode cannot be had, empty if it can.
-        """
+        """Load and compile all that the first command would wait for; why a mode cannot be had."""
         trouble = ''
         for mode in dict.fromkeys((*MODES, self._settings.mode)):
             trial = Feedforward(len(JOINTS))
@@ -348,10 +345,8 @@ class CompensatorNode(EndoscopeNode):
         return 0.0
 
     def _correction(self, stamp_ns: int) -> np.ndarray | None:
-        """Newest correction from before this command: which one must not depend on chance.
-
-        None in the mode that learns from the tracker itself.
-        """
+        """Newest correction from before this command: which one must not depend on chance."""
+        # This mode learns from the tracker itself.
         if self._feedforward.law.mode == ADAPTIVE_PHYSICAL:
             return None
         for sample in reversed(self._corrections):

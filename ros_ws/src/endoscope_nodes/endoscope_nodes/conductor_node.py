@@ -77,10 +77,7 @@ class ConductorNode(EndoscopeNode):
         self.diagnostics.add('lock-step', self._report)
 
     def advance(self, seconds: float) -> Future:
-        """Let simulated time go on by ``seconds``; the future is done when it has.
-
-        Its exception is a :class:`BarrierTimeout` if a topic did not answer.
-        """
+        """Let simulated time go on by `seconds`; the future ends then, or with a BarrierTimeout."""
         self._until_ns = self._now_ns + round(seconds * 1e9)
         self._future = Future()
         self._looked = 0

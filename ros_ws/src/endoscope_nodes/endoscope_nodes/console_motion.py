@@ -19,11 +19,7 @@ _SHORTEST_S = 0.2
 
 
 class SampledMotion:
-    """Desired angles and velocities at the ticks of a motion.
-
-    `angle`, `velocity`: rad and rad/s, shape (N, J), one row a tick; NaN for a joint that stays
-        where it is.
-    """
+    """Angles and velocities (N, J) in rad, rad/s at N ticks; NaN for a joint that stays."""
 
     def __init__(self, angle: Array, velocity: Array) -> None:
         self._angle: list[list[float]] = angle.tolist()
@@ -33,23 +29,15 @@ class SampledMotion:
         return len(self._angle)
 
     def at(self, tick: int, stay: Sequence[float]) -> tuple[list[float], list[float]]:
-        """Angles and velocities at a tick.
-
-        `tick`: which; the last row holds beyond the end.
-        `stay`: where joints are that do not move, rad, shape (J,).
-        """
+        """Angles and velocities (J,) at a tick; joints that do not move are at `stay` (J,)."""
+        # The last row holds beyond the end.
         row = min(tick, len(self._angle) - 1)
         angle = [s if math.isnan(a) else a for a, s in zip(self._angle[row], stay, strict=True)]
         return angle, [0.0 if math.isnan(v) else v for v in self._velocity[row]]
 
 
 def sample_motion(name: str, joints: Sequence[str], tick: float) -> SampledMotion:
-    """Sample a named motion for some of the joints.
-
-    `joints`: those that move; the others stay where they are.
-    `tick`: in s.
-    Raises ValueError: there is no motion of that name.
-    """
+    """Sample a named motion, every `tick` s, of `joints`; the others stay where they are."""
     motion = motion_by_name(name)
     time = np.arange(round(motion.duration / tick) + 1) * tick
     angle = np.full((len(time), len(JOINTS)), np.nan)
@@ -63,22 +51,14 @@ def sample_motion(name: str, joints: Sequence[str], tick: float) -> SampledMotio
 
 
 def load_command_file(path: Path, tick: float) -> SampledMotion:
-    """Sample a command file, interpolating between its rows.
-
-    Raises CommandFileError: the file cannot be played.
-    """
+    """Sample a command file every `tick` s, interpolating between its rows."""
     return SampledMotion(*read_command_file(path, JOINTS).sampled(tick))
 
 
 def approach(
     start: Sequence[float], end: Sequence[float], speed: float, tick: float
 ) -> SampledMotion:
-    """A minimum-jerk motion of all joints from one pose to another.
-
-    `start`, `end`: rad, shape (J,).
-    `speed`: largest speed in rad/s.
-    `tick`: in s.
-    """
+    """A minimum-jerk motion (J,) in rad at up to `speed` rad/s, a row every `tick` s."""
     distance = float(np.max(np.abs(np.subtract(end, start))))
     duration = max(_SHORTEST_S, _PEAK_OF_MEAN * distance / speed)
     time = np.arange(math.ceil(duration / tick)) * tick

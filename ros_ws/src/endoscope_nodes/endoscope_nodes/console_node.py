@@ -243,12 +243,10 @@ class ConsoleNode(EndoscopeNode):
         return self._settings.hold_to_play and not self._clutch.held
 
     def _begin(self) -> bool:
-        """Begin a stream, but not before the compensator knows that the last one has ended.
-
-        The compensator would take it for the last one going on, and for a jump: the measured pose
-        is not what was commanded.  It hears a command at most `STALL_NS` late, or leaves the
-        session.
-        """
+        """Begin a stream, but not before the compensator knows that the last one has ended."""
+        # The compensator would take it for the last one going on, and for a jump: the measured pose
+        # is not what was commanded. It hears a command at most `STALL_NS` late, or leaves the
+        # session.
         apart_ns = self.rig.timeouts.command_ns + STALL_NS
         now = self.ticker.monotonic_ns()
         soon = self._sent_ns is not None and now - self._sent_ns <= apart_ns

@@ -23,14 +23,7 @@ def declare_parameters[P](
     on_change: Callable[[P], None] | None = None,
     check: Callable[[P], object] | None = None,
 ) -> P:
-    """Declare every field of the dataclass ``kind`` on ``node`` and return its checked values.
-
-    `on_change`: called with the new values after a dynamic parameter was set.
-    `check`: called with the new values before they are taken; raises `ParameterError` to refuse
-        them.
-    Raises ParameterError: a value is NaN or infinite, of the wrong type, out of range, or not one
-        of the choices.
-    """
+    """Declare the fields of the dataclass `kind`; `check` refuses new values by ParameterError."""
     fields = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
     hints = typing.get_type_hints(kind)
     values = {}
@@ -91,19 +84,15 @@ def _watch(
 
 
 def check_overrides(nodes: list[Node]) -> None:
-    """Refuse parameter overrides that no node declared.
-
-    An override given to every node of a composition alike (without a node's name) need only be
-    known to one of them.
-
-    Raises ParameterError: names the override and the nearest valid parameter.
-    """
+    """Refuse parameter overrides that no node declared, naming the nearest valid parameter."""
     declared = {node: set(node._parameters) for node in nodes}
     given = {node: set(node._parameter_overrides) for node in nodes}
     for node in nodes:
         for name in sorted(given[node]):
             if name in declared[node] or name.startswith('qos_overrides.'):
                 continue
+            # An override given to every node of a composition alike (without a node's name) need
+            # only be known to one of them.
             known_elsewhere = any(name in declared[other] for other in nodes)
             if known_elsewhere and all(name in given[other] for other in nodes):
                 continue

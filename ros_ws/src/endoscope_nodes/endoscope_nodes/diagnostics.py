@@ -40,10 +40,9 @@ def _text(value: object) -> str:
 
 
 class Diagnostics:
-    """Collects the reports of a node's subcomponents and publishes them at 1 Hz.
+    """Collects the reports of a node's parts and publishes them at the pace of its ticker: 1 Hz.
 
-    `node`: its name, with namespace, is the first half of every status name.
-    `ticker`: gives the pace and the stamps.
+    The node's name, with namespace, is the first half of every status name.
     """
 
     def __init__(self, node: Node, ticker: Ticker) -> None:

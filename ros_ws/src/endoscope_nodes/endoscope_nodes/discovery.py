@@ -27,11 +27,8 @@ def stay_on_this_machine() -> None:
     """Let this machine alone reach the nodes; call it before a context is initialised.
 
     Whoever can reach the topics can move the slave, and without DDS-Security nothing else stops
-    them.  `ROS_AUTOMATIC_DISCOVERY_RANGE` in the environment (`SUBNET` for other machines) wins,
-    and so do `ROS_STATIC_PEERS` and a profile of one's own for Fast DDS.
-
-    Raises DiscoveryRangeError: the range is none that ROS 2 knows, for example ``localhost`` in
-        lower case.
+    them. `ROS_AUTOMATIC_DISCOVERY_RANGE` in the environment (`SUBNET` for other machines) wins, and
+    so do `ROS_STATIC_PEERS` and a profile of one's own for Fast DDS.
     """
     # ROS 2 takes an empty range for SUBNET.
     chosen = os.environ.get(RANGE) or 'LOCALHOST'

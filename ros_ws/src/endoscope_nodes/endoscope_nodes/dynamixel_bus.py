@@ -13,13 +13,7 @@ from endoscope_nodes.parameters import ParameterError
 def build_motors(
     parameters: DynamixelParameters, names: Sequence[str], goal_timeout: float
 ) -> DynamixelMotors:
-    """Make the bus that the parameters describe.
-
-    `parameters`: of the motor driver.
-    `names`: the motors.
-    `goal_timeout`: time in s after which a goal that the node has not renewed is given up.
-    Raises ParameterError: they do not fit together.
-    """
+    """Make the bus; a goal not renewed for `goal_timeout` s is given up."""
     p = parameters
     for name in ('servo_ids', 'servo_directions', 'servo_zeros'):
         if len(getattr(p, name)) != len(names):

@@ -23,16 +23,7 @@ NAMESPACE = 'endoscope'
 
 
 class EndoscopeNode(Node):
-    """A node in the ``/endoscope`` namespace that lives in a :class:`Runtime`.
-
-    `name`: name of the node, without namespace.
-    `runtime`: the process it lives in.
-    `ticker`: the beat and the time that all nodes of the process share.
-    `rig`: what stands on the table, the same for all nodes of the process.
-    `diagnostics`: reports published on ``/diagnostics``.
-    `exit_code`: what the process should say when it ends; 0 unless the node sets it.
-    `given`: values of its parameters that are not the defaults, as they were when it was built.
-    """
+    """A node in the ``/endoscope`` namespace that lives in a :class:`Runtime`."""
 
     def __init__(self, name: str, runtime: 'Runtime') -> None:
         super().__init__(
@@ -41,13 +32,13 @@ class EndoscopeNode(Node):
             namespace=NAMESPACE,
             parameter_overrides=runtime.overrides_of(name),
         )
-        self.exit_code = 0
-        self.given: dict[str, object] = {}
+        self.exit_code = 0  # what the process should say when it ends
+        self.given: dict[str, object] = {}  # values of its parameters that are not the defaults
         self._by_default = runtime.chosen if name == 'conductor' else {}
         self._matched: list[rclpy_implementation.EventHandle] = []
-        self.ticker = runtime.ticker_of(self)
+        self.ticker = runtime.ticker_of(self)  # shared, as the rig, by all nodes of the process
         self.rig = runtime.rig
-        self.diagnostics = Diagnostics(self, self.ticker)
+        self.diagnostics = Diagnostics(self, self.ticker)  # published on ``/diagnostics``
 
     def parameters[P](
         self,
@@ -109,10 +100,7 @@ class EndoscopeNode(Node):
         )
 
     def require_real_time(self, device: str) -> None:
-        """Refuse a real device in simulated time.
-
-        Raises ParameterError: time is simulated.
-        """
+        """Refuse a real device in simulated time."""
         if self.ticker.simulated:
             raise ParameterError(
                 f'{self.get_name()}: the device is {device}, which needs real time; '

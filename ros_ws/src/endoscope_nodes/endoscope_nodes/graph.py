@@ -31,14 +31,8 @@ _DEVICES = {'motor_driver': 'motors', 'load_cells': 'load_cells', 'em_tracker': 
 
 
 def compose(runtime: Runtime, real_time: bool = False) -> None:
-    """Add all nodes, and in simulated time the conductor.
-
-    Time is simulated where all devices are and the command line does not say otherwise: in
-    lock-step a busy machine makes the simulated slave slower, and nothing else.
-
-    `runtime`: without nodes.
-    `real_time`: whether to run in real time all the same.
-    """
+    """Add all nodes to an empty runtime, and in simulated time the conductor."""
+    # In lock-step a busy machine makes the simulated slave slower, and nothing else.
     if not real_time and _is_simulated(runtime):
         runtime.keep_lock_step(
             {

@@ -51,12 +51,7 @@ def _never() -> bool:
 
 
 class GraphClient(GraphListener):
-    """Listens to a graph and asks it for things.
-
-    Parameters are those of :class:`endoscope_nodes.graph_listener.GraphListener`.
-
-    `told`: called with what is waited for, in words, before an order can be given.
-    """
+    """Listens to a graph and asks it for things."""
 
     def __init__(
         self,
@@ -65,6 +60,7 @@ class GraphClient(GraphListener):
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         super().__init__(node, serve, clock)
+        # Called with what is waited for, in words, before an order can be given.
         self.told: Callable[[str], object] = lambda what: None
         self._orders = node.create_publisher(String, STATE_COMMAND, EVENT)
         self._clients: dict[str, Client] = {}
@@ -74,10 +70,7 @@ class GraphClient(GraphListener):
         return self._is_heard() and all(s.count_publishers() for s, _ in self._heard)
 
     def find(self, patience_s: float) -> None:
-        """Wait until the supervisor is heard and hears.
-
-        Raises NoGraphError: nobody does within so long.
-        """
+        """Wait until the supervisor is heard and hears; NoGraphError if nobody is there."""
         if self.wait_until(lambda: bool(self.state) and self._is_heard(), patience_s):
             return
         others = self.nodes()
@@ -101,13 +94,7 @@ class GraphClient(GraphListener):
         patience_s: float = PATIENCE_S,
         withdrawn: Callable[[], bool] = _never,
     ) -> str:
-        """Give a state command and wait for the state that it leads to; that state.
-
-        Parameters are those of :meth:`ask_and_see`.
-
-        Raises GraphRefusedError: with the supervisor's reason, or because the state is not reached
-            in time.
-        """
+        """Give a state command and wait for the state that it leads to; that state."""
         target = _OPENS[command]
         asked_ns = time.time_ns()
         self._ask(
@@ -125,15 +112,9 @@ class GraphClient(GraphListener):
         patience_s: float = PATIENCE_S,
         withdrawn: Callable[[], bool] = _never,
     ) -> str:
-        """Give a state command, and see whether the state lasts; that state.
-
-        `command`: of the supervisor.
-        `patience_s`: for how long to wait.
-        `withdrawn`: whether it is not wanted any more, so that it is not given again.
-        Raises GraphRefusedError: as of :meth:`ask`, or because a node's trouble came to light at
-            once; with its cause.
-        """
+        """Give a state command, and see whether the state lasts; that state."""
         state = self.ask(command, patience_s, withdrawn)
+        # A node's trouble may come to light at once; its cause follows.
         if state == 'ENABLED' and self.wait_until(lambda: self.state != state, _STEADY_S):
             self.wait_until(lambda: bool(self.why) or withdrawn(), patience_s)
             raise GraphRefusedError(f'{self.state}: {self.why or "asked for meanwhile"}')
@@ -184,12 +165,7 @@ class GraphClient(GraphListener):
         return self.wait_until(lambda: not self.awaited, WHOLE_S)
 
     def home(self, patience_s: float = PATIENCE_S, withdrawn: Callable[[], bool] = _never) -> str:
-        """Go home, and wait until the slave is there; what calibration says of it.
-
-        Parameters are those of :meth:`ask_and_see`.
-
-        Raises GraphRefusedError: with the reason of the supervisor or of calibration.
-        """
+        """Go home, and wait until the slave is there; what calibration says of it."""
         known = self.known_orders(patience_s)
         what = 'the way home: calibration does not begin it'
         self._ask(
@@ -202,10 +178,7 @@ class GraphClient(GraphListener):
         return ended.words
 
     def known_orders(self, patience_s: float = PATIENCE_S) -> frozenset[int]:
-        """Ids of the orders that calibration has been given; what it is asked next is none of them.
-
-        Raises GraphRefusedError: calibration is not heard.
-        """
+        """Ids of the orders that calibration has been given; a new one gets none of them."""
         self.wait_for(lambda: bool(self.orders), 'calibration', patience_s)
         return frozenset(self.orders)
 
@@ -242,14 +215,7 @@ class GraphClient(GraphListener):
         progress: Callable[[str, float], None] = lambda step, share: None,
         patience_s: float = PATIENCE_S,
     ) -> Health:
-        """Calibrate, and wait for the result.
-
-        `progress`: called with what is being done and the share that is done, as often as it is
-            heard.
-        `patience_s`: for how long calibration may say nothing.
-        Raises GraphRefusedError: it was refused or aborted, or the tube is of no known class; with
-            the reason.
-        """
+        """Calibrate, and wait for the result; calibration may say nothing for `patience_s`."""
         known = self.known_orders(patience_s)
         try:
             self.trigger(CALIBRATION_RUN, patience_s)
@@ -268,10 +234,7 @@ class GraphClient(GraphListener):
         return cast(Health, self.calibration)
 
     def trigger(self, service: str, patience_s: float = PATIENCE_S) -> str:
-        """Call a service that only begins or ends something; what it answers.
-
-        Raises GraphRefusedError: with the node's reason.
-        """
+        """Call a service that only begins or ends something; what it answers."""
         answer = self.call(Trigger, service, Trigger.Request(), patience_s)
         if not answer.success:
             raise GraphRefusedError(answer.message)
@@ -284,20 +247,14 @@ class GraphClient(GraphListener):
         return self._clients[service]
 
     def call(self, kind: type, service: str, request: Any, patience_s: float = PATIENCE_S) -> Any:
-        """Call a service and wait for its answer.
-
-        Raises NoGraphError: nobody serves it, or nobody answers.
-        """
+        """Call a service and wait for its answer; NoGraphError if nobody serves it or answers."""
         client = self.client(kind, service)
         if not self.wait_until(client.service_is_ready, patience_s):
             raise NoGraphError(f'nobody serves {service} in {self.where}')
         return self.answer(client.call_async(request), service, patience_s)
 
     def answer(self, future: Future, what: str, patience_s: float = PATIENCE_S) -> Any:
-        """Wait for the answer to a call.
-
-        Raises NoGraphError: nobody answers.
-        """
+        """Wait for the answer to a call."""
         if not self.wait_until(future.done, patience_s):
             raise NoGraphError(f'{what} has not answered for {patience_s:g} s')
         return future.result()

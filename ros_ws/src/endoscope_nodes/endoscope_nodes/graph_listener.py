@@ -53,39 +53,20 @@ class NoGraphError(GraphRefusedError):
 
 @dataclass(frozen=True)
 class Health:
-    """What a node last said of a part of itself on ``/diagnostics``, or of a result.
+    """What a node last said of a part of itself on ``/diagnostics``, or of a result."""
 
-    `level`: 0 for good health, 1 for a warning, 2 for an error.
-    `message`: in words.
-    `values`: by key.
-    `stamp_ns`, `received_ns`: when it was said by the graph's clock, and heard by this machine's.
-    `session`: motion session that it is of, for results.
-    """
-
-    level: int
+    level: int  # 0 for good health, 1 for a warning, 2 for an error
     message: str
     values: dict[str, str]
-    stamp_ns: int
-    received_ns: int
-    session: str = ''
+    stamp_ns: int  # said, by the graph's clock
+    received_ns: int  # heard, by this machine's clock
+    session: str = ''  # motion session that it is of, for results
 
 
 class GraphListener(ClosedOnExit):
     """Listens to a graph; it hears only while it waits for something.
 
-    `node`: in the namespace of the graph, by which to listen.
-    `serve`: lets the node be served for so many seconds; what is waited for is looked at in
-        between.
-    `clock`: time in s by which patience is measured.
-    `state`, `session`: operating state and motion session as last heard; empty before.
-    `state_ns`, `open_ns`: when the state was heard, and when a session was last heard to be open.
-    `graph_ns`: the supervisor's time when it last spoke; 0 before.
-    `health`: by status, without the namespace: ``supervisor: operating state``.
-    `heard_ns`: when each node was last heard on ``/diagnostics``.
-    `calibration`, `compensator`: last result of a calibration, and the model in force; None before
-        the first.
-    `orders`: how each order to calibrate or to go home has fared, by its id; empty until
-        calibration is heard.
+    `serve` serves the node for so many seconds; what is waited for is looked at in between.
     """
 
     def __init__(
@@ -97,12 +78,16 @@ class GraphListener(ClosedOnExit):
         self.node = node
         self.serve = serve
         self._clock = clock
-        self.state = self.session = ''
+        self.state = self.session = ''  # as last heard, empty before
+        # State and open session last heard; the supervisor's time when it last spoke, 0 before.
         self.state_ns = self.open_ns = self.graph_ns = 0
+        # By status without the namespace: ``supervisor: operating state``.
         self.health: dict[str, Health] = {}
-        self.heard_ns: dict[str, int] = {}
-        self.calibration: Health | None = None
-        self.compensator: Health | None = None
+        self.heard_ns: dict[str, int] = {}  # each node on ``/diagnostics``
+        self.calibration: Health | None = None  # last result; None before the first
+        self.compensator: Health | None = None  # model in force; None before the first
+        # By id, how each order to calibrate or to go home has fared; empty until calibration is
+        # heard.
         self.orders: dict[int, OrderFeedback] = {}
         self._prefix = f'{node.get_namespace().rstrip("/")}/'
         self._heard: list[tuple[RawSubscription, Callable[[bytes, int], object]]] = []
@@ -221,10 +206,7 @@ class GraphListener(ClosedOnExit):
     def wait_for(
         self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
     ) -> None:
-        """Listen until something has come true.
-
-        Raises GraphRefusedError: it has not within so long.
-        """
+        """Listen until something has come true; GraphRefusedError if it has not within so long."""
         if not self.wait_until(condition, patience_s):
             raise GraphRefusedError(f'waited {patience_s:g} s in vain for {what}')
 

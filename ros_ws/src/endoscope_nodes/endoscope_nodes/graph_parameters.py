@@ -39,25 +39,16 @@ class UnknownParameterError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class GraphParameter:
-    """A parameter as its node has it.
-
-    `node`, `name`: whose, and which.
-    `value`: now.
-    `description`: what it means, its unit at the end in brackets, and within what bounds it may be.
-    `type`: one of rcl_interfaces/msg/ParameterType.
-    """
+    """A parameter as its node has it."""
 
     node: str
     name: str
     value: Any
-    description: str
-    type: int
+    description: str  # what it means, unit at the end in brackets, and its bounds
+    type: int  # one of rcl_interfaces/msg/ParameterType
 
     def parse(self, text: str) -> Any:
-        """Read a value of this parameter's type.
-
-        Raises UnknownParameterError: it is none.
-        """
+        """Read a value of this parameter's type."""
         kind, wanted = _WANTED[self.type]
         if self.type >= Kind.PARAMETER_BOOL_ARRAY or self.type == Kind.PARAMETER_BYTE_ARRAY:
             listed = text.strip().removeprefix('[').removesuffix(']')
@@ -90,10 +81,7 @@ def _whole(kind: type, value: Any) -> Any:
 
 
 def node_and_parameter(name: str) -> tuple[str, str]:
-    """Split ``NODE.PARAMETER``.
-
-    Raises UnknownParameterError: it is not of that form.
-    """
+    """Split ``NODE.PARAMETER``."""
     node, _, parameter = name.strip('/').partition('.')
     if not node or not parameter:
         raise UnknownParameterError(f'{name!r}: give NODE.PARAMETER, for example compensator.mode')
@@ -103,12 +91,7 @@ def node_and_parameter(name: str) -> tuple[str, str]:
 def read_parameter(
     client: GraphClient, name: str, patience_s: float = PATIENCE_S
 ) -> GraphParameter:
-    """Ask a node for a parameter called ``NODE.PARAMETER``.
-
-    Raises UnknownParameterError: there is no such node or parameter; with the nearest that there
-        is.
-    Raises NoGraphError: the node does not answer.
-    """
+    """Ask for ``NODE.PARAMETER``; UnknownParameterError names the nearest that there is."""
     node, parameter = node_and_parameter(name)
     own = _names(client, node, patience_s)
     if parameter not in own:
@@ -119,11 +102,7 @@ def read_parameter(
 def read_parameters(
     client: GraphClient, node: str, patience_s: float = PATIENCE_S
 ) -> list[GraphParameter]:
-    """Ask a node for all of its parameters, in the order of their names.
-
-    Raises UnknownParameterError: there is no such node; with the nearest that there is.
-    Raises NoGraphError: the node does not answer.
-    """
+    """Ask a node for all of its parameters, in the order of their names."""
     return _read(client, node, sorted(_names(client, node, patience_s)), patience_s)
 
 
@@ -177,11 +156,7 @@ def request_parameters(client: GraphClient, node: str, values: Mapping[str, Any]
 def set_parameters(
     client: GraphClient, node: str, values: Mapping[str, Any], patience_s: float = PATIENCE_S
 ) -> None:
-    """Give a node new values of some parameters: all of them or, where it refuses one, none.
-
-    Raises GraphRefusedError: with the node's reason.
-    Raises NoGraphError: the node does not answer.
-    """
+    """Give a node new values of some parameters: all or, where it refuses one, none."""
     kind, service = SetParametersAtomically, f'{node}/set_parameters_atomically'
     result = client.call(kind, service, _request(values), patience_s).result
     if not result.successful:

@@ -25,11 +25,7 @@ def handle_senders(node: Node) -> list[str]:
 
 
 class HandleSender:
-    """The one sender of ``master/measured_js`` and ``master/clutch``, in whichever thread.
-
-    `node`: in the namespace of the graph.
-    `clutch`: whether it is held, as was last said.
-    """
+    """The one sender of ``master/measured_js`` and ``master/clutch``, in whichever thread."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -38,7 +34,7 @@ class HandleSender:
         )
         self._clutch = node.create_publisher(Joy, MASTER_CLUTCH, EVENT, event_callbacks=_NO_EVENTS)
         self._said_ns = 0
-        self.clutch = False
+        self.clutch = False  # whether it is held, as was last said
 
     def press(self, held: bool, stamp_ns: int) -> None:
         """Say at once whether the clutch is held; stamped in ns."""

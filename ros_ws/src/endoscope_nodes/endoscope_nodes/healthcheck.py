@@ -15,12 +15,7 @@ _LONGEST_S = 5.0
 
 
 def is_heard(node: str, namespace: str, longest_s: float) -> bool:
-    """Listen to ``/diagnostics`` until a node speaks.
-
-    `node`, `namespace`: its name, which a status bears before the colon, alone or behind the
-        namespace.
-    `longest_s`: for how long to listen, in s; a node speaks once a second.
-    """
+    """Listen to ``/diagnostics`` for up to `longest_s` s until a node speaks, as it does each s."""
     # Only now: whoever asks for help need not wait for ROS.
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray

@@ -9,15 +9,13 @@ from rclpy.node import Node
 class InFlight:
     """Counts messages on their way, so that no tick begins before all of the last one was heard.
 
-    The middleware hands a message to its readers one after the other.  On a busy machine one of
-    them may be told of it later than the next tick, which would then depend on the machine.
-
-    `count`: messages on their way, once for each reader.
-    `landed`: called when the last one has been dealt with.
+    The middleware hands a message to its readers one after the other. On a busy machine one of them
+    may be told of it later than the next tick, which would then depend on the machine.
     """
 
     def __init__(self) -> None:
-        self.count = 0
+        self.count = 0  # once for each reader
+        # Called when the last one has been dealt with.
         self.landed: Callable[[], object] = lambda: None
         self._sent: Counter[str] = Counter()
         self._readers: defaultdict[str, list[Node]] = defaultdict(list)

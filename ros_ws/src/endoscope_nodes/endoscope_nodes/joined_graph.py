@@ -23,10 +23,7 @@ LAST_DOMAIN = 232
 
 @contextmanager
 def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterator[GraphClient]:
-    """Join the graph of a namespace as a node of this name, for as long as the block lasts.
-
-    Raises EndoscopeError: the namespace or the domain cannot be one.
-    """
+    """Join the graph of a namespace as a node of this name, for as long as the block lasts."""
     with joined_node(name, namespace, domain) as node:
         executor = SingleThreadedExecutor(context=node.context)
         executor.add_node(node)
@@ -45,10 +42,7 @@ def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterat
 
 @contextmanager
 def joined_node(name: str, namespace: str, domain: int | None = None) -> Iterator[Node]:
-    """A node of this name in the namespace of a graph, which its owner has to serve.
-
-    Raises EndoscopeError: the namespace or the domain cannot be one.
-    """
+    """A node of this name in the namespace of a graph, which its owner has to serve."""
     stay_on_this_machine()
     log_as_asked()
     given = os.environ.get('ROS_DOMAIN_ID', '')

@@ -28,28 +28,17 @@ _STAMP_END = 12
 
 
 class JointSample(NamedTuple):
-    """One JointState, values in the order of the names that the subscriber asked for.
-
-    `stamp_ns`: header stamp in ns.
-    `position`, `velocity`, `effort`: rad, rad/s, N m (N for wires); empty where the message has
-        none.
-    `session`: frame of the header: for commands, the motion session that they belong to.
-    """
+    """One JointState, values in the order of the names that the subscriber asked for."""
 
     stamp_ns: int
-    position: tuple[float, ...]
-    velocity: tuple[float, ...]
-    effort: tuple[float, ...]
-    session: str = ''
+    position: tuple[float, ...]  # rad; like the others empty where the message has none
+    velocity: tuple[float, ...]  # rad/s
+    effort: tuple[float, ...]  # N m (N for wires)
+    session: str = ''  # frame of the header: for commands, the motion session they belong to
 
 
 class JointPublisher:
-    """Publishes JointStates of fixed names and fields.
-
-    `names`: the J joints.
-    `fields`: which of ``position``, ``velocity``, ``effort`` the messages carry, in this order.
-    `events`: what of the topic the node's executor is to be told; as usual where None.
-    """
+    """Publishes JointStates of J fixed names and of fixed fields, in this order."""
 
     def __init__(
         self,
@@ -111,11 +100,7 @@ class JointPublisher:
 
 
 class JointReader:
-    """Reads JointStates of certain joints out of CDR bytes.
-
-    `names`: the joints asked for.
-    `exact`: whether other joints in a message make it unacceptable: right for commands.
-    """
+    """Reads JointStates of certain joints out of CDR; if `exact` (for commands), no others."""
 
     def __init__(self, names: Sequence[str], exact: bool = False) -> None:
         self._names = tuple(names)
@@ -127,11 +112,7 @@ class JointReader:
         self._session = ''
 
     def read(self, data: bytes) -> JointSample:
-        """Read one message.
-
-        Raises MalformedMessageError: not a JointState, of an absurd size, or not of the joints
-            asked for.
-        """
+        """Read one message."""
         if len(data) > LARGEST_BYTES:
             raise MalformedMessageError(f'has {len(data)} bytes; at most {LARGEST_BYTES} are read')
         for start, stop, expected in self._spans:
@@ -178,13 +159,7 @@ class JointReader:
 
 
 class JointSubscription:
-    """Delivers the JointStates of a topic as samples.
-
-    `callback`: called with each sample.
-    `on_malformed`: called with the reason where a message is not a JointState of these joints.
-    `malformed`: how many messages were unreadable or of other joints.
-    `subscription`: the subscription of rclpy.
-    """
+    """Delivers the JointStates of a topic as samples; of other messages it tells the reason."""
 
     def __init__(
         self,
@@ -197,7 +172,7 @@ class JointSubscription:
         exact: bool = False,
         on_malformed: Callable[[str], object] | None = None,
     ) -> None:
-        self.malformed = 0
+        self.malformed = 0  # messages that were unreadable or of other joints
         self._reader = JointReader(names, exact)
         self._callback = callback
         self._on_malformed = on_malformed

@@ -13,10 +13,7 @@ def section_of(instrument: InstrumentFacts) -> Vertebrae:
 
 
 class JointTransforms:
-    """Writes `/tf`, which few have the message class of.
-
-    `section`: whose joints they are.
-    """
+    """Writes `/tf`, which few have the message class of, for a section's joints."""
 
     def __init__(self, section: Vertebrae) -> None:
         self._section = section

@@ -13,12 +13,7 @@ class LogLevelError(EndoscopeError, ValueError):
 
 
 def log_as_asked() -> None:
-    """Take the level of the log from the environment, if it names one; call it before ROS starts.
-
-    A `--log-level` among the ROS arguments of a program wins.
-
-    Raises LogLevelError: there is no such level.
-    """
+    """Set the log level of the environment, if any; before ROS starts, whose `--log-level` wins."""
     asked = os.environ.get(LOG_LEVEL_VARIABLE)
     if not asked:
         return

@@ -8,11 +8,9 @@ from rclpy.node import Node
 def all_matched(nodes: Sequence[Node]) -> bool:
     """Say whether no message between these nodes would be lost from now on.
 
-    Both sides have to know of each other, and each finds the other at its own time.  Endpoints of
-    other nodes do not count.
-
-    `nodes`: nodes of this process.  One that reads topics by other means than subscriptions of its
-        own lists them in ``extra_readers() -> [(topic, publishers found)]``.
+    Both sides have to know of each other, and each finds the other at its own time. Endpoints of
+    other nodes do not count. A node of this process that reads topics by other means than
+    subscriptions of its own lists them in ``extra_readers() -> [(topic, publishers found)]``.
     """
     here = {(node.get_name(), node.get_namespace()) for node in nodes}
     for node in nodes:

@@ -165,10 +165,9 @@ class MotorDriverNode(EndoscopeNode):
             self._bending.publish(stamp_ns, *self._slave.bending)
 
     def _judge_what_arrived(self) -> None:
-        """Take commands by the session of the turn that gives the goal.
-
-        Within a tick the middleware may bring the last one before or after the end of its session.
-        """
+        """Take commands by the session of the turn that gives the goal."""
+        # Within a tick the middleware may bring the last one before or after the end of its
+        # session.
         for sample, received_ns, rivals in self._arrived:
             refusal = self.motion.command(
                 sample.session,

@@ -33,13 +33,7 @@ where it was stopped before it had started."""
 def help_of(
     name: str, purpose: str, nodes: Sequence[str], options: Sequence[tuple[str, str]] = ()
 ) -> str:
-    """Return the help of a program.
-
-    `name`: of the program.
-    `purpose`: what it does, a sentence.
-    `nodes`: those that it runs, in their order.
-    `options`: its own words, and what each does.
-    """
+    """Return the help of a program; `options` are its own words, and what each does."""
     words = ''.join(f'[{word}] ' for word, _ in options)
     blank = ' ' * len(f'{name} {words}')
     said = textwrap.fill(purpose, _WIDTH)

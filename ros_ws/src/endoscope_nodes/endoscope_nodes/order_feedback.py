@@ -19,23 +19,15 @@ UNKNOWN_TUBE, NOT_JUDGED, NOT_REACHED = 'unknown_tube', 'not_judged', 'not_reach
 
 @dataclass(frozen=True)
 class OrderFeedback:
-    """How an order fares, by codes.
+    """How an order fares, by codes."""
 
-    `order`: `CALIBRATE` or `HOME`; empty before the first.
-    `id`: no other order has it: the time in ns at which this one was given, or just after it.
-    `state`, `phase`, `code`: what became of it, what is done for it now, and why it was rejected or
-        aborted.
-    `progress`: from 0 to 1.
-    `words`: the same for a person.
-    """
-
-    order: str = ''
-    id: int = 0
+    order: str = ''  # `CALIBRATE` or `HOME`; empty before the first
+    id: int = 0  # unique: the time in ns at which it was given, or just after it
     state: str = WAITING
-    phase: str = ''
-    progress: float = 0.0
-    code: str = ''
-    words: str = ''
+    phase: str = ''  # what is done for it now
+    progress: float = 0.0  # from 0 to 1
+    code: str = ''  # why it was rejected or aborted
+    words: str = ''  # the same for a person
 
     def message(self, stamp_ns: int) -> DiagnosticArray:
         """Write it, at a time in ns."""

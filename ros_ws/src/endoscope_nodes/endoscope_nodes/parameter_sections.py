@@ -22,17 +22,9 @@ _ANY = ('*', '**')
 
 
 def check_sections(args: Sequence[str], namespace: str) -> list[str]:
-    """Refuse parameters for nodes that there cannot be, and tell those that are for other rigs.
-
-    A file may serve several processes and rigs, so that a section need not be for a node of this
-    process, but for one of this project.
-
-    `args`: the command line, which rcl has read without an error.
-    `namespace`: that of the nodes here, for example ``'/endoscope'``.
-    Returns: sections for another namespace, a line each.
-    Raises ParameterError: a name that no node of this project has, one without its namespace, or a
-        parameter twice.
-    """
+    """Refuse parameters for nodes that there cannot be; a line for each section of another rig."""
+    # A file may serve several processes and rigs, so that a section need not be for a node of this
+    # process, but for one of this project.
     renamed = [rule.partition('__node:=')[2] for rule in _values_of(args, ('-r', '--remap'))]
     known = sorted({*NODES, *renamed} - {''})
     for rule in _values_of(args, ('-p', '--param')):

@@ -27,11 +27,8 @@ def parameter(
 ) -> Any:
     """Describe one parameter as a dataclass field.
 
-    `default`: value where nothing else is given: bool, int, float, str, or a tuple of float or str.
-    `description`, `unit`: what it does, as help and reference show it.
-    `low`, `high`: inclusive limits of a number (of each number of a tuple).
-    `choices`: the only strings allowed; empty for any.
-    `dynamic`: whether it may change while the node runs.
+    `default` is a bool, int, float, str, or a tuple of float or str; `low` and `high` are
+    inclusive, for each number of a tuple; empty `choices` allow any string.
     """
     return dataclasses.field(
         default=default,
@@ -48,19 +45,13 @@ def parameter(
 
 @dataclasses.dataclass(frozen=True)
 class Described:
-    """A parameter in words.
-
-    `name`, `description`, `unit`: of the parameter.
-    `default`: as it is written on a command line, for example ``[1, 2]``; ``''`` for an empty text.
-    `allowed`: for example ``from 0 to 3`` or ``one of none, motion``; empty where anything goes.
-    `dynamic`: whether it may change while the node runs.
-    """
+    """A parameter in words."""
 
     name: str
-    default: str
-    allowed: str
+    default: str  # as on a command line, for example ``[1, 2]``; ``''`` for an empty text
+    allowed: str  # ``from 0 to 3`` or ``one of none, motion``, say; empty where anything goes
     unit: str
-    dynamic: bool
+    dynamic: bool  # may change while the node runs
     description: str
 
 
@@ -112,12 +103,7 @@ def constraints(field: dataclasses.Field) -> str:
 
 
 def checked(node: str, field: dataclasses.Field, hint: Any, value: Any) -> Any:
-    """Return a value as the type of its parameter.
-
-    `node`: whose parameter it is, for errors.
-    `field`, `hint`: of the dataclass.
-    Raises ParameterError: it is of another type, not finite or out of bounds.
-    """
+    """Return a value as the type of its parameter, if of that type, finite and within bounds."""
     where = f"{node}: parameter '{field.name}'"
     item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
     if item is not None:

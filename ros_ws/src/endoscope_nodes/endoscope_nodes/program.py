@@ -17,20 +17,13 @@ _HELP = ('-h', '--help')
 
 @dataclass(frozen=True)
 class Program:
-    """One command of the package.
+    """One command of the package."""
 
-    `name`: that of the command, and of the node if it runs a single one.
-    `module`: module of the package whose ``main()`` runs it.
-    `purpose`: what it does, a sentence or two.
-    `composed`: nodes that it runs; empty for the one of its name.
-    `options`: words of its own that it understands, and what each does.
-    """
-
-    name: str
-    module: str
-    purpose: str
-    composed: tuple[str, ...] = ()
-    options: tuple[tuple[str, str], ...] = ()
+    name: str  # also of the node, if it runs a single one
+    module: str  # whose ``main()`` runs it
+    purpose: str  # a sentence or two
+    composed: tuple[str, ...] = ()  # nodes that it runs; empty for the one of its name
+    options: tuple[tuple[str, str], ...] = ()  # words of its own, and what each does
 
     @property
     def nodes(self) -> tuple[str, ...]:
@@ -38,11 +31,7 @@ class Program:
         return self.composed or (self.name,)
 
     def __call__(self, argv: Sequence[str] | None = None) -> int:
-        """Run it.
-
-        `argv`: the command line without the name of the program; ``sys.argv`` by default.
-        Returns: exit status; see the help.
-        """
+        """Run it with a command line without its name (default: `sys.argv`); the exit status."""
         end_when_asked(self.name)
         return exit_status(self.name, lambda: self._run(sys.argv[1:] if argv is None else argv))
 
@@ -66,11 +55,9 @@ class Program:
 
 
 def words_for_nobody(argv: Sequence[str]) -> list[str]:
-    """Return the words of a command line that are not ROS arguments.
-
-    Those stand between ``--ros-args`` and ``--`` or the end, as often as one likes; see
-    https://design.ros2.org/articles/ros_command_line_arguments.html.
-    """
+    """Return the words of a command line that are not ROS arguments."""
+    # Those stand between --ros-args and -- or the end, as often as one likes; see
+    # https://design.ros2.org/articles/ros_command_line_arguments.html.
     words = []
     for_ros = False
     for word in argv:

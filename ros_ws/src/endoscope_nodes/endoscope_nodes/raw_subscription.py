@@ -10,13 +10,8 @@ class RawSubscription:
     """Reads the messages of a topic as bytes, with both time stamps and the publication number.
 
     An executor that wakes up for every message costs eight times what it costs to empty the queue
-    now and then, and does not tell the stamps. The middleware's queue is read directly here, so
-    the executor does not know of this subscription at all.
-
-    `node`: its name and namespace hold for the topic.
-    `kind`: message class.
-    `topic`: relative or full name; remapped as usual.
-    `qos`: what is asked for; its depth is the queue.
+    now and then, and does not tell the stamps. The middleware's queue, as deep as the QoS says, is
+    read directly here, so the executor does not know of this subscription at all.
     """
 
     def __init__(self, node: Node, kind: type, topic: str, qos: QoSProfile) -> None:

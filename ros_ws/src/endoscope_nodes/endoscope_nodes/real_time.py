@@ -27,10 +27,8 @@ def threads_of_this_process() -> frozenset[int]:
 
 
 def granted_priority() -> int:
-    """Priority to take unasked: what the limits of this user grant, 0 for none.
-
-    Only limits tell that somebody meant it; root could have any priority.
-    """
+    """Priority to take unasked: what the limits of this user grant, 0 for none."""
+    # Only limits tell that somebody meant it; root could have any priority.
     if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] != resource.RLIM_INFINITY:
         return 0
     allowed = resource.getrlimit(resource.RLIMIT_RTPRIO)[0]
@@ -41,21 +39,14 @@ def granted_priority() -> int:
 def enter_real_time(
     node: str, wanted: RealTimeParameters, urgent: frozenset[int], simulated: bool
 ) -> None:
-    """Apply the parameters to a process; the calling thread and what it starts become urgent.
-
-    `node`: name of the node that was given the parameters, for errors.
-    `wanted`: its parameters.
-    `urgent`: further threads to give the priority to, for example those of DDS and of devices.
-    `simulated`: whether time is simulated, which runs as fast as it can and must not do so before
-        all else.
-    Raises ParameterError: one of them cannot be had here; says which permission is missing.
-    """
+    """Apply the parameters; this thread, what it starts and `urgent` ones become urgent."""
     if wanted.cores:
         _keep_to(node, set(wanted.cores))
     priority = wanted.realtime_priority
     if not priority:
         return
     where = f"{node}: parameter 'realtime_priority' is {priority}"
+    # Simulated time runs as fast as it can, and must not do so before all else.
     if simulated:
         raise ParameterError(
             f'{where}, which is not for simulated time; give 0, or to `graph` --real-time'

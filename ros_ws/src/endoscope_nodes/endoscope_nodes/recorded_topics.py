@@ -15,16 +15,12 @@ from endoscope_nodes.transform_type import transform_class
 
 
 def message_class(type_name: str) -> type:
-    """Return the class of a message type, for example of ``'std_msgs/msg/String'``.
-
-    That of ``'tf2_msgs/msg/TFMessage'`` is for bytes alone where its package is not installed.
-
-    Raises UnknownTypeError: the package is not installed or has no such message.
-    """
+    """Return the class of a message type, for example of ``'std_msgs/msg/String'``."""
     package, _, name = type_name.partition('/msg/')
     try:
         kind: type = getattr(importlib.import_module(f'{package}.msg'), name)
     except (ImportError, AttributeError) as error:
+        # Its package is not installed: for bytes alone.
         if type_name == TF_MESSAGE:
             return transform_class()
         raise UnknownTypeError(f'message type {type_name}: not installed') from error
@@ -32,11 +28,7 @@ def message_class(type_name: str) -> type:
 
 
 def suitable_qos(latched: bool, publishers: Sequence[TopicEndpointInfo]) -> QoSProfile:
-    """Return the QoS that hears every publisher, and latched messages where all are latched.
-
-    `latched`: whether to ask for latched messages while nobody publishes yet.
-    `publishers`: those known at the moment.
-    """
+    """Return the QoS that hears all publishers, latched if all are; without any, as asked."""
     offered = [p.qos_profile for p in publishers]
     if offered:
         latched = all(q.durability == DurabilityPolicy.TRANSIENT_LOCAL for q in offered)

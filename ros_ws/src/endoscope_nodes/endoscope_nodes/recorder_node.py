@@ -71,8 +71,6 @@ class RecorderNode(EndoscopeNode):
     A recording that nobody asked for or named ends once the slave has rested, and the next motion
     session begins another one, until all of them have taken the rig's ``recording.room``. Whoever
     calls ``recorder/start`` or ``recorder/stop`` decides alone from then on.
-
-    `last_report`: how the last recording went; None before it ended.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -93,7 +91,7 @@ class RecorderNode(EndoscopeNode):
         self._unasked_bytes = 0
         self._warning = ''
         self._active_ns = 0
-        self.last_report: SessionReport | None = None
+        self.last_report: SessionReport | None = None  # none before the first has ended
         self.create_service(Trigger, RECORDER_START, self._on_start)
         self.create_service(Trigger, RECORDER_STOP, self._on_stop)
         if self.ticker.simulated:
@@ -123,10 +121,7 @@ class RecorderNode(EndoscopeNode):
         self._bag = new.bag
 
     def start(self) -> Path:
-        """Begin a recording and return where it goes.
-
-        Raises BagError: one is being made already, its place is taken, or the disk is full.
-        """
+        """Begin a recording and return where it goes; BagError if one is under way already."""
         if self._session is not None:
             there = with_final_names(str(self._session.path))
             raise BagError(f'already recording to {there}; stop that first')
@@ -140,10 +135,7 @@ class RecorderNode(EndoscopeNode):
         return path
 
     def stop(self, ended: str = 'on request') -> SessionReport:
-        """End the recording and say how it went.
-
-        Raises BagError: there is none.
-        """
+        """End the recording and say how it went; BagError if there is none."""
         if self._session is None:
             raise BagError('not recording')
         self._collect(self.ticker.now_ns())
@@ -261,13 +253,11 @@ class RecorderNode(EndoscopeNode):
         self._sources.append(source)
 
     def _look_around(self) -> None:
-        """Adapt one topic to its publishers; after the last one see what else there is.
-
-        One at a time, because the graph's answer for all of them would cost a tick.
-        """
+        """Adapt one topic to its publishers; after the last one see what else there is."""
         session = self._session
         if session is None:
             return
+        # One at a time, because the graph's answer for all of them would cost a tick.
         if self._to_look_at:
             self._adapt(self._to_look_at.pop())
             return
@@ -362,10 +352,7 @@ def new_bag() -> str:
 
 
 def checked_names(topics: tuple[str, ...]) -> tuple[str, ...]:
-    """Return names of topics, if all of them can be some.
-
-    Raises ParameterError: one cannot.
-    """
+    """Return names of topics, if all of them can be some."""
     for topic in topics:
         try:
             validate_topic_name(topic)

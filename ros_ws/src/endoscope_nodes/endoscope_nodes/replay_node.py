@@ -31,8 +31,6 @@ class ReplayNode(EndoscopeNode):
     ``/clock`` goes in steps of 1 ms; each is followed by the messages received until the next. It
     refuses to talk into a running system: where another node publishes one of the topics, or
     measures a motor that recorded commands would move, it says so and ends.
-
-    `published`: messages sent so far.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -56,7 +54,7 @@ class ReplayNode(EndoscopeNode):
         self._begin_ns = time.monotonic_ns() + self._delay_ns
         self._wait_until_ns = self._begin_ns + _LONGEST_WAIT_NS
         self._checked = p.beside_live_nodes
-        self.published = 0
+        self.published = 0  # messages sent so far
         self.diagnostics.add('replay', self._report)
         self.ticker.every(TICK_NS * 1e-9, self._go_on)
 

@@ -63,32 +63,9 @@ N = TypeVar('N', bound=EndoscopeNode)
 class Runtime(ClosedOnExit):
     """Nodes composed in one process around one executor, one ticker and one context.
 
-    Parameters
-    ----------
-    args
-        Command line, ROS arguments included (``sys.argv`` by default).
-    context
-        A context of one's own; by default the process's.
-    domain_id
-        ROS domain; by default that of the environment.
-    overrides
-        Parameter values by node name; they win over the command line's.
-    rig
-        What stands on the table; by default as the parameter `rig_file` of the first node says.
-
-    Raises
-    ------
-    ParameterError
-        The ROS arguments cannot be read.
-
-    Attributes
-    ----------
-    process_parameters
-        Values of the parameters of the whole process that are not the defaults.
-    chosen
-        Values of the conductor's parameters, in a lock-step that nobody has asked for.
-    clock
-        Topic of the simulated time.
+    By default it takes the command line of the process, its context, the ROS domain of the
+    environment, and the rig that the parameter `rig_file` of the first node names. `overrides`, by
+    node name, win over the command line's. Unreadable ROS arguments raise `ParameterError`.
 
     Examples
     --------
@@ -136,11 +113,12 @@ class Runtime(ClosedOnExit):
         self._plant: PlantDescription | None = None
         self._plant_source = '', ''
         self._seed = 0
-        self.process_parameters: dict[str, object] = {}
+        self.process_parameters: dict[str, object] = {}  # of the whole process, not the defaults
         self._real_time = RealTimeParameters()
         self._overrides = overrides or {}
+        # The conductor's, in a lock-step that nobody has asked for.
         self.chosen: dict[str, object] = {}
-        self.clock = CLOCK
+        self.clock = CLOCK  # topic of the simulated time
         self._exit_codes: list[int] = []
         self._stop = Future()
         self._closed = False
@@ -193,15 +171,10 @@ class Runtime(ClosedOnExit):
             node.destroy_node()
 
     def keep_lock_step(self, conductor: Mapping[str, object]) -> None:
-        """Simulate time though nobody has asked for it; call it before the first node is added.
-
-        A graph in another namespace than the usual has a clock of its own there: two rigs of a
-        domain do not share one.
-
-        `conductor`: values of its parameters, where the command line has none.
-        """
+        """Simulate time though nobody has asked for it; call it before the first node is added."""
         self.chosen = {**conductor, **self.given('conductor')}
         with self._asked('conductor') as node:
+            # Two rigs of a domain do not share a clock.
             if node.get_namespace() != f'/{NAMESPACE}':
                 self.clock = CLOCK.strip('/')
 
@@ -213,11 +186,7 @@ class Runtime(ClosedOnExit):
         return [Parameter(key, value=value) for key, value in values.items()]
 
     def ticker_of(self, node: EndoscopeNode) -> Ticker:
-        """Give the process's ticker; the first node to ask decides whether time is simulated.
-
-        Raises ParameterError: nodes of one process disagree about ``use_sim_time``, or the command
-            line has parameters for nodes that there are not.
-        """
+        """Give the process's ticker; the first node to ask decides whether time is simulated."""
         simulated = node.get_parameter('use_sim_time').value is True
         if self._ticker is None:
             for line in check_sections(self._args, node.get_namespace()):
@@ -272,10 +241,7 @@ class Runtime(ClosedOnExit):
 
     @property
     def plant(self) -> PlantDescription:
-        """The simulated slave, read when it is asked for first.
-
-        Raises ParameterError: see :func:`load_slave`.
-        """
+        """The simulated slave, read when it is asked for first."""
         if self._plant is None:
             self._plant = load_slave(*self._plant_source)
         return self._plant
@@ -292,13 +258,10 @@ class Runtime(ClosedOnExit):
         return self._ticker
 
     def prepare(self, whole_process: bool = False) -> None:
-        """Check the parameters and make ready for a long life; call it before the nodes are served.
-
-        `whole_process`: whether nothing but the nodes runs here, so that a real-time priority that
-            the system grants may be taken unasked.
-        Raises ParameterError: see :meth:`check_parameters` and :func:`enter_real_time`.
-        """
+        """Check the parameters and make ready for a long life; before the nodes are served."""
         self.check_parameters()
+        # Where nothing but the nodes runs here, a priority that the system grants may be taken
+        # unasked.
         self._enter_real_time(whole_process)
         # A collection that walks over all that was imported would cost many ticks.
         gc.collect()
@@ -329,10 +292,7 @@ class Runtime(ClosedOnExit):
         )
 
     def check_parameters(self) -> None:
-        """Refuse overrides that no node knows.
-
-        Raises ParameterError: a parameter override, or a node with overrides, that nobody knows.
-        """
+        """Refuse overrides that no node knows."""
         names = [node.get_name() for node in self.nodes]
         for name in self._overrides:
             if name not in names:
@@ -392,13 +352,7 @@ class Runtime(ClosedOnExit):
 def run_nodes(
     factories: Sequence[Callable[[Runtime], EndoscopeNode]], args: Sequence[str] | None = None
 ) -> int:
-    """Run nodes composed in this process until SIGINT, SIGTERM or SIGHUP stops them.
-
-    `factories`: called in order with the runtime; each gives a node.
-    `args`: command line; ``sys.argv`` by default.
-    Returns: 0, the exit code that a node asked for, or 2 for parameters or arguments that were
-        refused.
-    """
+    """Run nodes until a signal stops them; 0, what a node asked for, or 2 for refused arguments."""
 
     def compose(runtime: Runtime) -> None:
         for factory in factories:

@@ -8,12 +8,7 @@ from endoscope_nodes.parameters import ParameterError
 
 
 def load_slave(source: str, path: str) -> PlantDescription:
-    """Load a plant file; an empty path is the nominal plant.
-
-    `source`: who names the file.
-    `path`: of the plant.yaml.
-    Raises ParameterError: the file cannot be read as a plant of both joints, or spoils recordings.
-    """
+    """Load a plant file of both joints that `source` names; an empty path is the nominal plant."""
     if not path:
         return PlantDescription()
     try:

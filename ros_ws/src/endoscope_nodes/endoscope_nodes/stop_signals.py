@@ -22,16 +22,13 @@ def _stopping() -> tuple[signal.Signals, ...]:
 
 
 def end_when_asked(program: str) -> None:
-    """End the process at a signal, with one line and status 128 + number, from now on.
-
-    For a program that is still starting and has opened nothing: an exception out of a handler would
-    be raised wherever the imports are, some of which turn it into another one or lose it.
-
-    `program`: name to begin the line with.
-    """
+    """End the process at a signal, with one line and status 128 + number, from now on."""
 
     def end(number: int, frame: FrameType | None) -> None:
         os.write(2, f'{program}: {_WORDS[signal.Signals(number)]} while starting\n'.encode())
+        # A program that is still starting has opened nothing, and an exception out of a handler
+        # would be raised wherever the imports are, some of which turn it into another one or lose
+        # it.
         os._exit(128 + number)
 
     for number in _stopping():
@@ -39,18 +36,16 @@ def end_when_asked(program: str) -> None:
 
 
 class StopSignals:
-    """Calls ``on_stop`` from a thread of its own when the process is asked to stop.
+    """Calls `on_stop` from a thread of its own when the process is asked to stop.
 
     An exception raised by a signal handler would tear a callback apart, and rclpy's own handler
     shuts the context down under callbacks that are publishing, so that a node could neither finish
-    its work nor say that it ends.  Further signals change nothing: whatever is being finished is
+    its work nor say that it ends. Further signals change nothing: whatever is being finished is
     finished, and only SIGKILL ends a process that hangs.
-
-    `on_stop`: called at the first signal; must be safe to call from another thread.
     """
 
     def __init__(self, on_stop: Callable[[], None]) -> None:
-        self.on_stop = on_stop
+        self.on_stop = on_stop  # at the first signal, from another thread
         self._asked = False
 
     def __enter__(self) -> Self:

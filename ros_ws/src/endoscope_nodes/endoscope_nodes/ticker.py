@@ -27,33 +27,24 @@ _LONGEST_WAIT_NS = 50_000_000
 class Ticker:
     """Calls its listeners at each beat and says how many milliseconds went by.
 
-    In real time a timer of the steady clock beats; in simulated time each message on ``/clock``
-    is a beat, so that a conductor can run the whole graph in lock-step.  One ticker serves all
-    nodes of a process, because a timer or a subscription of each node's own would cost more than
-    most nodes do.
-
-    `node`: hosts the timer or the subscription.
-    `simulated`: whether ``/clock`` gives the time.
-    `stride`: milliseconds from beat to beat; simulated time beats as ``/clock`` does, whoever gives
-        it.
-    `clock`: topic of the simulated time.
-    `ticks`, `missed`: beats delivered, and beats that were due but came too late to be told from
-        the next.
-    `late_ns`: time that this process was not run though a beat was due, so far, in ns; delays of up
-        to 5 ms, which every desktop kernel makes, do not count.
-    `in_flight`: what the nodes of this process have sent each other in simulated time.
-    `paced`: whether simulated time goes no faster than a person's: set by who gives it in this
-        process.
+    In real time a timer of the steady clock beats; in simulated time each message on ``/clock`` is
+    a beat, so that a conductor can run the whole graph in lock-step. One ticker serves all nodes of
+    a process, because a timer or a subscription of each node's own would cost more than most nodes
+    do. `stride`, from beat to beat, is in ms; simulated time beats as its clock does.
     """
 
     def __init__(self, node: Node, simulated: bool, stride: int = 1, clock: str = CLOCK) -> None:
         self._node = node
         self.simulated = simulated
         self._stride = stride
-        self.ticks = 0
-        self.missed = 0
+        self.ticks = 0  # beats delivered
+        self.missed = 0  # due, but too late to be told from the next
+        # Time that this process was not run though a beat was due; delays of up to 5 ms, which
+        # every desktop kernel makes, do not count.
         self.late_ns = 0
+        # What the nodes of this process have sent each other in simulated time.
         self.in_flight = InFlight()
+        # Simulated time goes no faster than a person's: set by who gives it in this process.
         self.paced = False
         self._hand_ns = self._hand_at_ns = 0
         self._slow_ns = 0
@@ -100,10 +91,7 @@ class Ticker:
         return stamp_ns if self.simulated else stamp_ns - self._offset_ns
 
     def add(self, listener: TickCallback) -> None:
-        """Call ``listener(stamp_ns, periods)`` at each beat.
-
-        ``periods`` is how many milliseconds have passed since the beat before: 1 at full rate.
-        """
+        """Call `listener(stamp_ns, periods)` at each beat, `periods` ms after the one before."""
         self._listeners += (listener,)
         if not self.simulated and not self._timer_started:
             self._timer_started = True
@@ -129,11 +117,9 @@ class Ticker:
         self.in_flight.forget(owners)
 
     def every(self, seconds: float, callback: Callable[[], None]) -> None:
-        """Call ``callback()`` at a slower pace, without asking for the 1 kHz beat.
-
-        Callbacks of the same pace come one after the other rather than all in the same tick.
-        """
+        """Call `callback()` at a slower pace, without asking for the 1 kHz beat."""
         period_ns = round(seconds * 1e9)
+        # Callbacks of the same pace come one after the other rather than all in the same tick.
         item = _Periodic(period_ns, len(self._periodic) * _SLOW_NS % period_ns, callback)
         if not self.simulated and period_ns < 2 * _SLOW_NS:
             item.timer = self._node.create_timer(seconds, callback, clock=self._steady)

@@ -15,16 +15,11 @@ from endoscope_nodes import names
 
 @dataclass(frozen=True)
 class Qos:
-    """Quality of service, as far as the interface uses it.
+    """Quality of service, as far as the interface uses it."""
 
-    `depth`: messages that the queue keeps, the newest ones.
-    `reliable`: whether what is lost is sent again; best effort otherwise.
-    `latched`: whether a reader that comes late is given the last message (transient local).
-    """
-
-    depth: int
-    reliable: bool = True
-    latched: bool = False
+    depth: int  # messages that the queue keeps, the newest ones
+    reliable: bool = True  # what is lost is sent again; best effort otherwise
+    latched: bool = False  # a reader that comes late is given the last message (transient local)
 
     def __str__(self) -> str:
         words = ['reliable' if self.reliable else 'best effort']
@@ -44,56 +39,29 @@ LOCK_STEP = Qos(100)
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of the interface.
+    """A topic of the interface."""
 
-    Attributes
-    ----------
-    name
-        Relative to the namespace of the graph, ``/endoscope`` by default, or absolute.
-    type
-        For example ``'sensor_msgs/msg/JointState'``.
-    rate
-        In words, with its unit.
-    content
-        What it says, each figure with its unit.
-    offered
-        QoS of the sender; None where it is not a node of this project.
-    asked
-        QoS of the readers.
-    said_by, heard_by
-        Nodes; the recorder hears whatever is `recorded`, and the conductor waits for the streams.
-    recorded
-        Whether the recorder takes it unless it is told otherwise.
-    one_sender
-        Whether whoever else speaks here while the slave is enabled is a fault.
-    """
-
-    name: str
-    type: str
-    rate: str
-    content: str
-    offered: Qos | None
+    name: str  # relative to the namespace of the graph, ``/endoscope`` by default, or absolute
+    type: str  # for example ``'sensor_msgs/msg/JointState'``
+    rate: str  # in words, with its unit
+    content: str  # what it says, each figure with its unit
+    offered: Qos | None  # None where the sender is not a node of this project
     asked: Qos
     said_by: tuple[str, ...] = ()
+    # Nodes; the recorder hears whatever is `recorded`, and the conductor waits for the streams.
     heard_by: tuple[str, ...] = ()
-    recorded: bool = True
-    one_sender: bool = False
+    recorded: bool = True  # unless the recorder is told otherwise
+    one_sender: bool = False  # whoever else speaks here while the slave is enabled is a fault
 
 
 @dataclass(frozen=True)
 class Service:
-    """A service of the graph; all are `std_srvs/srv/Trigger`: success, and a message in words.
+    """A service of the graph; all are `std_srvs/srv/Trigger`: success, and a message in words."""
 
-    `name`: relative to the namespace of the graph.
-    `served_by`: node.
-    `purpose`: what it does and when it is refused.
-    `device`: device without which it is not there; empty for none.
-    """
-
-    name: str
-    served_by: str
-    purpose: str
-    device: str = ''
+    name: str  # relative to the namespace of the graph
+    served_by: str  # node
+    purpose: str  # what it does and when it is refused
+    device: str = ''  # without which it is not there; empty for none
 
 
 TRIGGER = 'std_srvs/srv/Trigger'

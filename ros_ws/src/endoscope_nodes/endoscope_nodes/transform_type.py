@@ -81,11 +81,7 @@ class _Description(Structure):
 
 @functools.cache
 def transform_class() -> type:
-    """Return a class without fields for publishers of bytes and raw subscriptions.
-
-    Raises UnknownTypeError: another middleware than Fast DDS is in use, and `tf2_msgs` not
-        installed.
-    """
+    """Return a class without fields, for bytes; UnknownTypeError unless Fast DDS is in use."""
     if rclpy_implementation.rclpy_get_rmw_implementation_identifier() != _RMW:
         raise UnknownTypeError(f'message type {TF_MESSAGE}: not installed')
     for kind in (MarkerArray, TransformStamped):

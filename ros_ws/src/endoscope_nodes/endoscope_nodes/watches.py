@@ -78,12 +78,7 @@ def senders_in_words(node: EndoscopeNode, topic: str) -> str:
 
 
 class SessionWatch:
-    """A node's part in the motion sessions of the supervisor, told on `/diagnostics`.
-
-    `on_enter`: called when the node has entered a session.
-    `on_leave`: called when it is in none any more.
-    `session`: kept by somebody else; one of its own by default.
-    """
+    """A node's part in the motion sessions of the supervisor, told on `/diagnostics`."""
 
     def __init__(
         self,
@@ -112,11 +107,7 @@ class SessionWatch:
     def senders_of(
         self, subscription: Subscription, on_crowd: Callable[[str], None] | None = None
     ) -> SenderWatch:
-        """Watch who sends on a topic: a second sender ends the node's part.
-
-        `subscription`: by which the topic is heard.
-        `on_crowd`: called with who there was, instead; it calls :meth:`leave`.
-        """
+        """Watch who sends on a topic: a second one ends the node's part, by `on_crowd` if given."""
         senders = SenderWatch(self._node, subscription)
         self._streams.append((senders, on_crowd or self.leave))
         return senders
@@ -182,10 +173,7 @@ class ClutchWatch:
     """The clutch as last heard; silence counts as released.
 
     A second sender ends the node's part in the session, and the clutch counts as released until it
-    is let go of: who held it is not known.
-
-    `session`: the node's part in motion sessions.
-    `on_release`: called when it is let go of, or heard again after having been silent.
+    is let go of: who held it is not known. `on_release` also comes when it is heard again.
     """
 
     def __init__(
@@ -228,17 +216,10 @@ class ClutchWatch:
 
 
 class StreamWatch:
-    """Whether a topic is alive, as far as this process listened to it.
-
-    A loop that came late has heard nothing meanwhile: its delay is not taken for silence, up to
-    once the time allowed, and is told beside it.
-
-    `ticker`: gives the time.
-    `topic`: name for its troubles.
-    """
+    """Whether a topic is alive, as far as this process listened to it."""
 
     def __init__(self, ticker: Ticker, topic: str) -> None:
-        self.topic = topic
+        self.topic = topic  # name for its troubles
         self._ticker = ticker
         self._heard_ns: int | None = None
         self._late_ns = 0
@@ -258,6 +239,8 @@ class StreamWatch:
         if self._heard_ns is None:
             return False
         age = self._ticker.monotonic_ns() - self._heard_ns
+        # A loop that came late has heard nothing meanwhile: its delay is not taken for silence, up
+        # to once the time allowed.
         return age - min(self._ticker.late_ns - self._late_ns, timeout_ns) <= timeout_ns
 
     def trouble(self, timeout_ns: int) -> str:
@@ -275,15 +258,8 @@ class StreamWatch:
 class MeasuredPose:
     """Where shafts and bending section are: what whoever enters a session starts from.
 
-    The bending is that of the tracker while it is fresh, and else what the shafts would have bent
-    it to without any loss.
-
     One serves all nodes of a process, because a subscription of each node's own would cost more
-    than most nodes do; :meth:`listen` lets another of them host the subscriptions.
-
-    `tracked`: newest bending angles of the tracker; None before the first.
-    `shafts_ns`: when the newest shaft angles came, a monotonic time in ns.
-    `host`: node that subscribes.
+    than most nodes do; `listen` lets another of them host the subscriptions.
     """
 
     def __init__(self, node: EndoscopeNode) -> None:
@@ -293,9 +269,9 @@ class MeasuredPose:
         self._shafts_reader = JointReader(MOTORS)
         self._shafts = b''
         self._shafts_stamp = (0, 0)
-        self.shafts_ns = 0
+        self.shafts_ns = 0  # when the newest shaft angles came, monotonic
         self._joints_reader = JointReader(JOINTS)
-        self.tracked: JointSample | None = None
+        self.tracked: JointSample | None = None  # None before the first
         self._tracked_ns = 0
         self.listen(node)
 
@@ -342,6 +318,7 @@ class MeasuredPose:
         """Bending angles in rad, shape (J,); None while neither tracker nor shafts are known."""
         if self.tracked is not None and self.tracks:
             return self.tracked.position
+        # What the shafts would have bent it to without any loss.
         shafts = self.shafts()
         return None if shafts is None else tuple(x / self._gear for x in shafts)
 
@@ -371,19 +348,7 @@ def _who_starves(late_ns: int) -> str:
 
 
 class CommandReport:
-    """What a command gate did, as a diagnostic report.
-
-    Refusals since the last report are told from old ones, so that a warning ends when its cause
-    does.  It is an error where more was refused than obeyed, not counting what comes while the
-    clutch is not held: whoever sends it believes that he moves something.  Commands that were lost
-    on the way are told as such, with who was not run and what helps: the hop that starves is the
-    first whose share is low.
-
-    `gate`: the gate.
-    `ticker`: knows for how long this process was not run.
-    `on_starved`: called with the reason when more than half of the commands were lost in two
-        reports in a row: a rate of which a half would be carried better.
-    """
+    """What a command gate did, as a diagnostic report; lost commands are told with what helps."""
 
     def __init__(
         self,
@@ -406,8 +371,10 @@ class CommandReport:
         values: dict[str, object] = {'accepted': gate.accepted}
         values |= {f'refused: {reason}': count for reason, count in gate.refused.items()}
         total = sum(gate.refused.values())
+        # Told from old ones, so that a warning ends when its cause does.
         fresh, self._reported = total - self._reported, total
         idle = gate.refused[Refusal.CLUTCH]
+        # Not counting what comes while the clutch is not held.
         unheeded = fresh - (idle - self._without_clutch)
         self._without_clutch = idle
         accepted, self._accepted = gate.accepted - self._accepted, gate.accepted
@@ -416,11 +383,14 @@ class CommandReport:
         values['carried [%]'] = 100.0 * share
         self._starved = self._starved + 1 if share < _HALF else 0
         late_ns, self._late_ns = self._ticker.late_ns - self._late_ns, self._ticker.late_ns
+        # The hop that starves is the first whose share is low.
         starved = f'{100.0 * share:.0f} % of {due:.0f} commands arrive: {_who_starves(late_ns)}'
+        # A rate of which a half would be carried better.
         if self._starved >= _STARVED_REPORTS and self._on_starved is not None:
             self._on_starved(starved)
         if fresh:
             said = f'{fresh} of {fresh + accepted} commands refused, last: {gate.last_reason}'
+            # Whoever sends what is not obeyed believes that he moves something.
             return ERROR if unheeded > accepted else WARN, said, values
         if share < _CARRIED:
             return WARN, starved, values

@@ -46,13 +46,7 @@ def analyse(
     calibrations: Sequence[CalibrationFacts],
     lost: dict[str, int],
 ) -> DemoResults:
-    """Figures of all runs, from the recordings alone.
-
-    `bags`: recording of each tube.
-    `lost`: messages that the recorder missed, by topic.
-    Raises BagError: if a recording lacks what is needed.
-    Raises ValueError: if a run ended before its motion did.
-    """
+    """Figures of all runs, from the recordings alone; `lost` is what recorders missed, by topic."""
     recordings = {tube: open_bag(path) for tube, path in bags.items()}
     angles = {tube: Angles.of(recording) for tube, recording in recordings.items()}
     shafts = {tube: _shafts(recording) for tube, recording in recordings.items()}
@@ -74,15 +68,12 @@ def analyse(
 
 @dataclass(frozen=True)
 class Angles:
-    """What was asked of the joints of one tube and what the tracker saw, s and rad.
+    """What was asked of the joints of one tube and what the tracker saw, s and rad."""
 
-    Shapes: `time` (N,), `actual` (N, J), `asked_time` (M,), `asked` (M, J).
-    """
-
-    time: Array
-    actual: Array
-    asked_time: Array
-    asked: Array
+    time: Array  # (N,)
+    actual: Array  # (N, J)
+    asked_time: Array  # (M,)
+    asked: Array  # (M, J)
 
     @classmethod
     def of(cls, recording: Recording) -> 'Angles':
@@ -115,11 +106,7 @@ class Angles:
 
 
 def run_of(angles: Angles, shafts: tuple[Array, Array], segment: Segment) -> TrackingRun:
-    """The steady part of a run, beside what was asked for in this very run.
-
-    `shafts` (K,): stamps in s and shaft angles in rad.
-    Raises ValueError: if the run ended before its motion did.
-    """
+    """The steady part of a run, beside what was asked for; `shafts` are (K,) s and (K, J) rad."""
     own = angles.between(segment.start, segment.end)
     signal = motion_by_name(segment.motion).joints[JOINTS[0]]
     began = start_of_motion(own.asked_time, own.asked[:, 0], signal)
@@ -143,16 +130,13 @@ def run_of(angles: Angles, shafts: tuple[Array, Array], segment: Segment) -> Tra
 
 
 def start_of_motion(time: Array, desired: Array, signal: Signal) -> float:
-    """When a motion began: the way to it from the measured pose comes first.
-
-    `time` (N,): seconds.
-    `desired` (N,): what was asked for then, rad: the signal, cut where the reach of the tube ends.
-    Returns: seconds, to a millisecond.
-    """
+    """When, in s to a ms, a motion began in what was asked for: `desired` (N,), rad."""
+    # The way to the motion from the measured pose comes first.
     late = np.flatnonzero(time >= LATEST_START_S)[::10]
     least, most = desired[late].min(), desired[late].max()
 
     def misfit(start: float) -> float:
+        # What was asked for is the signal, cut where the reach of the tube ends.
         asked = np.clip(signal(time[late] - start)[0], least, most)
         return float(np.sum((asked - desired[late]) ** 2))
 
@@ -161,12 +145,7 @@ def start_of_motion(time: Array, desired: Array, signal: Signal) -> float:
 
 
 def reversals(time: Array, desired_deg: Array) -> Array:
-    """Instants at which a desired angle turns back.
-
-    `time` (N,): seconds.
-    `desired_deg` (N,): an angle that was cut turns where it comes off its end.
-    Returns (R,): where the way back begins that leads back by `TURNED_DEG` at least, s.
-    """
+    """Instants (R,) in s at which a way back begins that leads back by `TURNED_DEG` at least."""
     turns = []
     moves = np.diff(desired_deg)
     way, furthest = 0.0, float(desired_deg[0])
@@ -175,17 +154,13 @@ def reversals(time: Array, desired_deg: Array) -> Array:
             way, furthest = way or float(np.sign(angle - furthest)), angle
         elif abs(angle - furthest) > TURNED_DEG:
             way, furthest = -way, angle
+            # An angle that was cut turns where it comes off its end.
             turns.append(time[np.flatnonzero(way * moves[:k] <= STILL_DEG)[-1] + 1])
     return np.array(turns)
 
 
 def longest_crossing(time: Array, shafts: Array, start: float, end: float) -> Crossing:
-    """Longest stretch at more than half the motors' top speed.
-
-    `time` (K,): seconds.
-    `shafts` (K, J): shaft angles, rad.
-    `start`, `end`: of the interval that is looked at, s.
-    """
+    """Longest stretch of `shafts` (K, J), rad, at more than half the motors' top speed."""
     rig = shipped_rig()
     inside = (time >= start) & (time < end)
     time, shafts = time[inside], shafts[inside]

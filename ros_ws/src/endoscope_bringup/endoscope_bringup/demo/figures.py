@@ -50,10 +50,7 @@ def loops_figure(results: DemoResults, tube: str, motion: str, best: Method, cap
 def tracking_figure(
     results: DemoResults, tube: str, motion: str, methods: list[Method], caption: str
 ) -> str:
-    """Angle over time beside what was asked for in the same run, a row for each method.
-
-    Below, the errors of all methods but `Method.NONE`.
-    """
+    """Angle over time beside what was asked for, a row for each method, and below the errors."""
     runs = [results.run(tube, motion, method) for method in methods]
     plots = [_track(run, column, joint) for run in runs for column, joint in enumerate(JOINTS)]
     compensated = [run for run in runs if run.method is not Method.NONE]

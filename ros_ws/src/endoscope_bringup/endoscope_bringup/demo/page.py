@@ -23,11 +23,7 @@ def endoscope_picture() -> str:
 
 
 def report_page(results: DemoResults, facts: dict[str, str]) -> str:
-    """HTML of the whole report.
-
-    `facts`: how it was made (date, seed, command, clock), shown at the foot.
-    Returns: a page that needs no other file.
-    """
+    """HTML of the whole report, in one file; `facts`, how it was made, stand at the foot."""
     environment = Environment(
         loader=PackageLoader('endoscope_bringup', 'demo/templates'),
         autoescape=True,

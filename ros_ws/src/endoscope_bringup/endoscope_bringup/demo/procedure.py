@@ -32,14 +32,10 @@ COMPENSATOR = {
 
 @dataclass(frozen=True)
 class Tube:
-    """A shape of the insertion tube.
+    """A shape of the insertion tube."""
 
-    `name`: the colon section of the first paper's experiment (section 4) whose backlash it has.
-    `bend`: sum of the tube's bends in that shape, rad; both joints are the recorded family's.
-    """
-
-    name: str
-    bend: float
+    name: str  # colon section of the first paper's experiment (section 4) whose backlash it has
+    bend: float  # sum of the tube's bends in that shape, rad; both joints are the recorded family's
 
 
 @dataclass(frozen=True)
@@ -55,21 +51,14 @@ class Segment:
 
 @dataclass(frozen=True)
 class CalibrationFacts:
-    """What one calibration announced.
-
-    `start`: stamp in s at which the sinusoid began.
-    `class_deg`: class chosen.
-    `probabilities`: by class in degrees.
-    `duration`: seconds from request to result.
-    `reach_deg`: least and greatest angle to which each joint can be bent in this tube.
-    """
+    """What one calibration announced."""
 
     tube: str
-    start: float
-    class_deg: float
-    probabilities: dict[int, float]
-    duration: float
-    reach_deg: tuple[tuple[float, float], ...]
+    start: float  # stamp in s at which the sinusoid began
+    class_deg: float  # chosen
+    probabilities: dict[int, float]  # by class in degrees
+    duration: float  # from request to result, s
+    reach_deg: tuple[tuple[float, float], ...]  # least and greatest of each joint in this tube
 
 
 @dataclass(frozen=True)

@@ -13,22 +13,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class CalibrationOutcome:
-    """One calibration: what the wires said and what was made of it.
+    """One calibration: what the wires said and what was made of it."""
 
-    `facts`: what was announced.
-    `time` (N,): seconds since the sinusoid began.
-    `tension` (N, 4): load cells in N, in the order of `wires`.
-    `tracked_at` (M,): stamps of the tracker on the same clock.
-    `desired_deg`, `actual_deg` (M, J): commanded and tracked angle of each joint.
-    """
-
-    facts: CalibrationFacts
-    time: Array
-    tension: Array
+    facts: CalibrationFacts  # what was announced
+    time: Array  # (N,), s since the sinusoid began
+    tension: Array  # (N, 4), N, in the order of `wires`
     wires: tuple[str, ...]
-    tracked_at: Array
-    desired_deg: Array
-    actual_deg: Array
+    tracked_at: Array  # (M,), stamps of the tracker on the same clock
+    desired_deg: Array  # (M, J), commanded
+    actual_deg: Array  # (M, J), tracked
 
     @property
     def backlash_deg(self) -> float:
@@ -41,33 +34,23 @@ class Crossing:
     """The longest stretch of a run in which a motor turned at more than half its top speed.
 
     No signal of the demonstration asks for that: it is the dead zone of a reversal.
-
-    `seconds`: 0 where there was none.
-    `width_deg`: bending for which the shaft would have turned as far without friction.
     """
 
-    seconds: float
-    width_deg: float
+    seconds: float  # 0 where there was none
+    width_deg: float  # bending for which the shaft would have turned as far without friction
 
 
 @dataclass(frozen=True)
 class TrackingRun:
-    """One motion tracked by one method, over its steady part, at the tracker's stamps.
-
-    `time` (N,): seconds since the motion began.
-    `desired_deg`, `actual_deg` (N, J): what each joint was asked for in this very run, and what the
-        tracker saw.
-    `reversals`: for each joint the instants on the same clock at which what was asked for turned
-        back.
-    """
+    """One motion tracked by one method, over its steady part, at the tracker's stamps."""
 
     tube: str
     motion: str
     method: Method
-    time: Array
-    desired_deg: Array
-    actual_deg: Array
-    reversals: tuple[Array, ...]
+    time: Array  # (N,), s since the motion began
+    desired_deg: Array  # (N, J), asked for in this very run
+    actual_deg: Array  # (N, J), as the tracker saw it
+    reversals: tuple[Array, ...]  # of each joint, when what was asked for turned back
     crossing: Crossing
 
     @property
@@ -94,24 +77,16 @@ class TrackingRun:
 
 @dataclass(frozen=True)
 class DemoResults:
-    """All that the report shows.
-
-    `noise_deg`: what the tracker says of a tip that rests, rms.
-    `messages`: recorded messages by topic.
-    `lost`: messages missing from the recording by topic.
-    """
+    """All that the report shows."""
 
     calibrations: tuple[CalibrationOutcome, ...]
     runs: tuple[TrackingRun, ...]
-    noise_deg: float
-    messages: dict[str, int]
-    lost: dict[str, int]
+    noise_deg: float  # what the tracker says of a tip that rests, rms
+    messages: dict[str, int]  # recorded, by topic
+    lost: dict[str, int]  # missing from the recording, by topic
 
     def run(self, tube: str, motion: str, method: Method) -> TrackingRun:
-        """The run of that tube, motion and method.
-
-        Raises KeyError: if it was not made.
-        """
+        """The run of that tube, motion and method; KeyError if it was not made."""
         for run in self.runs:
             if (run.tube, run.motion, run.method) == (tube, motion, method):
                 return run

@@ -34,13 +34,10 @@ def run_demo(
     real_time: bool,
     progress: Callable[[str], None],
 ) -> DemoResults:
-    """Run the procedure on every tube, and write bags, figures and report into a folder.
+    """Run the procedure on every tube; bags, plants, figures and report go into an existing folder.
 
-    `folder`: exists; gets a bag and a plant file for each tube, `report.html` and `figures.json`.
-    `seed`: of the sensors' noise; the same seed gives the same bags unless `real_time`.
-    `real_time`: whether to run by the wall clock instead of in lock-step on /clock.
-    `progress`: told, in a line, what happens; must be picklable.
-    Raises EndoscopeError: if a node refuses, or the graph stands still.
+    The same seed of the sensors' noise gives the same bags, unless `real_time` runs by the wall
+    clock instead of in lock-step on /clock. `progress` must be picklable.
     """
     began = time.monotonic()
     recordings = _run_tubes(folder, tubes, seed, real_time, progress)
@@ -82,13 +79,11 @@ def _run_tubes(
     real_time: bool,
     progress: Callable[[str], None],
 ) -> list[TubeRecording]:
-    """Run tubes side by side in processes of their own, each in its own ROS domain.
-
-    By the wall clock they run one after the other: graphs that share two cores would be late.
-    """
+    """Run tubes side by side in processes of their own, each in its own ROS domain."""
     progress('loading the nodes, which takes some seconds')
     here = int(os.environ.get('ROS_DOMAIN_ID', '0'))
     procedure = partial(_run_tube, folder=folder, seed=seed, real_time=real_time, progress=progress)
+    # Graphs that share two cores would be late by the wall clock.
     if real_time or len(tubes) == 1:
         return [procedure(tube, domain=here) for tube in tubes]
     with worker_pool(len(tubes)) as pool:

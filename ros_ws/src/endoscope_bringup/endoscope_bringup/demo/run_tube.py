@@ -54,15 +54,7 @@ PATIENCE_OF_TIME_S = 120.0
 def run_tube(
     tube: Tube, folder: Path, *, domain: int, seed: int, real_time: bool, progress: Progress
 ) -> TubeRecording:
-    """Enable, calibrate, and track every motion by every method on one simulated tube.
-
-    `folder`: gets the bag, and the plant file of the slave.
-    `domain`: ROS domain of the graph.
-    `seed`: of the sensors' noise.
-    `real_time`: whether to run by the wall clock instead of in lock-step on /clock.
-    `progress`: told, in a line, what happens.
-    Raises EndoscopeError: if a node refuses, or the graph stands still.
-    """
+    """Enable, calibrate, and track every motion by every method on one simulated tube."""
     name = tube.name.replace(' ', '_')
     plant_file = folder / f'{name}.plant.yaml'
     joint = shipped_family().joint(tube.bend)

@@ -24,17 +24,14 @@ COLUMN, HEADING = 14, 3
 
 @dataclass(frozen=True)
 class TableRow:
-    """One figure of one motion in one tube, in degrees.
-
-    `paper_none`, `paper_proposed`: on the paper's rig; None where the paper does not say.
-    """
+    """One figure of one motion in one tube, in degrees."""
 
     tube: str
     motion: str
     figure: str
     values: dict[Method, float]
-    paper_none: PaperFigure | None
-    paper_proposed: PaperFigure | None
+    paper_none: PaperFigure | None  # on the paper's rig; None where the paper does not say
+    paper_proposed: PaperFigure | None  # likewise
 
     def is_best(self, method: Method) -> bool:
         """Whether a method has the least figure of all, as printed."""

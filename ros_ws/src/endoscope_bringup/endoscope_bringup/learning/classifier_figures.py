@@ -26,10 +26,7 @@ def training_figure(curve: Sequence[tuple[int, float]]) -> str:
 
 
 def save_figures(folder: Path, figures: Mapping[str, str]) -> None:
-    """Write NAME.svg for each figure to a new folder, whole or not at all.
-
-    Raises OutputExistsError: if there is something at `folder` already.
-    """
+    """Write NAME.svg for each figure to a new folder, whole or not at all."""
     with atomic_directory(folder) as partial:
         for name, text in figures.items():
             (partial / f'{name}.svg').write_text(text, encoding='utf-8')

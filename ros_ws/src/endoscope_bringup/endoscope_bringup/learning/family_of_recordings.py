@@ -114,12 +114,10 @@ def table(recordings: Sequence[TubeRecording], found: IdentifiedFamily) -> str:
 
 
 def settled(recording: TubeRecording, number: int) -> slice:
-    """A whole loop: the second cycle, or as much from the end of the first quarter.
-
-    The first quarter of a recording starts from rest and is on no loop.
-    """
+    """A whole loop: the second cycle, or as much from the end of the first quarter."""
     if number > 1:
         return recording.cycle(number)
+    # The first quarter of a recording starts from rest and is on no loop.
     quarter = recording.cycles[1] // 4
     return slice(quarter, recording.cycles[1] + quarter)
 

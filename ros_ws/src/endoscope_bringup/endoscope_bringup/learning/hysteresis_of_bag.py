@@ -24,15 +24,10 @@ class NoHysteresisError(EndoscopeError, ValueError):
 
 
 def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecording]:
-    """Joint-equivalent motor angle and bending angle at 200 Hz, for every joint that has both.
+    """Motor angle and bending at the joint, at 200 Hz; `gear` is shaft rad for one rad of bending.
 
     The motor angle is the measured one; where it is missing, the motor's command or the desired
     angle passed through the nominal servo.
-
-    `gear`: shaft angle for one radian at the joint.
-    Raises NoHysteresisError: if `gear` is not positive, or no joint has both angles for at least a
-        second.
-    Raises BagError: if the bending angle is missing or a message is damaged.
     """
     if not gear > 0.0:
         raise NoHysteresisError(f'gear = {gear} must be positive')

@@ -16,26 +16,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PlantRecording:
-    """One joint, N samples at 1 kHz.
+    """One joint, N samples at 1 kHz."""
 
-    `command` (N,): joint-equivalent motor command in rad.
-    `tension` (N, 2): N.
-    `bending` (N,): rad, NaN where the tracker says nothing.
-    """
-
-    command: Array
-    tension: Array
-    bending: Array | None
+    command: Array  # (N,), joint-equivalent, rad
+    tension: Array  # (N, 2), N
+    bending: Array | None  # (N,), rad, NaN where the tracker says nothing
 
 
 def plant_recordings_of_bag(bag: Recording, gear: float) -> dict[str, PlantRecording]:
-    """Every joint whose motor command and two wire tensions are in the bag.
+    """Every joint with motor command and two tensions; `gear` is shaft rad for one of bending.
 
     The recording should begin at rest at zero, as a calibration does.
-
-    `gear`: shaft angle for one radian at the joint.
-    Raises NoHysteresisError: if `gear` is not positive or no joint has both.
-    Raises BagError: if a message is damaged.
     """
     if not gear > 0.0:
         raise NoHysteresisError(f'gear = {gear} must be positive')

@@ -30,22 +30,14 @@ _NEXT_WORD_S = 1.5
 
 @dataclass(frozen=True)
 class Reply:
-    """What the graph answered.
+    """What the graph answered."""
 
-    `lines`: in words, the answer itself first.
-    `values`: the same for programs.
-    """
-
-    lines: tuple[str, ...]
-    values: dict[str, Any] = field(default_factory=dict)
+    lines: tuple[str, ...]  # in words, the answer itself first
+    values: dict[str, Any] = field(default_factory=dict)  # the same for programs
 
 
 def act(client: GraphClient, args: argparse.Namespace) -> Reply:
-    """Do what the command line asks for.
-
-    Raises GraphRefusedError: the graph refuses it, or does not do it in time.
-    Raises UnknownParameterError: there is no such node, parameter or value.
-    """
+    """Do what the command line asks for."""
     action, patience_s = args.action, args.timeout
     if action == 'get':
         return _get(client, args.parameter, patience_s)

@@ -25,10 +25,7 @@ _PROMPT_S = 0.01
 
 
 def listing(client: GraphClient, patience_s: float, as_json: bool) -> None:
-    """Print all topics of the interface, and others of the namespace.
-
-    Raises NoGraphError: nobody is there.
-    """
+    """Print all topics of the interface, and others of the namespace."""
     if not client.wait_until(lambda: bool(client.nodes()), patience_s):
         raise NoGraphError(f'no graph answers in {client.where}: start one with `graph`')
     # The topics of a node become known after its name.
@@ -157,10 +154,7 @@ def rate(
     patience_s: float,
     as_json: bool,
 ) -> None:
-    """Measure until so many messages or seconds, or Ctrl-C, and print the statistics.
-
-    Raises NoGraphError: nobody sends it.
-    """
+    """Measure until so many messages or seconds, or Ctrl-C, and print the statistics."""
     times: list[int] = []
     try:
         for _, received_ns, _ in _messages(client, name, count, seconds, patience_s):
@@ -195,10 +189,7 @@ def echo(
     patience_s: float,
     as_json: bool,
 ) -> None:
-    """Print messages as they come.
-
-    Raises NoGraphError: nobody sends it.
-    """
+    """Print messages as they come."""
     say: Callable[[Any], None] = _print_json if as_json else _print_lines
     for data, _, kind in _messages(client, name, count, seconds, patience_s):
         say(_decoded(data, kind))

@@ -46,10 +46,7 @@ _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
-    """Move the slave by the terminal's keys until the operator has enough; the exit status.
-
-    Raises GraphRefusedError: the graph does not take a handle.
-    """
+    """Move the slave by the terminal's keys until the operator has enough; the exit status."""
     client.find(args.timeout)
     source = read_parameter(client, 'console.source', args.timeout).value
     scale = read_parameter(client, 'console.scale', args.timeout).value

@@ -35,10 +35,7 @@ class TerminalLostError(Exception):
 
 
 def check_terminal() -> None:
-    """Refuse to go on without a terminal.
-
-    Raises NoTerminalError: stdin or stdout is none.
-    """
+    """Refuse to go on without a terminal at both stdin and stdout."""
     for stream, name in ((sys.stdin, 'stdin'), (sys.stdout, 'stdout')):
         if not stream.isatty():
             raise NoTerminalError(
@@ -50,8 +47,6 @@ class Terminal(ClosedOnExit):
     """Stdin without lines and echo, and two lines of stdout that are written again and again.
 
     Signals of keys stay on: Ctrl-C interrupts even where this program hangs.
-
-    `told_apart`: whether it tells presses and releases apart.
     """
 
     def __init__(self) -> None:
@@ -59,13 +54,10 @@ class Terminal(ClosedOnExit):
         self._before: list | None = None
         self._begun_s: float | None = None
         self._keys = TerminalKeys()
-        self.told_apart = False
+        self.told_apart = False  # it tells presses and releases apart
 
     def open(self) -> None:
-        """Take the terminal over, and ask it what it can do.
-
-        Raises TerminalLostError: the terminal is gone.
-        """
+        """Take the terminal over, and ask it what it can do; TerminalLostError if it is gone."""
         try:
             self._before = termios.tcgetattr(self._in)
             self._read_keys()
@@ -94,10 +86,7 @@ class Terminal(ClosedOnExit):
         termios.tcsetattr(self._in, termios.TCSAFLUSH, ours)
 
     def read(self) -> list[KeyEvent]:
-        """Take the key events that have come.
-
-        Raises TerminalLostError: the terminal is gone.
-        """
+        """Take the key events that have come; TerminalLostError if the terminal is gone."""
         events: list[KeyEvent] = []
         while select.select([self._in], [], [], 0.0)[0]:
             try:
