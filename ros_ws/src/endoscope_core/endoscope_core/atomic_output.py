@@ -28,10 +28,8 @@ class OutputExistsError(EndoscopeError, FileExistsError):
 def atomic_file(path: str | Path, *, overwrite: bool = True) -> Iterator[Path]:
     """Write a file under a temporary name; it takes its own name when the block ends well.
 
-    `path`: where the file shall be. Missing parent folders are made.
-    `overwrite`: whether a file that is there already is replaced.
-    Yields: a hidden sibling of `path` with the same suffix, not yet existing; the block creates it.
-    Raises OutputExistsError: `path` is a folder, or it exists and `overwrite` is false.
+    Yields a hidden sibling of `path` with the same suffix, not yet there; missing parent folders
+    are made. OutputExistsError where `path` is a folder, or exists and `overwrite` is false.
     """
     target = Path(path)
     if target.is_dir():
@@ -52,9 +50,8 @@ def atomic_file(path: str | Path, *, overwrite: bool = True) -> Iterator[Path]:
 def atomic_directory(path: str | Path) -> Iterator[Path]:
     """Fill a folder under a temporary name; it takes its own name when the block ends well.
 
-    `path`: where the folder shall be; it may exist if it is empty. Missing parent folders are made.
-    Yields: an empty folder, a hidden sibling of `path`.
-    Raises OutputExistsError: `path` is a file or a folder with something in it.
+    Yields an empty hidden sibling of `path`; missing parent folders are made. OutputExistsError
+    where `path` is a file or a folder with something in it.
     """
     target = Path(path).resolve()
     require_free_directory(target)
@@ -69,19 +66,12 @@ def atomic_directory(path: str | Path) -> Iterator[Path]:
 
 
 def with_final_names(text: str) -> str:
-    """Return a text in which outputs have the names that a person will find when they are done.
-
-    `text`: a path, or a line that names outputs which are still under their temporary names.
-    """
+    """A path, or a line of text, with outputs under the names that they will have when done."""
     return _PARTIAL.sub('', text)
 
 
 def require_free_directory(path: str | Path) -> None:
-    """Check, before long work, that a folder can be written at `path`.
-
-    Raises OutputExistsError: `path` is a file or a folder with something in it.
-    Raises OutputPlaceError: the folder that it would be made in takes nothing.
-    """
+    """Check before long work: OutputExistsError or OutputPlaceError if no folder can be written."""
     target = Path(path).absolute()
     if target.is_dir():
         if any(target.iterdir()):
@@ -92,10 +82,7 @@ def require_free_directory(path: str | Path) -> None:
 
 
 def require_place(path: str | Path) -> None:
-    """Check, before long work, that something can be made at `path`.
-
-    Raises OutputPlaceError: the folder that it would be made in takes nothing.
-    """
+    """Check before long work: OutputPlaceError if the folder around `path` takes nothing."""
     target = Path(path).absolute()
     place = next(parent for parent in target.parents if parent.exists())
     if not place.is_dir():

@@ -18,14 +18,12 @@ _LONGEST_REASON = 300
 
 
 def exit_status(program: str, run: Callable[[], int]) -> int:
-    """Run a program and turn whatever ends it into its exit status.
+    """Run a program and turn whatever ends it into its exit status; lines begin with its name.
 
-    `program`: its name, with which every line begins.
-    `run`: does the work and returns the exit status.
-    Returns: what `run` returned; 2 on input that cannot be used, on a file or device that the
-        system refuses, without memory and on a defect, each with one line that names the thing; 1
-        where the reader of stdout has gone; 130 when interrupted. The line of a defect says that it
-        is one and where. At the log level debug the traceback stands above the line.
+    The status is what `run` returned; 2 on input that cannot be used, on a file or device that the
+    system refuses, without memory and on a defect, each with one line that names the thing; 1 where
+    the reader of stdout has gone; 130 when interrupted. The line of a defect says that it is one
+    and where; at the log level debug the traceback stands above it.
     """
     _have_standard_streams()
     try:

@@ -24,11 +24,7 @@ class YamlError(EndoscopeError, ValueError):
 
 
 def load_yaml(path: str | Path) -> Any:
-    """Content of a YAML file.
-
-    `path`: the file, UTF-8.
-    Raises YamlError: it cannot be read, or `parse_yaml` refuses it; names file and line.
-    """
+    """Content of a UTF-8 YAML file; YamlError, naming file and line, if `parse_yaml` refuses it."""
     try:
         with Path(path).open('rb') as file:
             text = file.read(LARGEST + 1).decode()
@@ -42,11 +38,9 @@ def load_yaml(path: str | Path) -> Any:
 def parse_yaml(text: str, name: str) -> Any:
     """Content of a YAML text: mappings with unique keys, lists, texts, numbers, dates, nothing.
 
-    `text`: one document.
-    `name`: where the text is from, for messages.
-    Raises YamlError: it is no YAML, larger than `LARGEST`, deeper than `DEEPEST`, has a key twice,
-        an alias (of which a few lines can make gigabytes), a merge key, a tag, or a number that is
-        none; names the line.
+    YamlError, with `name` and the line, where it is no YAML, larger than `LARGEST`, deeper than
+    `DEEPEST`, has a key twice, an alias (of which a few lines can make gigabytes), a merge key, a
+    tag, or a number that is none.
     """
     if len(text) > LARGEST:
         raise YamlError(f'{name} is larger than {LARGEST >> 20} MiB: no file of this kind is')

@@ -16,10 +16,8 @@ def worker_pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
     """Fresh processes that end with the block or with the process that started them.
 
     An executor of its own, left by an error or a signal, would first do every task that was
-    submitted, and workers of a killed process would go on with theirs, each for minutes.
-
-    `jobs`: number of processes.
-    Yields: left without an error, it waits for its tasks; otherwise they are given up.
+    submitted, and workers of a killed process would go on with theirs, each for minutes. Left
+    without an error, this one waits for its tasks; otherwise they are given up.
     """
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context('spawn')

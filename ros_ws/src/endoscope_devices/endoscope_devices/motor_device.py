@@ -13,16 +13,12 @@ class DeviceError(EndoscopeError, RuntimeError):
 
 @dataclass(frozen=True)
 class MotorReading:
-    """Newest valid state of J motor shafts.
+    """Newest valid state of J motor shafts."""
 
-    `position`, `velocity`, `effort`: rad, rad/s and N m, shape (J,).
-    `age`: time in s since it was measured.
-    """
-
-    position: tuple[float, ...]
-    velocity: tuple[float, ...]
-    effort: tuple[float, ...]
-    age: float = 0.0
+    position: tuple[float, ...]  # rad, (J,)
+    velocity: tuple[float, ...]  # rad/s, (J,)
+    effort: tuple[float, ...]  # N m, (J,)
+    age: float = 0.0  # s since it was measured
 
 
 class MotorDevice(Protocol):
@@ -35,10 +31,7 @@ class MotorDevice(Protocol):
     names: tuple[str, ...]
 
     def open(self) -> None:
-        """Connect and check the settings.
-
-        Raises DeviceError: not reachable, or set up wrongly.
-        """
+        """Connect and check the settings; DeviceError where not reachable, or set up wrongly."""
 
     def set_torque(self, on: bool) -> None:
         """Let the servos hold where they are and then follow goals, or let them go.
@@ -47,11 +40,9 @@ class MotorDevice(Protocol):
         """
 
     def exchange(self, goal: Sequence[float], periods: int) -> MotorReading | None:
-        """Set the goal and give the newest reading.
+        """Set the goal (J,) in rad and give the newest valid reading; None while none is new.
 
-        `goal`: shaft angles in rad, shape (J,): the newest command.
-        `periods`: control periods (1 ms) since the last call.
-        Returns: none while there is no new valid reading.
+        The goal is the newest command; `periods` are control periods (1 ms) since the last call.
         """
 
     def trouble(self) -> str:

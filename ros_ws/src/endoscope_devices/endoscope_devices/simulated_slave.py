@@ -9,29 +9,22 @@ Numbers = tuple[float, ...]
 
 
 class SimulatedSlave:
-    """Servos, wires and joints of a plant, advanced by the motor driver's beat.
-
-    `plant`: the rig with its effects.
-    `names`: motor names, one for each joint of the plant and in that order.
-    `seed`: of the sensors' noise.
-    `tension`: noise-free wire tensions in N after the last exchange, shape (2 J,): positive and
-        negative wire of each joint in turn.
-    `bending`: noise-free bending angles in rad as the tracker would read them, shape (J,).
-    `goal`: where the servos go or stand, rad, shape (J,).
-    """
+    """Servos, wires and J joints of a plant, advanced by the motor driver's beat."""
 
     def __init__(self, plant: PlantDescription, names: Sequence[str], seed: int) -> None:
         if len(names) != len(plant.joint_names()):
             raise ValueError(f'{len(names)} motors for {len(plant.joint_names())} joints')
-        self.names = tuple(names)
+        self.names = tuple(names)  # of motors, in the order of the joints
         self._plant = plant
         self._simulator = PlantSimulator(plant)
         self._sensors = SensorModel(plant.sensors, seed)
         self._torque = False
-        self.goal: Numbers = (0.0,) * len(self.names)
+        self.goal: Numbers = (0.0,) * len(self.names)  # where the servos go or stand, rad, (J,)
         self._started = False
+        # Noise-free wire tensions in N after the last exchange, (2 J,): positive and negative wire
+        # of each joint in turn.
         self.tension: Numbers = ()
-        self.bending: Numbers = ()
+        self.bending: Numbers = ()  # noise-free angles in rad as the tracker would read them, (J,)
 
     def open(self) -> None:
         """Nothing to connect; the plant is compiled here rather than in the first tick."""

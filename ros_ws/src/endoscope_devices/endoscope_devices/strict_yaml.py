@@ -15,13 +15,7 @@ class DeviceFileError(EndoscopeError, ValueError):
 
 
 class Section:
-    """One mapping of a YAML file.
-
-    `where`: file and path of keys so far, for messages.
-    `content`: what the file has there.
-    `keys`: the keys that it may have.
-    Raises DeviceFileError: it is not a mapping, or has a key that is unknown.
-    """
+    """One mapping of a YAML file; DeviceFileError where it is none or has an unknown key."""
 
     def __init__(self, where: str, content: Any, keys: Sequence[str]) -> None:
         if not isinstance(content, Mapping):
@@ -31,7 +25,7 @@ class Section:
                 near = difflib.get_close_matches(str(key), keys, 1, 0.4)
                 hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(keys)}'
                 raise DeviceFileError(f'{where}: unknown key {key}: {hint}')
-        self._where = where
+        self._where = where  # file and path of keys so far, for messages
         self._content = content
 
     def section(self, key: str, keys: Sequence[str], *, required: bool = True) -> 'Section':
@@ -44,11 +38,7 @@ class Section:
         return Section(f'{self._where}: {key}', content, keys)
 
     def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
-        """The finite number under ``key``.
-
-        `low`, `high`: what it may be, in the unit of the key.
-        `default`: what it is where it is missing; without one it is required.
-        """
+        """The finite number under ``key``, in its unit; required where there is no default."""
         value = self._given(key, default)
         if (
             isinstance(value, bool)
@@ -61,11 +51,7 @@ class Section:
         return float(value)
 
     def whole(self, key: str, low: int, high: int, default: int | None = None) -> int:
-        """The whole number under ``key``.
-
-        `low`, `high`: what it may be.
-        `default`: what it is where it is missing; without one it is required.
-        """
+        """The whole number under ``key``; required where there is no default."""
         value = self._given(key, default)
         if type(value) is not int or not low <= value <= high:
             raise DeviceFileError(
@@ -74,10 +60,7 @@ class Section:
         return value
 
     def sign(self, key: str, default: int | None = None) -> int:
-        """The 1 or -1 under ``key``.
-
-        `default`: what it is where it is missing; without one it is required.
-        """
+        """The 1 or -1 under ``key``; required where there is no default."""
         value = self._given(key, default)
         if type(value) is not int or value not in (1, -1):
             raise DeviceFileError(f'{self._where}: {key} is {value!r}: give 1 or -1')
@@ -93,10 +76,7 @@ class Section:
         return str(value)
 
     def vector(self, key: str, length: int) -> tuple[float, ...]:
-        """The ``length`` finite numbers under ``key``.
-
-        `length`: how many.
-        """
+        """The ``length`` finite numbers under ``key``."""
         value = self._given(key, None)
         if (
             not isinstance(value, list)
@@ -122,13 +102,7 @@ class Section:
 
 
 def load_section(path: str | Path, what: str, keys: Sequence[str]) -> Section:
-    """Read a YAML file that is one mapping.
-
-    `path`: the file.
-    `what`: what kind of file it should be, for messages.
-    `keys`: the keys that it may have.
-    Raises DeviceFileError: it cannot be read, is not YAML, or has an unknown key.
-    """
+    """Read a YAML file, called `what` in messages, of one mapping; DeviceFileError if it is not."""
     try:
         content = load_yaml(path)
     except YamlError as error:

@@ -26,19 +26,13 @@ class UnseenTensionError(ClassifierError):
 
 @dataclass(frozen=True)
 class ClassificationResult:
-    """What the classifier says of one calibration.
+    """What the classifier says of one calibration."""
 
-    `class_deg`: the likeliest class: backlash size in deg.
-    `probability`: of that class.
-    `probabilities`: of each class, by its size in deg; they add up to one.
-    `size`: backlash size in rad, where the classifier regresses it.
-    `interval`: lower and upper end in rad of the interval that holds the size nine times in ten.
-    """
-
-    class_deg: int
-    probability: float
-    probabilities: dict[int, float]
-    size: float | None = None
+    class_deg: int  # the likeliest class: backlash size in deg
+    probability: float  # of that class
+    probabilities: dict[int, float]  # of each class, by its size in deg; they add up to one
+    size: float | None = None  # backlash size in rad, where the classifier regresses it
+    # Lower and upper end in rad, which hold the size nine times in ten.
     interval: tuple[float, float] | None = None
 
     @property
@@ -62,8 +56,8 @@ class Classifier(Protocol):
     def classify(self, tension: ArrayLike) -> ClassificationResult:
         """Class of the tensions (N, 4) in N at 1 kHz from the start of the motion.
 
-        Raises UnseenTensionError: if they are like nothing that the classifier knows.
-        Raises ClassifierError: if they are no recording of the motion.
+        UnseenTensionError where they are like nothing that the classifier knows, ClassifierError
+        where they are no recording of the motion.
         """
         ...
 
@@ -71,10 +65,7 @@ class Classifier(Protocol):
 def checked_tension(
     tension: ArrayLike, shape: tuple[int, int], dtype: DTypeLike = np.float64
 ) -> np.ndarray:
-    """Tensions as an array of the shape that a calibration has.
-
-    Raises ClassifierError: if the shape is another or a value is not finite.
-    """
+    """Tensions as an array; ClassifierError where the shape is another or a value not finite."""
     array: np.ndarray = np.asarray(tension, dtype=dtype)
     if array.shape != shape:
         raise ClassifierError(f'tensions of a calibration have shape {shape}, not {array.shape}')

@@ -51,35 +51,26 @@ _FAR = 'the tensions are too far from those of all known tubes'
 
 @dataclass(frozen=True)
 class HeldOutCalibration:
-    """What rigs held out from the training say of the network.
+    """What rigs held out from the training say of the network."""
 
-    `inflation`: half the width of an interval, in the network's standard deviations.
-    `ceiling`, `doubt`: distance of the features, and probability of 'none of these', up to which
-        tensions are those of known tubes.
-    """
-
-    inflation: float
+    inflation: float  # half the width of an interval, in the network's standard deviations
+    # Distance of the features, and probability of 'none of these', up to which tensions are those
+    # of known tubes.
     ceiling: float
     doubt: float
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the network makes of R recordings.
+    """What the network makes of R recordings; all arrays (R,)."""
 
-    `size`, `deviation` (R,): backlash size in rad, mean of the joints, and the standard deviation
-        of its error as the network takes it, before calibration on rigs held out.
-    `none` (R,): probability that the tensions are of no tube but of disturbed cells or another
-        motion.
-    `distance` (R,): of the features from those of the training (Mahalanobis).
-    `gap` (R,): by which the loop of a wire fails to close, N: the greatest of the wires.
-    """
-
-    size: Array
+    size: Array  # backlash size in rad, mean of the joints
+    # Of the error of `size` in rad, as the network takes it: before calibration on rigs held out.
     deviation: Array
+    # Probability that the tensions are of no tube but of disturbed cells or another motion.
     none: Array
-    distance: Array
-    gap: Array
+    distance: Array  # of the features from those of the training (Mahalanobis)
+    gap: Array  # by which the loop of a wire fails to close, N: the greatest of the wires
 
 
 def course(tension: ArrayLike, motion: str) -> Single:
@@ -116,12 +107,7 @@ def logarithm(tension: Single) -> Single:
 
 
 def cnn_shapes(classes: int) -> dict[str, tuple[int, ...]]:
-    """Shape of each array of weights of the network for a number of classes.
-
-    `offset` and `scale` are each wire's mean and spread in the training; a filter has a row for
-    each sample of its window and each channel of that sample. `centre` and `whitening` make the
-    features of the training white.
-    """
+    """Shape of each array of weights of the network for a number of classes."""
     shapes: dict[str, tuple[int, ...]] = {'offset': (WIRES,), 'scale': (WIRES,)}
     for k, (width, wider) in enumerate(zip((WIRES, *CHANNELS), CHANNELS, strict=False)):
         shapes |= {f'filter.{k}': (STRIDE * width, wider), f'bias.{k}': (wider,)}
@@ -147,12 +133,7 @@ def evaluated(weights: Mapping[str, Single], courses: Single) -> tuple[Array, Ar
 
 
 class CnnClassifier:
-    """A trained network, calibrated on rigs held out from it.
-
-    `weights`: of the shapes that `cnn_shapes` gives.
-    `classes_deg`: backlash sizes of the classes in deg.
-    `motion`: calibration motion whose tensions it reads.
-    """
+    """A trained network of the shapes of `cnn_shapes`, calibrated on rigs held out from it."""
 
     def __init__(
         self,
@@ -164,20 +145,17 @@ class CnnClassifier:
         self.weights = weights
         self.calibration = calibration
         self.classes_deg = classes_deg
-        self.motion = motion
+        self.motion = motion  # calibration motion whose tensions it reads
         recorded = calibration_motion(motion)
         self._samples = recorded.samples
         period = recorded.samples - recorded.settled
         self._period = min(INPUT - 1, period if recorded.samples > INPUT else INPUT)
 
     def classify(self, tension: ArrayLike) -> ClassificationResult:
-        """Class, backlash size and interval of one calibration.
+        """Class, size and interval of one calibration: tension (N, 4) in N at 1 kHz from its start.
 
-        `tension` (N, 4): n at 1 kHz from the start of the motion, wires in the order x_pos, x_neg,
-            y_pos, y_neg.
-        Raises UnseenTensionError: if the tensions are unlike any of the training, or their size is
-            none of the classes.
-        Raises ClassifierError: if the shape is another or a value is not finite.
+        The wires are in the order x_pos, x_neg, y_pos, y_neg. UnseenTensionError where the tensions
+        are unlike any of the training, or their size is none of the classes.
         """
         array = checked_tension(tension, (self._samples, WIRES))
         judgement = self.judged(course(array, self.motion)[None])

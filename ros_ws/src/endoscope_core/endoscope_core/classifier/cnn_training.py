@@ -49,32 +49,21 @@ _LEAST_RIGS, _LEAST_STEPS = 40, 10
 
 @dataclass(frozen=True)
 class CnnTraining:
-    """How much is simulated, and how the network is trained with it.
+    """How much is simulated, and how the network is trained with it."""
 
-    `rigs`, `strange`, `held_out`: simulated rigs to train with; recordings of slack wires and other
-        motions; rigs on which intervals and refusals are calibrated.
-    `steps`, `batch`, `warm_up`: steps of AdamW with recordings in each; in the first `warm_up` the
-        size is learnt by its squared error, then by its likelihood.
-    `spoilt`: share of a batch that is of no tube.
-    `learning_rate`, `smoothing`: peak of one cycle; of the labels.
-    """
-
-    rigs: int = 5000
-    strange: int = 500
-    held_out: int = 1000
-    steps: int = 6000
-    batch: int = 64
-    warm_up: int = 600
-    spoilt: float = 0.15
-    learning_rate: float = 4e-3
-    smoothing: float = 0.02
+    rigs: int = 5000  # simulated rigs to train with
+    strange: int = 500  # recordings of slack wires and other motions
+    held_out: int = 1000  # rigs on which intervals and refusals are calibrated
+    steps: int = 6000  # of AdamW
+    batch: int = 64  # recordings in each step
+    warm_up: int = 600  # first steps, in which size is learnt by squared error, then by likelihood
+    spoilt: float = 0.15  # share of a batch that is of no tube
+    learning_rate: float = 4e-3  # peak of one cycle
+    smoothing: float = 0.02  # of the labels
 
     @classmethod
     def of_size(cls, rigs: int, steps: int) -> 'CnnTraining':
-        """Training with so many rigs and steps, and what belongs to them.
-
-        Raises EndoscopeError: if they are too few to train or to calibrate with.
-        """
+        """Settings for so many rigs and steps; EndoscopeError if too few to train or calibrate."""
         if rigs < _LEAST_RIGS or steps < _LEAST_STEPS:
             raise EndoscopeError(
                 f'--n {rigs} and --steps {steps}: at least {_LEAST_RIGS} rigs and {_LEAST_STEPS} '
@@ -85,17 +74,14 @@ class CnnTraining:
 
 @dataclass(frozen=True)
 class TrainedCnn:
-    """A classifier, and how it came about.
-
-    `held_out`: what the rigs held out say for each instrument and reading rate: share of right
-        classes, rms error of the size in deg, share of sizes in their interval, and of rigs
-        refused. Half of the rigs calibrate the intervals that the other half is judged by.
-    `curve`: steps and mean loss since the entry before.
-    """
+    """A classifier, and how it came about."""
 
     classifier: CnnClassifier
+    # What the rigs held out say for each instrument and reading rate: share of right classes, rms
+    # error of the size in deg, share of sizes in their interval, and of rigs refused. Half of the
+    # rigs calibrate the intervals that the other half is judged by.
     held_out: dict[str, dict[str, float]]
-    curve: list[tuple[int, float]]
+    curve: list[tuple[int, float]]  # steps and mean loss since the entry before
 
 
 def train_cnn(
@@ -107,10 +93,7 @@ def train_cnn(
 ) -> TrainedCnn:
     """Simulate, train and calibrate; the same seed on the same machine gives the same weights.
 
-    `motion`: calibration motion, one of `CALIBRATION_MOTIONS`.
-    `seed`: of rigs, first weights and batches.
-    `kept`: file in which the training is kept and from which it goes on where it was interrupted.
-    `report`: takes lines of progress.
+    The file `kept` holds the training's progress, from which an interrupted one goes on.
     """
     settings = settings or CnnTraining()
     torch.set_num_threads(1)

@@ -24,12 +24,10 @@ def shipped_weights(motion: str) -> Path:
 
 
 def load_classifier(weights: str | Path | None = None, motion: str = SINUSOID) -> CnnClassifier:
-    """Classifier for a calibration motion.
+    """Classifier for a calibration motion, by default with the weights that come with this package.
 
-    `weights`: as `endoscope train` writes them; those that come with this package if not given.
-    `motion`: one of `CALIBRATION_MOTIONS`.
-    Raises ClassifierError: if a file is missing, is not what `endoscope train` writes, was damaged,
-        is for another motion, or holds numbers that give no answer.
+    ClassifierError where a file is missing, is not what `endoscope train` writes, was damaged, is
+    for another motion, or holds numbers that give no answer.
     """
     path = Path(weights) if weights else shipped_weights(motion)
     description, state = read_weights(path)

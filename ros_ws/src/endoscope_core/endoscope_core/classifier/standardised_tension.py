@@ -5,12 +5,9 @@ from endoscope_core.classifier.pytorch import Tensor, nn, torch
 
 
 class StandardisedTension(nn.Module):
-    """A network that sees each wire by mean and spread of what it is trained on.
+    """A network that sees each wire by mean and spread of what it is trained on."""
 
-    `offset`, `scale`: n; kept with the weights.
-    """
-
-    offset: Tensor
+    offset: Tensor  # (4, 1) in N, like `scale` kept with the weights
     scale: Tensor
 
     def __init__(self) -> None:

@@ -11,12 +11,10 @@ from endoscope_core.classifier.standardised_tension import StandardisedTension
 
 
 class TensionCnn(StandardisedTension):
-    """Eight convolutions with batch normalisation and ReLU, then a dense layer.
+    """Eight convolutions with batch normalisation and ReLU, then a dense layer of `outputs` logits.
 
-    Eight unpadded strides of three reduce 6,561 samples to exactly one: of 9,000 the last 2,439
-    are not seen. Softmax belongs to the loss in training and to the caller otherwise.
-
-    `outputs`: of the dense layer: a logit for each class, and what else it is to tell.
+    Eight unpadded strides of three reduce 6,561 samples to exactly one: of 9,000 the last 2,439 are
+    not seen. Softmax belongs to the loss in training and to the caller otherwise.
     """
 
     def __init__(self, outputs: int) -> None:

@@ -26,11 +26,7 @@ class WeightsFileError(EndoscopeError, ValueError):
 
 
 def weights_path(path: str | Path) -> Path:
-    """Check the name of a weights file before long work.
-
-    Raises WeightsFileError: if its suffix is .json, which the file beside it needs, or it is a
-        folder.
-    """
+    """Check a weights file's name before long work: not a folder, nor .json like its twin."""
     path = Path(path)
     if path.suffix == '.json' or path.is_dir():
         raise WeightsFileError(f'{path} cannot hold weights: name a file with suffix .safetensors')
@@ -40,10 +36,7 @@ def weights_path(path: str | Path) -> Path:
 def save_weights(
     path: str | Path, state: Mapping[str, np.ndarray], description: Mapping[str, Any]
 ) -> None:
-    """Write arrays to ``path`` and a description to the JSON file of the same name beside it.
-
-    Raises WeightsFileError: if `path` cannot hold weights.
-    """
+    """Write arrays to ``path`` and a description to the JSON file of the same name beside it."""
     path = weights_path(path)
     described = {'schema': SCHEMA, 'kind': 'cnn', **description}
     data = safetensors.numpy.save({k: np.asarray(x, order='C') for k, x in state.items()})
@@ -52,11 +45,7 @@ def save_weights(
 
 
 def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Description and arrays of a weights file.
-
-    Raises ClassifierError: if a file is missing, is not what `endoscope train` writes, or was
-        damaged since.
-    """
+    """Description and arrays of a weights file; ClassifierError if missing, foreign or damaged."""
     path = Path(path)
     sidecar = path.with_suffix('.json')
     for each, largest in ((path, LARGEST_WEIGHTS), (sidecar, LARGEST_DESCRIPTION)):
@@ -103,10 +92,7 @@ def sealed(description: dict[str, Any], data: bytes) -> dict[str, Any]:
 def fitting(
     state: dict[str, np.ndarray], shapes: Mapping[str, tuple[int, ...]], dtype: DTypeLike
 ) -> dict[str, np.ndarray]:
-    """The arrays, whose names, shapes and type must be those that are due.
-
-    Raises ValueError: if they are not.
-    """
+    """The arrays, whose names, shapes and type must be those that are due, or ValueError."""
     for name in shapes.keys() | state.keys():
         if name not in state or name not in shapes:
             raise ValueError(f'{name} is {"missing" if name in shapes else "unknown"}')
@@ -120,10 +106,7 @@ def fitting(
 
 
 def classes_of(description: dict[str, Any]) -> tuple[int, ...]:
-    """Backlash sizes in deg of the classes.
-
-    Raises ValueError: if they are not whole, increasing degrees of a turn.
-    """
+    """Backlash sizes of the classes in deg: whole, increasing, within a turn, or ValueError."""
     classes = description.get('classes_deg')
     if (
         not isinstance(classes, list)

@@ -42,16 +42,11 @@ bent; at the end, friction is twice what it is at the motor."""
 
 @dataclass(frozen=True)
 class Instrument:
-    """How an instrument differs from the one that was recorded.
+    """How an instrument differs, joint by joint, from the one that was recorded."""
 
-    `factors`: for each joint, factors on its parameters by their names.
-    `pretension`: for each joint, what its wires are tighter by, N.
-    `tightening`: for each joint, what its pretension profile is higher by.
-    """
-
-    factors: Mapping[str, Mapping[str, float]]
-    pretension: Mapping[str, float]
-    tightening: Mapping[str, float]
+    factors: Mapping[str, Mapping[str, float]]  # on parameters, by their names
+    pretension: Mapping[str, float]  # what the wires are tighter by, N
+    tightening: Mapping[str, float]  # what the pretension profile is higher by
 
 
 @dataclass(frozen=True)
@@ -115,12 +110,7 @@ def in_tube(
     unevenness: float = 0.0,
     family: TubeFamily | None = None,
 ) -> PlantDescription:
-    """An instrument in a tube.
-
-    `bend`: sum of the tube's bends, rad.
-    `unevenness`: see `TubeConfiguration`.
-    `family`: the shipped one if not given.
-    """
+    """An instrument in a tube (by default of the shipped family) with `bend` rad of bends."""
     joint = (family or shipped_family()).joint(bend)
     profile = joint.friction_profile or (0.0,)
     joints = {}

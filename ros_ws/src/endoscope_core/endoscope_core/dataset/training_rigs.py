@@ -50,14 +50,11 @@ _EARLIER = 1000
 
 @dataclass(frozen=True)
 class TrainingRigs:
-    """R recordings without noise, N samples at 1 kHz.
+    """R recordings without noise, N samples at 1 kHz."""
 
-    `tension` (R, N, 4): N.
-    `size` (R,): backlash size in rad under the sinusoid, mean of the joints; NaN where the
-        recording is of slack wires or of another motion.
-    """
-
-    tension: NDArray[np.float32]
+    tension: NDArray[np.float32]  # (R, N, 4) in N
+    # (R,): backlash size in rad under the sinusoid, mean of the joints; NaN for slack wires or
+    # another motion.
     size: Array
 
 

@@ -16,11 +16,9 @@ MOST_BINS = 2000
 def banded(x: Array, y: Array) -> tuple[Array, Array, Array]:
     """Return edges (K + 1,) of stretches, and the least and greatest of y (K,) in each.
 
-    Neighbours share a reading, so that the band is as connected as the line through all readings,
-    and none of these lies outside.
-
-    `x` (N,): increasing.
-    `y` (N,): naN is left out; a stretch of nothing else is NaN.
+    Of x (N,), increasing, neighbours share a reading, so that the band is as connected as the line
+    through all readings, and none of these lies outside. NaN in y (N,) is left out; a stretch of
+    nothing else is NaN.
     """
     step = math.ceil((len(y) - 1) / MOST_BINS)
     begins = np.arange(0, len(y) - 1, step)

@@ -42,30 +42,20 @@ _ACTIONS = (
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A curve of a plot.
-
-    `x` (N,): where the values are, increasing unless the plot is a loop; of N + 1 elements, the
-        edges of the stretches in each of which a value holds. In the unit that the plot names.
-    `y` (N,): naN leaves a gap.
-    `colour`: a variable of look.css without its dashes.
-    `width`: of the line, px.
-    `dash`: lengths of strokes and gaps in px; none for a solid line.
-    `low`, `high` (N,): a band around the curve.
-    `time` (N,): of each point of a loop, s, which says what part of it another plot of the figure
-        shows.
-    `to`: label of another curve of the plot, with the same `x`; the area between them is filled.
-    """
+    """A curve of a plot."""
 
     label: str
+    # (N,) or (N + 1,), in the plot's unit: where the values are, increasing unless the plot is a
+    # loop; of N + 1 elements, the edges of the stretches in each of which a value holds.
     x: Array
-    y: Array
-    colour: str = 'actual'
-    width: float = 1.4
-    dash: tuple[float, ...] = ()
-    low: Array | None = None
+    y: Array  # (N,); NaN leaves a gap
+    colour: str = 'actual'  # a variable of look.css without its dashes
+    width: float = 1.4  # of the line, px
+    dash: tuple[float, ...] = ()  # lengths of strokes and gaps in px; none for a solid line
+    low: Array | None = None  # (N,), with `high` a band around the curve
     high: Array | None = None
-    time: Array | None = None
-    to: str = ''
+    time: Array | None = None  # (N,) in s, of points of a loop: what part of it another plot shows
+    to: str = ''  # label of another curve of the plot with the same `x`; the area between is filled
 
     def __post_init__(self) -> None:
         count = len(self.y)
@@ -82,37 +72,24 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Plot:
-    """One plot of a figure.
+    """One plot of a figure."""
 
-    `title`: what is drawn, with its unit.
-    `x_label`: what is across, with its unit; plots of a figure that name the same are zoomed
-        together.
-    `columns`: width, of the figure's twelve columns.
-    `height`: of the drawing without its axis, px.
-    `loop`: whether the curves run back and forth in `x`.
-    `square`: whether it is as high as it is wide.
-    `range_x`, `range_y`: what is seen at first; by default all.
-    `log`: whether values are drawn by their logarithm.
-    `level`: a value that a dotted line marks, and its word.
-    `diagonal`: whether a dotted line marks where both axes have the same value.
-    `shaded`: stretches of `x` that are pointed at.
-    `marks`: places on `x` that are pointed at.
-    """
-
-    title: str
+    title: str  # what is drawn, with its unit
+    # What is across, with its unit; plots of a figure that name the same zoom together.
     x_label: str
     curves: tuple[Curve, ...]
-    columns: int = COLUMNS
-    height: int = 180
-    loop: bool = False
-    square: bool = False
+    columns: int = COLUMNS  # width, of the figure's twelve columns
+    height: int = 180  # of the drawing without its axis, px
+    loop: bool = False  # whether the curves run back and forth in `x`
+    square: bool = False  # whether it is as high as it is wide
+    # with `range_y` what is seen at first; by default all
     range_x: tuple[float, float] | None = None
     range_y: tuple[float, float] | None = None
-    log: bool = False
-    level: tuple[float, str] | None = None
-    diagonal: bool = False
-    shaded: tuple[tuple[float, float], ...] = ()
-    marks: tuple[float, ...] = ()
+    log: bool = False  # whether values are drawn by their logarithm
+    level: tuple[float, str] | None = None  # a value that a dotted line marks, and its word
+    diagonal: bool = False  # whether a dotted line marks where both axes have the same value
+    shaded: tuple[tuple[float, float], ...] = ()  # stretches of `x` that are pointed at
+    marks: tuple[float, ...] = ()  # places on `x` that are pointed at
 
     def __post_init__(self) -> None:
         for curve in self.curves:
@@ -131,10 +108,7 @@ def scripts() -> str:
 
 
 def figure_html(plots: Sequence[Plot], caption: str = '') -> str:
-    """Return plots that belong together as a `<figure>`.
-
-    `plots`: row by row.
-    """
+    """Return plots that belong together, row by row, as a `<figure>`."""
     places: dict[bytes, int] = {}
     kept: list[list[float | None]] = []
 

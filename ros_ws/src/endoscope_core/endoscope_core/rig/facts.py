@@ -159,14 +159,10 @@ class Timeouts:
 
 @dataclass(frozen=True)
 class TensionFacts:
-    """Tensions of a wire in N.
+    """Tensions of a wire in N."""
 
-    `ceiling`: at which the slave goes to FAULT.
-    `calibration_ceiling`: at which a calibration is aborted.
-    """
-
-    ceiling: float = _fact(0.1, 500.0)
-    calibration_ceiling: float = _fact(0.1, 500.0)
+    ceiling: float = _fact(0.1, 500.0)  # at which the slave goes to FAULT
+    calibration_ceiling: float = _fact(0.1, 500.0)  # at which a calibration is aborted
 
 
 @dataclass(frozen=True)

@@ -55,12 +55,10 @@ def begun_sinusoid(
     steady: tuple[float, float],
     way_back: float,
 ) -> Signal:
-    """Sine from rest, whose amplitude rises smoothly, brought back to rest at zero at last.
+    """Sine (rad, rad/s) from rest, brought back to rest at zero at last; times in s.
 
-    `amplitude`, `omega`: rad and rad/s.
-    `ramp`: time in s within which the amplitude rises.
-    `steady`: interval in s of the result; the way back begins where it ends.
-    `way_back`: length of the way back in s.
+    The amplitude rises smoothly within `ramp`; `steady` is the interval of the result, at whose end
+    a way back of length `way_back` begins.
     """
 
     def rising(time: FloatArray) -> tuple[FloatArray, FloatArray]:

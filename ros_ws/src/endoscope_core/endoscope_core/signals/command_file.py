@@ -28,16 +28,11 @@ class CommandFileError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class CommandTable:
-    """A sampled motion.
+    """A sampled motion of J joints."""
 
-    `joints`: columns of `angle`.
-    `time` (N,): increasing, in s.
-    `angle` (N, J): desired bending angles in rad.
-    """
-
-    joints: tuple[str, ...]
-    time: FloatArray
-    angle: FloatArray
+    joints: tuple[str, ...]  # columns of `angle`
+    time: FloatArray  # (N,) in s, increasing
+    angle: FloatArray  # (N, J): desired bending angles in rad
 
     def sampled(self, tick: float) -> tuple[FloatArray, FloatArray]:
         """Angles and velocities at every `tick` in s, in rad and rad/s, both of shape (M, J)."""
@@ -52,13 +47,9 @@ class CommandTable:
 def write_command_file(
     path: str | Path, time: ArrayLike, angle: ArrayLike, joints: Sequence[str] = JOINTS
 ) -> None:
-    """Write a command file, whole or not at all.
+    """Write time (N,) in s and angle (N, J) in rad as a command file, whole or not at all.
 
-    `time` (N,): in s, increasing.
-    `angle` (N, J): in rad.
-    `joints`: names of the columns of `angle`.
-    Raises CommandFileError: if the table has another shape, is not finite, or its time does not
-        increase.
+    CommandFileError where the shape is another, a number is not finite, or time does not increase.
     """
     time, angle = np.asarray(time, float), np.asarray(angle, float)
     table = CommandTable(tuple(joints), time, angle)
@@ -72,11 +63,10 @@ def write_command_file(
 
 
 def read_command_file(path: str | Path, joints: Sequence[str] = JOINTS) -> CommandTable:
-    """Read a command file.
+    """Read a command file, which must have columns for `joints`; the table has them in this order.
 
-    `joints`: columns that it must have; the table has them in this order.
-    Raises CommandFileError: if the file cannot be read, lacks a column, or a value is not a finite
-        number or out of order.
+    CommandFileError where it cannot be read, lacks a column, or a value is no finite number or out
+    of order.
     """
     path = Path(path)
     wanted = (TIME, *joints)

@@ -37,10 +37,7 @@ def triangle(amplitude: float, speed: float) -> Signal:
 
 
 def steps_with_holds(angles: tuple[float, ...], rise: float = 0.15, rest: float = 0.6) -> Signal:
-    """Quick moves to each angle (rad) in turn and back to zero, with a rest after each.
-
-    Shows creep, delay and ringing.
-    """
+    """Quick moves to each angle (rad), then zero, with rests: shows creep, delay and ringing."""
     parts: list[Signal] = []
     here = 0.0
     for target in (*angles, 0.0):
@@ -93,10 +90,7 @@ def chirp(amplitude: float, duration: float, start: float = 0.2, stop: float = 4
 
 
 def teleoperation_like(seed: int, reaches: int, reach: float, end: float = 0.0) -> Signal:
-    """Minimum-jerk reaches to random angles within +-`reach` rad with pauses, like a hand's.
-
-    The same seed gives the same motion.
-    """
+    """Minimum-jerk reaches to random angles within +-`reach` rad with pauses, like a hand's."""
     generator = np.random.default_rng(seed)
     parts: list[Signal] = []
     here = 0.0

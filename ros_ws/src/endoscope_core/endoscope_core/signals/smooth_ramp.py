@@ -8,11 +8,7 @@ from endoscope_core.signals.signal import FloatArray, Signal
 
 
 def smooth_step(phase: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Quintic rise from 0 to 1 with zero speed and acceleration at both ends.
-
-    `phase` (N,): 0 at the start, 1 at the end; values outside are clipped.
-    Returns `value, slope` (N,): height and its derivative with respect to `phase`.
-    """
+    """Quintic rise 0 to 1 and its slope, at phases (N,); no speed or acceleration at the ends."""
     s = np.clip(phase, 0.0, 1.0)
     value = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     slope = 30.0 * s**2 * (1.0 - s) ** 2
@@ -22,12 +18,7 @@ def smooth_step(phase: FloatArray) -> tuple[FloatArray, FloatArray]:
 def window(
     time: FloatArray, duration: float, rise: float, fall: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Amplitude that rises smoothly from 0 to 1 and falls back to 0 at the end.
-
-    `time` (N,): seconds since the start.
-    `duration`, `rise`, `fall`: length of the whole, of the rise and of the fall in s.
-    Returns `value, rate` (N,): amplitude factor and its time derivative in 1/s.
-    """
+    """Amplitude (N,) that rises smoothly to 1 and falls back, and its rate in 1/s; times in s."""
     up, up_slope = smooth_step(time / rise)
     down, down_slope = smooth_step((duration - time) / fall)
     return up * down, up_slope / rise * down - up * down_slope / fall

@@ -12,13 +12,10 @@ class RunningAngles:
 
     What the console wants of the slave tells where a limit is, be it of the joint, of the tube or
     of the console's own: the angles wait there, and turn round at once.
-
-    `joints`: how many there are.
-    `position`: in rad, shape (J,).
     """
 
     def __init__(self, joints: int) -> None:
-        self.position = [0.0] * joints
+        self.position = [0.0] * joints  # rad, (J,)
         self._start: tuple[Sequence[float], Sequence[float]] | None = None
 
     def release(self) -> None:
@@ -33,16 +30,13 @@ class RunningAngles:
         wanted: Sequence[float] | None,
         scale: float,
     ) -> tuple[bool, ...]:
-        """Go on at a speed.
+        """Go on at `speed` (J,) in rad/s, and tell which joints (J,) follow no further.
 
-        `speed`: in rad/s, shape (J,).
-        `usual`: greatest speed in rad/s for which the slave is given time to follow, shape (J,).
-        `elapsed`: time in s since the last call of this grip.
-        `wanted`: angles in rad that the console asks of the slave now, shape (J,); None while it
-            follows nobody: the angles do not move before it does, nor away from what it has
-            reached.
-        `scale`: slave motion for one radian of the handle.
-        Returns: joints that do not follow any further.
+        `usual` (J,) is the greatest speed in rad/s for which the slave is given time to follow,
+        `elapsed` the time in s since the last call of this grip, `scale` slave motion for one
+        radian of the handle. `wanted` (J,) are the angles in rad that the console asks of the slave
+        now; None while it follows nobody: the angles do not move before it does, nor away from what
+        it has reached.
         """
         at_limit = [False] * len(self.position)
         if wanted is None:

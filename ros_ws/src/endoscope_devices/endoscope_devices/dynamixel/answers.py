@@ -14,29 +14,18 @@ from endoscope_devices.dynamixel.packet import (
 
 
 class Reply(NamedTuple):
-    """What a servo answered.
+    """What a servo answered."""
 
-    `error`: error byte; the alert bit alone is no refusal.
-    `data`: parameters after the error byte.
-    """
-
-    error: int
-    data: bytes
+    error: int  # error byte; the alert bit alone is no refusal
+    data: bytes  # parameters after the error byte
 
 
 class AnswerCollector:
-    """Matches packets with the open request by kind, id, order and length.
-
-    `devices`: ids that answer, in this order.
-    `size`: data bytes of each answer.
-    `fast`: whether all answer in one packet (fast sync read).
-    `replies`: answers so far, by id.
-    `stray`: valid packets that answer no open question: late, repeated, or of another servo.
-    `reader`: counts damage.
-    """
+    """Matches packets with the open request by kind, id, order and length; `fast`: all in one."""
 
     def __init__(self, devices: Sequence[int], size: int, fast: bool = False) -> None:
         self.replies: dict[int, Reply] = {}
+        # Valid packets that answer no open question: late, repeated, or of another servo.
         self.stray = 0
         self.reader = PacketReader()
         self._devices = tuple(devices)

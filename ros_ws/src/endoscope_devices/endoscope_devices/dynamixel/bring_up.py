@@ -37,10 +37,7 @@ class SetUpError(BusError):
 
 
 def wanted_registers(settings: BusSettings) -> dict[Register, int]:
-    """What every servo's registers shall hold before it may be enabled, in counts.
-
-    `settings`: of the bus.
-    """
+    """What every servo's registers shall hold before it may be enabled, in counts."""
     return {
         RETURN_DELAY_TIME: settings.return_delay_counts,
         DRIVE_MODE: 0,
@@ -56,16 +53,11 @@ def wanted_registers(settings: BusSettings) -> dict[Register, int]:
 
 
 def bring_up(bus: PacketHandler, device: int, settings: BusSettings) -> ServoModel:
-    """Set one servo up with its torque off.
+    """Set one servo up with its torque off, and say what it is.
 
-    Registers of the EEPROM, which wears, are written only where they differ.
-
-    `bus`: where it is.
-    `device`: its id.
-    `settings`: what to set.
-    Returns: what it is.
-    Raises BusError: it does not answer, is another model, reports a hardware error, or does not
-        keep what was written.
+    Registers of the EEPROM, which wears, are written only where they differ. BusError where the
+    servo does not answer, is another model, reports a hardware error, or does not keep what was
+    written.
     """
     number, _ = bus.ping(device)
     if number not in MODELS:
@@ -86,16 +78,10 @@ def bring_up(bus: PacketHandler, device: int, settings: BusSettings) -> ServoMod
 def verify(
     bus: PacketHandler, device: int, settings: BusSettings, but: Register | None = None
 ) -> None:
-    """Read back what :func:`bring_up` wrote.
+    """Read back what :func:`bring_up` wrote, except the register `but`; BusError where any differs.
 
     Whole areas are read, each of a length that nothing else has, so that no answer to an earlier
     question can be taken for them.
-
-    `bus`: where the servo is.
-    `device`: its id.
-    `settings`: what it shall hold.
-    `but`: a register that may differ.
-    Raises BusError: it does not answer, or a register differs.
     """
     wanted = wanted_registers(settings)
     for area in ([r for r in wanted if r.eeprom], [r for r in wanted if not r.eeprom]):
@@ -135,13 +121,10 @@ def _refuse_hardware_errors(bus: PacketHandler, device: int) -> None:
 
 
 def enable(bus: PacketHandler, goals: Mapping[int, int], settings: BusSettings) -> None:
-    """Let servos hold the positions where they are.
+    """Let servos hold the positions `goals`, in counts by id, where they are.
 
-    `bus`: where they are.
-    `goals`: where they are to stay, in counts, by id: positions that have passed every check of a
-        reading, which the answer to a single question has not.
-    `settings`: what they must hold.
-    Raises BusError: anything is not as it was set; no torque is switched on then.
+    These must have passed every check of a reading, which the answer to a single question has not.
+    BusError where anything is not as it was set; no torque is switched on then.
     """
     for device, goal in goals.items():
         # Only 0 ends the error state of a watchdog that has tripped, and until then goals are

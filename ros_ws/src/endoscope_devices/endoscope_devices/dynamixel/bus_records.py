@@ -8,45 +8,29 @@ from endoscope_devices.motor_device import MotorReading
 
 @dataclass(frozen=True)
 class TimedReading:
-    """A reading of all shafts.
-
-    `reading`: what was measured.
-    `taken_ns`: our monotonic time in ns at which the oldest of it was taken.
-    """
+    """A reading of all shafts."""
 
     reading: MotorReading
-    taken_ns: int
+    taken_ns: int  # our monotonic time in ns at which the oldest of it was taken
 
 
 @dataclass
 class ServoHealth:
-    """What is known of a servo beside its motion.
-
-    `model`: its name.
-    `error`: error byte of its last answer.
-    `hardware`: hardware errors in words.
-    `voltage`, `temperature`: v and °C, as last read.
-    """
+    """What is known of a servo beside its motion."""
 
     model: str = ''
-    error: int = 0
-    hardware: str = ''
-    voltage: float = 0.0
-    temperature: int = 0
+    error: int = 0  # error byte of its last answer
+    hardware: str = ''  # errors in words
+    voltage: float = 0.0  # V, as last read
+    temperature: int = 0  # °C, as last read
 
 
 @dataclass
 class BusFigures:
-    """What the thread counts.
-
-    `cycles`, `readings`: cycles run, and those that gave a new reading of all servos.
-    `failures`: failed cycles by reason.
-    `last_failure`: the last one in words.
-    `last_ns`: monotonic time in ns of the last valid reading.
-    """
+    """What the thread counts."""
 
     cycles: int = 0
-    readings: int = 0
-    failures: Counter[str] = field(default_factory=Counter)
-    last_failure: str = ''
-    last_ns: int = 0
+    readings: int = 0  # cycles that gave a new reading of all servos
+    failures: Counter[str] = field(default_factory=Counter)  # failed cycles by reason
+    last_failure: str = ''  # in words
+    last_ns: int = 0  # monotonic time in ns of the last valid reading

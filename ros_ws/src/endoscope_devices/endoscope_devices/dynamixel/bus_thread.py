@@ -52,23 +52,15 @@ _LARGEST_CURRENT_A = 1193 * CURRENT_UNIT
 
 
 class BusThread:
-    """Runs the bus of some servos.
-
-    `settings`: of the bus.
-    `mounts`: the J servos.
-    `newest`: the newest valid reading, replaced as a whole.
-    `figures`: counts.
-    `health`: state of each servo.
-    `armed`: whether goals are obeyed.
-    """
+    """Runs the bus of the J servos in `mounts`."""
 
     def __init__(self, settings: BusSettings, mounts: Sequence[ServoMount]) -> None:
         self.settings = settings
         self.mounts = tuple(mounts)
-        self.newest: TimedReading | None = None
+        self.newest: TimedReading | None = None  # the newest valid reading, replaced as a whole
         self.figures = BusFigures()
         self.health = [ServoHealth() for _ in self.mounts]
-        self.armed = False
+        self.armed = False  # whether goals are obeyed
         self._ids = [mount.device for mount in self.mounts]
         self._bus: PacketHandler | None = None
         self._judges: list[BlockJudge] = []
@@ -88,10 +80,7 @@ class BusThread:
         self._thread = threading.Thread(target=self._run, name=f'bus {settings.port}', daemon=True)
 
     def start(self) -> None:
-        """Open the port, set all servos up, and begin.
-
-        Raises DeviceError: the port cannot be opened, or a servo is not as it must be.
-        """
+        """Open the port, set all servos up, and begin; DeviceError if one is not as it must be."""
         try:
             self._connect()
         except OSError as error:
@@ -106,10 +95,7 @@ class BusThread:
         self._disconnect()
 
     def set_goal(self, goal: Sequence[float]) -> None:
-        """Renew the goal.
-
-        `goal`: shaft angles in rad, shape (J,).
-        """
+        """Renew the goal: shaft angles (J,) in rad."""
         self._goal = (tuple(goal), time.monotonic_ns())
 
     def set_torque(self, on: bool) -> None:

@@ -36,37 +36,22 @@ BAUD_CODES = {
 
 @dataclass(frozen=True)
 class Register:
-    """One entry of the control table.
+    """One entry of the control table."""
 
-    `name`: as the e-manual calls it.
-    `address`, `size`: first byte and number of bytes, little endian.
-    `unit`: SI unit of ``scale``; empty for codes and flags.
-    `scale`: SI units in one count.
-    `signed`: whether the value is two's complement.
-    `writable`: access is RW rather than R.
-    `eeprom`: kept without power, and only writable while torque is off.
-    `initial`: factory value (for RAM: the value after power-up).
-    `low`, `high`: allowed counts.
-    """
-
-    name: str
-    address: int
-    size: int
-    unit: str = ''
-    scale: float = 1.0
-    signed: bool = False
-    writable: bool = True
-    eeprom: bool = False
-    initial: int = 0
-    low: int | None = None
+    name: str  # as the e-manual calls it
+    address: int  # first byte
+    size: int  # bytes, little endian
+    unit: str = ''  # SI unit of ``scale``; empty for codes and flags
+    scale: float = 1.0  # SI units in one count
+    signed: bool = False  # two's complement
+    writable: bool = True  # access is RW rather than R
+    eeprom: bool = False  # kept without power, and only writable while torque is off
+    initial: int = 0  # factory value (for RAM: the value after power-up)
+    low: int | None = None  # with `high`, the allowed counts
     high: int | None = None
 
     def encode(self, counts: int) -> bytes:
-        """Little-endian bytes of a value.
-
-        `counts`: value in counts.
-        Raises OverflowError: it does not fit.
-        """
+        """Little-endian bytes of a value in counts; OverflowError where it does not fit."""
         return counts.to_bytes(self.size, 'little', signed=self.signed)
 
     def decode(self, data: bytes) -> int:
@@ -181,16 +166,11 @@ TABLE_SIZE = 662
 
 @dataclass(frozen=True)
 class ServoModel:
-    """What the e-manual's 'Specifications' say of a servo at 12 V.
+    """What the e-manual's 'Specifications' say of a servo at 12 V."""
 
-    `name`: as printed on it.
-    `torque_constant`: stall torque by stall current, N m/A.
-    `no_load_speed`: rad/s.
-    """
-
-    name: str
-    torque_constant: float
-    no_load_speed: float
+    name: str  # as printed on it
+    torque_constant: float  # stall torque by stall current, N m/A
+    no_load_speed: float  # rad/s
 
 
 MODELS = {
@@ -220,7 +200,7 @@ ALERT = 0x80
 def error_in_words(error: int) -> str:
     """What the error byte of a status packet says (e-manual 'Protocol 2.0', 'Error').
 
-    `error`: the byte; its highest bit alone means that Hardware Error Status(70) is not zero.
+    Its highest bit alone means that Hardware Error Status(70) is not zero.
     """
     number = error & ~ALERT
     words = [_ERROR_NUMBERS.get(number, f'error number {number}')] if number else []
@@ -230,10 +210,7 @@ def error_in_words(error: int) -> str:
 
 
 def hardware_errors_in_words(status: int) -> str:
-    """Name the bits of Hardware Error Status(70); empty for none.
-
-    `status`: the register's value.
-    """
+    """Name the bits of Hardware Error Status(70); empty for none."""
     return ', '.join(
         _HARDWARE_ERRORS.get(bit, f'unknown bit {bit}') for bit in range(8) if status >> bit & 1
     )

@@ -39,28 +39,20 @@ _ATTEMPTS = 3
 
 @dataclass
 class ServoFinding:
-    """What a servo says of itself.
-
-    `device`, `baud`: id, and the speed at which it was found.
-    `model`, `firmware`: name and version.
-    `voltage`, `temperature`: v and °C.
-    `hardware`: hardware errors in words.
-    `mode`, `current_limit`, `return_delay`, `torque`: settings; A and s.
-    `complete`: whether all of this was read: it may answer a ping and then no more.
-    """
+    """What a servo says of itself."""
 
     device: int
-    baud: int
+    baud: int  # speed in bit/s at which it was found
     model: str
     firmware: int
-    voltage: float = 0.0
-    temperature: int = 0
-    hardware: str = ''
+    voltage: float = 0.0  # V
+    temperature: int = 0  # °C
+    hardware: str = ''  # errors in words
     mode: int = 0
-    current_limit: float = 0.0
-    return_delay: float = 0.0
+    current_limit: float = 0.0  # A
+    return_delay: float = 0.0  # s
     torque: bool = False
-    complete: bool = False
+    complete: bool = False  # whether all of this was read: it may answer a ping and then no more
 
     def __str__(self) -> str:
         known = f'  servo {self.device}: {self.model}, firmware {self.firmware}, {self.baud} baud'
@@ -77,18 +69,12 @@ class ServoFinding:
 
 @dataclass
 class PortFinding:
-    """What is behind a port.
+    """What is behind a port."""
 
-    `port`: device file.
-    `latency`: latency timer in s, None where the adapter has none.
-    `servos`: what was found.
-    `advice`: what to change, one line each.
-    """
-
-    port: str
-    latency: float | None = None
+    port: str  # device file
+    latency: float | None = None  # timer in s; None where the adapter has none
     servos: list[ServoFinding] = field(default_factory=list)
-    advice: list[str] = field(default_factory=list)
+    advice: list[str] = field(default_factory=list)  # what to change, one line each
 
     def __str__(self) -> str:
         timer = 'none' if self.latency is None else f'{self.latency * 1e3:.0f} ms'
@@ -104,11 +90,7 @@ def serial_ports() -> list[str]:
 
 
 def examine(port: str, bauds: Sequence[int] = tuple(BAUD_CODES.values())) -> PortFinding:
-    """Look for servos on a port at several speeds, without changing anything.
-
-    `port`: device file.
-    `bauds`: bits per second.
-    """
+    """Look for servos on a port at several speeds in bit/s, without changing anything."""
     finding = PortFinding(port, latency_timer(port))
     try:
         for baud in bauds:
@@ -123,13 +105,7 @@ def examine(port: str, bauds: Sequence[int] = tuple(BAUD_CODES.values())) -> Por
 
 
 def reboot(port: str, baud: int, device: int) -> None:
-    """Restart a servo, which ends its shutdown.
-
-    `port`: device file.
-    `baud`: speed of the servo.
-    `device`: its id.
-    Raises DeviceError: the port cannot be used, or the servo does not answer.
-    """
+    """Restart a servo, which ends its shutdown; DeviceError where it does not answer."""
     line = BusPort(port, baud)
     line.open()
     try:
@@ -139,10 +115,7 @@ def reboot(port: str, baud: int, device: int) -> None:
 
 
 def advise(finding: PortFinding) -> list[str]:
-    """Say what to change about what was found.
-
-    `finding`: of a port that could be used.
-    """
+    """Say what to change about what was found at a port that could be used."""
     advice = []
     if finding.latency is not None and finding.latency > _WANTED_LATENCY_S:
         name = Path(finding.port).resolve().name

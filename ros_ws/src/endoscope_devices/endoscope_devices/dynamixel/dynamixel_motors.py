@@ -12,11 +12,7 @@ from endoscope_devices.motor_device import MotorReading
 
 
 class DynamixelMotors:
-    """Servos on a serial port, run by a thread of their own.
-
-    `settings`: of the bus.
-    `mounts`: the J servos, in the order of the motors.
-    """
+    """J servos on a serial port, in the order of the motors, run by a thread of their own."""
 
     def __init__(self, settings: BusSettings, mounts: Sequence[ServoMount]) -> None:
         self.names = tuple(mount.name for mount in mounts)

@@ -57,13 +57,10 @@ def crc16(data: bytes) -> int:
 
 
 def encode(device: int, instruction: int, parameters: bytes = b'') -> bytes:
-    """Make a packet, stuffed.
+    """Make a packet, stuffed; ValueError where it is longer than a servo takes.
 
-    `device`: id, or ``BROADCAST_ID``.
-    `instruction`: an :class:`Instruction`, or ``STATUS`` with the error byte first in the
-        parameters.
-    `parameters`: unstuffed.
-    Raises ValueError: longer than a servo takes.
+    `device` is an id or ``BROADCAST_ID``, `instruction` an :class:`Instruction`, or ``STATUS`` with
+    the error byte first in the parameters.
     """
     body = bytes((instruction,)) + parameters.replace(_BARE, _STUFFED)
     length = len(body) + CRC_SIZE
@@ -74,31 +71,21 @@ def encode(device: int, instruction: int, parameters: bytes = b'') -> bytes:
 
 
 class Packet(NamedTuple):
-    """A packet whose CRC is right.
-
-    `device`: id.
-    `instruction`: ``STATUS`` for an answer.
-    `parameters`: unstuffed (but as they came in the answer to a fast sync read, which is never
-        stuffed).
-    `size`: bytes on the wire.
-    """
+    """A packet whose CRC is right."""
 
     device: int
-    instruction: int
+    instruction: int  # ``STATUS`` for an answer
+    # Unstuffed, but as they came in the answer to a fast sync read, which is never stuffed.
     parameters: bytes
-    size: int
+    size: int  # bytes on the wire
 
 
 class PacketReader:
-    """Finds packets in a stream of bytes that may be damaged in any way.
-
-    `wrong_crc`: packets dropped for their CRC or their stuffing.
-    `skipped`: bytes dropped because they belong to no packet.
-    """
+    """Finds packets in a stream of bytes that may be damaged in any way."""
 
     def __init__(self) -> None:
-        self.wrong_crc = 0
-        self.skipped = 0
+        self.wrong_crc = 0  # packets dropped for their CRC or their stuffing
+        self.skipped = 0  # bytes dropped because they belong to no packet
         self._buffer = bytearray()
 
     def clear(self) -> None:
@@ -156,14 +143,10 @@ def _is_stuffed(body: bytes) -> bool:
 
 
 def split_fast_answer(packet: Packet, size: int) -> dict[int, tuple[int, bytes]]:
-    """Take the answer to a fast sync read apart.
+    """Error byte and `size` bytes of data by id in a fast sync read's answer; empty if it is none.
 
     Every servo adds error, id, data and the CRC of all that came before (e-manual 'Fast Sync
     Read'), so that each part is checked by itself.
-
-    `packet`: the answer.
-    `size`: bytes of data of each servo.
-    Returns: error byte and data by id; empty if the packet is not such an answer.
     """
     body = packet.parameters
     step = 2 + size + CRC_SIZE

@@ -54,35 +54,23 @@ class RefusedError(BusError):
 
 @dataclass
 class BusCounts:
-    """What has been seen on the bus.
+    """What has been seen on the bus."""
 
-    `requests`, `answers`: requests that want an answer, and answers taken.
-    `missing`: answers that did not come in time.
-    `stray`: valid packets that answered no open request: late, repeated, or of another servo.
-    `damaged`: packets dropped for their CRC.
-    """
-
-    requests: int = 0
-    answers: int = 0
-    missing: int = 0
-    stray: int = 0
-    damaged: int = 0
+    requests: int = 0  # that want an answer
+    answers: int = 0  # taken
+    missing: int = 0  # answers that did not come in time
+    stray: int = 0  # valid packets that answer no open request: late, repeated, or of another servo
+    damaged: int = 0  # packets dropped for their CRC
 
 
 @dataclass
 class PacketHandler:
-    """Speaks Protocol 2.0 on an open port.
-
-    `port`: open.
-    `margin`: time in s granted to an answer beyond its time on the wire.
-    `counts`: counts requests and answers.
-    `return_delay`: return delay of the servos in s, as far as known; the largest there is until
-        then.
-    """
+    """Speaks Protocol 2.0 on an open port."""
 
     port: BusPort
-    margin: float = REPLY_MARGIN_S
+    margin: float = REPLY_MARGIN_S  # s granted to an answer beyond its time on the wire
     counts: BusCounts = field(default_factory=BusCounts)
+    # Of the servos in s, as far as known; the largest there is until then.
     return_delay: float = _LONGEST_RETURN_DELAY_S
     _size_before: int = field(default=0, init=False)
 
@@ -90,11 +78,7 @@ class PacketHandler:
         self.margin += latency_timer(self.port.port_name) or 0.0
 
     def time_out(self, sent: int, answers: Sequence[int]) -> float:
-        """Time in s within which all answers must have come.
-
-        `sent`: bytes of the request.
-        `answers`: data bytes of each answer.
-        """
+        """Time in s for `sent` bytes of request and for answers of so many data bytes each."""
         on_the_wire = sent + sum(STATUS_OVERHEAD + size for size in answers)
         return (
             on_the_wire * byte_time(self.port.baudrate)
@@ -105,66 +89,37 @@ class PacketHandler:
     def drain(self, quiet: float) -> None:
         """Throw away what still arrives, so that it answers no later request.
 
-        `quiet`: time in s for which the line must be quiet; a line that never is is left after ten
-            times that.
+        It must be quiet for `quiet` s; a line that never is is left after ten times that.
         """
         latest = time.monotonic() + 10.0 * quiet
         while self.port.receive(time.monotonic() + quiet) and time.monotonic() < latest:
             pass
 
     def ping(self, device: int) -> tuple[int, int]:
-        """Model number and firmware version of a servo.
-
-        `device`: its id.
-        Raises NoReplyError: it does not answer.
-        """
+        """Model number and firmware version of a servo; NoReplyError where it does not answer."""
         reply = self._ask(device, Instruction.PING, b'', _PING_SIZE)
         return reply.data[0] | reply.data[1] << 8, reply.data[2]
 
     def read(self, device: int, address: int, size: int) -> Reply:
-        """Read bytes of a servo's control table.
-
-        `device`: its id.
-        `address`, `size`: first byte and number of bytes.
-        Raises NoReplyError, RefusedError: it does not answer, or with an error.
-        """
+        """`size` bytes of a servo's control table; NoReplyError, or RefusedError on its error."""
         asked = size + 1 if size == self._size_before else size
         reply = self._ask(device, Instruction.READ, _words(address, asked), asked)
         return Reply(reply.error, reply.data[:size])
 
     def write(self, device: int, address: int, data: bytes) -> None:
-        """Write bytes of a servo's control table.
-
-        `device`: its id.
-        `address`: first byte.
-        `data`: what to write.
-        Raises NoReplyError, RefusedError: it does not answer, or with an error.
-        """
+        """Write to a servo's control table; NoReplyError, or RefusedError on its error."""
         self._ask(device, Instruction.WRITE, _words(address) + data, 0)
 
     def reboot(self, device: int) -> None:
-        """Restart a servo: all of RAM is lost and torque is off.
-
-        `device`: its id.
-        Raises NoReplyError, RefusedError: it does not answer, or with an error.
-        """
+        """Restart a servo: all of RAM is lost and torque is off. Raises as :meth:`write` does."""
         self._ask(device, Instruction.REBOOT, b'', 0, attempts=1)
 
     def read_register(self, device: int, register: Register) -> int:
-        """Value of a register in counts; see :meth:`read`.
-
-        `device`: id of the servo.
-        `register`: which.
-        """
+        """Value of a register in counts; see :meth:`read`."""
         return register.decode(self.read(device, register.address, register.size).data)
 
     def write_register(self, device: int, register: Register, counts: int) -> None:
-        """Set a register; see :meth:`write`.
-
-        `device`: id of the servo.
-        `register`: which.
-        `counts`: its new value.
-        """
+        """Set a register, in counts; see :meth:`write`."""
         self.write(device, register.address, register.encode(counts))
 
     def _ask(
@@ -202,15 +157,11 @@ class PacketHandler:
         fast: bool = False,
         margin: float = 0.0,
     ) -> dict[int, Reply]:
-        """Send bytes and collect the answers of some servos.
+        """Send one packet or more, and collect the answers of some servos to the last, by id.
 
-        `request`: one packet or more; those before the last want no answer.
-        `devices`: who answers, in this order.
-        `size`: data bytes of each answer.
-        `fast`: whether all answer in one packet (fast sync read).
-        `margin`: time in s granted in addition.
-        Returns: answers by id; those that did not come are missing. Raises OSError when the adapter
-            is gone.
+        They answer in the order of `devices` with `size` data bytes each, in one packet if `fast`
+        (fast sync read), and have `margin` s in addition. Answers that did not come are missing.
+        OSError when the adapter is gone.
         """
         port = self.port
         port.clearPort()
@@ -251,22 +202,15 @@ class PacketHandler:
 
 
 def sync_read_request(address: int, size: int, devices: Sequence[int], fast: bool = False) -> bytes:
-    """Bytes that make several servos answer with the same registers.
-
-    `address`, `size`: first byte and number of bytes.
-    `devices`: their ids, in the order of the answers.
-    `fast`: whether to answer in one packet.
-    """
+    """Bytes that make several servos answer, in order of `devices`, with the same registers."""
     instruction = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
     return encode(BROADCAST_ID, instruction, _words(address, size) + bytes(devices))
 
 
 def sync_write_request(address: int, size: int, data: Mapping[int, bytes]) -> bytes:
-    """Bytes that set the same registers of several servos, which do not answer.
+    """Bytes that set the same registers of several servos, which do not answer; data by id.
 
-    `address`, `size`: first byte and number of bytes.
-    `data`: what to write, by id.
-    Raises ValueError: an id that no servo has, or data of another size.
+    ValueError for an id that no servo has, or data of another size.
     """
     parameters = _words(address, size)
     for device, value in data.items():

@@ -16,10 +16,7 @@ _TTY = Path('/sys/class/tty')
 
 
 def byte_time(baud: int) -> float:
-    """Seconds that one byte takes (8 data bits, no parity, 1 stop bit).
-
-    `baud`: bits per second.
-    """
+    """Seconds that a byte (8 data bits, no parity, 1 stop bit) takes at `baud` bit/s."""
     return BITS_PER_BYTE / baud
 
 
@@ -30,11 +27,7 @@ def latency_timer(port_name: str) -> float | None:
 
 
 class BusPort(PortHandler):
-    """A serial port with a Dynamixel bus behind it.
-
-    `port_name`: device file.
-    `baud`: bits per second.
-    """
+    """A serial port with a Dynamixel bus behind it."""
 
     def __init__(self, port_name: str, baud: int) -> None:
         super().__init__(port_name)
@@ -58,11 +51,7 @@ class BusPort(PortHandler):
             raise OSError(*error.args) from error
 
     def open(self) -> None:
-        """Open the port.
-
-        Raises DeviceError: there is no such port, it cannot be used, or the speed is none of the
-            servos'.
-        """
+        """Open the port; DeviceError if it cannot be used, or the speed is none of the servos'."""
         try:
             opened = self.openPort()
         except serial.SerialException as error:
@@ -82,11 +71,10 @@ class BusPort(PortHandler):
         self.writePort(data)
 
     def receive(self, deadline: float) -> bytes:
-        """Bytes that are there, waiting for the first of them.
+        """Bytes that are there, waiting for the first up to `deadline`, s of ``time.monotonic``.
 
-        `deadline`: time of ``time.monotonic`` in s up to which to wait. What came before it but
-            could not be fetched in time, as when this process was held up, is still given.
-        Returns: empty if nothing came; raises OSError when the adapter is gone.
+        What came before it but could not be fetched in time, as when this process was held up, is
+        still given. Empty if nothing came; OSError when the adapter is gone.
         """
         wait = max(0.0, deadline - time.monotonic())
         ready, _, _ = select.select([self.ser.fileno()], [], [], wait)

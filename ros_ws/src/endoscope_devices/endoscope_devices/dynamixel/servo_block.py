@@ -35,25 +35,17 @@ JITTER = 0.02
 
 @dataclass(frozen=True)
 class ServoBlock:
-    """One reading of a servo, in the servo's own direction and zero.
+    """One reading of a servo, in the servo's own direction and zero."""
 
-    `tick`: realtime Tick(120), ms.
-    `watchdog`: bus Watchdog(98).
-    `current`, `velocity`, `position`: A, rad/s, rad.
-    """
-
-    tick: int
-    watchdog: int
-    current: float
-    velocity: float
-    position: float
+    tick: int  # Realtime Tick(120), ms
+    watchdog: int  # Bus Watchdog(98)
+    current: float  # A
+    velocity: float  # rad/s
+    position: float  # rad
 
 
 def decode_block(data: bytes) -> ServoBlock:
-    """Take the bytes of a block apart (all little endian, current, velocity, position signed).
-
-    `data`: ``BLOCK_SIZE`` bytes.
-    """
+    """Take the ``BLOCK_SIZE`` bytes of a block apart."""
     tick, watchdog, current, velocity, position = _LAYOUT.unpack(data)
     return ServoBlock(
         tick, watchdog, current * CURRENT_UNIT, velocity * VELOCITY_UNIT, position * COUNT
@@ -65,10 +57,7 @@ class BlockJudge:
 
     A CRC of 16 bits lets one in 65536 arbitrary damages through. What remains must also carry a
     tick that fits our clock, the watchdog as it was set, and a shaft that moved no faster than
-    it can.
-
-    `max_speed`: largest speed of the shaft in rad/s.
-    `max_current`: largest current in A.
+    `max_speed` (rad/s) with no more than `max_current` (A).
     """
 
     def __init__(self, max_speed: float, max_current: float) -> None:
@@ -86,13 +75,10 @@ class BlockJudge:
     def judge(
         self, block: ServoBlock, watchdog: int, asked_ns: int, received_ns: int
     ) -> tuple[Freshness | None, str]:
-        """Judge one block.
+        """Freshness of one block, or None and why it is refused.
 
-        `block`: as read.
-        `watchdog`: what Bus Watchdog(98) was set to.
-        `asked_ns`, `received_ns`: our monotonic time in ns before the request and after the answer.
-        Returns: none if the block is refused.
-        Returns: why it is refused.
+        `watchdog` is what Bus Watchdog(98) was set to; `asked_ns` and `received_ns` are our
+        monotonic time in ns before the request and after the answer.
         """
         if block.watchdog not in (watchdog, -1):
             return None, 'has lost its settings: it has restarted'

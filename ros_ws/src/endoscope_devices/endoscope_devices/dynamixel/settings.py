@@ -15,18 +15,12 @@ from endoscope_devices.motor_device import DeviceError
 
 @dataclass(frozen=True)
 class ServoMount:
-    """How a servo is built in.
+    """How a servo is built in."""
 
-    `name`: of the motor it is.
-    `device`: its id on the bus.
-    `direction`: 1, or -1 where the shaft's positive sense is the servo's negative one.
-    `zero`: servo angle in rad at which the shaft is at 0.
-    """
-
-    name: str
-    device: int
-    direction: int = 1
-    zero: float = math.pi
+    name: str  # of its motor
+    device: int  # its id on the bus
+    direction: int = 1  # 1, or -1 where the shaft's positive sense is the servo's negative one
+    zero: float = math.pi  # servo angle in rad at which the shaft is at 0
 
     def shaft(self, servo: float) -> float:
         """Shaft angle of a servo angle, in rad."""
@@ -39,28 +33,20 @@ class ServoMount:
 
 @dataclass(frozen=True)
 class BusSettings:
-    """Everything about the bus that a person may want to change.
+    """Everything about the bus that a person may want to change."""
 
-    `port`, `baud`: device file and bits per second.
-    `current_limit`: current in A at which the servos' firmware limits the tension of the wires.
-    `watchdog`: silence in s after which a servo stops by itself; a multiple of 20 ms is taken.
-    `return_delay`: time in s that a servo waits before it answers.
-    `rate`: cycles per second at most; 0 for as many as the bus carries.
-    `goal_timeout`: time in s after which a goal that nobody renewed is given up and the measured
-        position held.
-    `fault_after`: silence of a servo in s after which motion is refused until it is enabled anew.
-    `fast`: whether to use fast sync read (firmware 45 and newer).
-    """
-
-    port: str
-    baud: int = 1_000_000
-    current_limit: float = 0.5
+    port: str  # device file
+    baud: int = 1_000_000  # bit/s
+    current_limit: float = 0.5  # A at which the servos' firmware limits the tension of the wires
+    # Silence in s after which a servo stops by itself; a multiple of 20 ms is taken.
     watchdog: float = 0.1
-    return_delay: float = 0.0
-    rate: float = 1000.0
+    return_delay: float = 0.0  # s that a servo waits before it answers
+    rate: float = 1000.0  # cycles per second at most; 0 for as many as the bus carries
+    # Time in s after which a goal that nobody renewed is given up and the measured position held.
     goal_timeout: float = 0.1
+    # Silence of a servo in s after which motion is refused until it is enabled anew.
     fault_after: float = 0.05
-    fast: bool = False
+    fast: bool = False  # whether to use fast sync read (firmware 45 and newer)
 
     def __post_init__(self) -> None:
         for register, counts in (

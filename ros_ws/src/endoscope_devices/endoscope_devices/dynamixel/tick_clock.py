@@ -21,15 +21,13 @@ class TickClock:
 
     Every true reading was taken between request and receipt, which bounds the offset to an interval
     as wide as the exchange took, plus the millisecond that the tick is long (e-manual 'Realtime
-    Tick(120)': 0 to 32767 ms, then 0 again).  The intervals of true readings always overlap, up to
+    Tick(120)': 0 to 32767 ms, then 0 again). The intervals of true readings always overlap, up to
     the drift between the clocks; that of a late answer, or of a counter that stands still, lies
     above them, and that of a counter that began anew lies anywhere.
-
-    `drift`: largest rate error between the two clocks; an oscillator without a crystal keeps 1 %.
     """
 
     def __init__(self, drift: float = 0.01) -> None:
-        self._drift = drift
+        self._drift = drift  # rate error of the clocks at most; one without a crystal keeps 1 %
         self._low_ns = 0
         self._high_ns = 0
         self._tick = -1
@@ -42,9 +40,8 @@ class TickClock:
     def judge(self, tick: int, asked_ns: int, received_ns: int) -> Freshness:
         """Judge the tick of a reading; only a new one moves the clock.
 
-        `tick`: the register's value.
-        `asked_ns`, `received_ns`: our monotonic time in ns just before the request was sent and
-            just after the answer came.
+        `asked_ns` and `received_ns` are our monotonic time in ns just before the request was sent
+        and just after the answer came.
         """
         if self._tick < 0 or received_ns - self._seen_ns > TICK_PERIOD * _MS // 4:
             self._set(tick, received_ns)
@@ -65,10 +62,7 @@ class TickClock:
         return Freshness.NEW
 
     def taken_ns(self, tick: int) -> int:
-        """Our monotonic time in ns at which a tick that was judged new began.
-
-        `tick`: the register's value.
-        """
+        """Our monotonic time in ns at which a tick that was judged new began."""
         middle = (self._low_ns + self._high_ns) // 2
         turns = round((self._seen_ns - middle - tick * _MS) / (TICK_PERIOD * _MS))
         return middle + (tick + turns * TICK_PERIOD) * _MS

@@ -8,10 +8,7 @@ from endoscope_devices.dynamixel.servo_block import BLOCK_ADDRESS, BLOCK_SIZE
 
 
 def bytes_of_cycle(servos: int) -> int:
-    """Bytes of one sync write of goals and one sync read with its answers, unstuffed.
-
-    `servos`: how many there are.
-    """
+    """Bytes of one sync write of goals and one sync read with its answers, unstuffed."""
     devices = range(1, servos + 1)
     goals = {device: bytes(GOAL_POSITION.size) for device in devices}
     requests = sync_write_request(GOAL_POSITION.address, GOAL_POSITION.size, goals)
@@ -20,10 +17,5 @@ def bytes_of_cycle(servos: int) -> int:
 
 
 def cycles_per_second(baud: int, servos: int, return_delay: float = 0.0) -> float:
-    """Largest rate that the line carries.
-
-    `baud`: bits per second.
-    `servos`: how many there are.
-    `return_delay`: time in s that each servo waits before it answers.
-    """
+    """Largest rate that the line carries at `baud` bit/s, with `return_delay` s of each servo."""
     return 1.0 / (bytes_of_cycle(servos) * byte_time(baud) + servos * return_delay)

@@ -37,15 +37,7 @@ _STEP_S = 0.004
 
 
 class AuroraEmulator(ClosedOnExit):
-    """Serves commands in a thread until it is closed.
-
-    `sources`: the wired sensors.
-    `link`: link to the port, which stays the same when the tracker is plugged in again.
-    `latency`: time in s from measuring a frame to having it ready.
-    `line_speed`: whether bytes take their time.
-    `unit`: the tracker behind the line.
-    `tap`: what becomes of replies on the way: pieces, each with the seconds that it takes.
-    """
+    """Serves commands in a thread until closed; a frame is ready `latency` s after its time."""
 
     def __init__(
         self,
@@ -55,10 +47,11 @@ class AuroraEmulator(ClosedOnExit):
         latency: float = 0.0,
         line_speed: bool = True,
     ) -> None:
-        self.unit = AuroraUnit(sources, time.monotonic, latency)
-        self.link = link
+        self.unit = AuroraUnit(sources, time.monotonic, latency)  # the tracker behind the line
+        self.link = link  # to the port; it stays the same when the tracker is plugged in again
+        # What becomes of replies on the way: pieces, each with the seconds that it takes.
         self.tap: Callable[[bytes], Sequence[tuple[float, bytes]]] = lambda data: [(0.0, data)]
-        self._line_speed = line_speed
+        self._line_speed = line_speed  # whether bytes take their time
         self._ends: tuple[int, int] | None = None
         self._wake: tuple[int, int] = (-1, -1)
         self._thread: threading.Thread | None = None
@@ -147,11 +140,9 @@ class AuroraEmulator(ClosedOnExit):
 class InstrumentInField:
     """The sensor in the tip of an instrument that bends with constant curvature.
 
-    `bending`: ``bend_x`` and ``bend_y`` in rad at a time in s.
-    `base_position`, `base_orientation`: of the instrument's base in the frame of the field
-        generator: m, shape (3,), and x, y, z, w.
-    `roll`: angle in rad by which the sensor is turned about its own axis as it is mounted.
-    `length`: of the bending section in m.
+    `bending` gives ``bend_x`` and ``bend_y`` in rad at a time in s. The base is placed in the frame
+    of the field generator: m, (3,), and x, y, z, w. The sensor is mounted with a `roll` in rad
+    about its own axis; `length` is that of the bending section in m.
     """
 
     def __init__(
@@ -169,10 +160,7 @@ class InstrumentInField:
         self._length = length
 
     def __call__(self, seconds: float) -> SensorView:
-        """Where the sensor is.
-
-        `seconds`: since frame 0.
-        """
+        """Where the sensor is, some seconds since frame 0."""
         position, orientation = tip_pose(self.bending(seconds), self._length)
         place, turn = self._base
         return SensorView(

@@ -14,21 +14,15 @@ _COMM = f'COMM:{{}}{ndicapy.NDI_8N1:03d}{ndicapy.NDI_NOHANDSHAKE}'
 
 
 class TrackerReplyError(DeviceError):
-    """A reply that is missing, spoilt, or says that the tracker refused.
-
-    `silent`: whether nothing came at all.
-    """
+    """A reply that is missing, spoilt, or says that the tracker refused."""
 
     def __init__(self, command: str, words: str, *, silent: bool = False) -> None:
         super().__init__(f'tracker, {command} {words}')
-        self.silent = silent
+        self.silent = silent  # whether nothing came at all
 
 
 class AuroraPort:
-    """Commands and replies.
-
-    `path`: device path.
-    """
+    """Commands and replies at a device path."""
 
     def __init__(self, path: str) -> None:
         self._path = path
@@ -36,12 +30,10 @@ class AuroraPort:
         self._device: object | None = None
 
     def open(self) -> None:
-        """Open the port and bring the tracker to 115200 baud and set-up mode.
+        """Open the port and bring the tracker to 115200 baud and set-up mode, or raise DeviceError.
 
         A tracker that does not answer at 9600 baud was left at another rate: a serial break resets
         it.
-
-        Raises DeviceError: there is no port, or no tracker at it.
         """
         self._guard = NdiLineGuard(self._path)
         self._device = ndicapy.ndiOpen(self._guard.inner)
@@ -56,10 +48,9 @@ class AuroraPort:
         self._guard.set_baud(_FRAME_BAUD)
 
     def ask(self, command: str) -> str:
-        """Send a command; give its reply without CRC.
+        """Send a command with its colon, to which ndicapi adds the CRC; give its reply without CRC.
 
-        `command`: with its colon; ndicapi adds the CRC.
-        Raises TrackerReplyError: no reply, a wrong CRC, or an error of the tracker.
+        TrackerReplyError for no reply, a wrong CRC, or an error of the tracker.
         """
         if self._guard is None:
             raise TrackerReplyError(command, 'not connected', silent=True)
@@ -72,12 +63,10 @@ class AuroraPort:
             ) from error
 
     def fence(self) -> None:
-        """Make sure that no earlier reply is still to come.
+        """Make sure that no earlier reply is still to come; DeviceError where it has not come yet.
 
         The tracker answers in order: once the line has been quiet and the tracker then told its
         revision, nothing older is under way.
-
-        Raises DeviceError: it has not come yet, or the port is gone.
         """
         if self._guard is not None:
             self._guard.settle()

@@ -25,20 +25,13 @@ _FIRMWARE = 'AURORA Rev 012'
 
 @dataclass(frozen=True)
 class SensorView:
-    """Where a sensor is.
+    """Where a sensor is."""
 
-    `position`: m, in the frame of the field generator, shape (3,).
-    `orientation`: unit quaternion x, y, z, w, shape (4,).
-    `error`: indicated error in m.
-    `out_of_volume`: whether the measurement volume ends before it.
-    `broken`: whether a coil of the sensor is broken: then there is no position.
-    """
-
-    position: Sequence[float] = (0.0, 0.0, -0.2)
-    orientation: Sequence[float] = (0.0, 0.0, 0.0, 1.0)
-    error: float = 0.0003
-    out_of_volume: bool = False
-    broken: bool = False
+    position: Sequence[float] = (0.0, 0.0, -0.2)  # m, (3,), in the frame of the field generator
+    orientation: Sequence[float] = (0.0, 0.0, 0.0, 1.0)  # unit quaternion x, y, z, w
+    error: float = 0.0003  # indicated, in m
+    out_of_volume: bool = False  # whether the measurement volume ends before it
+    broken: bool = False  # whether a coil of the sensor is broken: then there is no position
 
 
 # Sensor at a time in s since frame 0; None where the field is too weak to see it at all.
@@ -93,26 +86,19 @@ class _Frame:
 
 
 class AuroraUnit:
-    """The tracker without its line.
-
-    `sources`: one wired sensor each, in ports 1, 2, ...
-    `now`: time in s, monotonic.
-    `latency`: time in s from measuring a frame to having it ready.
-    `baud`: rate that it listens at.
-    `frame_zero`: when frame 0 was, in s.
-    """
+    """The tracker without its line; a wired sensor each in ports 1, 2, ..."""
 
     def __init__(
         self, sources: Sequence[SensorSource], now: Callable[[], float], latency: float = 0.0
     ) -> None:
         self._sources = tuple(sources)
-        self._now = now
-        self._latency = latency
+        self._now = now  # monotonic time in s
+        self._latency = latency  # s from measuring a frame to having it ready
         self._ports: dict[int, _Port] = {}
         self._mode = _Mode.RESET
-        self.frame_zero = now()
+        self.frame_zero = now()  # when frame 0 was, in s
         self._frame = _Frame()
-        self.baud = BAUD_RATES[0]
+        self.baud = BAUD_RATES[0]  # rate that it listens at
 
     def reset(self) -> bytes:
         """Start anew, as after power-up, a serial break or RESET; what it then says."""
@@ -123,10 +109,7 @@ class AuroraUnit:
         return sealed('RESET')
 
     def answer(self, line: bytes) -> bytes:
-        """Reply to a command line without its carriage return.
-
-        `line`: ``NAME:parametersCRC`` or ``NAME parameters``.
-        """
+        """Reply to ``NAME:parametersCRC`` or ``NAME parameters`` without its carriage return."""
         try:
             name, parameters = self._taken_apart(line)
             handler = getattr(self, f'_on_{name.lower()}', None)

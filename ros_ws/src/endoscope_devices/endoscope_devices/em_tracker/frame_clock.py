@@ -4,14 +4,12 @@ _DRIFT = 1e-4
 
 
 class FrameClock:
-    """Lays frame numbers on the host's clock.
+    """Lays frame numbers on the host's clock, at `rate` frames a second.
 
-    Frames are equally spaced; a reply comes after its frame by a time that varies.  The earliest
+    Frames are equally spaced; a reply comes after its frame by a time that varies. The earliest
     reply, relative to its number, shows where the frames lie (NDI advises to use the frame number,
-    not the host's clock, to tell when data was collected).  The line follows clocks that drift
-    apart by up to ``1e-4``.
-
-    `rate`: frames a second in Hz.
+    not the host's clock, to tell when data was collected). The line follows clocks that drift apart
+    by up to ``1e-4``.
     """
 
     def __init__(self, rate: float) -> None:
@@ -20,11 +18,10 @@ class FrameClock:
         self._frame = 0
 
     def stamp(self, frame: int, asked_ns: int) -> int:
-        """Time of a frame that was seen for the first time.
+        """Time of a frame seen for the first time, in ns, never later than `asked_ns`.
 
-        `frame`: its number, larger than the last.
-        `asked_ns`: when the reply that brought it was asked for, in ns.
-        Returns: in ns of the same clock, never later than ``asked_ns``.
+        The frame's number is larger than the last; `asked_ns` is when the reply that brought it was
+        asked for, in ns of the same clock.
         """
         seen = asked_ns - frame * self._period_ns
         self._offset_ns = seen if self._offset_ns is None else min(seen, self._latest_ns(frame))
@@ -32,10 +29,7 @@ class FrameClock:
         return round(self._offset_ns + frame * self._period_ns)
 
     def ahead_ns(self, frame: int, asked_ns: int) -> int:
-        """How much earlier than it can have been measured a frame was seen; 0 if it was not.
-
-        `frame`, `asked_ns`: as in `stamp`.
-        """
+        """How much earlier than it can have been measured a frame was seen; 0 if it was not."""
         if self._offset_ns is None:
             return 0
         return max(0, round(self._latest_ns(frame) + frame * self._period_ns - asked_ns))

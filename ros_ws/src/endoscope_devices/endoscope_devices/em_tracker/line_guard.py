@@ -33,19 +33,13 @@ class NdiLineGuard:
 
     The port is touched by one thread at a time: by the guard's between a command and its reply, by
     the caller's otherwise.
-
-    `path`: device path of the tracker's port.
-    `frame_timeout`: longest wait in s for the reply to TX.
-    `inner`: path for ndicapi.
-    `trouble`: what was wrong with the last reply; empty if nothing.
-    `silent`: whether the last reply did not come at all.
     """
 
     def __init__(self, path: str, frame_timeout: float = 0.1) -> None:
         self._path = path
-        self._frame_timeout = frame_timeout
-        self.trouble = ''
-        self.silent = False
+        self._frame_timeout = frame_timeout  # longest wait in s for the reply to TX
+        self.trouble = ''  # what was wrong with the last reply; empty if nothing
+        self.silent = False  # whether the last reply did not come at all
         try:
             self._port = serial.Serial(path, 9600, timeout=0.0, write_timeout=1.0, exclusive=True)
         except (serial.SerialException, OSError) as error:
@@ -54,16 +48,13 @@ class NdiLineGuard:
             ) from error
         self._ends = os.openpty()
         tty.setraw(self._ends[1])
-        self.inner = os.ttyname(self._ends[1])
+        self.inner = os.ttyname(self._ends[1])  # path for ndicapi
         self._wake = os.pipe()
         self._thread = threading.Thread(target=self._run, name='tracker line', daemon=True)
         self._thread.start()
 
     def set_baud(self, baud: int) -> None:
-        """Go on at another rate, which the tracker has agreed to.
-
-        `baud`: in bit/s.
-        """
+        """Go on at another rate in bit/s, which the tracker has agreed to."""
         self._port.baudrate = baud
 
     def settle(self) -> None:
@@ -79,7 +70,7 @@ class NdiLineGuard:
     def reset(self) -> None:
         """Send a serial break, after which the tracker is at 9600 baud (Aurora API Guide, RESET).
 
-        Raises DeviceError: it does not say that it was reset.
+        DeviceError where it does not say that it was reset.
         """
         try:
             self._port.baudrate = 9600

@@ -31,10 +31,7 @@ CONFIRMATIONS = 3
 
 
 class PoseCheck:
-    """Judges each pose by the last one that was believed.
-
-    `rate`: frames a second in Hz.
-    """
+    """Judges each pose, at `rate` frames a second, by the last one that was believed."""
 
     def __init__(self, rate: float) -> None:
         self._rate = rate
@@ -43,10 +40,7 @@ class PoseCheck:
         self._agreeing = 0
 
     def believable(self, tool: ToolReading) -> bool:
-        """Whether a tip can have come there, no faster than servos and hand move it.
-
-        `tool`: with a pose, of a later frame than the last.
-        """
+        """Whether servos and hand can have moved a tip there since the last believed frame."""
         if self._believed is not None and not self._near(self._believed, tool):
             agrees = self._candidate is not None and self._near(self._candidate, tool)
             self._agreeing = self._agreeing + 1 if agrees else 1

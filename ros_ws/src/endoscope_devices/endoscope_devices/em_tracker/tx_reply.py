@@ -38,22 +38,15 @@ class PortStatus(IntFlag):
 
 @dataclass(frozen=True)
 class ToolReading:
-    """One tool in one frame.
+    """One tool in one frame."""
 
-    `handle`: port handle.
-    `status`: port status.
-    `frame`: frame number.
-    `position`, `orientation`: m, shape (3,), and unit quaternion x, y, z, w, shape (4,), in the
-        frame of the field generator; empty where the sensor is missing.
-    `error`: the tracker's own estimate in m.
-    """
-
-    handle: int
+    handle: int  # of the port, like `status`
     status: PortStatus
     frame: int
+    # In m, (3,), in the frame of the field generator; empty where the sensor is missing.
     position: tuple[float, ...] = ()
-    orientation: tuple[float, ...] = ()
-    error: float = math.nan
+    orientation: tuple[float, ...] = ()  # unit quaternion x, y, z, w, likewise
+    error: float = math.nan  # the tracker's own estimate in m
 
 
 class MalformedReplyError(ValueError):
@@ -61,10 +54,9 @@ class MalformedReplyError(ValueError):
 
 
 def parse_tx(text: str) -> list[ToolReading]:
-    """Tools of a reply; those that are disabled or unplugged are left out.
+    """Tools of a reply without CRC and carriage return, but for those disabled or unplugged.
 
-    `text`: without CRC and carriage return.
-    Raises MalformedReplyError: any character is not where it belongs, or a number cannot be.
+    MalformedReplyError where a character is not where it belongs, or a number cannot be.
     """
     count = _COUNT.match(text)
     if count is None:

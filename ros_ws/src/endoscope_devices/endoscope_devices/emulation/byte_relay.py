@@ -19,10 +19,9 @@ def faithful(data: bytes) -> Sequence[tuple[float, bytes]]:
 
 
 class ByteRelay:
-    """A thread between two ends; it ends when either end goes away.
+    """A thread between two ends, which the caller closes; it ends when either end goes away.
 
-    `near`, `far`: file descriptors, read and written here; the caller closes them.
-    `tap_for`: gives the tap in force at an end from which bytes come, ``'near'`` or ``'far'``.
+    `tap_for` gives the tap in force at an end from which bytes come, ``'near'`` or ``'far'``.
     """
 
     def __init__(self, near: int, far: int, tap_for: Callable[[str], Tap]) -> None:

@@ -12,20 +12,16 @@ class SerialCable(ClosedOnExit):
     """Two serial ports that are connected; a driver opens one, an emulated device the other.
 
     A pseudo-terminal has no baud rate, parity or break: bytes arrive at once and whole.
-
-    `host`: link by which the driver finds its port; it stays the same when the cable is plugged in
-        again, as a udev link does.
-    `device`: path of the device's port.
-    `to_host`, `to_device`: what becomes of bytes on the way; a test sets them.
     """
 
     def __init__(self, host: Path) -> None:
+        # The driver's link to its port, which stays when the cable is plugged in anew, as udev's do.
         self.host = host
-        self.to_host: Tap = faithful
+        self.to_host: Tap = faithful  # what becomes of bytes on the way; a test sets it
         self.to_device: Tap = faithful
         self._far_ends = os.openpty()
         tty.setraw(self._far_ends[1])
-        self.device = os.ttyname(self._far_ends[1])
+        self.device = os.ttyname(self._far_ends[1])  # path of the device's port
         self._near_ends: tuple[int, int] | None = None
         self._relay: ByteRelay | None = None
         self.plug_in()

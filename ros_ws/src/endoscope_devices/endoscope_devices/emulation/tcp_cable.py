@@ -8,19 +8,14 @@ from endoscope_devices.emulation.byte_relay import ByteRelay, Tap, faithful
 
 
 class TcpCable(ClosedOnExit):
-    """Accepts connections on a port of its own and carries them to a server.
-
-    `server_port`: port of the server on this machine.
-    `port`: where to connect instead.
-    `to_host`, `to_device`: what becomes of bytes on the way; a test sets them.
-    """
+    """Carries connections at a port of its own to a server on this machine."""
 
     def __init__(self, server_port: int) -> None:
-        self.to_host: Tap = faithful
+        self.to_host: Tap = faithful  # what becomes of bytes on the way; a test sets it
         self.to_device: Tap = faithful
         self._server_port = server_port
         self._listener = socket.create_server(('127.0.0.1', 0))
-        self.port: int = self._listener.getsockname()[1]
+        self.port: int = self._listener.getsockname()[1]  # where to connect instead
         self._pairs: list[tuple[socket.socket, socket.socket, ByteRelay]] = []
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._accept, name='tcp cable', daemon=True)

@@ -49,88 +49,59 @@ class SerialSettings:
 
 @dataclass(frozen=True)
 class Transmitter:
-    """How the transmitter is asked.
+    """How the transmitter is asked."""
 
-    `unit`: Modbus address.
-    `function`: 3 (holding registers) or 4 (input registers).
-    `big_word_first`: whether the more significant register of a 32-bit value comes first.
-    `rate`: readings a second in Hz.
-    `reply_timeout`: in s.
-    `latency`: time in s by which a register is older than the question for it: filter and
-        conversion.
-    `serial`: line settings for RTU.
-    """
-
-    unit: int
-    function: int
-    big_word_first: bool
-    rate: float
-    reply_timeout: float
-    latency: float
-    serial: SerialSettings
+    unit: int  # Modbus address
+    function: int  # 3 (holding registers) or 4 (input registers)
+    big_word_first: bool  # whether the more significant register of a 32-bit value comes first
+    rate: float  # Hz
+    reply_timeout: float  # s
+    latency: float  # s by which a register is older than the question: filter, conversion
+    serial: SerialSettings  # for RTU
 
 
 @dataclass(frozen=True)
 class WireCell:
-    """One cell: ``tension = sign * newton_per_count * (count - zero)``.
+    """One cell: ``tension = sign * newton_per_count * (count - zero)``."""
 
-    `register`, `type`: first register and its type, a key of ``REGISTER_TYPES``.
-    `newton_per_count`: sensitivity in N a count.
-    `sign`: 1 or -1: which way the count goes when the wire is pulled.
-    `zero`: count without tension.
-    """
-
-    register: int
-    type: str
-    newton_per_count: float
-    sign: int
-    zero: float
+    register: int  # the first
+    type: str  # a key of ``REGISTER_TYPES``
+    newton_per_count: float  # sensitivity
+    sign: int  # 1 or -1: which way the count goes when the wire is pulled
+    zero: float  # count without tension
 
     def tension(self, count: float) -> float:
-        """Tension in N at a count.
-
-        `count`: as read.
-        """
+        """Tension in N at a count."""
         return self.sign * self.newton_per_count * (count - self.zero)
 
 
 @dataclass(frozen=True)
 class FaultLimits:
-    """What no real tension does.
+    """What no real tension does."""
 
-    `broken_below`, `broken_above`, `saturated_below`, `saturated_above`: counts.
-    `frozen_after`: in s; 0 to leave it out.
-    `spike_rate`, `spike_noise`: fastest change in N/s, and what noise may add in N.  A wire of
-        stiffness k on a pulley of radius r, whose shaft turns at w, changes its tension at the cell
-        by k r w exp(phi) at most, phi being the sheath's capstan exponent (Euler-Eytelwein): 1620
-        N/s for the nominal 2000 N/m and 5 mm, the greatest exponent of 3 and the 8.06 rad/s of an
-        XM430-W210 without load. Noise: seven times that of a difference of two readings at the 0.1
-        N rms that a tare allows.
-    """
-
-    broken_below: float
+    broken_below: float  # counts, as the next three
     broken_above: float
     saturated_below: float
     saturated_above: float
-    frozen_after: float = 0.5
+    frozen_after: float = 0.5  # s; 0 to leave it out
+    # Fastest change in N/s. A wire of stiffness k on a pulley of radius r, whose shaft turns at w,
+    # changes its tension at the cell by k r w exp(phi) at most, phi being the sheath's capstan
+    # exponent (Euler-Eytelwein): 1620 N/s for the nominal 2000 N/m and 5 mm, the greatest exponent
+    # of 3 and the 8.06 rad/s of an XM430-W210 without load.
     spike_rate: float = 1650.0
+    # What noise may add in N: seven times that of a difference of two readings at the 0.1 N rms
+    # that a tare allows.
     spike_noise: float = 1.0
 
 
 @dataclass(frozen=True)
 class TareLimits:
-    """When a tare is refused.
+    """When a tare is refused."""
 
-    `noise`, `drift`: largest standard deviation, and largest change from one half second to the
-        next, in N.
-    `largest`: largest tension in N that may be taken for zero.
-    `shaft_speed`: speed of a motor shaft in rad/s from which the wires count as moving.
-    """
-
-    noise: float = 0.1
-    drift: float = 0.05
-    largest: float = 2.0
-    shaft_speed: float = 0.02
+    noise: float = 0.1  # largest standard deviation, N
+    drift: float = 0.05  # largest change from one half second to the next, N
+    largest: float = 2.0  # tension that may be taken for zero, N
+    shaft_speed: float = 0.02  # rad/s from which the wires count as moving
 
 
 @dataclass(frozen=True)

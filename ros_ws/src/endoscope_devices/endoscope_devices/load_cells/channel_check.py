@@ -15,28 +15,21 @@ class ChannelCheck:
     """Judges each reading of one cell.
 
     Broken: the count is not a number, or beyond ``broken_below`` and ``broken_above``, where only
-    an open bridge drives the amplifier.  Saturated: beyond ``saturated_*``.  Frozen: not one count
-    of change for ``frozen_after`` seconds; the noise of a living cell changes its last digit.
-    Spiking: a change faster than ``spike_rate``; three readings in a row that agree with each other
-    are a new level.  With five spikes in a second the whole channel is not believed.  This is all
-    that tells an old reply of Modbus RTU, which has no number: kept on the way and sent again, it
-    is left out where the tension has gone on by more than a wire can in one interval.
-
-    `wire`: name for messages.
-    `cell`: its calibration.
-    `limits`: what no real tension does.
-    `fault`: what is wrong, naming the wire; empty while readings are good.
-    `spikes`, `new_levels`: readings that changed too fast, and how often three of them were taken
-        for a new level.
+    an open bridge drives the amplifier. Saturated: beyond ``saturated_*``. Frozen: not one count of
+    change for ``frozen_after`` seconds; the noise of a living cell changes its last digit. Spiking:
+    a change faster than ``spike_rate``; three readings in a row that agree with each other are a
+    new level. With five spikes in a second the whole channel is not believed. This is all that
+    tells an old reply of Modbus RTU, which has no number: kept on the way and sent again, it is
+    left out where the tension has gone on by more than a wire can in one interval.
     """
 
     def __init__(self, wire: str, cell: WireCell, limits: FaultLimits) -> None:
         self._wire = wire
         self._limits = limits
         self.cell = cell
-        self.fault = ''
-        self.spikes = 0
-        self.new_levels = 0
+        self.fault = ''  # what is wrong, naming the wire; empty while readings are good
+        self.spikes = 0  # readings that changed too fast
+        self.new_levels = 0  # how often three of them were taken for a new level
         self._good = 0
         self._spiked_ns: deque[int] = deque(maxlen=_SPIKES)
         self._count = math.nan
@@ -48,11 +41,9 @@ class ChannelCheck:
         self._agreeing = 0
 
     def read(self, time_ns: int, count: float) -> float | None:
-        """Take a count; give the tension in N, or None where it cannot be believed.
+        """Take a count at a monotonic time in ns; give the tension in N where it can be believed.
 
-        `time_ns`: when it was read, in ns of a monotonic clock.
-        `count`: as read.
-        Returns: none during a fault, and for its first ``CONFIRMATIONS - 1`` good readings after.
+        None during a fault, and for its first ``CONFIRMATIONS - 1`` good readings after.
         """
         trouble = self._trouble(time_ns, count)
         if trouble:

@@ -35,10 +35,7 @@ class ReplyTrouble(StrEnum):
 
 
 class ReplyError(Exception):
-    """A reply that is not accepted.
-
-    `trouble`: the kind.
-    """
+    """A reply that is not accepted, and of what kind its trouble is."""
 
     def __init__(self, trouble: ReplyTrouble, words: str) -> None:
         super().__init__(f'{trouble}: {words}')
@@ -46,11 +43,7 @@ class ReplyError(Exception):
 
 
 class Framing(ABC):
-    """How requests and replies lie in bytes; one request is out at a time.
-
-    `unit`: Modbus address.
-    `function`: 3 or 4.
-    """
+    """How requests of function 3 or 4 and replies lie in bytes; one request is out at a time."""
 
     def __init__(self, unit: int, function: int) -> None:
         self._unit = unit
@@ -60,24 +53,18 @@ class Framing(ABC):
 
     @abstractmethod
     def request(self, address: int, count: int) -> bytes:
-        """Bytes that ask for registers.
-
-        `address`, `count`: first register and number of registers.
-        """
+        """Bytes that ask for `count` registers from `address` on."""
 
     @abstractmethod
     def length(self, head: bytes) -> int:
         """How long the reply is, as far as its first bytes tell.
 
-        `head`: what has come so far; at least two bytes more are always wanted than decide.
+        At least two bytes more are always wanted than decide.
         """
 
     @abstractmethod
     def accept(self, reply: bytes) -> tuple[int, ...] | None:
-        """Registers of the reply to the last request; None if it answers an earlier one.
-
-        Raises ReplyError: it is not the reply to that request.
-        """
+        """Registers of the reply to the last request, None for an earlier one; or ReplyError."""
 
     def _pdu(self, address: int, count: int, transaction: int = 0) -> ReadHoldingRegistersRequest:
         self._count = count
@@ -110,10 +97,7 @@ class RtuFraming(Framing):
         self._framer = FramerRTU(self._decoder)
 
     def request(self, address: int, count: int) -> bytes:
-        """See :class:`Framing`.
-
-        `address`, `count`: first register and number of registers.
-        """
+        """See :class:`Framing`."""
         return self._framer.buildFrame(self._pdu(address, count))
 
     def length(self, head: bytes) -> int:
@@ -140,10 +124,7 @@ class TcpFraming(Framing):
         self._transaction = 0
 
     def request(self, address: int, count: int) -> bytes:
-        """See :class:`Framing`; each request has a transaction number of its own.
-
-        `address`, `count`: first register and number of registers.
-        """
+        """See :class:`Framing`; each request has a transaction number of its own."""
         self._transaction = self._transaction % 0xFFFF + 1
         return self._framer.buildFrame(self._pdu(address, count, self._transaction))
 

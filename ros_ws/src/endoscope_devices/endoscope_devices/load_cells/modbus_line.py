@@ -22,38 +22,24 @@ class LineLostError(DeviceError):
 
 
 class Line(ABC):
-    """A byte stream, used by one thread.
-
-    `name`: what messages call it.
-    """
+    """A byte stream, used by one thread; LineLostError where it goes away."""
 
     def __init__(self, name: str) -> None:
         self._name = name
 
     @abstractmethod
     def open(self) -> None:
-        """Connect.
-
-        Raises LineLostError: it cannot be opened; the message says what to look at.
-        """
+        """Connect; LineLostError, which says what to look at, where it cannot be opened."""
 
     def write(self, data: bytes) -> None:
-        """Send bytes.
-
-        Raises LineLostError: it went away.
-        """
+        """Send bytes."""
         try:
             self._send(data)
         except OSError as error:
             raise LineLostError(f'{self._name} is gone: {error}') from error
 
     def read(self, wanted: int, deadline_ns: int) -> bytes:
-        """Bytes that arrive until there are ``wanted`` or the deadline has passed.
-
-        `wanted`: most bytes.
-        `deadline_ns`: in ns of ``time.monotonic_ns``.
-        Raises LineLostError: it went away.
-        """
+        """Bytes that arrive until there are `wanted`, or to a deadline of ``time.monotonic_ns``."""
         data = b''
         try:
             while len(data) < wanted:
@@ -83,9 +69,6 @@ class SerialLine(Line):
     """A serial port, silent between frames as Modbus over Serial Line V1.02, 2.5.1.1 asks for.
 
     That is 3.5 characters, or 1.75 ms above 19200 baud.
-
-    `port`: device path.
-    `settings`: baud rate, parity, stop bits.
     """
 
     def __init__(self, port: str, settings: SerialSettings) -> None:
@@ -139,11 +122,9 @@ class SerialLine(Line):
 
 
 class TcpLine(Line):
-    """A TCP connection.
+    """A TCP connection to ``HOST`` or ``HOST:PORT``, by default port 502; `timeout` s to connect.
 
-    `address`: ``HOST`` or ``HOST:PORT``; the port is 502 by default.
-    `timeout`: for connecting, in s.
-    Raises DeviceError: the address cannot be understood.
+    DeviceError where the address cannot be understood.
     """
 
     def __init__(self, address: str, timeout: float = 1.0) -> None:

@@ -9,28 +9,19 @@ from endoscope_devices.load_cells.modbus_line import LONGEST, Line
 
 @dataclass(frozen=True)
 class RegisterReading:
-    """Registers with the time at which they were asked for.
+    """16-bit registers with the time at which they were asked for."""
 
-    `asked_ns`: in ns of ``time.monotonic_ns``.
-    `registers`: 16-bit values.
-    """
-
-    asked_ns: int
+    asked_ns: int  # of ``time.monotonic_ns``
     registers: tuple[int, ...]
 
 
 class RegisterReader:
-    """One question at a time on one line.
+    """One question at a time on one line, which the caller has opened.
 
     Modbus RTU replies do not say which request they answer: a late one looks like the answer to the
-    next.  So after a silence, and after bytes that nobody asked for, a fence is put up: registers
+    next. So after a silence, and after bytes that nobody asked for, a fence is put up: registers
     are asked for in another number, and until the answer to that has come, which a transmitter
     gives in order, nothing counts.
-
-    `line`: opened by the caller.
-    `framing`: RTU or TCP.
-    `reply_timeout`: in s.
-    `unexpected`: bytes that came without a question.
     """
 
     def __init__(self, line: Line, framing: Framing, reply_timeout: float) -> None:
@@ -38,15 +29,10 @@ class RegisterReader:
         self._framing = framing
         self._timeout_ns = round(reply_timeout * 1e9)
         self._fenced = False
-        self.unexpected = 0
+        self.unexpected = 0  # bytes that came without a question
 
     def read(self, address: int, count: int) -> RegisterReading:
-        """Read ``count`` registers from ``address`` on.
-
-        `address`, `count`: first register and number of registers.
-        Raises ReplyError: no acceptable reply in time.
-        Raises LineLostError: the line went away.
-        """
+        """Read registers; ReplyError where no acceptable reply comes in time."""
         waiting = len(self._line.read(LONGEST, 0))
         self.unexpected += waiting
         if waiting or self._fenced:

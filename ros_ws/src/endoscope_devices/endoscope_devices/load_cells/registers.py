@@ -23,15 +23,10 @@ REGISTER_TYPES = {
 
 
 def decode_number(registers: Sequence[int], kind: str, big_word_first: bool) -> float:
-    """A number from its registers.
+    """A number in counts, of a type `kind` of ``REGISTER_TYPES``, from its 16-bit registers.
 
     Bytes within a register are big-endian (Modbus Application Protocol V1.1b3, section 4.2); the
-    order of registers is the maker's choice.
-
-    `registers`: as many 16-bit values as the type has.
-    `kind`: a key of ``REGISTER_TYPES``.
-    `big_word_first`: whether the more significant register comes first.
-    Returns: in counts; may be NaN for ``float32``.
+    order of registers is the maker's choice. May be NaN for ``float32``.
     """
     words = registers if big_word_first else tuple(reversed(registers))
     raw = struct.pack(f'>{len(words)}H', *words)

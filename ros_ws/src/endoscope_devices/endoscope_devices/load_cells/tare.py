@@ -23,11 +23,7 @@ class TareError(EndoscopeError, RuntimeError):
 
 
 class TareWindow:
-    """Readings of the last second, of which a zero can be made.
-
-    `wires`: names of the W wires.
-    `limits`: when a tare is refused.
-    """
+    """Readings of W wires in the last second, of which a zero can be made."""
 
     def __init__(self, wires: Sequence[str], limits: TareLimits) -> None:
         self._wires = tuple(wires)
@@ -36,30 +32,21 @@ class TareWindow:
         self._moved_ns: int | None = None
 
     def add(self, time_ns: int, tension: tuple[float, ...]) -> None:
-        """Take a good reading.
-
-        `time_ns`: in ns of a monotonic clock.
-        `tension`: in N, shape (W,).
-        """
+        """Take a good reading (W,) in N at a monotonic time in ns."""
         self._readings.append((time_ns, tension))
         while self._readings[0][0] < time_ns - WINDOW_NS:
             self._readings.popleft()
 
     def note_shafts(self, time_ns: int, velocity: Sequence[float]) -> None:
-        """Take the speed of the motor shafts.
-
-        `time_ns`: in ns of the same clock.
-        `velocity`: in rad/s, shape (J,).
-        """
+        """Take the speed of the motor shafts (J,) in rad/s, at ns of the same clock."""
         if any(not abs(v) <= self._limits.shaft_speed for v in velocity):
             self._moved_ns = time_ns
 
     def mean(self, now_ns: int) -> tuple[float, ...]:
-        """Mean tension of the last second in N, shape (W,).
+        """Mean tension (W,) of the last second in N.
 
-        `now_ns`: in ns of the same clock.
-        Raises TareError: too few readings, the wires move, noise or drift or the tension itself is
-            too large.
+        TareError where readings are too few, the wires move, noise or drift or the tension is too
+        large.
         """
         since = now_ns - WINDOW_NS
         values = np.array([tension for time_ns, tension in self._readings if time_ns >= since])
@@ -88,11 +75,7 @@ class TareWindow:
 
 
 def with_zero(calibration: LoadCellCalibration, zero: Sequence[float]) -> LoadCellCalibration:
-    """The calibration with other zeros.
-
-    `calibration`: what it was.
-    `zero`: counts without tension, one a wire in the calibration's order.
-    """
+    """The calibration with other zeros: counts without tension, one a wire in its order."""
     cells = {
         name: replace(cell, zero=float(count))
         for (name, cell), count in zip(calibration.wires.items(), zero, strict=True)
@@ -101,11 +84,7 @@ def with_zero(calibration: LoadCellCalibration, zero: Sequence[float]) -> LoadCe
 
 
 def zero_after_tare(calibration: LoadCellCalibration, tension: Sequence[float]) -> list[float]:
-    """Counts without tension, once ``tension`` is taken for zero.
-
-    `calibration`: in force while the tension was measured.
-    `tension`: in N, one a wire in the calibration's order.
-    """
+    """Counts without tension, one a wire, once a ``tension`` (W,) in N is taken for zero."""
     return [
         cell.zero + cell.sign * value / cell.newton_per_count
         for cell, value in zip(calibration.wires.values(), tension, strict=True)

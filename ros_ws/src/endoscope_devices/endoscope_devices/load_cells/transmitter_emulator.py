@@ -19,14 +19,8 @@ RegisterSource = Callable[[float], Sequence[int] | None]
 class TransmitterEmulator(ClosedOnExit):
     """Serves registers by Modbus, each reading anew from ``source``.
 
-    Protocol and server are pymodbus's; what a test chooses is the registers' content.
-
-    `source`: what the registers hold.
-    `registers`: number of registers.
-    `unit`: Modbus address.
-    `serial_port`: path of a serial port for RTU; without one a TCP port of this machine is served.
-    `tcp_port`: which; 0 for any that is free.
-    `tcp_port`: where it listens.
+    Protocol and server are pymodbus's; what a test chooses is the registers' content. Without a
+    serial port for RTU, a TCP port of this machine is served.
     """
 
     def __init__(
@@ -39,7 +33,7 @@ class TransmitterEmulator(ClosedOnExit):
         tcp_port: int = 0,
     ) -> None:
         self.source = source
-        self.tcp_port = tcp_port
+        self.tcp_port = tcp_port  # where it listens; 0 at first for any that is free
         self._registers = registers
         self._unit = unit
         self._serial_port = serial_port

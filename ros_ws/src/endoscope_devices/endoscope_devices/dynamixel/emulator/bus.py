@@ -44,16 +44,13 @@ class EmulatedBus:
     """A line with servos, served by a thread.
 
     Bytes take the time that the line's speed says, both ways; a servo that is set to another speed
-    than the line hears nothing.
-
-    `servos`: what is on the line.
-    `link`: a path that shall lead to the terminal whenever it is plugged in, as udev's do.
-    `faults`: faults in force; change them inside :meth:`paused`.
+    than the line hears nothing. The path `link` leads to the terminal while it is plugged in, as
+    udev's do.
     """
 
     def __init__(self, servos: Sequence[EmulatedServo], link: Path | None = None) -> None:
         self.servos = {servo.value(table.ID): servo for servo in servos}
-        self.faults = LineFaults()
+        self.faults = LineFaults()  # in force; change them inside :meth:`paused`
         self._link = link
         self._lock = threading.RLock()
         self._reader = PacketReader()
@@ -138,11 +135,7 @@ class EmulatedBus:
             self.servos[device].restart(time.monotonic())
 
     def supply(self, device: int, volts: float) -> None:
-        """Change the voltage of a servo; below 6 V it is off, and restarts when that is over.
-
-        `device`: its id.
-        `volts`: V.
-        """
+        """Change a servo's voltage in V; below 6 V it is off, and restarts when that is over."""
         with self.paused():
             servo = self.servos[device]
             was_off = servo.supply <= 0.0

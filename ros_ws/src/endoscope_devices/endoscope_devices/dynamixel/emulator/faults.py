@@ -6,23 +6,14 @@ from random import Random
 
 @dataclass
 class LineFaults:
-    """Faults in force on a line.
+    """Faults in force on a line."""
 
-    `silent`: ids of servos whose cable is out.
-    `damage_rate`: share of packets, both ways, in which bits are flipped.
-    `bits`: how many bits at most in each of them.
-    `delay_s`: by how much the next answers are late.
-    `delayed`: how many they are.
-    `repeated`: how many of the next answers are sent twice.
-    `chance`: source of chance.
-    """
-
-    silent: set[int] = field(default_factory=set)
-    damage_rate: float = 0.0
-    bits: int = 3
-    delay_s: float = 0.0
-    delayed: int = 0
-    repeated: int = 0
+    silent: set[int] = field(default_factory=set)  # ids of servos whose cable is out
+    damage_rate: float = 0.0  # share of packets, both ways, in which bits are flipped
+    bits: int = 3  # at most in each of them
+    delay_s: float = 0.0  # by which the next answers are late
+    delayed: int = 0  # how many they are
+    repeated: int = 0  # how many of the next answers are sent twice
     chance: Random = field(default_factory=lambda: Random(1))
 
     def damaged(self, packet: bytes) -> bytes:

@@ -11,14 +11,7 @@ from endoscope_core.closed_on_exit import ClosedOnExit
 
 
 class EmulatorProcess(ClosedOnExit):
-    """Starts an emulated bus and commands it.
-
-    `ids`: of the servos.
-    `baud`: that the servos are set to, in bits per second.
-    `link`: a path that shall lead to the terminal.
-    `stiffness`: of the spring on each shaft, in N m/rad.
-    `port`: device file for the client.
-    """
+    """An emulated bus in a process: servos at `baud` bit/s with springs in N m/rad on shafts."""
 
     def __init__(
         self,
@@ -33,7 +26,7 @@ class EmulatorProcess(ClosedOnExit):
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
-        self.port = self._read()
+        self.port = self._read()  # device file for the client
         if not self.port:
             raise RuntimeError('the emulator does not start')
 

@@ -66,16 +66,7 @@ class ErrorNumber(IntEnum):
 
 
 class EmulatedServo:
-    """A servo that is advanced by the time of its bus.
-
-    `device`: id.
-    `baud_code`: baud Rate(8).
-    `model`: model number.
-    `shaft`: what it turns.
-    `trace`: time in s and shaft angle in rad, each millisecond.
-    `supply`: input voltage in V.
-    `stuck`: addresses of registers that acknowledge a write and do not keep it, as worn cells do.
-    """
+    """A servo that is advanced by the time of its bus; `baud_code` as in Baud Rate(8)."""
 
     def __init__(
         self,
@@ -85,8 +76,10 @@ class EmulatedServo:
         shaft: FirstOrderShaft | None = None,
     ) -> None:
         self.shaft = FirstOrderShaft() if shaft is None else shaft
+        # Time in s and shaft angle in rad, each ms.
         self.trace: deque[tuple[float, float]] = deque(maxlen=_TRACE_LENGTH)
-        self.supply = 12.0
+        self.supply = 12.0  # V
+        # Addresses of registers that acknowledge a write and do not keep it, as worn cells do.
         self.stuck: set[int] = set()
         self._memory = bytearray(TABLE_SIZE)
         for register in CONTROL_TABLE:
@@ -114,10 +107,7 @@ class EmulatedServo:
         return self.supply > 0.0 and now >= self._silent_until
 
     def advance(self, now: float) -> None:
-        """Let time pass in it.
-
-        `now`: time of the bus in s.
-        """
+        """Let time pass in it, to `now` in s of the bus."""
         if not self._started:
             self._started = True
             self._begin = self._now = self._born = self._heard = now

@@ -11,33 +11,20 @@ class FirstOrderShaft:
     """A shaft that closes on its goal exponentially, against a spring, as far as current allows.
 
     ``x' = (goal - x) / time_constant``, no faster than the motor without load; it stops where the
-    spring needs more than the allowed current.  Without torque it stays where it is, for the gear
+    spring needs more than the allowed current. Without torque it stays where it is, for the gear
     holds it.
-
-    `position`, `velocity`: rad and rad/s.
-    `time_constant`: s; the simulated plant's servo lag.
-    `stiffness`: spring in N m/rad about ``rest``.
-    `rest`: where the spring pulls to, rad.
-    `max_speed`: rad/s.
-    `torque_constant`: n m/A.
     """
 
-    position: float = math.pi
-    velocity: float = 0.0
-    time_constant: float = 0.06
-    stiffness: float = 0.2
-    rest: float = math.pi
-    max_speed: float = MODELS[1020].no_load_speed
-    torque_constant: float = MODELS[1020].torque_constant
+    position: float = math.pi  # rad
+    velocity: float = 0.0  # rad/s
+    time_constant: float = 0.06  # s; the simulated plant's servo lag
+    stiffness: float = 0.2  # of the spring about ``rest``, N m/rad
+    rest: float = math.pi  # where the spring pulls to, rad
+    max_speed: float = MODELS[1020].no_load_speed  # rad/s
+    torque_constant: float = MODELS[1020].torque_constant  # N m/A
 
     def advance(self, goal: float | None, limit: float, dt: float) -> float:
-        """Move for a while.
-
-        `goal`: rad; None without torque.
-        `limit`: largest current in A.
-        `dt`: s.
-        Returns: current in A.
-        """
+        """Move for dt s to a goal in rad (None: no torque), within a limit in A; current in A."""
         if goal is None:
             self.velocity = 0.0
             return 0.0
