@@ -19,17 +19,10 @@ _POORER = 5.0
 def read(
     tension: Single, generator: Generator, period: int = 1, zero: float = 0.0, gain: float = 0.0
 ) -> Single:
-    """Readings of tensions (R, N, 4) in N each so many ms, joined by straight lines at 1 kHz.
+    """Readings of noise-free tensions (R, N, 4) in N at 1 kHz, one each `period` ms.
 
-    Parameters
-    ----------
-    tension : ndarray, shape (R, N, 4)
-        Without noise, N at 1 kHz.
-    generator : numpy.random.Generator
-    period : int
-        Between readings in ms.
-    zero, gain : float
-        Standard deviations of the cells' zero errors in N and of their relative gain errors.
+    `zero` and `gain` are standard deviations of the cells' zero errors in N and relative gain
+    errors; readings are joined by straight lines at 1 kHz.
     """
     recordings, samples, wires = tension.shape
     cells = (recordings, 1, wires)

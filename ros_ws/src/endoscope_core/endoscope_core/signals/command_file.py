@@ -47,10 +47,7 @@ class CommandTable:
 def write_command_file(
     path: str | Path, time: ArrayLike, angle: ArrayLike, joints: Sequence[str] = JOINTS
 ) -> None:
-    """Write time (N,) in s and angle (N, J) in rad as a command file, whole or not at all.
-
-    CommandFileError where the shape is another, a number is not finite, or time does not increase.
-    """
+    """Write time (N,) in s and angle (N, J) in rad, whole or not at all; else CommandFileError."""
     time, angle = np.asarray(time, float), np.asarray(angle, float)
     table = CommandTable(tuple(joints), time, angle)
     _check(table, str(path))
@@ -63,11 +60,7 @@ def write_command_file(
 
 
 def read_command_file(path: str | Path, joints: Sequence[str] = JOINTS) -> CommandTable:
-    """Read a command file, which must have columns for `joints`; the table has them in this order.
-
-    CommandFileError where it cannot be read, lacks a column, or a value is no finite number or out
-    of order.
-    """
+    """Read a command file into the order of `joints`; CommandFileError where it is not usable."""
     path = Path(path)
     wanted = (TIME, *joints)
     try:

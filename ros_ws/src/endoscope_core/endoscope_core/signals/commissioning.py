@@ -70,10 +70,7 @@ def multisine(amplitude: float, duration: float, lowest: float = 0.2, lines: int
 
 
 def chirp(amplitude: float, duration: float, start: float = 0.2, stop: float = 4.0) -> Signal:
-    """Exponential sweep from `start` to `stop` Hz.
-
-    The amplitude (rad) falls as the square root of the frequency rises.
-    """
+    """Exponential sweep from `start` to `stop` Hz, its amplitude (rad) falling as 1/sqrt(f)."""
     growth = np.log(stop / start) / duration
 
     def evaluate(time: FloatArray) -> tuple[FloatArray, FloatArray]:

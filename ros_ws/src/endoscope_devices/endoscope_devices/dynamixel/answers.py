@@ -29,7 +29,7 @@ class AnswerCollector:
         self.stray = 0
         self.reader = PacketReader()
         self._devices = tuple(devices)
-        self._size = size
+        self._size = size  # data bytes of each answer
         self._fast = fast
 
     @property

@@ -208,10 +208,7 @@ def sync_read_request(address: int, size: int, devices: Sequence[int], fast: boo
 
 
 def sync_write_request(address: int, size: int, data: Mapping[int, bytes]) -> bytes:
-    """Bytes that set the same registers of several servos, which do not answer; data by id.
-
-    ValueError for an id that no servo has, or data of another size.
-    """
+    """Bytes that set the same registers, `data` by id, of several servos, which do not answer."""
     parameters = _words(address, size)
     for device, value in data.items():
         if not 0 <= device <= LARGEST_ID or len(value) != size:

@@ -48,10 +48,7 @@ class AuroraPort:
         self._guard.set_baud(_FRAME_BAUD)
 
     def ask(self, command: str) -> str:
-        """Send a command with its colon, to which ndicapi adds the CRC; give its reply without CRC.
-
-        TrackerReplyError for no reply, a wrong CRC, or an error of the tracker.
-        """
+        """Reply, without CRC, to a command with its colon but no CRC; or TrackerReplyError."""
         if self._guard is None:
             raise TrackerReplyError(command, 'not connected', silent=True)
         try:

@@ -68,10 +68,7 @@ class NdiLineGuard:
             raise DeviceError(f'serial port {self._path} is gone: {error}') from error
 
     def reset(self) -> None:
-        """Send a serial break, after which the tracker is at 9600 baud (Aurora API Guide, RESET).
-
-        DeviceError where it does not say that it was reset.
-        """
+        """Send a serial break; the tracker says it is at 9600 baud (Aurora API Guide, RESET)."""
         try:
             self._port.baudrate = 9600
             termios.tcflush(self._port.fileno(), termios.TCIOFLUSH)

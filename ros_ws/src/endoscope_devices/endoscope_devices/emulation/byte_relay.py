@@ -19,7 +19,7 @@ def faithful(data: bytes) -> Sequence[tuple[float, bytes]]:
 
 
 class ByteRelay:
-    """A thread between two ends, which the caller closes; it ends when either end goes away.
+    """A thread between two file descriptors, closed by the caller; it ends when either goes away.
 
     `tap_for` gives the tap in force at an end from which bytes come, ``'near'`` or ``'far'``.
     """

@@ -43,11 +43,7 @@ class TareWindow:
             self._moved_ns = time_ns
 
     def mean(self, now_ns: int) -> tuple[float, ...]:
-        """Mean tension (W,) of the last second in N.
-
-        TareError where readings are too few, the wires move, noise or drift or the tension is too
-        large.
-        """
+        """Mean tension (W,) of the last second in N; TareError where it is unfit to be a zero."""
         since = now_ns - WINDOW_NS
         values = np.array([tension for time_ns, tension in self._readings if time_ns >= since])
         if len(values) < _FEWEST:
