@@ -12,6 +12,7 @@ PEERS = 'ROS_STATIC_PEERS'
 PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 PROFILES_OF_FAST_DDS_3 = 'FASTDDS_DEFAULT_PROFILES_FILE'
 """Its name from ROS 2 Kilted on, which heeds the old one too and warns of it."""
+_MIDDLEWARE = 'fastrtps'
 _RCLPY_OF_JAZZY = 7
 LOOPBACK = Path(__file__).with_name('this_machine.xml')
 # OFF is nobody but this process, for which Fast DDS listens at every address all the same.
@@ -38,14 +39,16 @@ def stay_on_this_machine() -> None:
             'alone, SUBNET for other machines too, or SYSTEM_DEFAULT for what Fast DDS does by '
             'itself'
         )
+    from rclpy.utilities import get_rmw_implementation_identifier
+
     os.environ[RANGE] = chosen
     if chosen in _ON_THIS_MACHINE and not os.environ.get(PEERS):
         heeded = _heeded()
         if not any(name in os.environ for name in heeded):
             os.environ[heeded[0]] = str(LOOPBACK)
             # The profile says where to look for others; for LOCALHOST, ROS 2 would add the shared
-            # memory to its transport.
-            if chosen == 'LOCALHOST':
+            # memory to its transport. Another middleware knows no profile, and keeps to the range.
+            if chosen == 'LOCALHOST' and _MIDDLEWARE in get_rmw_implementation_identifier():
                 os.environ[RANGE] = 'SYSTEM_DEFAULT'
 
 

@@ -56,6 +56,18 @@ def test_by_default_no_other_machine_can_reach_the_ports(given):
     assert shown(**given) == ('SYSTEM_DEFAULT', False, {LOOPBACK})
 
 
+def test_a_middleware_that_knows_no_profile_keeps_to_this_machine_by_its_range(monkeypatch):
+    for name in NAMES:
+        # Set first, so that what is set afterwards goes with the test.
+        monkeypatch.setenv(name, '')
+        monkeypatch.delenv(name)
+    monkeypatch.setattr(
+        'rclpy.utilities.get_rmw_implementation_identifier', lambda: 'rmw_cyclonedds_cpp'
+    )
+    stay_on_this_machine()
+    assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+
+
 def test_nobody_is_heard_at_no_address_but_the_loopback():
     found, _, addresses = shown(ROS_AUTOMATIC_DISCOVERY_RANGE='OFF')
     assert (found, addresses) == ('OFF', {LOOPBACK})
