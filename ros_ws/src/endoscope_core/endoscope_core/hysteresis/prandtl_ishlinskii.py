@@ -19,6 +19,9 @@ from endoscope_core.hysteresis.inverse_safety import (
     check_range,
 )
 
+SMALLEST_FIRST_WEIGHT = 1.0 / GREATEST_INVERSE_SLOPE
+LONGEST_THRESHOLD = 3.0
+
 
 @njit(cache=True)
 def play_stack_step(
@@ -39,10 +42,6 @@ def play_stack_path(
         plays = play_stack_step(thresholds, plays, driver[k])
         states[k] = plays
     return states
-
-
-SMALLEST_FIRST_WEIGHT = 1.0 / GREATEST_INVERSE_SLOPE
-LONGEST_THRESHOLD = 3.0
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,9 @@ from endoscope_explain.search.screen import background, directions, promises
 
 Array = NDArray[np.float64]
 
+MOST_RIVALS = 3
+MARGIN = 1.15
+"""How far a proposed motion may go beyond the tensions and angles that were recorded."""
 NOMINAL_BAND = 0.05
 """Relative freedom that nominal parameters still have after a first recording."""
 REFIT_STEPS = 3
@@ -106,11 +109,6 @@ def is_safe(recording: Recording, tension_limit: float, bending_limit: float) ->
         recording.tension.values.max() <= tension_limit
         and np.abs(recording.bending.values).max() <= bending_limit
     )
-
-
-MOST_RIVALS = 3
-MARGIN = 1.15
-"""How far a proposed motion may go beyond the tensions and angles that were recorded."""
 
 
 def propose(

@@ -36,6 +36,9 @@ from endoscope_explain.recording.signals import QUANTITY_UNITS, signal_name
 
 Array = NDArray[np.float64]
 
+TICK = 1.0e-3
+ANALYSIS_PERIOD = 0.01
+"""Length in s over which fast channels are averaged: 100 Hz, ten times the servo's bandwidth."""
 WINDOW = 250
 """Raw samples over which the scatter is estimated."""
 SIGNIFICANT = 1.3
@@ -63,11 +66,6 @@ def fast_scatter(values: Array, white: float) -> Array:
     local = local[WINDOW // 2 : WINDOW // 2 + len(values)]
     quiet = max(white**2, float(np.quantile(local, QUIET)))
     return np.where(local > SIGNIFICANT**2 * quiet, np.sqrt(local), 0.0)
-
-
-TICK = 1.0e-3
-ANALYSIS_PERIOD = 0.01
-"""Length in s over which fast channels are averaged: 100 Hz, ten times the servo's bandwidth."""
 
 
 @dataclass(frozen=True)

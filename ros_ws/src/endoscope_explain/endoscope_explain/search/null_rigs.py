@@ -144,7 +144,7 @@ class NullRigs:
         most promising ones stay far below (sequential Monte Carlo tests: Besag, Clifford,
         Biometrika 78, 1991).
         """
-        drawn, doubt = (np.max(each, axis=0) for each in (self.screened.drawn, self.screened.doubt))
+        null = self.as_screened()
         ranked = np.argsort(self.screened.drawn, axis=0)[::-1][:FITTED]
         slopes: dict[int, Array] = {}
 
@@ -154,17 +154,19 @@ class NullRigs:
                 _gain(self.behind, self.ways[i], slopes[int(i)], off) for i in ranked[:, rig]
             )
 
-        order = np.argsort(-drawn)
+        order = np.argsort(-null.drawn)
         for first in range(0, len(order), AT_ONCE):
             rigs = order[first : first + AT_ONCE]
             wanted = [int(i) for i in np.unique(ranked[:, rigs]) if int(i) not in slopes]
             terms = [self.ways[i].candidate for i in wanted]
             found = parallel_map(lambda term: _slopes(self.behind, term), terms, jobs)
             slopes |= dict(zip(wanted, found, strict=True))
+            drawn = null.drawn.copy()
             drawn[rigs] = parallel_map(fitted, [int(rig) for rig in rigs], jobs)
-            if Null(drawn, doubt).p_value(gain) > level or np.max(drawn[rigs]) < CLEAR * gain:
+            null = replace(null, drawn=drawn)
+            if null.p_value(gain) > level or np.max(drawn[rigs]) < CLEAR * gain:
                 break
-        return Null(drawn, doubt)
+        return null
 
 
 def null_rigs(

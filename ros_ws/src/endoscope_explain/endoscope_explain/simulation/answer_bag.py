@@ -34,6 +34,12 @@ from endoscope_explain.recording.shaft_input import INPUTS, input_topic
 from endoscope_explain.recording.signals import motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_running_stamps
 
+POSE_TOPIC = 'tracker/measured_cp'
+
+READ_DELAYS = (0.0, TICK)
+"""Seconds from a stamp to its reading that a rig at 1 kHz may have."""
+
+Stamps = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
 
@@ -132,14 +138,6 @@ def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> 
     chosen = series.select([names[joint] for joint in joints])
     scale = rig.joints.gear if desired else 1.0
     return BagCommands(series.topic, joints, chosen.stamp_ns, scale * chosen.require('position'))
-
-
-POSE_TOPIC = 'tracker/measured_cp'
-
-READ_DELAYS = (0.0, TICK)
-"""Seconds from a stamp to its reading that a rig at 1 kHz may have."""
-
-Stamps = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

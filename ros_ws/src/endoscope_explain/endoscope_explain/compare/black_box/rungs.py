@@ -15,6 +15,10 @@ from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
 
+Mask = NDArray[np.bool_]
+
+LEARNT = ('bending', 'tension', 'shaft_effort', 'shaft_position')
+BASE = 'refitted'
 GRID_S = 0.01
 PLAY_WIDTHS = (0.1, 0.3, 0.6, 1.0)
 """Full widths in rad of play operators, the memory of hysteresis."""
@@ -52,12 +56,6 @@ def _lagging(u: Array, lag: float) -> Array:
     share = 1.0 - np.exp(-GRID_S / lag)
     filtered, _ = lfilter([share], [1.0, share - 1.0], u, zi=[(1.0 - share) * u[0]])
     return np.asarray(filtered)
-
-
-Mask = NDArray[np.bool_]
-
-LEARNT = ('bending', 'tension', 'shaft_effort', 'shaft_position')
-BASE = 'refitted'
 
 
 @dataclass(frozen=True)
