@@ -62,15 +62,14 @@ def require_known(kind: str, names: Collection[str], known: Collection[str]) -> 
 
 
 def of_cases(
-    args: argparse.Namespace, strata: Sequence[str], function: Callable[..., Any], *before: Any
+    jobs: int, cases: Sequence[tuple[str, int]], function: Callable[..., Any], *before: Any
 ) -> Iterator[tuple[tuple[str, int], Future[Any]]]:
     """Yield each case with `function(*before, stratum, seed)`, as they are done."""
     from concurrent.futures import as_completed
 
     from endoscope_core.worker_pool import worker_pool
 
-    cases = [(name, seed) for name in strata for seed in args.seeds]
-    with worker_pool(args.jobs) as pool:
+    with worker_pool(jobs) as pool:
         futures = {pool.submit(function, *before, *case): case for case in cases}
         for future in as_completed(futures):
             yield futures[future], future

@@ -1,7 +1,6 @@
 """`endoscope bench criteria`: derive the numbers by which explanations are judged."""
 
 import argparse
-import json
 from pathlib import Path
 
 
@@ -21,11 +20,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print, and write if asked; return 0."""
     from endoscope_benchmarks.concealed.criteria import bank_of, derived, sensitivity, source
-    from endoscope_benchmarks.concealed.trial import Row
+    from endoscope_benchmarks.concealed.record import rows_of
     from endoscope_core.atomic_output import write_text
     from endoscope_core.errors import EndoscopeError
 
-    rows = [Row(**row) for file in args.rows for row in json.loads(file.read_text())]
+    rows = [row for file in args.rows for row in rows_of(file).values()]
     bank = bank_of(rows)
     try:
         criteria = derived(bank)

@@ -45,8 +45,9 @@ def run(args: argparse.Namespace) -> int:
     print(versions(names), flush=True)
     with worker_pool(args.jobs) as pool:
         shown = dict(zip(names, pool.map(example, names), strict=True))
+    cases = [(name, seed) for name in args.stratum for seed in args.seeds]
     found = []
-    for _, future in of_cases(args, args.stratum, answers, names):
+    for _, future in of_cases(args.jobs, cases, answers, names):
         found += future.result()
         print('\n'.join(answer.line() for answer in future.result()), flush=True)
     print('\n' + table(shown, found))

@@ -16,7 +16,7 @@ from endoscope_benchmarks.concealed.strength import left
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.criteria import REACH
 from endoscope_explain.explain_recording import explain_recording
-from endoscope_explain.explanation import Estimate, Explanation
+from endoscope_explain.explanation import Estimate, Explanation, NamedEffect
 
 GOOD = 1.3
 """Rmse over noise up to which a second recording is predicted."""
@@ -50,6 +50,8 @@ class Row(Judgement):
     beyond_form: float = math.nan
     # Error of each number over what its interval would allow on that side with a `REACH` of one.
     errors: tuple[float, ...] = ()
+    # Evidence of each named effect, with how many rivals it has, and whether it is right.
+    evidence: tuple[dict[str, float], ...] = ()
 
     def line(self) -> str:
         """The case in one line."""
@@ -107,8 +109,15 @@ def row_of(case: Case) -> Row:
         shares=tuple(sorted(shares.values(), reverse=True)),
         beyond_form=said.beyond_form,
         errors=tuple(REACH * error for error in errors),
+        evidence=tuple(_evidence(effect, case) for effect in said.effects),
         **vars(judgement),
     )
+
+
+def _evidence(effect: NamedEffect, case: Case) -> dict[str, float]:
+    right = any(is_of(effect.id, effect.joint, law) for law in case.laws)
+    rivals = float(len(effect.alternatives))
+    return {**effect.evidence, 'rivals': rivals, 'right': float(right)}
 
 
 def _shares(said: Explanation, joint: str) -> dict[str, float]:
