@@ -6,8 +6,8 @@ from endoscope_bringup.cli import main
 from endoscope_core.physics import PlantDescription, load_plant
 from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.nominal_plant_file import MEANING
-from endoscope_core.physics.plant_file import REACH, plant_from_mapping
+from endoscope_core.physics.plant_file import plant_from_mapping
+from endoscope_core.physics.plant_numbers import NUMBERS
 
 
 def test_lists_every_effect(capsys):
@@ -62,9 +62,9 @@ def test_a_complete_plant_is_printed_that_is_the_nominal_one(tmp_path, capsys):
     text = capsys.readouterr().out
     (tmp_path / 'plant.yaml').write_text(text)
     assert load_plant(tmp_path / 'plant.yaml') == PlantDescription()
-    for key in REACH:
+    for key, known in NUMBERS.items():
         assert f'{key}: ' in text
-        assert MEANING[key] in text
+        assert known.meaning in text
 
 
 def test_the_catalogue_as_json(capsys):

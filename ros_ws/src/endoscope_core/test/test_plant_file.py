@@ -16,7 +16,7 @@ from endoscope_core.physics import (
 )
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions.interpolation import NODES
-from endoscope_core.physics.plant_file import REACH
+from endoscope_core.physics.plant_numbers import NUMBERS
 
 
 def written(tmp_path, text):
@@ -127,9 +127,8 @@ def test_every_parameter_has_a_reach_that_holds_its_nominal_value():
     nominal = asdict(JointParameters()) | asdict(SensorParameters())
     nominal['friction_profile'] = 0.0
     for key, value in nominal.items():
-        low, high, _ = REACH[key]
-        assert low <= value <= high
-    assert set(REACH) == set(nominal)
+        assert NUMBERS[key].low <= value <= NUMBERS[key].high
+    assert set(NUMBERS) == set(nominal)
 
 
 def test_unknown_terms_survive_the_round_trip(tmp_path):

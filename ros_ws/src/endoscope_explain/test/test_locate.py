@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
-from endoscope_explain.decide.conclusions import NOMINAL
 from endoscope_explain.explanation import Estimate, Explanation, NamedEffect, Verdict
-from endoscope_explain.fit.free_parameters import FRICTION_PROFILE_NAMES
 from endoscope_explain.locate.chain_cut import cut_at_motor
 from endoscope_explain.locate.locating import locate_effects, locate_unknown
 from endoscope_explain.locate.regime import information
@@ -73,11 +71,6 @@ def test_information_is_zero_for_a_state_that_tells_nothing():
     assert information(energy, active, np.ones(1000, bool)) == pytest.approx(0.0, abs=1e-9)
     energy[~active] = 0.0
     assert information(energy, active, np.ones(1000, bool)) == pytest.approx(np.log(2), rel=1e-3)
-
-
-def test_every_nominal_parameter_has_a_stage():
-    names = {f.name for f in dataclasses.fields(PLANT.joints['bend_x'])}
-    assert set(NOMINAL) == names - {'friction_profile'} | set(FRICTION_PROFILE_NAMES)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from endoscope_core.physics import load_plant
 from endoscope_explain.fit.evidence import misfit
-from endoscope_explain.fit.free_parameters import BAND, FORM_SPREAD
+from endoscope_explain.fit.free_parameters import BAND, FORM_INDICES
 from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.recording import recording_from_bag
@@ -35,5 +35,5 @@ def test_the_plant_as_described_leaves_the_noise_and_its_refit_stays_there():
             found, true = item.value(float(coordinate)), item.value(float(truth))
             if item.name in ('pretension', 'wire_stiffness', 'capstan_exponent'):
                 assert found == pytest.approx(true, rel=0.02)
-            elif item.name in FORM_SPREAD:
-                assert abs(found - true) < 0.5 * FORM_SPREAD[item.name]
+            elif item.name in FORM_INDICES:
+                assert abs(found - true) < 0.5 * item.unit

@@ -23,7 +23,7 @@ from endoscope_core.physics import (
     load_plant,
     save_plant,
 )
-from endoscope_core.physics.plant_file import REACH
+from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_core.signals.command_file import read_command_file, write_command_file
 from endoscope_devices.load_cells.calibration_file import load_calibration
 
@@ -109,7 +109,7 @@ class PlantCase:
         plant = load_plant(self._path)
         sets = [asdict(joint) for joint in plant.joints.values()] + [asdict(plant.sensors)]
         return all(
-            REACH[key][0] <= number <= REACH[key][1]
+            NUMBERS[key].low <= number <= NUMBERS[key].high
             for parameters in sets
             for key, value in parameters.items()
             for number in np.atleast_1d(value)

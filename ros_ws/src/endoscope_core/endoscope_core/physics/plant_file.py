@@ -20,50 +20,13 @@ from endoscope_core.physics.description import (
 from endoscope_core.physics.functions import FUNCTIONS, describe_place
 from endoscope_core.physics.layout import PROFILE_TERMS
 from endoscope_core.physics.packing import with_nominal_in_place
+from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_core.physics.recording import recording_faults
 from endoscope_core.strict_yaml import YamlError, load_yaml
 
 UNKNOWN_TERM = 'unknown_term'
 """Id of what is added to the plant and is no effect of the catalogue."""
 JOINT_NAMES = ('bend_x', 'bend_y')
-
-REACH: Mapping[str, tuple[float, float, str]] = {
-    'pretension': (0.0, 1e3, 'N'),
-    'pretension_profile': (-1.0, 1.0, ''),
-    'friction_profile': (-5.0, 5.0, ''),
-    'joint_rest_angle': (-math.pi, math.pi, 'rad'),
-    'joint_presliding_spread': (0.0, 5.0, ''),
-    'wire_stiffness': (1.0, 1e7, 'N/m'),
-    'joint_radius': (1e-4, 0.1, 'm'),
-    'pulley_radius': (1e-4, 0.1, 'm'),
-    'capstan_exponent': (0.0, 10.0, ''),
-    'joint_stiffness': (0.0, 10.0, 'N m/rad'),
-    'joint_damping': (1e-7, 10.0, 'N m s/rad'),
-    'joint_friction': (0.0, 10.0, 'N m'),
-    'joint_presliding': (1e-5, math.pi, 'rad'),
-    'motor_bandwidth': (0.1, 1e4, 'rad/s'),
-    'motor_damping_ratio': (0.01, 100.0, ''),
-    'load_cell_noise': (0.0, 1e3, 'N'),
-    'load_cell_resolution': (0.0, 1e3, 'N'),
-    'load_cell_rate': (0.1, 1e5, 'Hz'),
-    'tracker_noise': (0.0, math.pi, 'rad'),
-    'tracker_rate': (0.1, 1e5, 'Hz'),
-    'encoder_counts': (1.0, 2.0**32, 'counts a turn'),
-    'velocity_resolution': (0.0, 1e3, 'rad/s'),
-    'effort_noise': (0.0, 1e3, 'N m'),
-    'effort_resolution': (0.0, 1e3, 'N m'),
-}
-"""Smallest and largest value of each key that a steerable instrument drawn by wires can have.
-
-A wire of 1 mm breaks at about 1 kN, and one of 20 mm length and 1 mm2 stiffens to E A / L = 1e7 N/m
-(steel, E = 2e11 Pa). A pulley finer than the wire, or one of 0.2 m, is none. An exponent of 10 is
-friction of 1 over one and a half turns and passes 1/22000 of the tension. Joint and motor are
-bounded by a finger's moment (10 N m) and by servos between 0.02 Hz and 1.6 kHz; a sensor's
-resolution by what it measures at most.
-"""
-
-ENDLESS = ('wire_stiffness', 'motor_bandwidth')
-"""Keys that a plant file may have as `.inf`, for a rigid wire and a servo without lag."""
 
 
 class PlantFileError(EndoscopeError, ValueError):
@@ -214,12 +177,13 @@ def _value(key: str, value: Any, where: str) -> Any:
 
 def _within_reach(key: str, value: Any, where: str) -> float:
     number = _number(value, where)
-    low, high, unit = REACH[key]
-    if key in ENDLESS and number == math.inf:
-        number = high
+    known = NUMBERS[key]
+    if known.endless and number == math.inf:
+        number = known.high
     # NaN passes: the parameters themselves refuse it, with a better word.
-    if number < low or number > high:
-        raise ValueError(f'{where} is {number:g}: give {low:g} to {high:g} {unit}'.rstrip())
+    if number < known.low or number > known.high:
+        reach = f'{known.low:g} to {known.high:g} {known.unit}'.rstrip()
+        raise ValueError(f'{where} is {number:g}: give {reach}')
     return number
 
 

@@ -9,7 +9,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import AuditReport
 from endoscope_explain.decide.conclusions import has_changed, verdict_by_stage
 from endoscope_explain.explanation import Explanation, NamedEffect, NominalEstimate, Verdict
-from endoscope_explain.fit.free_parameters import FORM_SPREAD
+from endoscope_explain.fit.free_parameters import nominal_number
 
 
 def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[NamedEffect, ...]:
@@ -62,7 +62,7 @@ def changed_parameters(estimates: Mapping[str, NominalEstimate]) -> dict[str, No
 
     def reach(item: tuple[str, NominalEstimate]) -> float:
         name, e = item
-        if name in FORM_SPREAD:
+        if nominal_number(name).spread:
             return abs(e.value - e.nominal)
         return abs(math.log(e.value / e.nominal))
 

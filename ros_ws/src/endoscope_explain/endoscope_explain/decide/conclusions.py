@@ -11,6 +11,7 @@ from scipy.stats import norm
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Effect, Stage
 from endoscope_core.physics.effects import describe
+from endoscope_core.physics.layout import NOMINAL_KEYS
 from endoscope_explain.decide.decision import Decision, MissingTerm
 from endoscope_explain.explanation import (
     Candidate,
@@ -24,8 +25,8 @@ from endoscope_explain.explanation import (
 from endoscope_explain.fit.evidence import misfit
 from endoscope_explain.fit.free_parameters import (
     FITTED_NOMINAL,
-    FORM_SPREAD,
     FRICTION_PROFILE_NAMES,
+    nominal_number,
 )
 from endoscope_explain.fit.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
@@ -48,25 +49,9 @@ many that did not change, each with its own, one would mostly be said to differ.
 MOST = 0.5
 """Share of the misfit that names must explain where they leave more than another form would: with
 less, the main thing has no name."""
-NOMINAL = {
-    'pretension': (Stage.TRANSMISSION, 'N'),
-    'wire_stiffness': (Stage.TRANSMISSION, 'N/m'),
-    'joint_radius': (Stage.TRANSMISSION, 'm'),
-    'pulley_radius': (Stage.TRANSMISSION, 'm'),
-    'capstan_exponent': (Stage.TRANSMISSION, '-'),
-    'joint_stiffness': (Stage.JOINT, 'N m/rad'),
-    'joint_damping': (Stage.JOINT, 'N m s/rad'),
-    'joint_friction': (Stage.JOINT, 'N m'),
-    'joint_presliding': (Stage.JOINT, 'rad'),
-    'joint_presliding_spread': (Stage.JOINT, '-'),
-    'pretension_profile': (Stage.TRANSMISSION, '-'),
-    'joint_rest_angle': (Stage.JOINT, 'rad'),
-    **dict.fromkeys(FRICTION_PROFILE_NAMES, (Stage.TRANSMISSION, '-')),
-    'motor_bandwidth': (Stage.ACTUATOR, 'rad/s'),
-    'motor_damping_ratio': (Stage.ACTUATOR, '-'),
+NOMINAL_UNITS = {
+    name: nominal_number(name).unit or '-' for name in (*NOMINAL_KEYS, *FRICTION_PROFILE_NAMES)
 }
-"""Part of the chain and unit of each number of the nominal plant."""
-NOMINAL_UNITS = {name: unit for name, (_, unit) in NOMINAL.items()}
 
 
 def named(
@@ -148,7 +133,7 @@ def has_changed(name: str, estimate: NominalEstimate) -> bool:
     value, nominal = estimate.value, estimate.nominal
     reach = value - estimate.low if nominal < value else estimate.high - value
     outside = abs(value - nominal) > JOINTLY * reach
-    if name in FORM_SPREAD:
+    if nominal_number(name).spread:
         return outside and not estimate.in_band
     return outside and abs(np.log(value / nominal)) > CHANGED
 

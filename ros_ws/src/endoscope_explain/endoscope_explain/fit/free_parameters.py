@@ -10,14 +10,8 @@ from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.effects import describe, lacking
 from endoscope_core.physics.functions.interpolation import HIGH, LAG
 from endoscope_core.physics.functions.place import Place
-from endoscope_core.physics.layout import (
-    FRICTION_PROFILE,
-    JOINT_PRESLIDING_SPREAD,
-    JOINT_REST_ANGLE,
-    NOMINAL_KEYS,
-    PRETENSION_PROFILE,
-)
-from endoscope_core.physics.plant_file import REACH
+from endoscope_core.physics.layout import FRICTION_PROFILE, NOMINAL_KEYS
+from endoscope_core.physics.plant_numbers import NUMBERS, PlantNumber
 
 Array = NDArray[np.float64]
 
@@ -30,38 +24,24 @@ COORDINATE = 10.0
 _FURTHEST = 6.0
 """Standard deviations of its prior that a coefficient may reach."""
 LEAD_PRIOR = (1.0, 0.5)
-SCALED_NOMINAL = (
-    'pretension',
-    'wire_stiffness',
-    'capstan_exponent',
-    'joint_stiffness',
-    'joint_friction',
-    'joint_presliding',
-    'joint_damping',
-    'motor_bandwidth',
-    'motor_damping_ratio',
-)
+SCALED_NOMINAL = tuple(key for key in NOMINAL_KEYS if NUMBERS[key].scaled)
 """Numbers of the plant that are known but for a factor. Radii are drawn and machined."""
 FRICTION_PROFILE_NAMES = tuple(f'friction_profile_{term}' for term in (1, 2, 3))
 """Coefficients of the sheath's friction profile that are fitted."""
-FORM_SPREAD = {
-    'pretension_profile': 0.25,
-    'joint_rest_angle': 0.05,
-    **dict.fromkeys(FRICTION_PROFILE_NAMES, 0.5),
-    'joint_presliding_spread': 0.5,
-}
-"""By how much (rms) the form of a healthy rig differs from its description, and the angle in rad at
-which its joint rests."""
 FORM_INDICES = {
-    'pretension_profile': PRETENSION_PROFILE,
-    'joint_rest_angle': JOINT_REST_ANGLE,
+    **{key: i for i, key in enumerate(NOMINAL_KEYS) if NUMBERS[key].spread},
     **{name: FRICTION_PROFILE + i for i, name in enumerate(FRICTION_PROFILE_NAMES)},
-    'joint_presliding_spread': JOINT_PRESLIDING_SPREAD,
 }
+"""Places of the numbers that say of what form a healthy rig is, and where its joint rests."""
 FITTED_NOMINAL = (*SCALED_NOMINAL, *FORM_INDICES)
 BAND = 0.15
 """Relative tolerance by which a healthy rig differs from its description."""
 BAND_SPREAD = 0.09
+
+
+def nominal_number(name: str) -> PlantNumber:
+    """What is known of a number of the nominal plant, or of a coefficient of its profile."""
+    return NUMBERS['friction_profile' if name in FRICTION_PROFILE_NAMES else name]
 
 
 @dataclass(frozen=True)
@@ -141,14 +121,14 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
 
 
 def _of_form(key: str, described: float, share: float) -> FreeParameter:
-    low, high, _ = REACH['friction_profile' if key in FRICTION_PROFILE_NAMES else key]
+    known = nominal_number(key)
     item = FreeParameter(
         FORM_INDICES[key],
         key,
         False,
-        FORM_SPREAD[key],
-        low,
-        high,
+        known.spread,
+        known.low,
+        known.high,
         spread=share,
         squared=key == 'joint_presliding_spread',
     )

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.functions.interpolation import NODES, VALUES
 from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
+from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_explain.fit.evidence import counts, mean_squares, weights
-from endoscope_explain.fit.free_parameters import FORM_SPREAD, FRICTION_PROFILE_NAMES
+from endoscope_explain.fit.free_parameters import FRICTION_PROFILE_NAMES
 from endoscope_explain.fit.model import Fit, glance
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.observe.observation import JointObservation
@@ -57,7 +58,7 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
     )
     weight = weights(model.observation, found.residuals)
     finer = slice(FRICTION_PROFILE + len(FRICTION_PROFILE_NAMES), FRICTION_PROFILE + PROFILE_TERMS)
-    size = FORM_SPREAD[FRICTION_PROFILE_NAMES[0]]
+    size = NUMBERS['friction_profile'].spread
     generator = np.random.default_rng(_SEED)
 
     def drawn() -> Array:

@@ -17,16 +17,11 @@ from numpy.typing import NDArray
 from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.layout import (
-    CAPSTAN_EXPONENT,
     FRICTION_PROFILE,
-    JOINT_RADIUS,
-    JOINT_REST_ANGLE,
-    MOTOR_BANDWIDTH,
-    MOTOR_DAMPING_RATIO,
-    PRETENSION_PROFILE,
+    NOMINAL_KEYS,
     PROFILE_TERMS,
-    PULLEY_RADIUS,
 )
+from endoscope_core.physics.plant_numbers import NUMBERS, Keeper
 from endoscope_explain.fit.evidence import weights
 from endoscope_explain.fit.free_parameters import LEAD, FreeParameter
 from endoscope_explain.fit.model import Fit, JointModel, central_jacobian
@@ -40,7 +35,12 @@ SPREAD = 0.1
 FIRST_SPREAD = 0.5
 """Scatter that is allowed at first, so that a recording finds its way to the others."""
 
-_OF_A_DEVICE = frozenset({MOTOR_BANDWIDTH, MOTOR_DAMPING_RATIO, PULLEY_RADIUS, JOINT_RADIUS}) | {
+
+def _kept_by(keeper: Keeper) -> set[int]:
+    return {i for i, key in enumerate(NOMINAL_KEYS) if NUMBERS[key].keeper is keeper}
+
+
+_OF_A_DEVICE = frozenset(_kept_by(Keeper.DEVICE)) | {
     place
     for definition in CATALOGUE.values()
     if definition.stage in (Stage.ACTUATOR, Stage.SENSING)
@@ -48,9 +48,7 @@ _OF_A_DEVICE = frozenset({MOTOR_BANDWIDTH, MOTOR_DAMPING_RATIO, PULLEY_RADIUS, J
 }
 _OF_A_SHAPE = frozenset(
     {
-        CAPSTAN_EXPONENT,
-        PRETENSION_PROFILE,
-        JOINT_REST_ANGLE,
+        *_kept_by(Keeper.SHAPE),
         *range(FRICTION_PROFILE, FRICTION_PROFILE + PROFILE_TERMS),
         *(p for e in CATALOGUE.values() if e.traits.of_shape for p in e.places),
     }

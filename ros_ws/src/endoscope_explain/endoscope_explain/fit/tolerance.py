@@ -1,6 +1,6 @@
 """By how much a rig may differ from its description: one definition for verdict, page and file."""
 
-from endoscope_explain.fit.free_parameters import BAND, FORM_SPREAD
+from endoscope_explain.fit.free_parameters import BAND, nominal_number
 
 NINETY_PERCENT = 1.645
 """Standard deviations that hold 90 % of a normal distribution, either way."""
@@ -13,7 +13,8 @@ def tolerance(name: str, described: float, band: float = BAND) -> tuple[float, f
     `band`: share by which parameters may differ: they may be larger, and smaller, by the factor `1
         + band`. What describes a form may differ by 90 % of what healthy rigs do.
     """
-    if name in FORM_SPREAD:
-        reach = NINETY_PERCENT * FORM_SPREAD[name]
+    spread = nominal_number(name).spread
+    if spread:
+        reach = NINETY_PERCENT * spread
         return described - reach, described + reach
     return described / (1.0 + band), described * (1.0 + band)

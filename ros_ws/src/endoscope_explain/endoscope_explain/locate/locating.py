@@ -11,8 +11,8 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport
 from endoscope_explain.case import Place
 from endoscope_explain.decide.combine import changed_parameters
-from endoscope_explain.decide.conclusions import NOMINAL
 from endoscope_explain.explanation import Explanation, NamedEffect
+from endoscope_explain.fit.free_parameters import nominal_number
 from endoscope_explain.locate.conditions import conditions, drive
 from endoscope_explain.locate.excess import SignalExcess, excess_between, shares
 from endoscope_explain.locate.regime import regime_in_words
@@ -86,7 +86,7 @@ def locate_parameters(recording: Recording, explanation: Explanation) -> list[Pl
     """Say where parameters that changed show, stage by stage."""
     found = excess_between(recording, explanation.nominal, explanation.refitted)
     stages = dict.fromkeys(
-        (str(NOMINAL[name][0]), joint)
+        (str(nominal_number(name).stage), joint)
         for joint, estimates in explanation.parameters.items()
         for name in changed_parameters(estimates)
     )

@@ -48,9 +48,11 @@ def test_rigs_are_fitted_until_it_is_clear_whether_they_show_as_much(one_joint):
     def fitted(null):
         return np.count_nonzero(null.drawn != screened)
 
-    clear = rigs.beside(1e6, 0.025, 1)
+    far = rigs.beside(5.0 * screened.max(), 0.025, 1)
+    assert fitted(far) == 0
+    assert far.p_value(5.0 * screened.max()) == pytest.approx(1.0 / 40.0)
+    clear = rigs.beside(3.5 * screened.max(), 0.025, 1)
     assert 0 < fitted(clear) <= AT_ONCE
-    assert clear.p_value(1e6) == pytest.approx(1.0 / 40.0)
     refused = rigs.beside(0.0, 0.025, 1)
     assert 0 < fitted(refused) <= AT_ONCE
     assert refused.p_value(0.0) > 0.025
