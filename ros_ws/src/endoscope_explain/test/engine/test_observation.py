@@ -6,7 +6,7 @@ import pytest
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_explain.fit.simulated_joint import packed_joint, residuals, simulate_joint
 from endoscope_explain.observe.held_noise import with_held_noise
-from endoscope_explain.observe.observation import fast_scatter, observe
+from endoscope_explain.observe.observation import fast_scatter, observe, step_read
 from endoscope_explain.observe.predicted_signals import reading_lead, simulate_rig
 
 
@@ -68,6 +68,23 @@ def test_noise_worse_than_described_is_seen_in_holds(recording, one_joint):
         after = with_held_noise(before)
         ratio = after[0].channels[2].noise.mean() / before[0].channels[2].noise.mean()
         assert ratio == pytest.approx(expected, rel=0.12)
+
+
+def test_a_sensor_coarser_than_described_is_as_coarse_as_it_reads(recording, one_joint):
+    step = 2.0 * np.pi / 512.0
+    rounded = np.round(recording.shaft_position.values / step) * step
+    coarse = replace(recording, shaft_position=replace(recording.shaft_position, values=rounded))
+    fine, seen = (observe(source, one_joint.rig())[0] for source in (recording, coarse))
+    assert seen.channels[0].noise == pytest.approx(step / np.sqrt(12.0))
+    for before, after in zip(fine.channels[1:], seen.channels[1:], strict=True):
+        assert np.array_equal(before.noise, after.noise), before.signal
+
+
+def test_continuous_or_few_readings_are_on_no_grid():
+    rng = np.random.default_rng(0)
+    assert step_read(rng.standard_normal(1000)) == 0.0
+    assert step_read(np.array([0.0, 0.5] * 50)) == 0.0
+    assert step_read(np.float32(0.1) * rng.integers(-300, 300, 400)) == pytest.approx(0.1)
 
 
 def test_scatter_is_found_where_the_wire_slips_and_only_there(one_joint):
