@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.layout import IN_OTHER_JOINT
 from endoscope_explain.decide.conclusions import (
     NOMINAL_UNITS,
     candidates,
@@ -23,12 +24,17 @@ from endoscope_explain.fit.baseline import against_baseline
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.intervals import nominal_estimates
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.fit.nominal import Anchors, all_anchors, anchored, beside
+from endoscope_explain.fit.nominal import (
+    Anchors,
+    all_anchors,
+    anchored,
+    beside,
+    simulated_bending,
+)
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.held_noise import with_held_noise
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.recording import Recording
-from endoscope_explain.search.candidate import Variant
 from endoscope_explain.search.levels import MOST_EFFECTS, JointSearch, search
 from endoscope_explain.search.refit import Composition
 
@@ -107,6 +113,7 @@ def explain_recording(
         all(d.adequate for d in decisions),
         max(d.beyond_form for d in decisions),
         {o.joint: fitting(d.chosen.fit) for o, d in zip(observations, decisions, strict=True)},
+        {o.joint: d.instead for o, d in zip(observations, decisions, strict=True) if d.instead},
     )
 
 
@@ -142,7 +149,7 @@ def _healthy(
 def _explained_together(
     anchors: list[Anchors], explained: Callable[[Anchors], Explained], tell: Progress
 ) -> tuple[list[JointSearch], list[Decision]]:
-    """Explain each joint beside the other as that is explained, until neither changes.
+    """Explain each joint beside the other as that is explained, until no tracker sees a change.
 
     Where the nominal plant leaves no more than noise, nothing that the other joint does is missing.
     """
@@ -150,21 +157,25 @@ def _explained_together(
     for pair in anchors:
         tell(f'searching what {pair[0].model.observation.joint} lacks')
         found.append(explained(pair))
-    # What each joint was explained beside: the other one without any term, at first.
-    seen: list[tuple[Variant, ...]] = [() for _ in anchors]
+    observations = [refitted.model.observation for refitted, _ in anchors]
+    # How the other joint moved as each was explained: as in its nominal fit, at first.
+    seen = [observation.inputs[0, :, IN_OTHER_JOINT] for observation in observations]
     for index in [0, 1] * ROUNDS if len(anchors) == 2 else []:
         (_, of_other), (_, own) = found[1 - index], found[index]
-        if (not own.chosen.terms and own.adequate) or seen[index] == _variants(of_other):
+        angle = simulated_bending(of_other.chosen.fit)
+        off = float(np.sqrt(np.mean((angle - seen[index]) ** 2)))
+        if (not own.chosen.terms and own.adequate) or off <= _noise_of(observations[1 - index]):
             continue
-        joint = anchors[index][0].model.observation.joint
-        tell(f'searching what {joint} lacks beside the other joint as explained')
-        seen[index] = _variants(of_other)
+        tell(f'searching what {observations[index].joint} lacks beside the other one as explained')
+        seen[index] = angle
         found[index] = explained(beside(anchors[index], of_other.chosen.fit))
     return [tried for tried, _ in found], [decision for _, decision in found]
 
 
-def _variants(decision: Decision) -> tuple[Variant, ...]:
-    return tuple(term.variant for term in decision.chosen.terms)
+def _noise_of(observation: JointObservation) -> float:
+    """Noise (rms) in rad of a joint's bending angle; 0 where it was not recorded."""
+    bending = [c.noise for c in observation.channels if c.quantity == 'bending']
+    return float(np.sqrt(np.mean(bending[0] ** 2))) if bending else 0.0
 
 
 def _is_enough(observations: tuple[JointObservation, ...]) -> bool:

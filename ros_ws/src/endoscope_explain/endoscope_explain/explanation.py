@@ -178,6 +178,8 @@ class Explanation:
     beyond_form: float = math.nan
     # how the final fits ended, by joint
     fitting: Mapping[str, Fitting] = field(default_factory=dict)
+    # Effects that the recording does not tell from the other numbers of a joint, nearest first.
+    instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @staticmethod
     def without_fit(verdict: Verdict, plant: PlantDescription) -> 'Explanation':

@@ -184,12 +184,20 @@ def teleoperation(generator: Generator, seed: int) -> Case:
     return catalogue(generator, seed, motions.teleoperation)
 
 
+def other_simulator(generator: Generator, seed: int) -> Case:
+    """A rig of `endoscope prove --form other`: sliding nodes, and laws of their own forms."""
+    from endoscope_benchmarks.proof import OTHER
+    from endoscope_benchmarks.proof.drawing import drawn
+
+    return replace(drawn(OTHER, seed, 0)[0], seed=seed)
+
+
 def as_strong(effect: str, seed: int, share: float) -> Case:
     """One effect that moves a given share of the signal, on the same rig for the same seed.
 
     RuntimeError if it moves no signal by as much.
     """
-    generator = np.random.default_rng([len(STRATA), DRAWN.index(effect), seed])
+    generator = np.random.default_rng([_BY_STRENGTH, DRAWN.index(effect), seed])
     rig = _rig(generator, _joints_of(effect))
     return _finished(generator, seed, rig, *_with_effect(generator, rig, effect, (share, share)))
 
@@ -206,7 +214,10 @@ STRATA: dict[str, Callable[[Generator, int], Case]] = {
     'sinusoid': sinusoid,
     'teleoperation': teleoperation,
     'two_states': two_states,
+    'other_simulator': other_simulator,
 }
+_BY_STRENGTH = 11
+"""In place of a stratum's number, so that a seed draws what it always drew."""
 
 
 def drawn_case(stratum: str, seed: int) -> Case:

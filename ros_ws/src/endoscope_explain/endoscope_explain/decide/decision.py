@@ -49,11 +49,13 @@ class Decision:
     `chosen`: the joint with what is missing; the nominal plant where nothing is.
     `missing`: in the order in which they were found.
     `explained`: share of the excess misfit that the terms remove; 1 where there was none.
+    `instead`: names of terms that the recording does not tell from other numbers, nearest first.
     """
 
     chosen: Composition
     missing: tuple[MissingTerm, ...]
     explained: float
+    instead: tuple[str, ...] = ()
 
     @property
     def beyond_form(self) -> float:
@@ -70,22 +72,23 @@ def decide(search: JointSearch, jobs: int) -> Decision:
     """Choose a composition, name its terms and their rivals, and judge whether it is adequate."""
     chosen: Composition = search.nominal
     missing: tuple[MissingTerm, ...] = ()
+    instead: tuple[str, ...] = ()
     for level in search.levels:
         if not level.is_found:
             break
         best = level.best
-        if not best.terms:
-            chosen = best
-            break
+        if level.adds_nothing(best):
+            chosen, instead = best, _instead(level)
+            continue
         best = replace(best, fit=with_form(best.fit, jobs))
         if any(not t.is_function and may_be_absent(best.fit, t.term) for t in best.terms):
             break
-        chosen = best
+        chosen, instead = best, ()
         if not best.terms[-1].multiplies:
             missing = (*missing[: len(best.terms) - 1], _missing(level, best, jobs))
     missing = _named_as_chosen(search, chosen, missing, jobs)
     chosen = replace(chosen, fit=with_form(chosen.fit, jobs))
-    return Decision(chosen, missing, share_explained(search.nominal, chosen))
+    return Decision(chosen, missing, share_explained(search.nominal, chosen), instead)
 
 
 def share_explained(nominal: Composition, chosen: Composition) -> float:
@@ -93,6 +96,13 @@ def share_explained(nominal: Composition, chosen: Composition) -> float:
     before, after = misfit(nominal.fit).total, misfit(chosen.fit).total
     above = before - nominal.fit.model.observation.size
     return 1.0 if above <= 0.0 else float(np.clip((before - after) / above, 0.0, 1.0))
+
+
+def _instead(level: Level) -> tuple[str, ...]:
+    """Terms that explain as much as other numbers do."""
+    least = level.best.evidence - level.form_is_worth()
+    near = [c for c in level.found if not level.adds_nothing(c) and c.evidence >= least]
+    return tuple(dict.fromkeys(_name(level, each) for each in near))
 
 
 def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
@@ -140,13 +150,14 @@ def _named_as_chosen(
 ) -> tuple[MissingTerm, ...]:
     """The missing terms as chosen: a rival of the first one may have led to a better two."""
     named = []
+    adding = [level for level in search.levels if not level.adds_nothing(level.best)]
     for position, term in enumerate(chosen.terms):
         if term.multiplies:
             continue
         if position < len(missing) and missing[position].term.id == term.id:
             named.append(missing[position])
             continue
-        level = search.levels[position]
+        level = adding[position]
         own = [c for c in level.found if c.terms and c.terms[-1].id == term.id]
         named.append(_missing(level, own[0], jobs))
     # What is missing besides is no other name of it.

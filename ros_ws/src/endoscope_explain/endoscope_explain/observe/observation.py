@@ -203,8 +203,7 @@ def _channels(
         if not len(time):
             continue
         step = max(step, step_read(values))
-        # Rounding is white only where the noise itself spreads readings over several steps.
-        dithered = white >= 0.3 * step
+        rounding = rounding_error(step, white)
         channels.append(
             _channel(
                 signal_name(quantity, joint, wire),
@@ -213,12 +212,26 @@ def _channels(
                 time,
                 values,
                 period,
-                sqrt(white**2 + (step**2 / 12.0 if dithered else 0.0)),
-                0.0 if dithered else step / sqrt(12.0),
+                sqrt(white**2 + step**2 / 12.0 - rounding**2),
+                rounding,
                 quantity == 'tension',
             )
         )
     return tuple(channels)
+
+
+def rounding_error(step: float, white: float) -> float:
+    """Part (rms) of the error of rounding to steps that a mean over readings does not lessen.
+
+    White noise spreads readings over several steps; what it leaves of the error is a function of
+    the reading's true value (Widrow, Kollar, Quantization Noise, 2008, ch. 19).
+    """
+    if step == 0.0:
+        return 0.0
+    k = np.arange(1.0, 100.0)
+    left = np.exp(-((2.0 * pi * k * white / step) ** 2)) / k**2
+    # The series of 1 / k^2 is summed to its end, as step^2 / 12 is without any noise.
+    return float(step * sqrt(np.sum(left) / np.sum(1.0 / k**2) / 12.0))
 
 
 def step_read(values: Array) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.case import ExplainedCase, Place
 from endoscope_explain.decide.combine import changed_parameters
 from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
@@ -171,7 +172,9 @@ def _differing(case: ExplainedCase) -> str:
         return 'Parameters differ within their tolerance.'
     (joint, name), e = next(iter(changed.items()))
     more = f', and {len(changed) - 1} more differ' if len(changed) > 1 else ''
-    return f'{_one_differing(joint, name, e)}{more}.'
+    others = [name for name in case.explanation.instead.get(joint, ()) if name in CATALOGUE]
+    rival = f'; {others[0]} would explain as much' if others else ''
+    return f'{_one_differing(joint, name, e)}{more}{rival}.'
 
 
 def _one_differing(joint: str, name: str, e: NominalEstimate) -> str:

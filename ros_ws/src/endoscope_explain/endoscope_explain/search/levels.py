@@ -100,11 +100,15 @@ class Level:
         def first(compositions: Iterable[Composition]) -> Composition | None:
             return next((c for c in compositions if top.evidence - c.evidence <= worth), None)
 
-        stands = first(c for c in self.found if not c.terms)
+        stands = first(c for c in self.found if self.adds_nothing(c))
         stands = stands or first(c for c in self.found if c.adds_nominal)
-        if stands is None and top.terms and top.terms[-1].is_function:
+        if stands is None and not self.adds_nothing(top) and top.terms[-1].is_function:
             stands = first(c for c in self.at_the_place_of(top) if not c.terms[-1].is_function)
         return stands or top
+
+    def adds_nothing(self, one: Composition) -> bool:
+        """Whether a composition has other numbers than its parent, and no term more."""
+        return len(one.terms) == len(self.parent.terms)
 
     def form_is_worth(self) -> float:
         """Evidence by which an error of form as large as what is left may mislead."""
@@ -190,10 +194,11 @@ def search(
         nominal = until_it_stands(until_it_stands(nominal))
     parents: list[tuple[Composition, tuple[Fit, ...]]] = [(nominal, (nominal.fit, *anchors[1:]))]
     levels: list[Level] = []
-    while len(levels) < depth and not is_noise(parents[0][0].fit):
-        level = _level(parents, jobs, left_out)
+    while len(parents[0][0].terms) < depth and not is_noise(parents[0][0].fit):
+        described = not any(each.adds_nothing(each.best) for each in levels)
+        level = _level(parents, jobs, left_out, other_numbers=described)
         levels.append(level)
-        if not level.is_found or not level.best.terms:
+        if not level.is_found:
             break
         best = level.best
         if best.adds_nominal:
@@ -201,10 +206,12 @@ def search(
         best = replace(best, fit=with_form(best.fit, jobs))
         found = tuple(best if c is level.best else c for c in level.found)
         levels[-1] = level = replace(level, found=found)
-        if best.fit.beyond_form is not None and best.fit.beyond_form <= 1.0:
+        as_another_form = best.fit.beyond_form is not None and best.fit.beyond_form <= 1.0
+        if as_another_form and not level.adds_nothing(best):
             # Rigs of another form, in which nothing more is missing, leave as much.
             break
-        others = [c for c in (*level.variants(), *level.rivals()) if c.terms][: PARENTS - 1]
+        others = [] if level.adds_nothing(best) else [*level.variants(), *level.rivals()]
+        others = [c for c in others if not level.adds_nothing(c)][: PARENTS - 1]
         parents = [(each, (each.fit,)) for each in (best, *map(until_it_stands, others))]
     return JointSearch(nominal, tuple(levels))
 
@@ -220,13 +227,20 @@ def _from_afar(one: Composition) -> Composition:
 
 
 def _level(
-    parents: Sequence[tuple[Composition, tuple[Fit, ...]]], jobs: int, left_out: tuple[str, ...]
+    parents: Sequence[tuple[Composition, tuple[Fit, ...]]],
+    jobs: int,
+    left_out: tuple[str, ...],
+    *,
+    other_numbers: bool,
 ) -> Level:
     first, _ = parents[0]
     grown = [_grown(parent, anchors, jobs, left_out) for parent, anchors in parents]
     found = [each for _, _, compositions in grown for each in compositions]
-    if not first.terms and leans(first.fit):
-        found.append(until_it_stands(composition((), with_any_numbers(first.fit))))
+    found += [
+        until_it_stands(composition(parent.terms, with_any_numbers(parent.fit)))
+        for parent, _ in parents
+        if other_numbers and leans(parent.fit)
+    ]
     best: dict[frozenset[Variant], Composition] = {}
     for each in sorted(found, key=lambda c: -c.evidence):
         best.setdefault(frozenset(term.variant for term in each.terms), each)

@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from endoscope_explain.fit.evidence import counts, log_likelihood, mean_squares
 from endoscope_explain.fit.model import Fit, glance, jacobian
 from endoscope_explain.fit.other_forms import other_forms, reading
-from endoscope_explain.fit.whiteness import WHITE
+from endoscope_explain.fit.whiteness import WHITE, is_noise
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.candidate import Candidate
@@ -112,7 +112,10 @@ def shown(behind: Background, ways: tuple[Directions, ...], best: Fit | None, jo
     rest = np.sum(alone.left[winner, np.arange(FORMS)] * number, axis=1)
     whole = np.sum(left**2, axis=0)
     off = above_noise(found.residuals)
-    remains = above_noise(best.residuals) if best is not None else np.zeros_like(off)
+    # Where noise alone is left, no form misleads.
+    remains = np.zeros_like(off)
+    if best is not None and not is_noise(best):
+        remains = above_noise(best.residuals)
     as_off = np.sqrt(np.sum(number * floor * off) / np.maximum(whole, _TINY))
     as_left = np.sqrt(np.sum(number * floor * remains) / np.maximum(rest, _TINY))
 

@@ -65,6 +65,21 @@ def test_the_effect_that_was_left_out_is_named(one_joint):
     assert worst < 1.3 < max(fit.ratio for fit in explanation.fit['refitted'].values())
 
 
+def test_an_effect_is_found_beside_a_number_far_from_its_description(one_joint):
+    true = one_joint.rig(
+        EffectSpec('tracker_delay', 'bend_x', {'delay_s': 0.05}), wire_stiffness=2000.0
+    )
+    explanation = explain_recording(
+        one_joint.record(true, one_joint.motion(7.0)), one_joint.rig(), jobs=2
+    )
+    (named,) = explanation.effects
+    assert named.id == 'tracker_delay'
+    assert named.parameters['delay_s'].value == pytest.approx(0.05, rel=0.05)
+    estimate = explanation.parameters['bend_x']['wire_stiffness']
+    assert estimate.value == pytest.approx(2000.0, rel=0.02)
+    assert explanation.adequate
+
+
 def test_a_law_of_no_known_form_is_a_function_at_its_place(one_joint):
     law = '0.4*sin(4*q)'
     true = replace(one_joint.rig(**OTHER), terms=(TermSpec('bend_x', 'exponent_of_angle', law),))

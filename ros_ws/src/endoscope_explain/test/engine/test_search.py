@@ -182,6 +182,15 @@ def test_other_numbers_stand_where_a_term_does_hardly_more():
     assert replace(near, found=(*near.found, numbers)).best is numbers
     far = _composition(300.0)
     assert replace(near, found=(*near.found, far)).best is near.found[0]
+    # Beside a term that was found before, too.
+    (gravity,) = near.found[0].terms
+    delay = Candidate(CATALOGUE['tracker_delay'])
+    beside = Level(
+        _composition(400.0, gravity),
+        (_composition(500.0, gravity, delay), _composition(470.0, gravity)),
+        near.null,
+    )
+    assert beside.best.terms == (gravity,)
 
 
 def test_a_finer_sheath_alone_is_not_named(one_joint):
