@@ -1,5 +1,7 @@
 """The numbers by which explanations are judged, from cases whose truth is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,13 +9,16 @@ from endoscope_benchmarks.concealed.criteria import (
     Bank,
     conformal,
     derived,
+    reliability,
     sensitivity,
     source,
 )
 from endoscope_benchmarks.concealed.limits import SHARES
 from endoscope_benchmarks.concealed.strata import as_strong
+from endoscope_explain.decide.certainty import probability
 
 RNG = np.random.default_rng(1)
+WEIGHTS = (-1.0, 4.0, 0.0)
 
 
 def test_a_conformal_limit_holds_the_next_score_as_often_as_it_says():
@@ -33,7 +38,18 @@ def bank():
     truth = np.where(RNG.uniform(size=100) < 0.97, 1.0, RNG.uniform(size=100))
     sizes = [np.array([1.0, 0.6, 0.2])] * 100
     beyond = np.concatenate([RNG.uniform(0.5, 1.2, size=100), np.full(20, 9.0)])
-    return Bank(truth, sizes, beyond, beyond < 2.0, np.abs(RNG.normal(size=500)) / 1.645)
+    alone = RNG.uniform(size=2000)
+    named = np.column_stack([np.ones(2000), alone, np.zeros(2000)])
+    return Bank(
+        truth,
+        sizes,
+        beyond,
+        beyond < 2.0,
+        np.abs(RNG.normal(size=500)) / 1.645,
+        named,
+        RNG.uniform(size=2000) < probability(named, WEIGHTS),
+        np.arange(2000),
+    )
 
 
 def test_criteria_follow_from_the_cases(bank):
@@ -41,6 +57,22 @@ def test_criteria_follow_from_the_cases(bank):
     assert found.LEAST_SHARE == 1.0, 'nine in ten truths gain most'
     assert pytest.approx(1.0, abs=0.1) == found.REACH, 'intervals are as wide as they should be'
     assert 1.0 < found.BEYOND_FORM < 1.2
+    assert found.CERTAINTY[:2] == pytest.approx(WEIGHTS[:2], abs=0.4)
+
+
+def test_names_are_right_as_often_as_their_probability_says(bank):
+    lines = [line.split() for line in reliability(bank).splitlines()[1:-1]]
+    assert len(lines) >= 5
+    for *_, count, mean, right in lines:
+        scatter = 3.0 * np.sqrt(float(mean) * (1.0 - float(mean)) / int(count))
+        assert float(right) == pytest.approx(float(mean), abs=scatter + 0.02)
+
+
+def test_a_name_that_was_always_right_is_not_certain(bank):
+    sure = derived(replace(bank, named=np.ones((28, 3)), right=np.ones(28, bool)))
+    (mean,) = probability([[1.0, 1.0, 1.0]], sure.CERTAINTY)
+    # The mean odds of a share that was 28 of 28 lie beyond 29 to 1 (Laplace's rule).
+    assert 29.0 / 30.0 < mean < 1.0 - 1e-6
 
 
 def test_the_module_holds_the_criteria_and_half_of_them_is_shown_to_be_worse(bank):
@@ -48,7 +80,7 @@ def test_the_module_holds_the_criteria_and_half_of_them_is_shown_to_be_worse(ban
     names: dict[str, float] = {}
     exec(source(found, 'a test'), names)
     for name, value in vars(found).items():
-        assert names[name] == pytest.approx(value, rel=0.01)
+        assert names[name] == pytest.approx(value, rel=0.01, abs=1e-12)
     reach = next(line for line in sensitivity(bank, found).splitlines() if 'REACH' in line)
     assert ': 90%' in reach
 

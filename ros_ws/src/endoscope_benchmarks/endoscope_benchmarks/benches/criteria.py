@@ -19,7 +19,13 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print, and write if asked; return 0."""
-    from endoscope_benchmarks.concealed.criteria import bank_of, derived, sensitivity, source
+    from endoscope_benchmarks.concealed.criteria import (
+        bank_of,
+        derived,
+        reliability,
+        sensitivity,
+        source,
+    )
     from endoscope_benchmarks.concealed.record import rows_of
     from endoscope_core.atomic_output import write_text
     from endoscope_core.errors import EndoscopeError
@@ -37,6 +43,7 @@ def run(args: argparse.Namespace) -> int:
         f'seeds {seeds} of {strata}'
     )
     print(sensitivity(bank, criteria))
+    print('\n' + reliability(bank))
     if args.write:
         write_text(args.write, source(criteria, made_by))
     return 0

@@ -1,7 +1,9 @@
 """The numbers by which explanations are judged, derived from cases whose truth is known.
 
 Sets of names and intervals are split conformal (Lei et al., J. Am. Stat. Assoc. 113, 2018): a limit
-is the quantile of the cases' own scores that holds the next one with the wanted chance.
+is the quantile of the cases' own scores that holds the next one with the wanted chance. The
+probability of a name is a logistic function of what else was tried and of what is left (Platt, in:
+Advances in Large Margin Classifiers, MIT Press 2000).
 """
 
 import math
@@ -11,8 +13,10 @@ from textwrap import fill
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from endoscope_benchmarks.concealed.trial import Row
+from endoscope_explain.decide.certainty import features, probability
 
 Array = NDArray[np.float64]
 
@@ -20,6 +24,9 @@ HOLDS = 0.9
 """Chance with which sets hold the truth and intervals the true number."""
 ADEQUATE = 0.95
 """Share of right explanations that are called adequate."""
+PARTS = 10
+WIDE = 10.0
+"""Standard deviation of a weight before anything is known: odds of e to the power of ten."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +36,7 @@ class Criteria:
     LEAST_SHARE: float
     BEYOND_FORM: float
     REACH: float
+    CERTAINTY: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,9 @@ class Bank:
     beyond: Array  # (k,), what is left over what another form leaves
     exact: NDArray[np.bool_]  # (k,), whether all was said rightly
     errors: Array  # (l,), of numbers, over what their intervals would allow with a `REACH` of one
+    named: Array  # (m, 3), features of each name that was given; see `certainty.features`
+    right: NDArray[np.bool_]  # (m,), whether it is right
+    case: NDArray[np.int64]  # (m,), number of its case
 
 
 def bank_of(rows: Sequence[Row]) -> Bank:
@@ -47,12 +58,16 @@ def bank_of(rows: Sequence[Row]) -> Bank:
     known = [row for row in rows if math.isfinite(row.truth_share)]
     left = [row for row in rows if math.isfinite(row.beyond_form)]
     errors = np.array([e for row in rows if row.exact for e in row.errors])
+    named = [(n, row, each) for n, row in enumerate(rows) for each in row.evidence]
     return Bank(
         np.array([row.truth_share for row in known]),
         [np.array(row.shares) for row in known],
         np.array([row.beyond_form for row in left]),
         np.array([row.exact for row in left], dtype=bool),
         errors[np.isfinite(errors)],
+        np.array([features(each, row.beyond_form) for _, row, each in named]).reshape(-1, 3),
+        np.array([each['right'] > 0.0 for *_, each in named], dtype=bool),
+        np.array([n for n, *_ in named], dtype=np.int64),
     )
 
 
@@ -62,7 +77,42 @@ def derived(bank: Bank) -> Criteria:
         1.0 - conformal(1.0 - bank.truth, HOLDS),
         conformal(bank.beyond[bank.exact], ADEQUATE),
         conformal(bank.errors, HOLDS),
+        _logistic(bank.named, bank.right),
     )
+
+
+def _logistic(named: Array, right: NDArray[np.bool_]) -> tuple[float, float, float]:
+    """Weights (3,) of the features that are most likely, with a wide prior that bounds them."""
+
+    def cost(weights: Array) -> float:
+        sign = np.where(right, 1.0, -1.0)
+        likely = np.sum(np.logaddexp(0.0, -sign * (named @ weights)))
+        return float(likely + 0.5 * np.sum((weights / WIDE) ** 2))
+
+    a, b, c = minimize(cost, np.zeros(3), method='BFGS').x.tolist()
+    return a, b, c
+
+
+def reliability(bank: Bank) -> str:
+    """How often names are right that were given with some probability, a line for each tenth.
+
+    The probability of a name follows from the other cases, ten parts of them in turn.
+    """
+    given = np.empty(len(bank.right))
+    for part in range(PARTS):
+        own = bank.case % PARTS == part
+        given[own] = probability(bank.named[own], _logistic(bank.named[~own], bank.right[~own]))
+    lines = [f'{"probability":>14s}{"names":>7s}{"mean":>8s}{"right":>8s}']
+    for tenth in range(10):
+        inside = np.minimum((10.0 * given).astype(int), 9) == tenth
+        if np.any(inside):
+            mean, right = np.mean(given[inside]), np.mean(bank.right[inside])
+            ends = f'{tenth / 10:.1f} to {(tenth + 1) / 10:.1f}'
+            lines.append(f'{ends:>14s}{np.sum(inside):7d}{mean:8.2f}{right:8.2f}')
+    off = np.mean((given - bank.right) ** 2)
+    flat = np.mean((np.mean(bank.right) - bank.right) ** 2)
+    lines.append(f'Brier score {off:.3f}, of one probability for all {flat:.3f}')
+    return '\n'.join(lines)
 
 
 def conformal(scores: Array, chance: float) -> float:
@@ -123,4 +173,6 @@ BEYOND_FORM = {criteria.BEYOND_FORM:.3g}
 of right explanations leave less."""
 REACH = {criteria.REACH:.3g}
 """Factor on intervals that makes them hold {HOLDS:.0%} of the true numbers."""
+CERTAINTY = ({', '.join(f'{weight:.3g}' for weight in criteria.CERTAINTY)})
+"""Weights of the features of a name in the logarithm of the odds that it is right."""
 '''

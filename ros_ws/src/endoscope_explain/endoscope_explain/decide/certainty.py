@@ -1,0 +1,28 @@
+"""How often a name is right that was given with as much evidence."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import expit
+
+Array = NDArray[np.float64]
+
+
+def features(evidence: Mapping[str, float], beyond_form: float) -> tuple[float, float, float]:
+    """What the certainty of a name is judged by.
+
+    One; the share of its gain that no other name has; and by how much what is left exceeds what
+    rigs of another form leave, as a logarithm. In the study of forms that differ, names whose next
+    rival had less than half of their gain were right in 27 cases of 28, and what was left told
+    right from wrong in 44 of 48.
+    """
+    alone = min(max(evidence['margin'] / evidence['gain'], 0.0), 1.0)
+    left = 0.0 if math.isnan(beyond_form) else math.log(max(beyond_form, 1.0))
+    return 1.0, alone, left
+
+
+def probability(named: ArrayLike, weights: Sequence[float]) -> Array:
+    """Probability (m,) that names are right, by their features (m, 3) and the weights of these."""
+    return np.asarray(expit(np.asarray(named, dtype=float) @ np.asarray(weights)))
