@@ -454,7 +454,7 @@ def test_the_terminal_says_it_all(stribeck_case):
 def test_the_block_that_was_touched_is_marked(stribeck_case):
     finding = Finding(
         'exchanged',
-        Severity.UNUSABLE,
+        Severity.MISTAKE,
         'bend_x',
         'sensing',
         ('wires/measured_js:wire_x_pos',),
@@ -464,8 +464,16 @@ def test_the_block_that_was_touched_is_marked(stribeck_case):
     )
     audit = AuditReport(stribeck_case.recording, (finding,))
     place = dataclasses.replace(stribeck_case.places[0], stage='sensing')
+    explanation = dataclasses.replace(
+        stribeck_case.explanation, effects=(), verdict=Verdict.CONSISTENT
+    )
     case = dataclasses.replace(
-        stribeck_case, verdict=Verdict.RECORDING_FAULT, effects=(), audit=audit, places=(place,)
+        stribeck_case,
+        verdict=Verdict.RECORDING_FAULT,
+        effects=(),
+        audit=audit,
+        places=(place,),
+        explanation=explanation,
     )
     (red,) = [text for text, marked in stages(html_page(case)) if marked]
     assert red == 'sensing load cells, tracker recording fault (bend_x)'

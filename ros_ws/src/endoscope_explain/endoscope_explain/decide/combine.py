@@ -31,8 +31,15 @@ def combined_verdict(explanation: Explanation, audit: AuditReport) -> Verdict:
 
     Where the rig hardly moves nothing can be told. Missing physics wins over a faulty sensor, that
     over a faulty recording, and any of them over differing parameters: these always differ a
-    little.
+    little. What was mistaken in the recording itself is the verdict: the rest is about another
+    recording than was given.
     """
+    return Verdict.RECORDING_FAULT if audit.mistakes() else verdict_of_rest(explanation, audit)
+
+
+def verdict_of_rest(explanation: Explanation, audit: AuditReport) -> Verdict:
+    """Say in one word what was found once all mistakes are put right."""
+    audit = audit.apart_from_mistakes()
     if explanation.verdict in (Verdict.INSUFFICIENT_DATA, Verdict.UNKNOWN_PHYSICS):
         return explanation.verdict
     effects = combined_effects(explanation, audit)

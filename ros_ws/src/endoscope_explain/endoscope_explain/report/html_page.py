@@ -107,7 +107,7 @@ def html_page(case: ExplainedCase) -> str:
         chain=CHAIN,
         guilty=_guilty(case),
         cut=_cut(case, joint) if case.places else '',
-        effects_title=EFFECTS_TITLE.get(case.verdict, 'What was named besides'),
+        effects_title=EFFECTS_TITLE.get(case.rest, 'What was named besides'),
         numbers_of=numbers_of,
         physics_of=physics_of,
         meaning=EVIDENCE,
@@ -156,8 +156,9 @@ def _drawings(
         j = case.recording.joints.index(joint)
         asked = case.recording.command
         command = (asked.time, asked.values[:, j] / case.recording.gear)
-        # What is drawn of a recording that cannot be used is what was meant, and shows nothing.
-        shaded = () if case.audit.unusable else case.places
+        # What is drawn is as corrected, and shows no mistake.
+        mistaken = bool(case.audit.mistakes())
+        shaded = tuple(p for p in case.places if p.shares or not mistaken)
         drawn['timeline'] = timeline_figure(recorded, command, joint, shaded)
         if joint in moving_joints(case.recording):
             views = telling_signals(recorded, joint)
@@ -193,10 +194,14 @@ def _guilty(case: ExplainedCase) -> dict[str, list[str]]:
     guilty: dict[str, list[str]] = {}
     for effect in case.effects:
         guilty.setdefault(effect.stage, []).append(f'{effect.id} ({effect.joint})')
-    if not guilty:
-        word = 'unknown' if case.verdict is Verdict.UNKNOWN_PHYSICS else str(case.verdict)
-        for place in case.places:
-            guilty.setdefault(place.stage, []).append(f'{word.replace("_", " ")} ({place.joint})')
+    mistaken = case.audit.mistakes()
+    places = case.places[: len(mistaken)] if guilty else case.places
+    for index, place in enumerate(places):
+        verdict = case.verdict if index < len(mistaken) else case.rest
+        word = 'unknown' if verdict is Verdict.UNKNOWN_PHYSICS else str(verdict)
+        said = f'{word.replace("_", " ")} ({place.joint})'
+        if said not in guilty.setdefault(place.stage, []):
+            guilty[place.stage].append(said)
     return guilty
 
 

@@ -29,6 +29,8 @@ EVIDENCE = {
     'worst_s': 'largest step back in seconds',
     'z': 'standard deviations from zero',
     'factor': 'reading of one SI unit',
+    'misfit': 'share that no lag, offset and scale make of what the plant gives, as recorded',
+    'misfit_corrected': 'the same, as corrected',
     'per_second': 'stamps of one second',
 }
 """What each number of an effect's evidence is."""
@@ -42,24 +44,27 @@ leaves 1.05 once in a hundred."""
 
 def verdict_sentence(case: ExplainedCase) -> str:
     """Say in one sentence what was found."""
-    if case.verdict is Verdict.INSUFFICIENT_DATA:
+    mistakes = case.audit.mistakes()
+    return f'{_capital(mistakes[0].text)}.' if mistakes else _sentence_of_rest(case)
+
+
+def _sentence_of_rest(case: ExplainedCase) -> str:
+    if case.rest is Verdict.INSUFFICIENT_DATA:
         return 'The rig moves too little, or too little was recorded, to tell causes apart.'
-    if case.audit.unusable:
-        return f'{_capital(case.audit.faults()[0].text)}.'
-    if case.verdict is Verdict.CONSISTENT:
+    if case.rest is Verdict.CONSISTENT:
         return f'The described plant predicts the recording of {_all(case.recording.joints)}.'
-    if case.verdict is Verdict.PARAMETERS_DIFFER:
+    if case.rest is Verdict.PARAMETERS_DIFFER:
         return _differing(case)
-    if case.verdict is Verdict.UNKNOWN_PHYSICS:
+    if case.rest is Verdict.UNKNOWN_PHYSICS:
         return _unknown(case)
     if case.effects:
         named = [_named(e) for e in case.effects[:MOST_NAMED]]
         more = len(case.effects) - len(named)
         named += [f'{more} more'] if more else []
-        missing = case.verdict is Verdict.MISSING_PHYSICS
+        missing = case.rest is Verdict.MISSING_PHYSICS
         begin = 'The simulation leaves out' if missing else 'The recording shows'
         return f'{begin} {_all(named)}.'
-    return f'{_capital(case.audit.faults()[0].text)}.'
+    return f'{_capital(case.audit.apart_from_mistakes().faults()[0].text)}.'
 
 
 def physics_of(effect: NamedEffect) -> str:
@@ -99,8 +104,22 @@ def before_and_after(case: ExplainedCase) -> str:
 
 
 def reservations(case: ExplainedCase) -> list[str]:
-    """Say what the names leave over, and which numbers differ besides; empty where none do."""
+    """Say what else has to be known: what is said of a corrected recording, and what is left over.
+
+    What the names leave over, and which numbers differ besides; empty where none do.
+    """
+    mistakes = case.audit.mistakes()
     said: list[str] = []
+    if len(mistakes) > 1:
+        said += [f'{_capital(finding.text)}.' for finding in mistakes[1:]]
+    if mistakes:
+        frozen = all(finding.id == 'frozen' for finding in mistakes)
+        begin = 'Of what is not frozen' if frozen else 'As corrected'
+        said.append(f'{begin}: {_sentence_of_rest(case)}')
+    left_over = [] if case.explanation.adequate else case.audit.findings
+    unlike = (f for f in left_over if f.id == 'unlike_the_plant')
+    said += [f'{_capital(finding.text)}. {_capital(finding.remedy)}.' for finding in unlike]
+    said += [f'{_capital(other)}. It was used as corrected.' for other in case.said_of_others]
     if not case.effects and case.explanation.unknown is None:
         return said
     left = judged(case, case.ladder).get('augmented', {})
@@ -143,8 +162,8 @@ def next_step(case: ExplainedCase) -> str:
     """Say what to do next."""
     if case.verdict is Verdict.INSUFFICIENT_DATA:
         return 'Record at least 10 s in which the motors move both ways, such as a calibration.'
-    if case.audit.unusable:
-        return f'{_capital(case.audit.faults()[0].remedy)}.'
+    if case.audit.mistakes():
+        return f'{_capital(case.audit.mistakes()[0].remedy)}.'
     if case.next_experiment is not None:
         rivals = _all(case.next_experiment.separates)
         return f'Play next_experiment.csv on the console: it tells {rivals} apart.'
@@ -185,7 +204,8 @@ def _one_differing(joint: str, name: str, e: NominalEstimate) -> str:
 def _unknown(case: ExplainedCase) -> str:
     term = case.explanation.unknown
     if term is None or not term.helps:
-        joint = case.places[0].joint if case.places else case.recording.joints[0]
+        shown = [place.joint for place in case.places if place.shares]
+        joint = [*shown, *case.recording.joints][0]
         return f'Neither an effect of the catalogue nor a function explains {joint}.'
     what = term.there.physics.rstrip('.')
     states = ''.join(f' and {factor.there.argument.words}' for factor in term.factors)

@@ -21,14 +21,13 @@ def told(case: ExplainedCase) -> str:
     for effect in case.effects:
         lines.append(f'  {effect.id}: {physics_of(effect)}')
         lines += [f'    {one}' for one in numbers_of(effect)]
-    if case.verdict is Verdict.PARAMETERS_DIFFER:
+    if case.rest is Verdict.PARAMETERS_DIFFER:
         for (joint, name), e in differing(case).items():
             lines.append(f'  {joint}: {shown(name, e)}')
     term = case.explanation.unknown
     if term is not None and term.helps:
         lines.append(f'  It explains {100 * term.explained:.0f} % of the excess misfit.')
-    if not case.audit.unusable:
-        lines += [f'Where: {where(place)}.' for place in case.places]
+    lines += [f'Where: {where(place)}.' for place in case.places]
     fits = fits_table(case)
     if fits:
         head, rows = fits
