@@ -48,6 +48,9 @@ class NominalEstimate(Estimate):
 
     nominal: float  # value in the plant file
     in_band: bool  # within the tolerance by which rigs differ from their description
+    # Whether the recording says more of it than was known before; else the interval is the prior's.
+    shown: bool = True
+    together_with: str = ''  # number without which the recording does not tell this one
 
 
 @dataclass(frozen=True)

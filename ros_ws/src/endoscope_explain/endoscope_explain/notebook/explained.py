@@ -18,7 +18,13 @@ from endoscope_explain.observe.predicted_signals import RecordedView, view
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.numbers import PLANTS, Shown, numbers_of
 from endoscope_explain.report.report_mapping import report_mapping
-from endoscope_explain.report.sentences import HEADLINES, next_step, reservations, verdict_sentence
+from endoscope_explain.report.sentences import (
+    HEADLINES,
+    next_step,
+    not_shown,
+    reservations,
+    verdict_sentence,
+)
 from endoscope_explain.report.terminal import fits_table, told
 from endoscope_explain.report.writing import write_report
 
@@ -145,7 +151,10 @@ class Explained:
         parts = [
             f'<p><b>{name}: {HEADLINES[self.case.verdict]}</b> ({self.verdict})</p>',
             f'<p>{escape(verdict_sentence(self.case))}</p>',
-            *(f'<p>{escape(said)}</p>' for said in reservations(self.case)),
+            *(
+                f'<p>{escape(said)}</p>'
+                for said in (*reservations(self.case), *not_shown(self.case))
+            ),
         ]
         if self.effects:
             parts.append(html_table(_EFFECTS, self._effect_rows()))

@@ -47,6 +47,7 @@ from endoscope_explain.report.sentences import (
     plain,
     reservations,
     verdict_sentence,
+    what_is_known,
 )
 from endoscope_explain.search.repeated_motion import motion_repeats
 
@@ -256,6 +257,7 @@ def _parameters(case: ExplainedCase) -> list[dict[str, Any]]:
                 {
                     'joint': joint,
                     'number': shown(name, e),
+                    'known': what_is_known(e),
                     'described': digits(factor * e.nominal),
                     'tolerance': f'{digits(factor * low)} … {digits(factor * high)}',
                     'outside': not low <= e.value <= high,

@@ -140,6 +140,27 @@ def reservations(case: ExplainedCase) -> list[str]:
     return said
 
 
+def what_is_known(e: NominalEstimate) -> str:
+    """Say why a fitted number is none that the recording tells; empty where it is."""
+    if e.together_with:
+        return f'only together with {e.together_with}'
+    return '' if e.shown else 'this recording does not show it'
+
+
+def not_shown(case: ExplainedCase) -> list[str]:
+    """Say which numbers of the plant the recording does not tell; empty where it tells all."""
+    said = []
+    for joint, estimates in case.explanation.parameters.items():
+        hidden = [n for n, e in estimates.items() if not (e.shown or e.together_with)]
+        if hidden:
+            said.append(f'This recording does not show {_all(hidden)} of {joint}.')
+        pairs = {n: e.together_with for n, e in estimates.items() if e.together_with}
+        # Of two that name each other it is said once.
+        once = [n for n, other in pairs.items() if pairs.get(other) != n or n < other]
+        said += [f'It shows {n} of {joint} only together with {pairs[n]}.' for n in once]
+    return said
+
+
 def fitting_sentences(case: ExplainedCase) -> list[str]:
     """Say how each joint's fit ended, and which numbers lie at an end of what is allowed."""
     said = []

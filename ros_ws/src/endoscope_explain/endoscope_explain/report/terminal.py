@@ -7,6 +7,7 @@ from endoscope_explain.report.numbers import PLANTS, digits, judged, numbers_of,
 from endoscope_explain.report.sentences import (
     differing,
     next_step,
+    not_shown,
     physics_of,
     plain,
     reservations,
@@ -24,6 +25,7 @@ def told(case: ExplainedCase) -> str:
     if case.rest is Verdict.PARAMETERS_DIFFER:
         for (joint, name), e in differing(case).items():
             lines.append(f'  {joint}: {shown(name, e)}')
+    lines += [f'  {one}' for one in not_shown(case)]
     term = case.explanation.unknown
     if term is not None and term.helps:
         lines.append(f'  It explains {100 * term.explained:.0f} % of the excess misfit.')
