@@ -63,6 +63,8 @@ class NamedEffect:
     alternatives: tuple[str, ...] = ()  # ids that the data cannot tell from this one, nearest first
     # each key has its meaning in `report.sentences.EVIDENCE`
     evidence: Mapping[str, float] = field(default_factory=dict)
+    # A second recording is predicted no better with it.
+    doubtful: bool = False
 
     @property
     def definition(self) -> Effect:

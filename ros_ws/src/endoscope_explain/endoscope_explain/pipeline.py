@@ -13,6 +13,7 @@ from endoscope_core.rig import Rig
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import ChainCut, ExplainedCase, NextExperiment, Place
 from endoscope_explain.compare.ladder import ladders
+from endoscope_explain.compare.second_recording import confirmed_by
 from endoscope_explain.decide.combine import combined_effects, combined_verdict, improved_plant
 from endoscope_explain.decide.given_physics import GivenJoints
 from endoscope_explain.design.proposal import propose
@@ -156,9 +157,12 @@ def explain_case(
             jobs=jobs,
             progress=progress,
         )
+    plant = improved_plant(explanation, audit)
+    if validation is not None:
+        validation = with_isolated_marked(validation, plant)
+        explanation = replace(explanation, effects=confirmed_by(validation, explanation))
     if explanation.fit:
         tell('locating what was found')
-    plant = improved_plant(explanation, audit)
     recording = audit.recording
     case = ExplainedCase(
         recording,
@@ -181,8 +185,6 @@ def explain_case(
     if not sources.quick:
         case = replace(case, next_experiment=_next(case, jobs, tell))
     tell('comparing the plants' if sources.quick else 'judging beside black boxes')
-    if validation is not None:
-        validation = with_isolated_marked(validation, plant)
     held_out, second = ladders(recording, explanation, validation, not sources.quick, jobs)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
 

@@ -42,10 +42,21 @@ def verdict_of_rest(explanation: Explanation, audit: AuditReport) -> Verdict:
     audit = audit.apart_from_mistakes()
     if explanation.verdict in (Verdict.INSUFFICIENT_DATA, Verdict.UNKNOWN_PHYSICS):
         return explanation.verdict
+    if all_refuted(explanation) and not explanation.adequate:
+        return Verdict.UNKNOWN_PHYSICS
     effects = combined_effects(explanation, audit)
     if effects or audit.faults():
         return verdict_by_stage(effects)
     return explanation.verdict
+
+
+def all_refuted(explanation: Explanation) -> bool:
+    """Whether effects were named, and a second recording refutes all of them.
+
+    It says nothing of what acted at a time of the first one.
+    """
+    refuted = [e.doubtful and not e.definition.traits.depends_on_time for e in explanation.effects]
+    return bool(refuted) and all(refuted)
 
 
 def improved_plant(explanation: Explanation, audit: AuditReport) -> PlantDescription:

@@ -20,6 +20,7 @@ from endoscope_explain.report.numbers import PLANTS, Shown, numbers_of
 from endoscope_explain.report.report_mapping import report_mapping
 from endoscope_explain.report.sentences import (
     HEADLINES,
+    label,
     next_step,
     not_shown,
     reservations,
@@ -136,7 +137,7 @@ class Explained:
     def _effect_rows(self) -> list[tuple[str, ...]]:
         rows: list[tuple[str, ...]] = []
         for effect in self.effects:
-            named = (effect.id, effect.joint, ', '.join(effect.alternatives) or '-')
+            named = (label(effect), effect.joint, ', '.join(effect.alternatives) or '-')
             for one in numbers_of(effect) or [Shown('-', '-', '-', '-', '-')]:
                 rows.append((*named, one.name, one.value, f'{one.low} to {one.high}', one.unit))
                 named = ('', '', '')

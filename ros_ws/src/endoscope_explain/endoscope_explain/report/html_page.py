@@ -42,6 +42,7 @@ from endoscope_explain.report.sentences import (
     LEAST_SHARE,
     before_and_after,
     fitting_sentences,
+    label,
     next_step,
     physics_of,
     plain,
@@ -108,8 +109,9 @@ def html_page(case: ExplainedCase) -> str:
         chain=CHAIN,
         guilty=_guilty(case),
         cut=_cut(case, joint) if case.places else '',
-        effects_title=EFFECTS_TITLE.get(case.rest, 'What was named besides'),
+        effects_title=_effects_title(case),
         numbers_of=numbers_of,
+        label=label,
         physics_of=physics_of,
         meaning=EVIDENCE,
         joint=joint,
@@ -127,6 +129,12 @@ def html_page(case: ExplainedCase) -> str:
         experiment_file=EXPERIMENT_FILE,
         written='improved' if case.effects or unknown else PLANTS[list(_plants(explanation))[-1]],
     )
+
+
+def _effects_title(case: ExplainedCase) -> str:
+    if case.effects and all(effect.doubtful for effect in case.effects):
+        return 'What fits this recording alone'
+    return EFFECTS_TITLE.get(case.rest, 'What was named besides')
 
 
 def _plants(explanation: Explanation) -> dict[str, Any]:
@@ -194,7 +202,7 @@ def _guilty(case: ExplainedCase) -> dict[str, list[str]]:
     """What was found in each stage of the chain."""
     guilty: dict[str, list[str]] = {}
     for effect in case.effects:
-        guilty.setdefault(effect.stage, []).append(f'{effect.id} ({effect.joint})')
+        guilty.setdefault(effect.stage, []).append(f'{label(effect)} ({effect.joint})')
     mistaken = case.audit.mistakes()
     places = case.places[: len(mistaken)] if guilty else case.places
     for index, place in enumerate(places):

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from endoscope_explain.case import ExplainedCase, Place
 from endoscope_explain.decide.combine import changed_parameters
 from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
+from endoscope_explain.recording.signals import axis
 from endoscope_explain.report.numbers import PLANTS, digits, form, in_degrees, judged
 
 HEADLINES = {
@@ -19,6 +20,7 @@ HEADLINES = {
 EVIDENCE = {
     'gain': 'log evidence that it adds, in nats',
     'p_value': 'share of rigs without it in which as much is found',
+    'second_p_value': 'chance that it predicts the second recording no better',
     'margin': 'nats by which it adds more than the best other name',
     'as_formula': '1 where the plant has its formula, 0 where it has a fitted function',
     'explained': 'share of the excess misfit that is gone with all that was found',
@@ -57,9 +59,12 @@ def _sentence_of_rest(case: ExplainedCase) -> str:
         return _differing(case)
     if case.rest is Verdict.UNKNOWN_PHYSICS:
         return _unknown(case)
-    if case.effects:
-        named = [_named(e) for e in case.effects[:MOST_NAMED]]
-        more = len(case.effects) - len(named)
+    sure = [e for e in case.effects if not e.doubtful]
+    if case.effects and not sure:
+        return _doubt(case, case.effects[0])
+    if sure:
+        named = [_named(e) for e in sure[:MOST_NAMED]]
+        more = len(sure) - len(named)
         named += [f'{more} more'] if more else []
         missing = case.rest is Verdict.MISSING_PHYSICS
         begin = 'The simulation leaves out' if missing else 'The recording shows'
@@ -117,6 +122,11 @@ def reservations(case: ExplainedCase) -> list[str]:
         begin = 'Of what is not frozen' if frozen else 'As corrected'
         said.append(f'{begin}: {_sentence_of_rest(case)}')
     left_over = [] if case.explanation.adequate else case.audit.findings
+    doubtful = [e for e in case.effects if e.doubtful]
+    if len(doubtful) == len(case.effects) and case.rest is not Verdict.UNKNOWN_PHYSICS:
+        # The first one is the verdict's sentence.
+        doubtful = doubtful[1:]
+    said += [_doubt(case, effect) for effect in doubtful]
     unlike = (f for f in left_over if f.id == 'unlike_the_plant')
     said += [f'{_capital(finding.text)}. {_capital(finding.remedy)}.' for finding in unlike]
     said += [f'{_capital(other)}. It was used as corrected.' for other in case.said_of_others]
@@ -188,12 +198,14 @@ def next_step(case: ExplainedCase) -> str:
     if case.next_experiment is not None:
         rivals = _all(case.next_experiment.separates)
         return f'Play next_experiment.csv on the console: it tells {rivals} apart.'
-    doubtful = next((e for e in case.effects if e.alternatives), None)
-    if doubtful is not None:
+    ambiguous = next((e for e in case.effects if e.alternatives), None)
+    if ambiguous is not None:
         return (
-            f'Run again without --quick for the motion that tells {doubtful.id} from '
-            f'{doubtful.alternatives[0]}.'
+            f'Run again without --quick for the motion that tells {ambiguous.id} from '
+            f'{ambiguous.alternatives[0]}.'
         )
+    if any(e.doubtful for e in case.effects):
+        return 'Explain both recordings with --same-physics: what is named then explains both.'
     if case.verdict is Verdict.CONSISTENT:
         return 'Go on with the described plant.'
     if case.verdict is Verdict.SENSOR_FAULT:
@@ -231,6 +243,29 @@ def _unknown(case: ExplainedCase) -> str:
     what = term.there.physics.rstrip('.')
     states = ''.join(f' and {factor.there.argument.words}' for factor in term.factors)
     return f'Missing on {term.joint}: {what[0].lower()}{what[1:]}{states}.'
+
+
+def label(effect: NamedEffect) -> str:
+    """The name of an effect, in doubt where a second recording does not confirm it."""
+    return f'{effect.id} (in doubt)' if effect.doubtful else effect.id
+
+
+def _doubt(case: ExplainedCase, effect: NamedEffect) -> str:
+    passed = effect.definition.traits.depends_on_time
+    text = (
+        f'{_named(effect)} fits this recording, but does not surely predict the second one better; '
+        f'it {"acted in this one alone, or stands" if passed else "may stand"} for something else.'
+    )
+    letter = f'_{axis(effect.joint)}'
+    refitted = {s: f for s, f in case.validation.get('refitted', {}).items() if letter in s}
+    if not refitted:
+        return text
+    signal, before = max(refitted.items(), key=lambda item: item[1].ratio)
+    after = case.validation['augmented'][signal]
+    return (
+        f'{text} There {plain(signal)} is off by {digits(after.ratio)} instead of '
+        f'{digits(before.ratio)} times its noise.'
+    )
 
 
 def _named(effect: NamedEffect) -> str:

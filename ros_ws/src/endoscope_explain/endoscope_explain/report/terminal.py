@@ -6,6 +6,7 @@ from endoscope_explain.report.columns import table
 from endoscope_explain.report.numbers import PLANTS, digits, judged, numbers_of, shown
 from endoscope_explain.report.sentences import (
     differing,
+    label,
     next_step,
     not_shown,
     physics_of,
@@ -20,7 +21,7 @@ def told(case: ExplainedCase) -> str:
     """Say what was found, in lines of which the first one is the verdict's sentence."""
     lines = [verdict_sentence(case), *reservations(case)]
     for effect in case.effects:
-        lines.append(f'  {effect.id}: {physics_of(effect)}')
+        lines.append(f'  {label(effect)}: {physics_of(effect)}')
         lines += [f'    {one}' for one in numbers_of(effect)]
     if case.rest is Verdict.PARAMETERS_DIFFER:
         for (joint, name), e in differing(case).items():
