@@ -99,3 +99,23 @@ def test_a_stop_that_is_hit_once_in_the_second_recording_is_confirmed(record, st
     explanation = replace(stribeck_case.explanation, augmented=augmented, effects=(named,))
     (effect,) = confirmed_by(second, explanation)
     assert not effect.doubtful
+
+
+def test_a_delay_of_the_tracker_is_judged_on_all_joints_together(record, stribeck_case):
+    late = tuple(EffectSpec('tracker_delay', j, {'delay_s': 0.15}) for j in ('bend_x', 'bend_y'))
+    second = record(PlantDescription(effects=late), command=motion() * [1.0, 0.05])
+    augmented = replace(stribeck_case.explanation.nominal, effects=late)
+    named = tuple(
+        replace(stribeck_case.effects[0], id='tracker_delay', joint=spec.joint) for spec in late
+    )
+    explanation = replace(stribeck_case.explanation, augmented=augmented, effects=named)
+    first, other = confirmed_by(second, explanation)
+    assert not first.doubtful
+    assert other.evidence == first.evidence
+
+
+def test_of_a_joint_that_rests_in_the_second_recording_nothing_is_said(record, stribeck_case):
+    second = record(command=motion() * [0.0, 1.0])
+    (effect,) = confirmed_by(second, stribeck_case.explanation)
+    assert not effect.doubtful
+    assert 'second_p_value' not in effect.evidence
