@@ -106,6 +106,9 @@ def test_many_bags_have_one_report_each_and_one_table(rig, tmp_path, capsys):
         rows = {row['parameter']: row for row in csv.DictReader(file)}
     exponents = [float(rows['capstan_exponent'][name]) for name in ('sound', 'sound_2')]
     assert exponents == pytest.approx([0.9, 0.9], rel=0.05)
+    report = json.loads((tmp_path / 'out' / 'sound' / 'report.json').read_text())
+    shown = {name for name, e in report['parameters']['bend_x'].items() if e['shown']}
+    assert {name for name, row in rows.items() if row['sound']} == shown < set(rows)
 
 
 def test_a_bag_that_cannot_tell_costs_the_others_nothing(rig, tmp_path):

@@ -287,3 +287,31 @@ def test_several_recordings_are_explained_in_one_call(bag, tmp_path):
     assert found[0].report | {'runtime_s': 0} == alone.report | {'runtime_s': 0}
     with pytest.raises(EndoscopeError, match='exclude each other'):
         endoscope_explain.explain(both, one_joint(), same_physics=True, baseline=bag)
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize('use', ['baseline', 'validate', 'same_physics'])
+def test_another_recording_in_degrees_is_used_as_corrected_and_that_is_said(use, tmp_path):
+    bag = write_short_bag(tmp_path / 'short')
+    signals = dict(endoscope_explain.read(bag))
+    angle = signals['slave/measured_js:bend_x']
+    signals[angle.name] = (angle.time, np.degrees(angle.values))
+    mistaken = endoscope_explain.from_arrays(signals)
+    told = []
+    if use == 'same_physics':
+        found, other = endoscope_explain.explain(
+            [bag, mistaken], one_joint(), quick=True, same_physics=True, progress=told.append
+        )
+        assert other.verdict == 'recording_fault'
+        assert 'bend_x is 57.3 times what the plant can give: in deg' in repr(other)
+    else:
+        found = endoscope_explain.explain(
+            bag, one_joint(), quick=True, progress=told.append, **{use: mistaken}
+        )
+        said = 'slave/measured_js:bend_x is 57.3 times what the plant can give: in deg'
+        for text in (repr(found), found._repr_html_(), found.page(), '\n'.join(told)):
+            assert said in text
+    assert found.verdict == 'consistent'
+    second = found.case.validation
+    if use == 'validate':
+        assert second['refitted'][angle.name].ratio < 1.2

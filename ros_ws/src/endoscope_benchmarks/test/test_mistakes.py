@@ -1,4 +1,4 @@
-"""What people take wrongly is said before anything is fitted; physics is not taken for it."""
+"""What people take wrongly is said and put right; physics is not taken for it."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from endoscope_benchmarks.mistakes.mistake import MISTAKES, is_said
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import audit_recording
-from endoscope_explain.explanation import Verdict
+from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 
 STRONGEST = [i for i, effect in CATALOGUE.items() if not effect.traits.audited]
@@ -20,12 +20,8 @@ def seed_of(name):
     return sum(map(ord, name))
 
 
-def never(*_, **__):
-    raise AssertionError('a misread recording was fitted')
-
-
 @pytest.mark.parametrize('name', MISTAKES)
-def test_a_mistake_is_said_and_nothing_is_fitted(name):
+def test_a_mistake_is_said_and_the_recording_is_handed_on_as_corrected(name):
     mistake = MISTAKES[name]
     rng = np.random.default_rng(seed_of(name))
     joints = ('bend_x', 'bend_y')[: mistake.joints]
@@ -33,9 +29,20 @@ def test_a_mistake_is_said_and_nothing_is_fitted(name):
     plant = drawing.described(recording)
     audit = audit_recording(mistake.change(recording, rng), plant)
     assert is_said(mistake, audit), [f.text for f in audit.findings]
-    case = explain_case(Inputs(Sources(Path('rig'), plant), audit), never)
+
+    # The rig's own forces alone tell what a count of its converter is in N.
+    rel = 0.2 if name == 'tension in counts' else 2e-3
+
+    def engine(corrected, *_, **__):
+        for quantity, series in corrected.measured().items():
+            meant = recording.measured()[quantity]
+            judged = series.valid
+            assert series.values[judged] == pytest.approx(meant.values[judged], rel=rel, abs=1e-9)
+            assert series.time == pytest.approx(meant.time, abs=1e-6)
+        return Explanation.without_fit(Verdict.CONSISTENT, plant)
+
+    case = explain_case(Inputs(Sources(Path('rig'), plant), audit), engine)
     assert case.verdict is Verdict.RECORDING_FAULT
-    assert case.effects == ()
 
 
 @pytest.mark.parametrize('effect_id', STRONGEST)
@@ -52,4 +59,4 @@ def test_the_strongest_physics_is_not_taken_for_a_mistake(effect_id):
     else:
         raise AssertionError('no strength that the rig survives')
     audit = audit_recording(recording, PlantDescription(joints=joint))
-    assert not audit.unusable, [f.text for f in audit.findings]
+    assert not audit.mistakes(), [f.text for f in audit.findings]

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport
+from endoscope_explain.decide.combine import verdict_of_rest
 from endoscope_explain.explanation import ChannelFit, Explanation, NamedEffect, Verdict
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.recording import Recording
@@ -88,9 +89,17 @@ class ExplainedCase:
     validation: Ladder = field(default_factory=dict)
     validation_name: str = ''  # empty if none was given
     baseline_name: str = ''  # empty if none was given
+    # What was mistaken in the baseline or the second recording.
+    said_of_others: tuple[str, ...] = ()
     next_experiment: NextExperiment | None = None
     # Whether the refitted plant does better when the measured motor drives it.
     cuts: tuple[ChainCut, ...] = ()
     band: float = BAND  # relative tolerance of the plant's parameters
     provenance: Provenance | None = None
     runtime_s: float = 0.0
+
+    @property
+    def rest(self) -> Verdict:
+        """The verdict with what was mistaken in the recording put right."""
+        mistaken = self.audit.mistakes()
+        return verdict_of_rest(self.explanation, self.audit) if mistaken else self.verdict

@@ -48,6 +48,9 @@ class NominalEstimate(Estimate):
 
     nominal: float  # value in the plant file
     in_band: bool  # within the tolerance by which rigs differ from their description
+    # Whether the recording says more of it than was known before; else the interval is the prior's.
+    shown: bool = True
+    together_with: str = ''  # number without which the recording does not tell this one
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,8 @@ class NamedEffect:
     alternatives: tuple[str, ...] = ()  # ids that the data cannot tell from this one, nearest first
     # each key has its meaning in `report.sentences.EVIDENCE`
     evidence: Mapping[str, float] = field(default_factory=dict)
+    # A second recording is predicted no better with it.
+    doubtful: bool = False
 
     @property
     def definition(self) -> Effect:

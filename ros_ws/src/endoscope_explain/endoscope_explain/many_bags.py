@@ -200,13 +200,18 @@ def summary_table(reports: Mapping[str, Reported]) -> str:
 
 
 def parameter_table(reports: Mapping[str, Reported]) -> str:
-    """Return one CSV line for each fitted parameter, bags beside each other in columns."""
+    """Return one CSV line for each fitted parameter, bags beside each other in columns.
+
+    A cell is empty where a recording does not show the parameter.
+    """
     columns: dict[tuple[str, str, str], dict[str, float]] = {}
     for name, reported in reports.items():
         content = reported.content()
         for joint, estimates in content['parameters'].items():
             for parameter, estimate in estimates.items():
-                columns.setdefault((joint, 'plant', parameter), {})[name] = estimate['value']
+                row = columns.setdefault((joint, 'plant', parameter), {})
+                if estimate['shown']:
+                    row[name] = estimate['value']
         for effect in content['effects']:
             for parameter, estimate in effect['parameters'].items():
                 key = (effect['joint'], effect['id'], parameter)

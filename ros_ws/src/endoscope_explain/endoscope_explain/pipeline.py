@@ -13,6 +13,7 @@ from endoscope_core.rig import Rig
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import ChainCut, ExplainedCase, NextExperiment, Place
 from endoscope_explain.compare.ladder import ladders
+from endoscope_explain.compare.second_recording import confirmed_by
 from endoscope_explain.decide.combine import combined_effects, combined_verdict, improved_plant
 from endoscope_explain.decide.given_physics import GivenJoints
 from endoscope_explain.design.proposal import propose
@@ -76,12 +77,14 @@ class Inputs:
     """The sources, read and audited.
 
     `baseline`, `validation`: as audited.
+    `said_of_others`: what somebody took wrongly in these two, in words.
     """
 
     sources: Sources
     audit: AuditReport
     baseline: Recording | None = None
     validation: Recording | None = None
+    said_of_others: tuple[str, ...] = ()
 
     @property
     def plant(self) -> PlantDescription:
@@ -91,20 +94,6 @@ class Inputs:
 
 class JointsDifferError(BagError):
     """A second recording lacks a joint of the first."""
-
-
-class MisreadRecordingError(BagError):
-    """A recording is not in the units, with the signs or in the order that its names say."""
-
-
-def require_as_named(path: Path, audit: AuditReport) -> None:
-    """Refuse a recording that nothing can be fitted to.
-
-    Raises MisreadRecordingError: says in one line what is wrong, and what would make it fit.
-    """
-    if audit.unusable:
-        worst = audit.faults()[0]
-        raise MisreadRecordingError(f'{path}: {worst.text}; {worst.remedy}')
 
 
 def read_inputs(sources: Sources) -> Inputs:
@@ -120,8 +109,9 @@ def read_inputs(sources: Sources) -> Inputs:
 
     raw = read(sources.bag, sources.plant)
     plant = sources.plant.of_joints(raw.joints)
+    said: list[str] = []
 
-    def second(path: Path | None) -> Recording | None:
+    def second(what: str, path: Path | None) -> Recording | None:
         if path is None:
             return None
         other = read(path, plant)
@@ -131,12 +121,13 @@ def read_inputs(sources: Sources) -> Inputs:
                 f'{", ".join(raw.joints)}'
             )
         audited = audit_recording(other, plant)
-        require_as_named(path, audited)
+        mistakes = audited.mistakes()
+        said.extend(f'the {what} {other.name}: {f.text}; {f.remedy}' for f in mistakes)
         return audited.recording
 
-    return Inputs(
-        sources, audit_recording(raw, plant), second(sources.baseline), second(sources.validate)
-    )
+    baseline = second('baseline', sources.baseline)
+    validation = second('second recording', sources.validate)
+    return Inputs(sources, audit_recording(raw, plant), baseline, validation, tuple(said))
 
 
 def explain_case(
@@ -152,24 +143,26 @@ def explain_case(
     sources, audit, validation = inputs.sources, inputs.audit, inputs.validation
     for finding in audit.findings:
         tell(f'audit: {finding.text}; {finding.remedy}')
-    if audit.unusable:
-        explanation = Explanation.without_fit(Verdict.RECORDING_FAULT, inputs.plant)
-    else:
-        # A fit's matrices are tall and narrow: threads would only wait for each other.
-        with threadpool_limits(1, 'blas'):
-            explanation = engine(
-                audit.recording,
-                inputs.plant,
-                baseline=inputs.baseline,
-                band=sources.band,
-                most_effects=sources.most_effects,
-                given=sources.given,
-                jobs=jobs,
-                progress=progress,
-            )
+    for other in inputs.said_of_others:
+        tell(f'audit: {other}')
+    # A fit's matrices are tall and narrow: threads would only wait for each other.
+    with threadpool_limits(1, 'blas'):
+        explanation = engine(
+            audit.recording,
+            inputs.plant,
+            baseline=inputs.baseline,
+            band=sources.band,
+            most_effects=sources.most_effects,
+            given=sources.given,
+            jobs=jobs,
+            progress=progress,
+        )
+    plant = improved_plant(explanation, audit)
+    if validation is not None:
+        validation = with_isolated_marked(validation, plant)
+        explanation = replace(explanation, effects=confirmed_by(validation, explanation))
     if explanation.fit:
         tell('locating what was found')
-    plant = improved_plant(explanation, audit)
     recording = audit.recording
     case = ExplainedCase(
         recording,
@@ -182,6 +175,7 @@ def explain_case(
         {},
         validation_name='' if validation is None else validation.name,
         baseline_name='' if inputs.baseline is None else inputs.baseline.name,
+        said_of_others=inputs.said_of_others,
         band=sources.band,
     )
     case = replace(case, places=_places(case), cuts=_cuts(case))
@@ -191,8 +185,6 @@ def explain_case(
     if not sources.quick:
         case = replace(case, next_experiment=_next(case, jobs, tell))
     tell('comparing the plants' if sources.quick else 'judging beside black boxes')
-    if validation is not None:
-        validation = with_isolated_marked(validation, plant)
     held_out, second = ladders(recording, explanation, validation, not sources.quick, jobs)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
 
@@ -216,15 +208,16 @@ def _places(case: ExplainedCase) -> tuple[Place, ...]:
     if case.verdict in (Verdict.CONSISTENT, Verdict.INSUFFICIENT_DATA):
         return ()
     explanation = case.explanation
-    audited = {(f.id, f.joint) for f in case.audit.faults()}
+    rest = case.audit.apart_from_mistakes()
+    audited = {(f.id, f.joint) for f in rest.faults()}
     places = locate_effects(
         case.recording,
         explanation.augmented,
         [e for e in case.effects if (e.id, e.joint) not in audited],
     )
-    places += locate_findings(case.audit)
-    if case.verdict is Verdict.UNKNOWN_PHYSICS:
+    places += locate_findings(rest.faults())
+    if case.rest is Verdict.UNKNOWN_PHYSICS:
         places = locate_unknown(case.recording, explanation) + places
-    if case.verdict is Verdict.PARAMETERS_DIFFER:
+    if case.rest is Verdict.PARAMETERS_DIFFER:
         places += locate_parameters(case.recording, explanation)
-    return tuple(places)
+    return (*locate_findings(case.audit.mistakes()), *places)

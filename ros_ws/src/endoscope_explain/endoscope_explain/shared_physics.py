@@ -15,12 +15,7 @@ from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.fit.pooled import told_alone
 from endoscope_explain.observe.held_noise import with_held_noise
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.pipeline import (
-    JointsDifferError,
-    Sources,
-    read_inputs,
-    require_as_named,
-)
+from endoscope_explain.pipeline import JointsDifferError, Sources, read_inputs
 from endoscope_explain.search.levels import FALSE_ALARMS
 from endoscope_explain.search.shared_choice import (
     Anchors,
@@ -45,7 +40,6 @@ def physics_of_all(
     with threadpool_limits(1, 'blas'):
         for one in sources:
             inputs = read_inputs(one)
-            require_as_named(one.bag, inputs.audit)
             recording = inputs.audit.recording
             tell(f'{recording.name}: refitting the nominal plant')
             _, anchors = anchored(

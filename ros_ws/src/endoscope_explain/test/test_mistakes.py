@@ -1,23 +1,103 @@
-"""A mistake is said before anything is fitted, and what looks like one is not."""
+"""A mistake is said and put right before all is fitted, and what looks like one is not said."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from endoscope_core.physics.description import JointParameters, PlantDescription
+from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Verdict
+from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.report.html_page import html_page
+from endoscope_explain.report.terminal import told
 from endoscope_explain.report.writing import write_report
+
+ONE_JOINT = PlantDescription(joints={'bend_x': JointParameters()})
 
 
 def inputs(plant, audit):
-    return Inputs(Sources(Path('rig'), plant), audit)
+    return Inputs(Sources(Path('rig'), plant, quick=True, most_effects=1), audit)
 
 
-def never(*_, **__):
-    raise AssertionError('a misread recording was fitted')
+def standing(*quantities, since=0):
+    def change(recording):
+        series = {q: recording.measured()[q] for q in quantities}
+        stood = {q: s.values.copy() for q, s in series.items()}
+        for values in stood.values():
+            values[since:] = values[since]
+        return recording.with_series({q: replace(s, values=stood[q]) for q, s in series.items()})
+
+    return change
+
+
+def in_degrees(recording):
+    bending = recording.bending
+    return recording.with_series({'bending': replace(bending, values=np.degrees(bending.values))})
+
+
+@pytest.mark.parametrize(
+    ('change', 'sentence', 'lost'),
+    [
+        (in_degrees, 'slave/measured_js:bend_x is 57.3 times', set()),
+        (standing('bending'), 'slave/measured_js is frozen', {'slave/measured_js:bend_x'}),
+        (standing('tension', since=3000), 'wires/measured_js is frozen', set()),
+        (
+            standing('shaft_position', 'shaft_velocity', 'shaft_effort'),
+            'motor/measured_js is frozen',
+            {'motor/measured_js:motor_x.position', 'motor/measured_js:motor_x.effort'},
+        ),
+    ],
+)
+def test_what_is_left_of_a_mistaken_recording_is_explained_below_the_mistake(
+    record, change, sentence, lost
+):
+    sound = record(ONE_JOINT, duration=8.0)
+    cases = []
+    for recording in (sound, change(sound)):
+        audit = audit_recording(recording, ONE_JOINT)
+        cases.append(explain_case(inputs(ONE_JOINT, audit), jobs=1))
+    right, mistaken = cases
+    assert (mistaken.verdict, mistaken.rest) == (Verdict.RECORDING_FAULT, Verdict.CONSISTENT)
+    fit, of_right = mistaken.explanation.fit['refitted'], right.explanation.fit['refitted']
+    assert set(of_right) - set(fit) == lost
+    assert all(fit[signal].ratio < 1.2 for signal in fit)
+    for estimate in mistaken.explanation.parameters['bend_x'].values():
+        assert estimate.low <= estimate.nominal <= estimate.high
+    first, second, *_ = told(mistaken).splitlines()
+    assert first.startswith(sentence)
+    assert second.endswith(': The described plant predicts the recording of bend_x.')
+    for page in (html_page(mistaken), Explained(mistaken)._repr_html_()):
+        assert first in page
+        assert second in page
+
+
+def test_an_effect_is_named_below_a_mistake_in_units_and_its_misfit_is_said(record):
+    effect = EffectSpec('load_cell_gain', 'bend_x', {'gain': 0.8, 'wire': 1.0})
+    recording = in_degrees(record(replace(ONE_JOINT, effects=(effect,)), duration=6.0))
+    case = explain_case(inputs(ONE_JOINT, audit_recording(recording, ONE_JOINT)), jobs=1)
+    assert case.verdict is Verdict.RECORDING_FAULT
+    assert [each.id for each in case.effects] == ['load_cell_gain']
+    assert 'As corrected: The recording shows load_cell_gain on bend_x.' in told(case)
+    (mistake,) = case.audit.mistakes()
+    assert mistake.evidence['misfit_corrected'] < 0.1 < 0.9 < mistake.evidence['misfit']
+    assert '(misfit 100 % as recorded, ' in mistake.text
+    assert [place.stage for place in case.places] == ['recording', 'sensing']
+
+
+def test_what_no_unit_makes_fit_is_fitted_as_recorded_and_that_is_said(record):
+    sound = record(ONE_JOINT, duration=6.0)
+    bending = sound.bending
+    shaken = 0.3 * np.sin(2.0 * np.pi * 3.0 * bending.time)[:, None]
+    foreign = sound.with_series({'bending': replace(bending, values=shaken)})
+    assert 'unlike_the_plant' not in {f.id for f in audit_recording(sound, ONE_JOINT).findings}
+    audit = audit_recording(foreign, ONE_JOINT)
+    assert audit.mistakes() == ()
+    (note,) = [f for f in audit.findings if f.id == 'unlike_the_plant']
+    assert note.signals == ('slave/measured_js:bend_x',)
+    np.testing.assert_array_equal(audit.recording.bending.values, shaken)
 
 
 def test_the_readings_are_handed_on_as_they_must_be_meant(record):
@@ -32,9 +112,9 @@ def test_plugs_that_were_exchanged_are_at_the_sensors(record):
     swapped = replace(sound.tension, values=sound.tension.values[:, ::-1])
     plant = PlantDescription()
     audit = audit_recording(sound.with_series({'tension': swapped}), plant)
-    case = explain_case(inputs(plant, audit), never)
-    assert case.verdict is Verdict.RECORDING_FAULT
-    assert {place.stage for place in case.places} == {'sensing'}
+    np.testing.assert_array_equal(audit.recording.tension.values, sound.tension.values)
+    (mistake,) = audit.mistakes()
+    assert mistake.stage == 'sensing'
 
 
 def test_forces_of_another_rig_are_no_counts_of_a_converter(record):

@@ -21,10 +21,12 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit.tolerance import tolerance
+from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.observe.predicted_signals import rung, view
 from endoscope_explain.recording import Series
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.numbers import in_degrees, judged, moving_joints, shown
+from endoscope_explain.report.report_mapping import report_mapping
 from endoscope_explain.report.sentences import (
     HEADLINES,
     before_and_after,
@@ -184,6 +186,29 @@ def test_the_numbers_of_the_plant_have_their_tolerance(stribeck_case):
     assert 'joint_rest_angle_deg deg 0 1.1 0.573 … 1.72' in text_of(page)
     assert 'divided, and multiplied, by 1.15' in text_of(page)
     assert tolerance('pretension', 5.0, 3.0) == (1.25, 20.0)
+
+
+def test_a_number_that_the_recording_does_not_show_has_words_in_place_of_an_interval(stribeck_case):
+    damping = NominalEstimate(0.003, 0.002, 0.004, 'N m s/rad', 0.003, True, False)
+    bandwidth, ratio = (
+        NominalEstimate(60.0, 54.0, 66.0, 'rad/s', 60.0, True, False, other)
+        for other in ('motor_damping_ratio', 'motor_bandwidth')
+    )
+    numbers = {'motor_bandwidth': bandwidth, 'motor_damping_ratio': ratio}
+    parameters = {'bend_x': {'joint_damping': damping, **numbers}}
+    case = with_explanation(stribeck_case, parameters=parameters)
+    page = text_of(html_page(case))
+    assert 'joint_damping N m s/rad 0.003 this recording does not show it' in page
+    assert 'motor_bandwidth rad/s 60 only together with motor_damping_ratio' in page
+    for text in (told(case), text_of(Explained(case)._repr_html_())):
+        assert 'This recording does not show joint_damping of bend_x.' in text
+        said = 'It shows motor_bandwidth of bend_x only together with motor_damping_ratio.'
+        assert text.count(said) == 1
+        assert 'It shows motor_damping_ratio' not in text
+    written = report_mapping(case)['parameters']['bend_x']
+    assert [(e['shown'], e['together_with']) for e in written.values()] == [
+        *((False, None), (False, 'motor_damping_ratio'), (False, 'motor_bandwidth'))
+    ]
 
 
 def test_how_the_fits_ended_is_said_beside_their_numbers(stribeck_case):
@@ -454,7 +479,7 @@ def test_the_terminal_says_it_all(stribeck_case):
 def test_the_block_that_was_touched_is_marked(stribeck_case):
     finding = Finding(
         'exchanged',
-        Severity.UNUSABLE,
+        Severity.MISTAKE,
         'bend_x',
         'sensing',
         ('wires/measured_js:wire_x_pos',),
@@ -464,8 +489,16 @@ def test_the_block_that_was_touched_is_marked(stribeck_case):
     )
     audit = AuditReport(stribeck_case.recording, (finding,))
     place = dataclasses.replace(stribeck_case.places[0], stage='sensing')
+    explanation = dataclasses.replace(
+        stribeck_case.explanation, effects=(), verdict=Verdict.CONSISTENT
+    )
     case = dataclasses.replace(
-        stribeck_case, verdict=Verdict.RECORDING_FAULT, effects=(), audit=audit, places=(place,)
+        stribeck_case,
+        verdict=Verdict.RECORDING_FAULT,
+        effects=(),
+        audit=audit,
+        places=(place,),
+        explanation=explanation,
     )
     (red,) = [text for text, marked in stages(html_page(case)) if marked]
     assert red == 'sensing load cells, tracker recording fault (bend_x)'

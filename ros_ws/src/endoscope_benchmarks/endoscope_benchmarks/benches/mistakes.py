@@ -55,7 +55,7 @@ def _measure(args: argparse.Namespace, pool: Executor) -> None:
     wrong = [row for row in rows if row.name]
     sound = [row for row in rows if not row.name]
     right = sum(row.right for row in wrong)
-    missed = sum(not row.unusable for row in wrong)
+    missed = sum(not row.mistaken for row in wrong)
     slowest = max(row.seconds for row in rows)
     print('| mistakes | said rightly | missed | otherwise | none | false alarms | slowest |')
     print('|---|---|---|---|---|---|---|')

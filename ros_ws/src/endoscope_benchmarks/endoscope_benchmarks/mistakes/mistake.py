@@ -190,8 +190,8 @@ MISTAKES = {
 
 
 def is_said(mistake: Mistake, report: AuditReport) -> bool:
-    """Whether a report says all that is wrong, and nothing else."""
-    found = [(f.id, f.signals[0].partition(':')[0], f.text) for f in report.findings]
+    """Whether a report says all that is wrong, and nothing else but notes."""
+    found = [(f.id, f.signals[0].partition(':')[0], f.text) for f in report.faults()]
     for wanted in mistake.said:
         left = list(found)
         for identity, topic, words in wanted:
@@ -201,5 +201,5 @@ def is_said(mistake: Mistake, report: AuditReport) -> bool:
                 break
         else:
             if not left:
-                return report.unusable
+                return len(found) == len(report.mistakes())
     return False

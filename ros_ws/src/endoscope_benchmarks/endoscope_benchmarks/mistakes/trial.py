@@ -19,7 +19,7 @@ class Row:
     seed: int
     # The mistake and nothing else was said, or nothing where none was made.
     right: bool
-    unusable: bool
+    mistaken: bool  # whether any mistake was said
     seconds: float
     said: tuple[str, ...]
 
@@ -37,6 +37,7 @@ def audited(name: str, seed: int) -> Row:
     begun = time.perf_counter()
     report = audit_recording(recording, described(recording))
     seconds = time.perf_counter() - begun
-    right = is_said(mistake, report) if mistake else not report.unusable
+    mistaken = bool(report.mistakes())
+    right = is_said(mistake, report) if mistake else not mistaken
     said = tuple(f.text for f in report.faults())
-    return Row(name, seed, right, report.unusable, seconds, said)
+    return Row(name, seed, right, mistaken, seconds, said)

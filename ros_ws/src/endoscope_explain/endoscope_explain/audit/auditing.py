@@ -9,7 +9,7 @@ from endoscope_explain.audit.earlier_motion import with_state_at_start
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
 from endoscope_explain.audit.held_pose import with_held_poses
 from endoscope_explain.audit.held_samples import held, held_before_jump, held_findings
-from endoscope_explain.audit.misreading import as_findings
+from endoscope_explain.audit.misreading import as_findings, unlike_the_plant
 from endoscope_explain.audit.outliers import find_outliers, motor_travel, outlier_finding
 from endoscope_explain.audit.plausibility import Comparison, as_meant
 from endoscope_explain.audit.receipt_clock import (
@@ -31,6 +31,7 @@ from endoscope_explain.audit.standing_still import (
     frozen_findings,
     moves,
     resting_motor_findings,
+    without_frozen,
 )
 from endoscope_explain.audit.time_unit import in_seconds, stamp_unit_findings
 from endoscope_explain.recording import Recording, Series
@@ -56,17 +57,16 @@ def audit_recording(recording: Recording, plant: PlantDescription) -> AuditRepor
     Returns
     -------
     AuditReport
-        Where the recording is not what its names say, of that alone, with the recording as it must
-        be meant.
+        Where the recording is not what its names say, it is corrected to what it must mean.
     """
     findings: list[Finding] = []
     recording = _on_ordered_stamps(recording, findings)
-    misread = stamp_unit_findings(recording, plant.sensors)
-    recording = _on_one_clock(in_seconds(recording, misread), findings)
+    in_other_units = stamp_unit_findings(recording, plant.sensors)
+    recording = _on_one_clock(in_seconds(recording, in_other_units), findings)
+    over_all = ((0.0, recording.duration),)
+    findings += [replace(f, intervals=over_all) for f in in_other_units]
     recording = _without_commandless_times(recording, findings)
-    recording, noisy = _as_meant(recording, plant, misread)
-    if misread:
-        return AuditReport(recording, tuple(misread))
+    recording, noisy = _as_meant(recording, plant, findings)
     findings += resting_motor_findings(recording)
     recording = with_held_poses(recording, plant.sensors, findings)
     recording = _audited_motor(recording, plant.sensors, findings)
@@ -76,8 +76,8 @@ def audit_recording(recording: Recording, plant: PlantDescription) -> AuditRepor
         bending=_audited_bending(recording, plant, findings, noisy),
     )
     recording = with_state_at_start(recording, plant, findings)
-    order = {Severity.FAULT: 0, Severity.NOTE: 1}
-    findings.sort(key=lambda f: order[f.severity])
+    order = (Severity.MISTAKE, Severity.FAULT, Severity.NOTE)
+    findings.sort(key=lambda f: order.index(f.severity))
     return AuditReport(recording, tuple(findings))
 
 
@@ -95,7 +95,7 @@ def _on_ordered_stamps(recording: Recording, findings: list[Finding]) -> Recordi
 
 
 def _as_meant(
-    recording: Recording, plant: PlantDescription, misread: list[Finding]
+    recording: Recording, plant: PlantDescription, findings: list[Finding]
 ) -> tuple[Recording, bool]:
     """The recording as it must be meant, and whether its readings have noise."""
     if recording.duration < LEAST_DURATION_S:
@@ -106,7 +106,7 @@ def _as_meant(
     frozen = frozen_findings(
         recording, comparison.grid, comparison.expected(), comparison.noise, noisy
     )
-    misread += frozen
+    findings += frozen
     if not moves(recording.command):
         return recording, noisy
     if frozen:
@@ -114,8 +114,12 @@ def _as_meant(
         still = [n for n, s in recording.measured().items() if s.topic in topics]
         comparison = Comparison(recording, plant, still)
     mistakes = comparison.judged()
-    misread += as_findings(recording, mistakes)
-    return as_meant(recording, mistakes), noisy
+    before, after = comparison.shares(), comparison.shares(mistakes)
+    findings += as_findings(recording, mistakes, before, after)
+    unlike = comparison.unlike(mistakes)
+    if unlike:
+        findings.append(unlike_the_plant(recording, unlike))
+    return without_frozen(as_meant(recording, mistakes), frozen), noisy
 
 
 def _on_one_clock(recording: Recording, findings: list[Finding]) -> Recording:
@@ -215,11 +219,11 @@ def _audited_tension(
     for j, joint in enumerate(recording.joints):
         for wire in range(2):
             signal = signal_name('tension', joint, wire)
-            values = series.values[:, j, wire]
+            values, seen = series.values[:, j, wire], series.valid[:, j, wire]
             pile = clipped(values, sensors.load_cell_noise, sensors.load_cell_resolution)
             at_limit = np.zeros(len(values), bool)
-            if pile is not None:
-                at_limit, limit = pile
+            if pile is not None and (seen & pile[0]).any():
+                at_limit, limit = seen & pile[0], pile[1]
                 findings.append(
                     saturation_finding(
                         joint,
@@ -235,7 +239,7 @@ def _audited_tension(
                 values, sensors.load_cell_noise, sensors.load_cell_resolution, interval
             )
             # A reading without noise, as of a simulation, may well repeat itself.
-            repeated &= ~at_limit & noisy
+            repeated &= seen & ~at_limit & noisy
             findings += held_findings(joint, signal, series.time, repeated)
             wrong[:, j, wire] = at_limit | repeated
     return series.without(wrong)
@@ -269,7 +273,7 @@ def _audited_bending(
         signal = signal_name('bending', joint)
         values = series.values[:, j]
         repeated, _ = held(values, plant.sensors.tracker_noise, 0.0, interval)
-        repeated &= noisy
+        repeated &= series.valid[:, j] & noisy
         findings += held_findings(joint, signal, series.time, repeated)
         asked = motor.values[:, j] / recording.gear
         travel = motor_travel(series.time, motor.time, asked, 3.0 * interval)

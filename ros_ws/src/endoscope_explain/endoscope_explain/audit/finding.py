@@ -1,7 +1,7 @@
 """What an audit says about a recording."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from endoscope_explain.explanation import Estimate
@@ -13,8 +13,8 @@ class Severity(StrEnum):
 
     NOTE = 'note'
     FAULT = 'fault'
-    UNUSABLE = 'unusable'
-    """It changes the verdict, and nothing can be learnt from the recording before it is mended."""
+    MISTAKE = 'mistake'
+    """Somebody took a unit, sign or order wrongly, or a source stood still: it is the verdict."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class Finding:
     ----------
     id : str
         Catalogue id (`recording_gap`, `clock_skew`, `tracker_outliers`, `load_cell_saturation`),
-        or, for notes, what was found: `repeated_stamps`, `unordered_stamps`, `held_samples`,
-        `held_pose`.
+        or what was found: `wrong_unit`, `wrong_sign`, `exchanged`, `wrong_gear`, `frozen`,
+        `repeated_stamps`, `unordered_stamps`, `held_samples`, `held_pose`.
     severity : Severity
     joint : str
         Joint it concerns; the first one if it concerns all.
@@ -63,7 +63,8 @@ class AuditReport:
     Attributes
     ----------
     recording : Recording
-        With strictly increasing stamps; samples that must not be judged are not valid.
+        As corrected, with strictly increasing stamps; samples that must not be judged are not
+        valid.
     findings : tuple of Finding
         Most serious first.
     """
@@ -75,7 +76,11 @@ class AuditReport:
         """Return the findings that change the verdict."""
         return tuple(f for f in self.findings if f.severity is not Severity.NOTE)
 
-    @property
-    def unusable(self) -> bool:
-        """Whether the recording is not what its names say, so that nothing must be fitted to it."""
-        return any(f.severity is Severity.UNUSABLE for f in self.findings)
+    def mistakes(self) -> tuple[Finding, ...]:
+        """Return in what the recording was not what its names say."""
+        return tuple(f for f in self.findings if f.severity is Severity.MISTAKE)
+
+    def apart_from_mistakes(self) -> 'AuditReport':
+        """Return what is wrong beside them."""
+        rest = tuple(f for f in self.findings if f.severity is not Severity.MISTAKE)
+        return replace(self, findings=rest)

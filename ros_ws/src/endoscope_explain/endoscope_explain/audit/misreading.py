@@ -1,15 +1,17 @@
 """Units, signs and orders that people take by mistake, and how each is said."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 from math import log, pi
+
+import numpy as np
 
 from endoscope_bags.units import UNITS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.recording import Recording
-from endoscope_explain.recording.series import DESIRED
+from endoscope_explain.recording.series import DESIRED, Array
 from endoscope_explain.recording.signals import QUANTITY_UNITS, motor_name, signal_name
 
 LARGE = 5.0
@@ -24,6 +26,9 @@ KINDS = 6 * 4
 """Of mistakes: unit, sign, order and factor of the command and of five measured quantities."""
 CONVERTER_BITS = 24
 """Of the finest converter whose counts anybody records."""
+
+Shares = Mapping[str, Array]
+"""By quantity, of each column: what no lag, offset and scale make of the simulated one."""
 
 
 @dataclass(frozen=True)
@@ -140,14 +145,17 @@ def _parts(columns: int, joints: int) -> list[tuple[tuple[int, ...], int]]:
     return list(found.items())
 
 
-def as_findings(recording: Recording, mistakes: Sequence[Misreading]) -> list[Finding]:
-    """Say each mistake in one line.
+def as_findings(
+    recording: Recording, mistakes: Sequence[Misreading], before: Shares, after: Shares
+) -> list[Finding]:
+    """Say each mistake in one line, with the misfits before and after all are put right.
 
-    Returns: none of them leaves the recording usable. An exchange of motors is said once.
+    An exchange of motors is said once.
     """
     findings: dict[tuple[str, str, tuple[int, ...]], Finding] = {}
     for mistake in mistakes:
-        finding = _finding(recording, mistake)
+        misfits = _misfit(mistake, before), _misfit(mistake, after)
+        finding = _finding(recording, mistake, *misfits)
         topic = finding.signals[0].partition(':')[0]
         key = (topic, mistake.kind if mistake.kind == 'order' else mistake.quantity, mistake.source)
         findings.setdefault(key, finding)
@@ -165,7 +173,34 @@ def column_name(recording: Recording, quantity: str, column: int) -> str:
     return signal_name(quantity, recording.joints[column])
 
 
-def _finding(recording: Recording, mistake: Misreading) -> Finding:
+def unlike_the_plant(recording: Recording, columns: Sequence[tuple[str, int]]) -> Finding:
+    """Note signals that nothing known turns into what the plant gives."""
+    signals = tuple(column_name(recording, *each) for each in columns)
+    has, fits = ('has', 'it') if len(signals) == 1 else ('have', 'them')
+    quantity, column = columns[0]
+    return Finding(
+        'unlike_the_plant',
+        Severity.NOTE,
+        recording.joints[column // (2 if quantity == 'tension' else 1)],
+        'recording',
+        signals,
+        ((0.0, recording.duration),),
+        f'{" and ".join(signals)} {has} nothing in common with what the plant gives, and no unit, '
+        f'sign or order that is known makes {fits} fit',
+        'fitted as recorded',
+    )
+
+
+def _misfit(mistake: Misreading, shares: Shares) -> float:
+    """Share (rms) of what a mistake spoils: of a wrong command, all that was measured."""
+    if mistake.quantity == 'command':
+        spoilt = np.concatenate(list(shares.values()))
+    else:
+        spoilt = shares[mistake.quantity][list(mistake.touched)]
+    return float(np.sqrt(np.mean(np.minimum(spoilt, 1.0) ** 2)))
+
+
+def _finding(recording: Recording, mistake: Misreading, before: float, after: float) -> Finding:
     quantity = mistake.quantity
     signals = tuple(column_name(recording, quantity, c) for c in mistake.touched)
     named = ' and '.join(signals)
@@ -173,14 +208,14 @@ def _finding(recording: Recording, mistake: Misreading) -> Finding:
     wanted = QUANTITY_UNITS.get(quantity, 'rad')
     factor = next((f for f in mistake.factor if f != 1.0), 1.0)
     per_joint = 2 if quantity == 'tension' else 1
-    evidence = {}
+    evidence = {'misfit': before, 'misfit_corrected': after}
     gear_of_shaft = mistake.of_gear and quantity == 'shaft_position'
     if mistake.kind == 'unit' and not gear_of_shaft:
         times = f'{factor:.3g} times' if factor > 1.0 else f'1/{1.0 / factor:.3g} of'
         name = 'wrong_unit'
         text = f'{named} {verb} {times} what the plant can give: in {mistake.unit}, not in {wanted}'
         remedy = f'divide by {factor:.6g}, or give the unit when the table is converted'
-        evidence = {'factor': factor}
+        evidence['factor'] = factor
     elif mistake.kind == 'factor' and not gear_of_shaft:
         name = 'wrong_unit'
         text = (
@@ -188,7 +223,7 @@ def _finding(recording: Recording, mistake: Misreading) -> Finding:
             'force: counts of a converter, not N'
         )
         remedy = 'give what one count is in N as scale when the table is converted'
-        evidence = {'factor': factor}
+        evidence['factor'] = factor
     elif gear_of_shaft:
         name = 'wrong_gear'
         text = (
@@ -196,7 +231,7 @@ def _finding(recording: Recording, mistake: Misreading) -> Finding:
             f'commanded by {recording.command.topic}: a gear is wrong on the way of one of them'
         )
         remedy = f'divide the position or multiply the command by {factor:.4g}, whichever is wrong'
-        evidence = {'factor': factor}
+        evidence['factor'] = factor
     elif mistake.kind == 'sign':
         name = 'wrong_sign'
         negated = 'it fits' if len(signals) == 1 else 'they fit'
@@ -212,12 +247,12 @@ def _finding(recording: Recording, mistake: Misreading) -> Finding:
         remedy = 'exchange their names, or the plugs'
     return Finding(
         name,
-        Severity.UNUSABLE,
+        Severity.MISTAKE,
         recording.joints[mistake.touched[0] // per_joint],
         _stage(mistake),
         signals,
         ((0.0, recording.duration),),
-        text,
+        f'{text} (misfit {100 * before:.3g} % as recorded, {100 * after:.3g} % as corrected)',
         remedy,
         evidence=evidence,
     )

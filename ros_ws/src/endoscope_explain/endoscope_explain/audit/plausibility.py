@@ -9,7 +9,7 @@ and shapes within those tolerances, or into what no mistake explains.
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
-from math import inf, log, pi
+from math import exp, inf, log, pi
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from endoscope_explain.audit.misreading import (
     misreadings,
     scaled,
 )
+from endoscope_explain.audit.standing_still import must_move
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.recording.series import Array
 
@@ -41,11 +42,13 @@ MOVES = 0.01
 class Way:
     """One way to read a quantity, and what speaks against it.
 
-    `misfit`: sum of the logarithms of its columns' misfits.
+    `shares` (columns,): misfit of each column.
+    `misfit`: sum of their logarithms.
     `size`: by how much larger or smaller they are than simulated, in what rigs usually differ by.
     """
 
     reading: Misreading
+    shares: Array
     misfit: float
     size: float
 
@@ -128,6 +131,37 @@ class Comparison:
                 least, best = against, tuple(said)
         return best
 
+    def shares(self, mistakes: Collection[Misreading] = ()) -> dict[str, Array]:
+        """Misfit of each column of each quantity (columns,), read with these mistakes put right."""
+        meant = {mistake.quantity: mistake for mistake in mistakes}
+        drive = meant.get('command', self._right())
+        return {
+            q: next(
+                w.shares
+                for w in self._ways(drive, q)
+                if w.reading == meant.get(q, self._readings[q][0])
+            )
+            for q in self.measured
+        }
+
+    def unlike(self, mistakes: Collection[Misreading]) -> list[tuple[str, int]]:
+        """Quantities and columns that must move and have nothing in common with the simulated ones.
+
+        What they share is worth less than the scale that was fitted for it (Schwarz).
+        """
+        worth = self._criteria.worth
+        least = exp(-0.5 * log(worth) / worth)
+        drive = next((m for m in mistakes if m.quantity == 'command'), self._right())
+        return [
+            (quantity, column)
+            for quantity, shares in self.shares(mistakes).items()
+            for column, share in enumerate(shares)
+            if share > least
+            and must_move(
+                self._answer(drive)[quantity][:, column], self.grid, 0.0, self.noise[quantity]
+            )
+        ]
+
     def _misreadings(self, quantity: str, columns: int) -> Iterator[Misreading]:
         return misreadings(quantity, self._plant, self._rig.joints.gear, columns)
 
@@ -180,12 +214,14 @@ class Comparison:
     def _ways(self, command: Misreading, quantity: str) -> list[Way]:
         """All ways to read a quantity where the command is meant so."""
         if (command, quantity) not in self._known:
-            if command not in self._answers:
-                self._answers[command] = self.simulated(command)
-            self._known[command, quantity] = self._ways_of(
-                quantity, self._answers[command][quantity]
-            )
+            answer = self._answer(command)[quantity]
+            self._known[command, quantity] = self._ways_of(quantity, answer)
         return self._known[command, quantity]
+
+    def _answer(self, command: Misreading) -> dict[str, Array]:
+        if command not in self._answers:
+            self._answers[command] = self.simulated(command)
+        return self._answers[command]
 
     def _ways_of(self, quantity: str, simulated: Array) -> list[Way]:
         moments = Moments.of(self.measured[quantity], simulated)
@@ -211,7 +247,7 @@ class Comparison:
             share, scale = np.transpose(misfit)
             kept = np.log(np.clip(share, usual, MOST))
             size = np.abs(np.log(np.maximum(scale, usual))) / max(log(largest), usual)
-            found.append(Way(reading, float(kept.sum()), float(size.sum())))
+            found.append(Way(reading, share, float(kept.sum()), float(size.sum())))
         return found
 
     def _of_any_size(self, quantity: str, moments: Moments) -> Iterator[Misreading]:

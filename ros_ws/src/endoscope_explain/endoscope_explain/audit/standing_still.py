@@ -1,6 +1,8 @@
 """Topics that stand still while the rig moves, and motors that do not follow at all."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +52,7 @@ def frozen_findings(
         if (
             sure
             and found is not None
-            and any(_must_move(expected[q][:, c], grid, found, noise[q]) for q, c in columns)
+            and any(must_move(expected[q][:, c], grid, found, noise[q]) for q, c in columns)
         ):
             findings.append(_finding(recording, columns, found, held[0][1].topic))
             continue
@@ -61,7 +63,7 @@ def frozen_findings(
                 constant
                 and noisy
                 and quantity in ('tension', 'bending')
-                and _must_move(expected[quantity][:, c], grid, float(time[0]), noise[quantity])
+                and must_move(expected[quantity][:, c], grid, float(time[0]), noise[quantity])
             ):
                 name = column_name(recording, quantity, c)
                 findings.append(_finding(recording, [(quantity, c)], float(time[0]), name))
@@ -70,6 +72,20 @@ def frozen_findings(
         columns = [('command', j) for j in range(len(recording.joints))]
         findings.append(_finding(recording, columns, float(command.time[0]), command.topic))
     return findings
+
+
+def without_frozen(recording: Recording, frozen: Sequence[Finding]) -> Recording:
+    """The recording without what stood still; a motor that did is as one that was not recorded."""
+    since = {signal: f.intervals[0][0] for f in frozen for signal in f.signals}
+    changed: dict[str, Any] = {}
+    for quantity, series in recording.measured().items():
+        flat = series.values.reshape(len(series.time), -1)
+        names = [column_name(recording, quantity, c) for c in range(flat.shape[1])]
+        begins = np.array([since.get(name, np.inf) for name in names])
+        wrong = (series.time[:, None] >= begins).reshape(series.valid.shape)
+        stands = series.topic == MOTOR and wrong.any()
+        changed[quantity] = None if stands else series.without(wrong)
+    return replace(recording, **changed)
 
 
 def resting_motor_findings(recording: Recording) -> list[Finding]:
@@ -105,7 +121,8 @@ def _frozen_since(time: Array, values: Array) -> float | None:
     return since if float(time[-1]) - since >= long else None
 
 
-def _must_move(expected: Array, grid: Array, since: float, noise: float) -> bool:
+def must_move(expected: Array, grid: Array, since: float, noise: float) -> bool:
+    """Whether an expected signal (N,) moves by more than its noise, in its own unit."""
     later = expected[grid >= since]
     return len(later) > 1 and bool(np.ptp(later) > max(NOISES * noise, MOVES_RAD))
 
@@ -118,7 +135,7 @@ def _finding(
     meanwhile = 'the command moves' if quantity != 'command' else 'the motors move'
     return Finding(
         'frozen',
-        Severity.UNUSABLE,
+        Severity.MISTAKE,
         recording.joints[column // per_joint],
         'recording',
         tuple(column_name(recording, q, c) for q, c in columns),

@@ -113,7 +113,7 @@ def _finding(recording: Recording, series: list[Series], power: int) -> Finding:
         remedy = f'multiply them by {1000**-power:g}'
     return Finding(
         'wrong_unit',
-        Severity.UNUSABLE,
+        Severity.MISTAKE,
         recording.joints[0],
         'recording',
         topics,

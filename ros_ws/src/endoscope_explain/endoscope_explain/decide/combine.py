@@ -31,14 +31,32 @@ def combined_verdict(explanation: Explanation, audit: AuditReport) -> Verdict:
 
     Where the rig hardly moves nothing can be told. Missing physics wins over a faulty sensor, that
     over a faulty recording, and any of them over differing parameters: these always differ a
-    little.
+    little. What was mistaken in the recording itself is the verdict: the rest is about another
+    recording than was given.
     """
+    return Verdict.RECORDING_FAULT if audit.mistakes() else verdict_of_rest(explanation, audit)
+
+
+def verdict_of_rest(explanation: Explanation, audit: AuditReport) -> Verdict:
+    """Say in one word what was found once all mistakes are put right."""
+    audit = audit.apart_from_mistakes()
     if explanation.verdict in (Verdict.INSUFFICIENT_DATA, Verdict.UNKNOWN_PHYSICS):
         return explanation.verdict
+    if all_refuted(explanation) and not explanation.adequate:
+        return Verdict.UNKNOWN_PHYSICS
     effects = combined_effects(explanation, audit)
     if effects or audit.faults():
         return verdict_by_stage(effects)
     return explanation.verdict
+
+
+def all_refuted(explanation: Explanation) -> bool:
+    """Whether effects were named, and a second recording refutes all of them.
+
+    It says nothing of what acted at a time of the first one.
+    """
+    refuted = [e.doubtful and not e.definition.traits.depends_on_time for e in explanation.effects]
+    return bool(refuted) and all(refuted)
 
 
 def improved_plant(explanation: Explanation, audit: AuditReport) -> PlantDescription:

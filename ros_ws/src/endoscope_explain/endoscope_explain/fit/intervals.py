@@ -24,6 +24,11 @@ Array = NDArray[np.float64]
 
 DEGREES = 19
 """Of freedom of what moves the numbers: rigs of another form that were fitted."""
+SHOWN = math.sqrt(0.5)
+"""Deviation over the prior's up to which a recording says as much of a number as the prior does:
+their precisions add."""
+TOGETHER = math.sqrt(0.75)
+"""Correlation from which on one number, were it known, would halve the other one's deviation."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,8 @@ class Intervals:
 
     Shapes: `values`, `low`, `high` (n,).
     `indices`: places in the packed parameters.
+    `shown` (n,): whether the recording says more of it than the prior.
+    `partners`: number without which the recording does not tell this one; empty where it does.
     """
 
     names: tuple[str, ...]
@@ -39,6 +46,8 @@ class Intervals:
     values: Array
     low: Array
     high: Array
+    shown: NDArray[np.bool_]
+    partners: tuple[str, ...]
 
 
 def covariance(fit: Fit) -> Array:
@@ -54,9 +63,18 @@ def intervals(fit: Fit) -> Intervals:
     kept = [k for k, item in enumerate(fit.model.free) if item.index != COEFFICIENT]
     free = [fit.model.free[k] for k in kept]
     theta = fit.theta[kept]
-    reach = NINETY_PERCENT * np.sqrt(np.diag(covariance(fit)))[kept]
+    spread = covariance(fit)[np.ix_(kept, kept)]
+    deviation = np.sqrt(np.diag(spread))
+    correlation = np.abs(spread) / np.outer(deviation, deviation) - np.eye(len(kept))
+    reach = NINETY_PERCENT * deviation
     if fit.moved_by_form is not None:
         reach = np.hypot(reach, t.ppf(0.95, DEGREES) * fit.moved_by_form[kept])
+    prior = np.array([item.spread for item in free])
+    shown = reach <= SHOWN * NINETY_PERCENT * prior
+    # Of two that go together the prior of one may have narrowed the other.
+    bound = (correlation > TOGETHER) & ~np.logical_and.outer(shown, shown)
+    nearest = np.where(bound, correlation, 0.0).argmax(axis=1)
+    partners = (free[n].name if bound[k, n] else '' for k, n in enumerate(nearest))
     reach *= REACH
 
     def values(coordinates: Array) -> Array:
@@ -68,6 +86,8 @@ def intervals(fit: Fit) -> Intervals:
         values(theta),
         values(theta - reach),
         values(theta + reach),
+        shown,
+        tuple(partners),
     )
 
 
@@ -99,9 +119,18 @@ def nominal_estimates(
             units.get(name, ''),
             float(described[index]),
             _in_band(name, float(value), float(described[index])),
+            bool(shown),
+            partner,
         )
-        for name, index, value, low, high in zip(
-            found.names, found.indices, found.values, found.low, found.high, strict=True
+        for name, index, value, low, high, shown, partner in zip(
+            found.names,
+            found.indices,
+            found.values,
+            found.low,
+            found.high,
+            found.shown,
+            found.partners,
+            strict=True,
         )
         if name in FITTED_NOMINAL and index not in absent
     }

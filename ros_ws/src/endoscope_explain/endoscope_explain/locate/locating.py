@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.signal import periodogram
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.audit import AuditReport
+from endoscope_explain.audit import Finding
 from endoscope_explain.case import Place
 from endoscope_explain.decide.combine import changed_parameters
 from endoscope_explain.explanation import Explanation, NamedEffect
@@ -93,11 +93,10 @@ def locate_parameters(recording: Recording, explanation: Explanation) -> list[Pl
     return [place(recording, found, stage, joint) for stage, joint in stages]
 
 
-def locate_findings(audit: AuditReport) -> list[Place]:
-    """Say where the audit's faults are."""
+def locate_findings(findings: Sequence[Finding]) -> list[Place]:
+    """Say where what the audit found is."""
     return [
-        Place(f.stage, f.joint, f.signals, f.intervals[:12], f.text, (0.0, 0.0))
-        for f in audit.faults()
+        Place(f.stage, f.joint, f.signals, f.intervals[:12], f.text, (0.0, 0.0)) for f in findings
     ]
 
 

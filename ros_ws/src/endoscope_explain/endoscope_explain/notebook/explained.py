@@ -18,7 +18,14 @@ from endoscope_explain.observe.predicted_signals import RecordedView, view
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.numbers import PLANTS, Shown, numbers_of
 from endoscope_explain.report.report_mapping import report_mapping
-from endoscope_explain.report.sentences import HEADLINES, next_step, verdict_sentence
+from endoscope_explain.report.sentences import (
+    HEADLINES,
+    label,
+    next_step,
+    not_shown,
+    reservations,
+    verdict_sentence,
+)
 from endoscope_explain.report.terminal import fits_table, told
 from endoscope_explain.report.writing import write_report
 
@@ -95,12 +102,14 @@ class Explained:
         Returns
         -------
         matplotlib.figure.Figure
-            A row for each joint, with the error in degrees below it.
+            A row for each joint, with the error in degrees below it; empty where none was read.
         """
         from matplotlib.figure import Figure
 
         bending = [s for s in self.predicted.signals.values() if s.quantity == 'bending']
         figure = Figure(figsize=(9.0, 3.6 * len(bending) + 0.4), layout='constrained')
+        if not bending:
+            return figure
         ratios = [2.0, 1.0] * len(bending)
         axes = figure.subplots(
             2 * len(bending), 1, sharex=True, squeeze=False, height_ratios=ratios
@@ -128,7 +137,7 @@ class Explained:
     def _effect_rows(self) -> list[tuple[str, ...]]:
         rows: list[tuple[str, ...]] = []
         for effect in self.effects:
-            named = (effect.id, effect.joint, ', '.join(effect.alternatives) or '-')
+            named = (label(effect), effect.joint, ', '.join(effect.alternatives) or '-')
             for one in numbers_of(effect) or [Shown('-', '-', '-', '-', '-')]:
                 rows.append((*named, one.name, one.value, f'{one.low} to {one.high}', one.unit))
                 named = ('', '', '')
@@ -143,6 +152,10 @@ class Explained:
         parts = [
             f'<p><b>{name}: {HEADLINES[self.case.verdict]}</b> ({self.verdict})</p>',
             f'<p>{escape(verdict_sentence(self.case))}</p>',
+            *(
+                f'<p>{escape(said)}</p>'
+                for said in (*reservations(self.case), *not_shown(self.case))
+            ),
         ]
         if self.effects:
             parts.append(html_table(_EFFECTS, self._effect_rows()))

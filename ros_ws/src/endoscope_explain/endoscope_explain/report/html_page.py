@@ -42,11 +42,13 @@ from endoscope_explain.report.sentences import (
     LEAST_SHARE,
     before_and_after,
     fitting_sentences,
+    label,
     next_step,
     physics_of,
     plain,
     reservations,
     verdict_sentence,
+    what_is_known,
 )
 from endoscope_explain.search.repeated_motion import motion_repeats
 
@@ -107,8 +109,9 @@ def html_page(case: ExplainedCase) -> str:
         chain=CHAIN,
         guilty=_guilty(case),
         cut=_cut(case, joint) if case.places else '',
-        effects_title=EFFECTS_TITLE.get(case.verdict, 'What was named besides'),
+        effects_title=_effects_title(case),
         numbers_of=numbers_of,
+        label=label,
         physics_of=physics_of,
         meaning=EVIDENCE,
         joint=joint,
@@ -126,6 +129,12 @@ def html_page(case: ExplainedCase) -> str:
         experiment_file=EXPERIMENT_FILE,
         written='improved' if case.effects or unknown else PLANTS[list(_plants(explanation))[-1]],
     )
+
+
+def _effects_title(case: ExplainedCase) -> str:
+    if case.effects and all(effect.doubtful for effect in case.effects):
+        return 'What fits this recording alone'
+    return EFFECTS_TITLE.get(case.rest, 'What was named besides')
 
 
 def _plants(explanation: Explanation) -> dict[str, Any]:
@@ -156,8 +165,9 @@ def _drawings(
         j = case.recording.joints.index(joint)
         asked = case.recording.command
         command = (asked.time, asked.values[:, j] / case.recording.gear)
-        # What is drawn of a recording that cannot be used is what was meant, and shows nothing.
-        shaded = () if case.audit.unusable else case.places
+        # What is drawn is as corrected, and shows no mistake.
+        mistaken = bool(case.audit.mistakes())
+        shaded = tuple(p for p in case.places if p.shares or not mistaken)
         drawn['timeline'] = timeline_figure(recorded, command, joint, shaded)
         if joint in moving_joints(case.recording):
             views = telling_signals(recorded, joint)
@@ -192,11 +202,15 @@ def _guilty(case: ExplainedCase) -> dict[str, list[str]]:
     """What was found in each stage of the chain."""
     guilty: dict[str, list[str]] = {}
     for effect in case.effects:
-        guilty.setdefault(effect.stage, []).append(f'{effect.id} ({effect.joint})')
-    if not guilty:
-        word = 'unknown' if case.verdict is Verdict.UNKNOWN_PHYSICS else str(case.verdict)
-        for place in case.places:
-            guilty.setdefault(place.stage, []).append(f'{word.replace("_", " ")} ({place.joint})')
+        guilty.setdefault(effect.stage, []).append(f'{label(effect)} ({effect.joint})')
+    mistaken = case.audit.mistakes()
+    places = case.places[: len(mistaken)] if guilty else case.places
+    for index, place in enumerate(places):
+        verdict = case.verdict if index < len(mistaken) else case.rest
+        word = 'unknown' if verdict is Verdict.UNKNOWN_PHYSICS else str(verdict)
+        said = f'{word.replace("_", " ")} ({place.joint})'
+        if said not in guilty.setdefault(place.stage, []):
+            guilty[place.stage].append(said)
     return guilty
 
 
@@ -251,6 +265,7 @@ def _parameters(case: ExplainedCase) -> list[dict[str, Any]]:
                 {
                     'joint': joint,
                     'number': shown(name, e),
+                    'known': what_is_known(e),
                     'described': digits(factor * e.nominal),
                     'tolerance': f'{digits(factor * low)} … {digits(factor * high)}',
                     'outside': not low <= e.value <= high,

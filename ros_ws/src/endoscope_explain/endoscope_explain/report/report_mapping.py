@@ -82,6 +82,8 @@ def _nominal(name: str, estimate: NominalEstimate, band: float) -> dict[str, Any
         'nominal': estimate.nominal,
         **_estimate(estimate),
         'in_band': low <= estimate.value <= high,
+        'shown': estimate.shown,
+        'together_with': estimate.together_with or None,
     }
 
 

@@ -6,6 +6,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.case import ExplainedCase, Place
 from endoscope_explain.decide.combine import changed_parameters
 from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
+from endoscope_explain.recording.signals import axis
 from endoscope_explain.report.numbers import PLANTS, digits, form, in_degrees, judged
 
 HEADLINES = {
@@ -20,6 +21,7 @@ HEADLINES = {
 EVIDENCE = {
     'gain': 'log evidence that it adds, in nats',
     'p_value': 'share of rigs without it in which as much is found',
+    'second_p_value': 'chance that it predicts the second recording no better',
     'margin': 'nats by which it adds more than the best other name',
     'as_formula': '1 where the plant has its formula, 0 where it has a fitted function',
     'explained': 'share of the excess misfit that is gone with all that was found',
@@ -30,6 +32,8 @@ EVIDENCE = {
     'worst_s': 'largest step back in seconds',
     'z': 'standard deviations from zero',
     'factor': 'reading of one SI unit',
+    'misfit': 'share that no lag, offset and scale make of what the plant gives, as recorded',
+    'misfit_corrected': 'the same, as corrected',
     'per_second': 'stamps of one second',
 }
 """What each number of an effect's evidence is."""
@@ -43,24 +47,30 @@ leaves 1.05 once in a hundred."""
 
 def verdict_sentence(case: ExplainedCase) -> str:
     """Say in one sentence what was found."""
-    if case.verdict is Verdict.INSUFFICIENT_DATA:
+    mistakes = case.audit.mistakes()
+    return f'{_capital(mistakes[0].text)}.' if mistakes else _sentence_of_rest(case)
+
+
+def _sentence_of_rest(case: ExplainedCase) -> str:
+    if case.rest is Verdict.INSUFFICIENT_DATA:
         return 'The rig moves too little, or too little was recorded, to tell causes apart.'
-    if case.audit.unusable:
-        return f'{_capital(case.audit.faults()[0].text)}.'
-    if case.verdict is Verdict.CONSISTENT:
+    if case.rest is Verdict.CONSISTENT:
         return f'The described plant predicts the recording of {_all(case.recording.joints)}.'
-    if case.verdict is Verdict.PARAMETERS_DIFFER:
+    if case.rest is Verdict.PARAMETERS_DIFFER:
         return _differing(case)
-    if case.verdict is Verdict.UNKNOWN_PHYSICS:
+    if case.rest is Verdict.UNKNOWN_PHYSICS:
         return _unknown(case)
-    if case.effects:
-        named = [_named(e) for e in case.effects[:MOST_NAMED]]
-        more = len(case.effects) - len(named)
+    sure = [e for e in case.effects if not e.doubtful]
+    if case.effects and not sure:
+        return _doubt(case, case.effects[0])
+    if sure:
+        named = [_named(e) for e in sure[:MOST_NAMED]]
+        more = len(sure) - len(named)
         named += [f'{more} more'] if more else []
-        missing = case.verdict is Verdict.MISSING_PHYSICS
+        missing = case.rest is Verdict.MISSING_PHYSICS
         begin = 'The simulation leaves out' if missing else 'The recording shows'
         return f'{begin} {_all(named)}.'
-    return f'{_capital(case.audit.faults()[0].text)}.'
+    return f'{_capital(case.audit.apart_from_mistakes().faults()[0].text)}.'
 
 
 def physics_of(effect: NamedEffect) -> str:
@@ -100,8 +110,27 @@ def before_and_after(case: ExplainedCase) -> str:
 
 
 def reservations(case: ExplainedCase) -> list[str]:
-    """Say what the names leave over, and which numbers differ besides; empty where none do."""
+    """Say what else has to be known: what is said of a corrected recording, and what is left over.
+
+    What the names leave over, and which numbers differ besides; empty where none do.
+    """
+    mistakes = case.audit.mistakes()
     said: list[str] = []
+    if len(mistakes) > 1:
+        said += [f'{_capital(finding.text)}.' for finding in mistakes[1:]]
+    if mistakes:
+        frozen = all(finding.id == 'frozen' for finding in mistakes)
+        begin = 'Of what is not frozen' if frozen else 'As corrected'
+        said.append(f'{begin}: {_sentence_of_rest(case)}')
+    left_over = [] if case.explanation.adequate else case.audit.findings
+    doubtful = [e for e in case.effects if e.doubtful]
+    if len(doubtful) == len(case.effects) and case.rest is not Verdict.UNKNOWN_PHYSICS:
+        # The first one is the verdict's sentence.
+        doubtful = doubtful[1:]
+    said += [_doubt(case, effect) for effect in doubtful]
+    unlike = (f for f in left_over if f.id == 'unlike_the_plant')
+    said += [f'{_capital(finding.text)}. {_capital(finding.remedy)}.' for finding in unlike]
+    said += [f'{_capital(other)}. It was used as corrected.' for other in case.said_of_others]
     if not case.effects and case.explanation.unknown is None:
         return said
     left = judged(case, case.ladder).get('augmented', {})
@@ -119,6 +148,27 @@ def reservations(case: ExplainedCase) -> list[str]:
     if besides:
         shown_ones = [_one_differing(*key, e) for key, e in besides.items()]
         said.append(f'Besides, {_all(shown_ones)}.')
+    return said
+
+
+def what_is_known(e: NominalEstimate) -> str:
+    """Say why a fitted number is none that the recording tells; empty where it is."""
+    if e.together_with:
+        return f'only together with {e.together_with}'
+    return '' if e.shown else 'this recording does not show it'
+
+
+def not_shown(case: ExplainedCase) -> list[str]:
+    """Say which numbers of the plant the recording does not tell; empty where it tells all."""
+    said = []
+    for joint, estimates in case.explanation.parameters.items():
+        hidden = [n for n, e in estimates.items() if not (e.shown or e.together_with)]
+        if hidden:
+            said.append(f'This recording does not show {_all(hidden)} of {joint}.')
+        pairs = {n: e.together_with for n, e in estimates.items() if e.together_with}
+        # Of two that name each other it is said once.
+        once = [n for n, other in pairs.items() if pairs.get(other) != n or n < other]
+        said += [f'It shows {n} of {joint} only together with {pairs[n]}.' for n in once]
     return said
 
 
@@ -144,17 +194,19 @@ def next_step(case: ExplainedCase) -> str:
     """Say what to do next."""
     if case.verdict is Verdict.INSUFFICIENT_DATA:
         return 'Record at least 10 s in which the motors move both ways, such as a calibration.'
-    if case.audit.unusable:
-        return f'{_capital(case.audit.faults()[0].remedy)}.'
+    if case.audit.mistakes():
+        return f'{_capital(case.audit.mistakes()[0].remedy)}.'
     if case.next_experiment is not None:
         rivals = _all(case.next_experiment.separates)
         return f'Play next_experiment.csv on the console: it tells {rivals} apart.'
-    doubtful = next((e for e in case.effects if e.alternatives), None)
-    if doubtful is not None:
+    ambiguous = next((e for e in case.effects if e.alternatives), None)
+    if ambiguous is not None:
         return (
-            f'Run again without --quick for the motion that tells {doubtful.id} from '
-            f'{doubtful.alternatives[0]}.'
+            f'Run again without --quick for the motion that tells {ambiguous.id} from '
+            f'{ambiguous.alternatives[0]}.'
         )
+    if any(e.doubtful for e in case.effects):
+        return 'Explain both recordings with --same-physics: what is named then explains both.'
     if case.verdict is Verdict.CONSISTENT:
         return 'Go on with the described plant.'
     if case.verdict is Verdict.SENSOR_FAULT:
@@ -188,11 +240,35 @@ def _one_differing(joint: str, name: str, e: NominalEstimate) -> str:
 def _unknown(case: ExplainedCase) -> str:
     term = case.explanation.unknown
     if term is None or not term.helps:
-        joint = case.places[0].joint if case.places else case.recording.joints[0]
+        shown = [place.joint for place in case.places if place.shares]
+        joint = [*shown, *case.recording.joints][0]
         return f'Neither an effect of the catalogue nor a function explains {joint}.'
     what = term.there.physics.rstrip('.')
     states = ''.join(f' and {factor.there.argument.words}' for factor in term.factors)
     return f'Missing on {term.joint}: {what[0].lower()}{what[1:]}{states}.'
+
+
+def label(effect: NamedEffect) -> str:
+    """The name of an effect, in doubt where a second recording does not confirm it."""
+    return f'{effect.id} (in doubt)' if effect.doubtful else effect.id
+
+
+def _doubt(case: ExplainedCase, effect: NamedEffect) -> str:
+    passed = effect.definition.traits.depends_on_time
+    text = (
+        f'{_named(effect)} fits this recording, but does not surely predict the second one better; '
+        f'it {"acted in this one alone, or stands" if passed else "may stand"} for something else.'
+    )
+    letter = f'_{axis(effect.joint)}'
+    refitted = {s: f for s, f in case.validation.get('refitted', {}).items() if letter in s}
+    if not refitted:
+        return text
+    signal, before = max(refitted.items(), key=lambda item: item[1].ratio)
+    after = case.validation['augmented'][signal]
+    return (
+        f'{text} There {plain(signal)} is off by {digits(after.ratio)} instead of '
+        f'{digits(before.ratio)} times its noise.'
+    )
 
 
 def _named(effect: NamedEffect) -> str:

@@ -6,7 +6,9 @@ from endoscope_explain.report.columns import table
 from endoscope_explain.report.numbers import PLANTS, digits, judged, numbers_of, shown
 from endoscope_explain.report.sentences import (
     differing,
+    label,
     next_step,
+    not_shown,
     physics_of,
     plain,
     reservations,
@@ -19,16 +21,16 @@ def told(case: ExplainedCase) -> str:
     """Say what was found, in lines of which the first one is the verdict's sentence."""
     lines = [verdict_sentence(case), *reservations(case)]
     for effect in case.effects:
-        lines.append(f'  {effect.id}: {physics_of(effect)}')
+        lines.append(f'  {label(effect)}: {physics_of(effect)}')
         lines += [f'    {one}' for one in numbers_of(effect)]
-    if case.verdict is Verdict.PARAMETERS_DIFFER:
+    if case.rest is Verdict.PARAMETERS_DIFFER:
         for (joint, name), e in differing(case).items():
             lines.append(f'  {joint}: {shown(name, e)}')
+    lines += [f'  {one}' for one in not_shown(case)]
     term = case.explanation.unknown
     if term is not None and term.helps:
         lines.append(f'  It explains {100 * term.explained:.0f} % of the excess misfit.')
-    if not case.audit.unusable:
-        lines += [f'Where: {where(place)}.' for place in case.places]
+    lines += [f'Where: {where(place)}.' for place in case.places]
     fits = fits_table(case)
     if fits:
         head, rows = fits

@@ -8,7 +8,7 @@ import pytest
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.fit.evidence import log_evidence, weights
-from endoscope_explain.fit.intervals import intervals, may_be_absent
+from endoscope_explain.fit.intervals import intervals, may_be_absent, nominal_estimates
 from endoscope_explain.fit.model import fit, jacobian
 from endoscope_explain.fit.nominal import beside, nominal_anchors
 from endoscope_explain.fit.other_forms import other_forms
@@ -136,3 +136,39 @@ def test_another_form_widens_intervals_by_what_it_moves_the_numbers(one_joint):
     plain, wide = intervals(refitted), intervals(replace(refitted, moved_by_form=moved))
     assert wide.high[exponent] > plain.high[exponent]
     assert np.all(wide.high >= plain.high)
+
+
+def told_of(one_joint, desired, *, cells=True):
+    """What a recording of the described rig tells of its numbers."""
+    plant = one_joint.rig()
+    recording = one_joint.record(plant, desired)
+    recording = recording if cells else replace(recording, tension=None)
+    (observation,) = observe(recording, plant)
+    packed = packed_joint(plant, 'bend_x')
+    fitted, _ = nominal_anchors(observation, *packed)
+    return nominal_estimates(fitted, packed[0], {})
+
+
+def test_a_number_that_moves_no_channel_is_not_shown(one_joint):
+    """A joint that its friction holds shows neither that nor what acts beyond it."""
+    moved = told_of(one_joint, one_joint.motion(6.0))
+    held = told_of(one_joint, 0.02 * np.sin(1.5 * 1e-3 * np.arange(6000)))
+    of_joint = {'joint_stiffness', 'joint_friction', 'joint_presliding'}
+    assert of_joint <= {name for name, e in moved.items() if e.shown}
+    assert of_joint <= {name for name, e in held.items() if not e.shown}
+    assert held['pretension'].shown
+    for name in of_joint:
+        one, other = held[name], moved[name]
+        assert one.value == pytest.approx(one.nominal, rel=0.01)
+        assert np.log(one.high / one.low) > 2.0 * np.log(other.high / other.low)
+
+
+def test_two_numbers_that_only_go_together_name_each_other(one_joint):
+    """So slow and small a motion shows by how much the motor lags, and not why."""
+    small = 0.02 * np.sin(1.5 * 1e-3 * np.arange(6000))
+    found = told_of(one_joint, small, cells=False)
+    pair = ('motor_bandwidth', 'motor_damping_ratio')
+    assert tuple(found[name].together_with for name in pair) == pair[::-1]
+    # Numbers that are told apart well may be correlated as strongly.
+    moved = told_of(one_joint, one_joint.motion(6.0))
+    assert {e.together_with for e in moved.values()} == {''}
