@@ -20,12 +20,12 @@ from endoscope_explain.decide.conclusions import (
 from endoscope_explain.decide.decision import Decision, decide
 from endoscope_explain.decide.given_physics import GivenJoints, explained_by
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.fit.baseline import against_baseline
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.intervals import nominal_estimates
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import (
     Anchors,
+    against_baseline,
     all_anchors,
     anchored,
     beside,

@@ -20,7 +20,7 @@ from endoscope_explain.explanation import (
     NominalEstimate,
     Verdict,
 )
-from endoscope_explain.fit.tolerance import tolerance
+from endoscope_explain.fit.free_parameters import tolerance
 from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.observe.predicted_signals import rung, view
 from endoscope_explain.recording import Series

@@ -18,9 +18,8 @@ from endoscope_core.physics.plant_file import plant_from_mapping, save_plant
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.pipeline import Sources, explain_case, read_inputs
-from endoscope_explain.report.provenance import provenance
 from endoscope_explain.report.sentences import verdict_sentence
-from endoscope_explain.report.writing import PLANT_YAML, REPORT_HTML, write_report
+from endoscope_explain.report.writing import PLANT_YAML, REPORT_HTML, provenance, write_report
 
 Array = NDArray[np.float64]
 

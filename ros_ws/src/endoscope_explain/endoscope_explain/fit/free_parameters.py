@@ -13,8 +13,6 @@ from endoscope_core.physics.functions.place import Place
 from endoscope_core.physics.layout import FRICTION_PROFILE, NOMINAL_KEYS
 from endoscope_core.physics.plant_numbers import NUMBERS, PlantNumber
 
-Array = NDArray[np.float64]
-
 LEAD = -1
 """Index that stands for the reading's lead, which is not a parameter of the plant."""
 COEFFICIENT = -2
@@ -37,11 +35,30 @@ FITTED_NOMINAL = (*SCALED_NOMINAL, *FORM_INDICES)
 BAND = 0.15
 """Relative tolerance by which a healthy rig differs from its description."""
 BAND_SPREAD = 0.09
+NINETY_PERCENT = 1.645
+"""Standard deviations that hold 90 % of a normal distribution, either way."""
 
 
 def nominal_number(name: str) -> PlantNumber:
     """What is known of a number of the nominal plant, or of a coefficient of its profile."""
     return NUMBERS['friction_profile' if name in FRICTION_PROFILE_NAMES else name]
+
+
+def tolerance(name: str, described: float, band: float = BAND) -> tuple[float, float]:
+    """Lowest and highest value of a nominal parameter that needs no explanation.
+
+    `described`: its value in the plant file.
+    `band`: share by which parameters may differ: they may be larger, and smaller, by the factor `1
+        + band`. What describes a form may differ by 90 % of what healthy rigs do.
+    """
+    spread = nominal_number(name).spread
+    if spread:
+        reach = NINETY_PERCENT * spread
+        return described - reach, described + reach
+    return described / (1.0 + band), described * (1.0 + band)
+
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

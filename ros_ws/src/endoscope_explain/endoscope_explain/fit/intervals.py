@@ -16,9 +16,13 @@ from endoscope_core.physics.effects import lacking
 from endoscope_explain.criteria import REACH
 from endoscope_explain.explanation import Estimate, NominalEstimate
 from endoscope_explain.fit.evidence import weights
-from endoscope_explain.fit.free_parameters import COEFFICIENT, FITTED_NOMINAL
+from endoscope_explain.fit.free_parameters import (
+    COEFFICIENT,
+    FITTED_NOMINAL,
+    NINETY_PERCENT,
+    tolerance,
+)
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.fit.tolerance import NINETY_PERCENT, tolerance
 
 Array = NDArray[np.float64]
 

@@ -24,8 +24,8 @@ from endoscope_explain.recording.series import (
     WIRES,
     Recording,
     Series,
+    input_topic,
 )
-from endoscope_explain.recording.shaft_input import input_topic
 from endoscope_explain.recording.signals import motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_common_time, without_stray
 

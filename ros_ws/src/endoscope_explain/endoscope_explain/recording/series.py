@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_bags.recording import Recording as Bag
 from endoscope_core.rig import Rig, shipped_rig
 
 Array = NDArray[np.float64]
@@ -18,6 +19,12 @@ MOTOR = 'motor/measured_js'
 WIRES = 'wires/measured_js'
 BENDING = 'slave/measured_js'
 DESIRED = 'slave/servo_jp'
+INPUTS = (SETPOINT, COMMAND, DESIRED)
+"""The nearest to the shafts first.
+
+A setpoint says what the motor driver made of commands: which it obeyed, how it bounded them, and
+the pose that it held once they had ended.
+"""
 
 
 @dataclass(frozen=True)
@@ -139,3 +146,8 @@ class Recording:
         """Seconds from the first stamp to the last one of any series."""
         last = [self.command.time[-1], *(s.time[-1] for s in self.measured().values())]
         return float(max(last))
+
+
+def input_topic(bag: Bag, namespace: str | None = None) -> str:
+    """The plant's input, the nearest to the shafts that was recorded; empty where none was."""
+    return next((topic for topic in INPUTS if bag.has(topic, namespace)), '')

@@ -11,7 +11,7 @@ from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.place import Argument
 from endoscope_explain.case import ExplainedCase, Ladder
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.fit.tolerance import tolerance
+from endoscope_explain.fit.free_parameters import tolerance
 from endoscope_explain.fit.whiteness import slips
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.predicted_signals import RecordedView, view

@@ -6,7 +6,7 @@ from typing import Any
 
 from endoscope_explain.case import ExplainedCase, Ladder, NextExperiment, Place
 from endoscope_explain.explanation import Estimate, NamedEffect, NominalEstimate, UnknownTerm
-from endoscope_explain.fit.tolerance import tolerance
+from endoscope_explain.fit.free_parameters import tolerance
 
 SCHEMA = 1
 EXPERIMENT_FILE = 'next_experiment.csv'

@@ -1,8 +1,9 @@
 """What a person reads in the terminal: the finding, its place, numbers, fits and the next step."""
 
+from collections.abc import Sequence
+
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.report.columns import table
 from endoscope_explain.report.numbers import PLANTS, digits, judged, numbers_of, shown
 from endoscope_explain.report.sentences import (
     differing,
@@ -15,6 +16,16 @@ from endoscope_explain.report.sentences import (
     verdict_sentence,
     where,
 )
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return rows below their heads in columns of even width."""
+    lines = [head, *rows]
+    widths = [max(len(row[k]) for row in lines) for k in range(len(head))]
+    return '\n'.join(
+        '  '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in lines
+    )
 
 
 def told(case: ExplainedCase) -> str:

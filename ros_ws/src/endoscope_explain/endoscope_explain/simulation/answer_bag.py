@@ -29,8 +29,15 @@ from endoscope_core.physics.recording import recording_faults
 from endoscope_core.physics.samples import TOPICS
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import Rig
-from endoscope_explain.recording.series import BENDING, COMMAND, DESIRED, MOTOR, WIRES
-from endoscope_explain.recording.shaft_input import INPUTS, input_topic
+from endoscope_explain.recording.series import (
+    BENDING,
+    COMMAND,
+    DESIRED,
+    INPUTS,
+    MOTOR,
+    WIRES,
+    input_topic,
+)
 from endoscope_explain.recording.signals import motor_name, wire_names
 from endoscope_explain.recording.usable_stamps import require_running_stamps
 
