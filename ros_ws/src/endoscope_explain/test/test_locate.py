@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.description import EffectSpec, PlantDescription, TermSpec
 from endoscope_explain.explanation import Estimate, Explanation, NamedEffect, Verdict
 from endoscope_explain.locate.chain_cut import cut_at_motor
 from endoscope_explain.locate.locating import locate_effects, locate_unknown
@@ -29,6 +29,16 @@ def test_a_wrong_cell_shows_in_its_own_wire_alone(record):
     place = located(record, 'load_cell_gain', gain=1.2, wire=1.0)
     assert place.signals == ('wires/measured_js:wire_x_neg',)
     assert place.stage == 'sensing'
+
+
+def test_an_effect_shows_where_the_function_does_by_which_the_plant_has_it(record):
+    term = TermSpec('bend_x', 'tracker_of_time', '0.05 * sin(1.0 * t)')
+    plant = dataclasses.replace(PLANT, terms=(term,))
+    (place,) = locate_effects(
+        record(plant, duration=15.0), plant, [NamedEffect('tracker_drift', 'bend_x', {})]
+    )
+    assert place.signals == ('slave/measured_js:bend_x',)
+    assert place.intervals
 
 
 def test_a_stop_shows_beyond_its_angle(record):

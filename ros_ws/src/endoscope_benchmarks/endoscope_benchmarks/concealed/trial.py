@@ -95,14 +95,19 @@ def explained(stratum: str, seed: int) -> Row:
     return row_of(drawn_case(stratum, seed))
 
 
-def row_of(case: Case) -> Row:
-    """Explain a case on one core, and judge what is said."""
+def explanation_of(case: Case) -> tuple[Explanation, float]:
+    """Explain a case on one core; also, how many seconds that took."""
     with threadpool_limits(1):
         begun = time.monotonic()
         said = explain_recording(
             case.recording, case.described, baseline=case.baseline, left_out=case.left_out, jobs=1
         )
-        seconds = time.monotonic() - begun
+        return said, time.monotonic() - begun
+
+
+def row_of(case: Case) -> Row:
+    """Explain a case on one core, and judge what is said."""
+    said, seconds = explanation_of(case)
     names = statements(said)
     errors = [_error(*number) for number in _numbers(case, said)]
     judgement = judged(case.laws, names, case.also)

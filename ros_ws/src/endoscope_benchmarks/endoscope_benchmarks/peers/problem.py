@@ -17,7 +17,7 @@ from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import anchored
 from endoscope_explain.fit.simulated_joint import simulate_joint
 from endoscope_explain.observe.held_noise import with_held_noise
-from endoscope_explain.observe.observation import Channel, observe
+from endoscope_explain.observe.observation import Channel, JointObservation, observe
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -43,6 +43,16 @@ class OwnExample:
     must: str
     gave: str
     works: bool
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What a peer says of a problem."""
+
+    statement: Statement | None  # what is missing
+    # Intervals in s in which it is; None from a peer that says nothing of where.
+    intervals: tuple[tuple[float, float], ...] | None = None
+    report: str = ''  # what else it says, where it cannot name anything
 
 
 @dataclass(frozen=True)
@@ -92,13 +102,18 @@ def problem_of(case: Case) -> Problem:
     observation = refitted.model.observation
     end = min(float(channel.time[-1]) for channel in observation.channels)
     grid = np.arange(2.0 * PERIOD_S, end - PERIOD_S, PERIOD_S)
-    residuals = np.zeros((len(grid), len(SIGNALS)))
-    for channel, part in zip(observation.channels, observation.slices(), strict=True):
-        if channel.output in SIGNALS:
-            column = SIGNALS.index(channel.output)
-            residuals[:, column] = _on_grid(channel, -refitted.residuals[part], grid)
+    residuals = on_grid(observation, -refitted.residuals, grid)
     joint, states = observation.joint, _states(refitted, grid)
     return Problem(joint, refitted, described, case.left_out, grid, residuals, states)
+
+
+def on_grid(observation: JointObservation, values: Array, grid: Array) -> Array:
+    """Values (size,) of all channels on a grid (M,) in s, of each of `SIGNALS` (M, 5)."""
+    found = np.zeros((len(grid), len(SIGNALS)))
+    for channel, part in zip(observation.channels, observation.slices(), strict=True):
+        if channel.output in SIGNALS:
+            found[:, SIGNALS.index(channel.output)] = _on_grid(channel, values[part], grid)
+    return found
 
 
 def is_held_out(time: Array) -> Mask:

@@ -8,18 +8,28 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from endoscope_benchmarks.concealed.judge import Judgement, Statement, judged
+from endoscope_benchmarks.concealed.judge import Statement, judged, statements
+from endoscope_benchmarks.concealed.regions import (
+    Intervals,
+    Overlap,
+    changed_windows,
+    explained_intervals,
+    pooled,
+    windows_in,
+)
 from endoscope_benchmarks.concealed.strata import drawn_case
-from endoscope_benchmarks.concealed.trial import explained
+from endoscope_benchmarks.concealed.trial import explanation_of
 from endoscope_benchmarks.peers import regression_on_library as library
 from endoscope_benchmarks.peers import symbolic
 from endoscope_benchmarks.peers.empirical_risk import by_empirical_risk, empirical_risk_example
-from endoscope_benchmarks.peers.problem import OwnExample, Problem, problem_of
+from endoscope_benchmarks.peers.localised_discrepancy import by_lisdd, lisdd_example
+from endoscope_benchmarks.peers.mujoco_sysid import by_mujoco, mujoco_example
+from endoscope_benchmarks.peers.problem import OwnExample, Problem, Reply, problem_of
 from endoscope_benchmarks.peers.universal_equation import by_network, network_example
 from endoscope_core.errors import EndoscopeError
 
 OURS = 'endoscope explain'
-Peer = tuple[str, Callable[[Problem], Statement | None], Callable[[], OwnExample]]
+Peer = tuple[str, Callable[[Problem], Reply | Statement | None], Callable[[], OwnExample]]
 """Its package (empty where it is written here), what it says of a problem, its own example."""
 
 PEERS: dict[str, Peer] = {
@@ -30,6 +40,8 @@ PEERS: dict[str, Peer] = {
     'Bayesian symbolic': ('autora-theorist-bms', symbolic.by_bayesian, symbolic.bayesian_example),
     'universal equation': ('', by_network, network_example),
     'EMD comparison': ('emdcmp', by_empirical_risk, empirical_risk_example),
+    'LISDD': ('', by_lisdd, lisdd_example),
+    'mujoco.sysid': ('mujoco', by_mujoco, mujoco_example),
 }
 
 
@@ -45,12 +57,17 @@ class Answer:
     place: bool
     false: int
     seconds: float  # without refitting the nominal plant, which all peers need
+    regions: Overlap | None  # None from a peer that says nothing of where
+    report: str
 
     def line(self) -> str:
         """The answer in one line."""
         right = 'right' if self.first else 'place' if self.place else 'WRONG'
         case = f'{self.stratum:17s}{self.seed:4d}'
-        return f'{case}  {self.peer:19s}{right:6s}{self.seconds:7.1f} s  {self.said}'
+        where = f', regions F1 {self.regions.f1:.2f}' if self.regions else ''
+        report = f' ({self.report})' if self.report else ''
+        said = f'{self.said}{report}{where}'
+        return f'{case}  {self.peer:19s}{right:6s}{self.seconds:7.1f} s  {said}'
 
 
 def require_installed(names: Sequence[str]) -> None:
@@ -66,22 +83,39 @@ def require_installed(names: Sequence[str]) -> None:
 def answers(names: Sequence[str], stratum: str, seed: int) -> list[Answer]:
     """Ask peers, and last ourselves, about one case on one core."""
     case, found = drawn_case(stratum, seed), []
+    true = changed_windows(case)
 
-    def answer(peer: str, said: Sequence[str], judged_as: Judgement, seconds: float) -> None:
-        right = judged_as.first, judged_as.place, judged_as.false
-        found.append(Answer(peer, stratum, seed, ' + '.join(said) or 'nothing', *right, seconds))
+    def answer(
+        peer: str,
+        said: Sequence[Statement],
+        intervals: Intervals | None,
+        seconds: float,
+        report: str = '',
+    ) -> None:
+        right = judged(case.laws, said, case.also)
+        regions = None
+        if intervals is not None:
+            regions = Overlap.of(windows_in(intervals, case.recording.duration), true)
+        found.append(
+            Answer(
+                peer, stratum, seed,
+                ' + '.join(f'{each.name}@{each.joint}' for each in said) or 'nothing',
+                right.first, right.place, right.false, seconds, regions, report,
+            )
+        )  # fmt: skip
 
     with threadpool_limits(1):
         problem = problem_of(case)
         for name in names:
             begun = time.monotonic()
-            statement = PEERS[name][1](problem)
+            reply = PEERS[name][1](problem)
             seconds = time.monotonic() - begun
-            said = [] if statement is None else [statement]
-            spoken = [f'{each.name}@{each.joint}' for each in said]
-            answer(name, spoken, judged(case.laws, said, case.also), seconds)
-    own = explained(stratum, seed)
-    answer(OURS, own.said, own, own.seconds)
+            if not isinstance(reply, Reply):
+                reply = Reply(reply)
+            said = [] if reply.statement is None else [reply.statement]
+            answer(name, said, reply.intervals, seconds, reply.report)
+    own, seconds = explanation_of(case)
+    answer(OURS, statements(own), explained_intervals(case, own), seconds)
     return found
 
 
@@ -95,16 +129,25 @@ def table(shown: Mapping[str, OwnExample], found: Sequence[Answer]) -> str:
     """A line for each peer, and one for ourselves."""
     ours = OwnExample('', '', '', True)
     rows: list[tuple[str, ...]] = [
-        ('peer', 'own example', 'it must give', 'it gave', 'first', 'place', 'false', 's')
+        (
+            *('peer', 'own example', 'it must give', 'it gave', 'first', 'place', 'false'),
+            *('regions, F1', 's'),
+        )
     ]
     for name, own in [*shown.items(), (OURS, ours)]:
         of_it = [each for each in found if each.peer == name]
         counts = (sum(getattr(a, what) for a in of_it) for what in ('first', 'place', 'false'))
         gave = own.gave if own.works else f'{own.gave} FAILS'
         seconds = f'{np.median([a.seconds for a in of_it]):.1f}' if of_it else '-'
-        rows.append((name, own.what, own.must, gave, *map(str, counts), seconds))
+        where = [a.regions for a in of_it if a.regions]
+        f1 = f'{pooled(where).f1:.2f}' if where else '-'
+        rows.append((name, own.what, own.must, gave, *map(str, counts), f1, seconds))
     widths = [max(map(len, column)) + 2 for column in zip(*rows, strict=True)]
-    return '\n'.join(''.join(map(str.ljust, row, widths)).rstrip() for row in rows)
+    lines = [''.join(map(str.ljust, row, widths)).rstrip() for row in rows]
+    every = [a.regions for a in found if a.peer == OURS and a.regions]
+    if every:
+        lines.append(f'regions, F1 of the whole of every recording: {pooled(every).f1_of_all:.2f}')
+    return '\n'.join(lines)
 
 
 def versions(names: Sequence[str]) -> str:

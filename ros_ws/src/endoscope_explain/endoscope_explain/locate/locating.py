@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.signal import periodogram
 
 from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.effects import describe
 from endoscope_explain.audit import Finding
 from endoscope_explain.case import Place
 from endoscope_explain.decide.combine import changed_parameters
@@ -52,14 +53,24 @@ def locate_effects(
     """
     located = []
     for effect in effects:
-        rest = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
-        if len(rest) == len(plant.effects):
+        rest = _without(plant, effect)
+        if rest == plant:
             continue
-        found = excess_between(recording, replace(plant, effects=rest), plant)
+        found = excess_between(recording, rest, plant)
         time = effect.parameters.get('time_s')
         began = None if time is None else time.value
         located.append(place(recording, found, effect.stage, effect.joint, began))
     return located
+
+
+def _without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
+    """The plant without an effect, or without the function by which the plant has it."""
+    here = effect.id, effect.joint
+    if any((e.id, e.joint) == here for e in plant.effects):
+        return replace(plant, effects=tuple(e for e in plant.effects if (e.id, e.joint) != here))
+    families = describe(effect.id).traits.families
+    kept = (t for t in plant.terms if t.joint != effect.joint or t.place not in families)
+    return replace(plant, terms=tuple(kept))
 
 
 def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place]:
