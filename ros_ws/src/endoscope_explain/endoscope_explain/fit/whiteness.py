@@ -12,7 +12,7 @@ LIMIT = 5.0
 NOTABLE = 0.1
 """Share of a wire's samples with more scatter than noise from which on it is said to slip."""
 WHITE = frozenset({'tension', 'bending', 'shaft_effort'})
-"""Quantities whose noise is white; the rounding error of the encoder is not."""
+"""Quantities whose noise is white but for rounding; that of the encoder is rounding alone."""
 
 
 def excess(fit: Fit) -> dict[str, float]:
@@ -27,7 +27,10 @@ def excess(fit: Fit) -> dict[str, float]:
             continue
         values = fit.residuals[part]
         count = len(values) // BLOCK
-        means = values[: count * BLOCK].reshape(count, BLOCK).mean(axis=1) * np.sqrt(BLOCK)
+        means = values[: count * BLOCK].reshape(count, BLOCK).mean(axis=1)
+        # Errors of rounding stay while the reading does: their part of a mean is as large as ever.
+        stays = min(channel.rounding**2 / float(np.mean(channel.noise**2)), 1.0)
+        means /= np.sqrt(stays + (1.0 - stays) / BLOCK)
         found[channel.signal] = max(_z(values), _z(means))
     return found
 

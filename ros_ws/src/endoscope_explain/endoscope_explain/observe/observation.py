@@ -45,9 +45,9 @@ SIGNIFICANT = 1.3
 """Scatter, in units of the noise, from which on it is taken for motion."""
 QUIET = 0.1
 """Share of the recording in which nothing slips; a sensor worse than described is no motion."""
-ON_A_GRID = 20
-"""Differences of readings from which on they tell a grid: of so many continuous ones, all are whole
-multiples of the least, within a hundredth, with a chance of 0.02 to the power of 19."""
+STEPS_SEEN = 20
+"""Changes of a reading from which on its step is told: that half of so many continuous ones are
+alike, within a hundredth, has a chance of 1e-15."""
 _SAME_READING = 1e-6
 """Relative difference of two readings that are one, written in single precision."""
 
@@ -81,6 +81,7 @@ class Channel:
     `output`: column of the compiled physics' output that this sensor reads.
     `time`, `value`, `noise` (M,): stamp in s from the first command, reading, and its known noise
         (rms).
+    `rounding`: part of the noise that a mean over readings does not lessen.
     """
 
     signal: str
@@ -91,6 +92,7 @@ class Channel:
     time: Array
     value: Array
     noise: Array
+    rounding: float = 0.0
 
     def predicted(self, outputs: Array, lead: float = 0.0, skew: float = 0.0) -> Array:
         """Return the analysis samples (M,) that simulated outputs (N, OUTPUTS) predict.
@@ -235,18 +237,17 @@ def rounding_error(step: float, white: float) -> float:
 
 
 def step_read(values: Array) -> float:
-    """Step in which readings (M,) come; 0 where they are on no grid, or are too few to tell.
+    """Step in which readings (M,) come, one after the other; 0 where it is not seen.
 
     A sensor may be coarser than its description says.
     """
-    distinct = np.unique(values)
-    apart = np.diff(distinct)
-    apart = apart[apart > _SAME_READING * np.max(np.abs(distinct), initial=0.0)]
-    if len(apart) < ON_A_GRID:
+    change = np.abs(np.diff(values))
+    change = change[change > _SAME_READING * np.max(np.abs(values), initial=0.0)]
+    if len(change) < STEPS_SEEN:
         return 0.0
-    least = float(np.min(apart))
-    off = np.abs(apart / least - np.round(apart / least))
-    return least if np.all(off < 0.01) else 0.0
+    least = np.min(change)
+    # Readings that go on by single steps show them; where noise is wider it hides them as well.
+    return float(least) if np.mean(change < 1.01 * least) >= 0.5 else 0.0
 
 
 def _valid_column(
@@ -296,4 +297,5 @@ def _channel(
         mean_time,
         mean,
         noise,
+        rounding,
     )

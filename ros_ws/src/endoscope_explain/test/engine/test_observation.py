@@ -83,8 +83,9 @@ def test_a_sensor_coarser_than_described_is_as_coarse_as_it_reads(recording, one
 def test_continuous_or_few_readings_are_on_no_grid():
     rng = np.random.default_rng(0)
     assert step_read(rng.standard_normal(1000)) == 0.0
-    assert step_read(np.array([0.0, 0.5] * 50)) == 0.0
-    assert step_read(np.float32(0.1) * rng.integers(-300, 300, 400)) == pytest.approx(0.1)
+    assert step_read(np.repeat([0.0, 0.5, 0.1], 300)) == 0.0
+    rounded = 0.1 * np.round(np.cumsum(0.03 * rng.standard_normal(4000)) / 0.1)
+    assert step_read(rounded.astype(np.float32)) == pytest.approx(0.1)
 
 
 def test_scatter_is_found_where_the_wire_slips_and_only_there(one_joint):
