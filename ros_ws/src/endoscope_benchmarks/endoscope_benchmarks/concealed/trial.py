@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from endoscope_benchmarks.concealed.case import Case
+from endoscope_benchmarks.concealed.case import Case, Law
 from endoscope_benchmarks.concealed.judge import Judgement, is_instead, is_of, judged, statements
 from endoscope_benchmarks.concealed.readings import misfit
 from endoscope_benchmarks.concealed.strata import drawn_case
 from endoscope_benchmarks.concealed.strength import left
+from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.criteria import REACH
 from endoscope_explain.explain_recording import explain_recording
@@ -71,11 +72,17 @@ class Row(Judgement):
     errors: tuple[float, ...] = ()
     # Evidence of each named effect, with how many rivals it has, and whether it is right.
     evidence: tuple[dict[str, float], ...] = ()
+    # The laws that are told from other numbers, and whether the first statements name these.
+    told: tuple[str, ...] = ()
+    first_of_told: bool = True
 
     @property
     def is_told_apart(self) -> bool:
-        """Whether a second recording shows that another rig without the laws is not enough."""
-        return not self.concealed or not self.refitted <= GOOD
+        """Whether a law is told from other numbers, and a second recording is not enough without.
+
+        Where nothing is concealed, nothing has to be told.
+        """
+        return not self.concealed or (bool(self.told) and not self.refitted <= GOOD)
 
     def line(self) -> str:
         """The case in one line."""
@@ -113,6 +120,8 @@ def row_of(case: Case) -> Row:
     judgement = judged(case.laws, names, case.also)
     in_set = judgement.in_set or is_instead(said, case.laws)
     judgement = replace(judgement, in_set=in_set)
+    told = told_from_numbers(case)
+    others = frozenset().union(*(law.ids for law in case.laws if law not in told))
     law = case.laws[0] if len(case.laws) == 1 else None
     where = (law.joint if law else '') or (names[0].joint if names else '')
     shares = _shares(said, where)
@@ -124,7 +133,7 @@ def row_of(case: Case) -> Row:
     return Row(
         stratum=case.stratum,
         seed=case.seed,
-        concealed=tuple(f'{law.name}@{law.joint or "all"}' for law in case.laws),
+        concealed=tuple(map(_named, case.laws)),
         note=case.note,
         moved=case.moved,
         left=_left(case),
@@ -141,8 +150,37 @@ def row_of(case: Case) -> Row:
         beyond_form=said.beyond_form,
         errors=tuple(REACH * error for error in errors),
         evidence=tuple(_evidence(effect, case) for effect in said.effects),
+        told=tuple(map(_named, told)),
+        first_of_told=judged(told, names, case.also | others).first,
         **vars(judgement),
     )
+
+
+def told_from_numbers(case: Case) -> tuple[Law, ...]:
+    """Laws of which a refit of the rig's numbers leaves more than noise, each alone in the rig.
+
+    A smaller pretension and slack are one thing in the wires of most motions, and gravity is one
+    with the joint's stiffness and rest angle; nobody can name what is not there to be seen.
+    """
+    if case.true == case.bare:
+        return case.laws
+    command = case.recording.command.values
+
+    def alone(law: Law) -> PlantDescription:
+        added = (e for e in case.true.effects if e not in case.bare.effects)
+        own = [e for e in added if e.id in law.ids and law.joint in ('', e.joint)]
+        return replace(case.bare, effects=(*case.bare.effects, *own))
+
+    plants = map(alone, case.laws) if len(case.laws) > 1 else [case.true] * len(case.laws)
+    return tuple(
+        law
+        for law, plant in zip(case.laws, plants, strict=True)
+        if left(case.bare, plant, command) >= 1.0
+    )
+
+
+def _named(law: Law) -> str:
+    return f'{law.name}@{law.joint or "all"}'
 
 
 def _left(case: Case) -> float:
@@ -239,7 +277,7 @@ def _cells(rows: Sequence[Row]) -> tuple[str, ...]:
     return (
         str(len(rows)),
         str(len(apart)),
-        share('first', apart),
+        share('first_of_told', apart),
         share('first'),
         share('place'),
         share('exact'),
