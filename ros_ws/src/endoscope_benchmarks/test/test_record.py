@@ -18,7 +18,7 @@ ROW = replace(
     augmented=1.05,
     held=15,
     intervals=16,
-    shares=(1.0, 0.2),
+    errors=(1.0, 0.2),
 )
 
 
@@ -35,7 +35,7 @@ def test_a_row_is_read_as_it_was_kept(record):
         ('sinusoid', 7): ROW.said,
         ('sinusoid', 8): ROW.said,
     }
-    assert rows_of(record)['sinusoid', 7].shares == ROW.shares
+    assert rows_of(record)['sinusoid', 7].errors == ROW.errors
 
 
 def test_a_line_that_was_cut_is_named(record):

@@ -4,9 +4,6 @@ Made by `endoscope bench criteria` from 28 cases of `endoscope bench concealed`,
 1004, 1005 of catalogue, mixed_forms, nulls, leave_a_form_out, tenth, sinusoid, teleoperation.
 """
 
-LEAST_SHARE = 1
-"""Share of the best gain from which on another name may be the true one: such sets of names hold it
-in 90%."""
 BEYOND_FORM = 1.61
 """What is left over what the worst rig of another form leaves, of the worst channel: 95%
 of right explanations leave less."""

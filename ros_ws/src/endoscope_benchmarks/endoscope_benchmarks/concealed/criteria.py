@@ -1,6 +1,6 @@
 """The numbers by which explanations are judged, derived from cases whose truth is known.
 
-Sets of names and intervals are split conformal (Lei et al., J. Am. Stat. Assoc. 113, 2018): a limit
+Intervals are split conformal (Lei et al., J. Am. Stat. Assoc. 113, 2018): a limit
 is the quantile of the cases' own scores that holds the next one with the wanted chance. The
 probability of a name is a logistic function of what else was tried and of what is left (Platt, in:
 Advances in Large Margin Classifiers, MIT Press 2000).
@@ -21,7 +21,7 @@ from endoscope_explain.decide.certainty import features, probability
 Array = NDArray[np.float64]
 
 HOLDS = 0.9
-"""Chance with which sets hold the truth and intervals the true number."""
+"""Chance with which intervals hold the true number."""
 ADEQUATE = 0.95
 """Share of right explanations that are called adequate."""
 PARTS = 10
@@ -33,7 +33,6 @@ WIDE = 10.0
 class Criteria:
     """Deciding numbers; their meaning is in `endoscope_explain.criteria`."""
 
-    LEAST_SHARE: float
     BEYOND_FORM: float
     REACH: float
     CERTAINTY: tuple[float, float, float]
@@ -43,8 +42,6 @@ class Criteria:
 class Bank:
     """What the cases say, with NaN left out."""
 
-    truth: Array  # (n,), share of the best gain that the truth has
-    sizes: list[Array]  # shares of all names of the same cases
     beyond: Array  # (k,), what is left over what another form leaves
     exact: NDArray[np.bool_]  # (k,), whether all was said rightly
     errors: Array  # (l,), of numbers, over what their intervals would allow with a `REACH` of one
@@ -55,13 +52,10 @@ class Bank:
 
 def bank_of(rows: Sequence[Row]) -> Bank:
     """Collect what rows say."""
-    known = [row for row in rows if math.isfinite(row.truth_share)]
     left = [row for row in rows if math.isfinite(row.beyond_form)]
     errors = np.array([e for row in rows if row.exact for e in row.errors])
     named = [(n, row, each) for n, row in enumerate(rows) for each in row.evidence]
     return Bank(
-        np.array([row.truth_share for row in known]),
-        [np.array(row.shares) for row in known],
         np.array([row.beyond_form for row in left]),
         np.array([row.exact for row in left], dtype=bool),
         errors[np.isfinite(errors)],
@@ -74,7 +68,6 @@ def bank_of(rows: Sequence[Row]) -> Bank:
 def derived(bank: Bank) -> Criteria:
     """Criteria from a bank of cases; ValueError if it has too few for the quantiles."""
     return Criteria(
-        1.0 - conformal(1.0 - bank.truth, HOLDS),
         conformal(bank.beyond[bank.exact], ADEQUATE),
         conformal(bank.errors, HOLDS),
         _logistic(bank.named, bank.right),
@@ -130,10 +123,6 @@ def sensitivity(bank: Bank, criteria: Criteria) -> str:
     def line(name: str, says: str, of: list[str]) -> None:
         lines.append(f'{name:14s}' + ''.join(f'{each:>24s}' for each in of) + f'  {says}')
 
-    def sets(share: float) -> str:
-        size = np.mean([np.sum(each >= share) for each in bank.sizes])
-        return f'{share:.3g}: {np.mean(bank.truth >= share):.0%}, {size:.1f}'
-
     def adequate(limit: float) -> str:
         right, wrong = bank.beyond[bank.exact], bank.beyond[~bank.exact]
         shares = [f'{np.mean(each <= limit):.0%}' if len(each) else '-' for each in (right, wrong)]
@@ -143,11 +132,6 @@ def sensitivity(bank: Bank, criteria: Criteria) -> str:
         return f'{factor:.3g}: {np.mean(bank.errors <= factor):.0%}'
 
     of_three = (0.5, 1.0, 2.0)
-    line(
-        'LEAST_SHARE',
-        'sets that hold the truth, names in a set',
-        [sets(k * criteria.LEAST_SHARE) for k in of_three],
-    )
     line(
         'BEYOND_FORM',
         'right, and wrong explanations called adequate',
@@ -165,9 +149,6 @@ def source(criteria: Criteria, made_by: str) -> str:
 {origin}
 """
 
-LEAST_SHARE = {criteria.LEAST_SHARE:.3g}
-"""Share of the best gain from which on another name may be the true one: such sets of names hold it
-in {HOLDS:.0%}."""
 BEYOND_FORM = {criteria.BEYOND_FORM:.3g}
 """What is left over what the worst rig of another form leaves, of the worst channel: {ADEQUATE:.0%}
 of right explanations leave less."""

@@ -63,9 +63,6 @@ class Row(Judgement):
     refitted: float = math.nan
     augmented: float = math.nan
     seconds: float = math.nan  # that explaining took
-    # gain of the truth over that of the best term; NaN where it is not one
-    truth_share: float = math.nan
-    shares: tuple[float, ...] = ()  # the same of each name that was tried, the best first
     # What is left over what rigs of another form leave, of the worst joint.
     beyond_form: float = math.nan
     # Error of each number over what its interval would allow on that side with a `REACH` of one.
@@ -122,10 +119,6 @@ def row_of(case: Case) -> Row:
     judgement = replace(judgement, in_set=in_set)
     told = told_from_numbers(case)
     others = frozenset().union(*(law.ids for law in case.laws if law not in told))
-    law = case.laws[0] if len(case.laws) == 1 else None
-    where = (law.joint if law else '') or (names[0].joint if names else '')
-    shares = _shares(said, where)
-    true = [share for name, share in shares.items() if law and is_of(name, where, law)]
     nominal, refitted, augmented = (
         misfit(plant, case.second, case.described.sensors)
         for plant in (said.nominal, said.refitted, said.augmented)
@@ -145,8 +138,6 @@ def row_of(case: Case) -> Row:
         refitted=refitted,
         augmented=augmented,
         seconds=seconds,
-        truth_share=max(true, default=0.0) if law and shares else math.nan,
-        shares=tuple(sorted(shares.values(), reverse=True)),
         beyond_form=said.beyond_form,
         errors=tuple(REACH * error for error in errors),
         evidence=tuple(_evidence(effect, case) for effect in said.effects),
@@ -194,16 +185,6 @@ def _evidence(effect: NamedEffect, case: Case) -> dict[str, float]:
     right = any(is_of(effect.id, effect.joint, law) for law in case.laws)
     rivals = float(len(effect.alternatives))
     return {**effect.evidence, 'rivals': rivals, 'right': float(right)}
-
-
-def _shares(said: Explanation, joint: str) -> dict[str, float]:
-    """What each name on a joint gains as the only term, over what the best one gains."""
-    gains: dict[str, float] = {}
-    for each in said.candidates:
-        if each.joint == joint and len(each.effects) == 1:
-            gains[each.effects[0]] = max(gains.get(each.effects[0], 0.0), -each.score)
-    best = max(gains.values(), default=0.0)
-    return {name: gain / best for name, gain in gains.items()} if best > 0.0 else {}
 
 
 def _error(true: float, found: Estimate) -> float:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from endoscope_core.physics.effects import lacking
-from endoscope_explain.criteria import LEAST_SHARE
 from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.held_out import predicts_better
 from endoscope_explain.fit.model import Fit
@@ -149,14 +148,9 @@ class Level:
         )
 
     def rivals(self) -> tuple[Composition, ...]:
-        """Compositions beside the best one that the recording does not tell from it.
-
-        They are behind by no more than form is worth, or gain so much that the truth may be among
-        them.
-        """
-        gain = self.gain(self.found[0])
-        least = min(LEAST_SHARE * gain, gain - self.form_is_worth())
-        return tuple(c for c in self.found if c is not self.best and self.gain(c) >= least)
+        """Compositions behind the best one by no more than form is worth."""
+        least = self.found[0].evidence - self.form_is_worth()
+        return tuple(c for c in self.found if c is not self.best and c.evidence >= least)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.acting import MULTIPLIES
 from endoscope_core.physics.packing import pack
-from endoscope_explain.criteria import LEAST_SHARE
 from endoscope_explain.decide.conclusions import plant_of
 from endoscope_explain.decide.decision import decide
 from endoscope_explain.fit.evidence import misfit
@@ -171,7 +170,7 @@ def test_a_formula_is_taken_where_it_loses_no_more_than_form_is_worth():
 def test_rivals_are_those_behind_by_no_more_than_form_is_worth():
     null = np.linspace(0.0, 50.0, 39)
     near = _level({'gravity': 500.0, 'tracker_delay': 470.0}, null)
-    far = _level({'gravity': 500.0, 'tracker_delay': 0.9 * LEAST_SHARE * 440.0}, null)
+    far = _level({'gravity': 500.0, 'tracker_delay': 440.0}, null)
     assert [c.terms[0].id for c in near.rivals()] == ['tracker_delay']
     assert far.rivals() == ()
 
