@@ -15,6 +15,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.worker_pool import worker_pool
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
+from endoscope_explain.report.sentences import verdict_sentence
 from endoscope_explain.report.terminal import told
 from endoscope_explain.report.writing import REPORT_HTML, REPORT_JSON, provenance, write_report
 from endoscope_explain.shared_physics import physics_of_all
@@ -66,11 +67,15 @@ def explained_case(
     sources: Sources, jobs: int = 1, progress: Progress | None = None
 ) -> ExplainedCase:
     """Explain one bag; errors as in `explain_one`."""
+    tell = progress or (lambda _: None)
     inputs = read_inputs(sources)
     for note in inputs.audit.recording.notes:
-        if progress is not None:
-            progress(f'note: {note}')
-    case = explain_case(inputs, jobs=jobs, progress=progress)
+        tell(f'note: {note}')
+
+    def answered(case: ExplainedCase) -> None:
+        tell(f'found: {verdict_sentence(case)}')
+
+    case = explain_case(inputs, jobs=jobs, progress=progress, answered=answered)
     made_from = provenance(sources.bag, sources.plant_file, sources.command)
     return replace(case, provenance=made_from)
 

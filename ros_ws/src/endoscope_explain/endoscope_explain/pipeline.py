@@ -136,8 +136,13 @@ def explain_case(
     *,
     jobs: int = 2,
     progress: Progress | None = None,
+    answered: Callable[[ExplainedCase], None] | None = None,
 ) -> ExplainedCase:
-    """Explain a recording by `engine`, which is told what to explain as `explain_recording` is."""
+    """Explain a recording by `engine`, which is told what to explain as `explain_recording` is.
+
+    The case is handed to `answered` once it is explained, before it is compared with black boxes
+    and a next experiment is looked for.
+    """
     begun = time.monotonic()
     tell = progress or (lambda _: None)
     sources, audit, validation = inputs.sources, inputs.audit, inputs.validation
@@ -179,6 +184,8 @@ def explain_case(
         band=sources.band,
     )
     case = replace(case, places=_places(case), cuts=_cuts(case))
+    if answered is not None:
+        answered(case)
     if not explanation.fit:
         ladder = ladders(recording, explanation, None, black_boxes=False, jobs=jobs)[0]
         return replace(case, ladder=ladder, runtime_s=time.monotonic() - begun)

@@ -10,8 +10,8 @@ from endoscope_bringup.subcommands import COUNT, add_json_option, print_json, wi
 from endoscope_core.choices import WAIVABLE
 from endoscope_core.errors import EndoscopeError
 
-STEPS = 5
-"""Of every explanation, beside one for each joint: read, refit, judge, locate."""
+STEPS = 6
+"""Of every explanation, beside one for each joint: read, refit, judge, locate, answer, compare."""
 
 
 class SecondsError(EndoscopeError, ValueError):

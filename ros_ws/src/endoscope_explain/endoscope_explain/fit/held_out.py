@@ -1,14 +1,11 @@
 """How well a fitted joint predicts blocks of samples that the fit has not seen."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.functions.places import DISTANCE, TIME
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.fit.evidence import weights
-from endoscope_explain.fit.model import Fit, JointModel, fit
+from endoscope_explain.fit.model import Fit, fit
 from endoscope_explain.observe.observation import JointObservation
 
 Array = NDArray[np.float64]
@@ -19,8 +16,6 @@ EVERY = 4
 GAP_S = 0.2
 """Left out on both sides of a held-out block, for the memory of wires and tracker."""
 REFIT_STEPS = 2
-_HELD = 1e-6
-"""Spread of a coordinate that a fit may not move."""
 
 
 def judged_at(time: Array) -> Mask:
@@ -70,27 +65,13 @@ def _held_out(final: Fit) -> tuple[Mask, Array]:
     if judged.all():
         return judged, final.residuals
     again = fit(
-        _holding_what_never_recurs(final),
+        final.model,
         final.theta,
         weight=used * weights(final.model.observation, final.residuals),
         iterations=REFIT_STEPS,
         known_jacobian=final.jacobian,
     )
     return judged, again.residuals
-
-
-def _holding_what_never_recurs(final: Fit) -> JointModel:
-    """The model of a fit with its functions of time and of distance held.
-
-    What such a function does within a block no other block tells: a fit that has not seen it leaves
-    it to the prior there, however right the term is.
-    """
-    model, free = final.model, list(final.model.free)
-    for family, places in zip(model.families, model.places_of_coefficients(), strict=True):
-        if family.place.argument in (TIME, DISTANCE) and not family.repeats:
-            for k in places:
-                free[k] = replace(free[k], mean=float(final.theta[k]), spread=_HELD)
-    return replace(model, free=tuple(free))
 
 
 def on_samples(

@@ -241,6 +241,7 @@ def _level(
     ranked = tuple(best.values())
     if not ranked:
         return Level(first, (), NOTHING_SHOWN)
+    ranked = _that_predict(ranked, first)
     if not is_noise(ranked[0].fit):
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     behind, ways, _ = grown[0]
@@ -249,6 +250,17 @@ def _level(
     if rigs and not level.best.adds_nominal:
         level = replace(level, null=rigs.beside(level.gain(level.best), FALSE_ALARMS, jobs))
     return replace(level, predicts=predicts_better(level.best.fit, first.fit))
+
+
+def _that_predict(ranked: tuple[Composition, ...], first: Composition) -> tuple[Composition, ...]:
+    """Compositions, best first, from the first one on that predicts blocks better than its parent.
+
+    A function of time can be anything: what it gains where it was fitted it loses where it was not.
+    """
+    for k, each in enumerate(ranked):
+        if each.evidence > first.evidence and predicts_better(each.fit, first.fit):
+            return ranked[k:]
+    return ranked
 
 
 def _grown(

@@ -19,6 +19,7 @@ from endoscope_explain.fit.nominal import nominal_anchors
 from endoscope_explain.fit.simulated_joint import packed_joint, simulate_joint
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.observe.observation import observe
+from endoscope_explain.search import levels
 from endoscope_explain.search.candidate import (
     LAGS,
     Candidate,
@@ -190,6 +191,17 @@ def test_other_numbers_stand_where_a_term_does_hardly_more():
         near.null,
     )
     assert beside.best.terms == (gravity,)
+
+
+def test_what_loses_on_blocks_not_seen_gives_way_to_what_predicts_them(monkeypatch):
+    found = _level({'function': 500.0, 'gravity': 400.0, 'tracker_delay': 300.0}, [0.0]).found
+    first = _composition(0.0)
+    predicting = {'gravity', 'tracker_delay'}
+    monkeypatch.setattr(levels, 'predicts_better', lambda one, _: one in predicting)
+    named = tuple(replace(each, fit=each.terms[0].id) for each in found)
+    assert [c.fit for c in levels._that_predict(named, first)] == ['gravity', 'tracker_delay']
+    predicting.clear()
+    assert levels._that_predict(named, first) == named
 
 
 def test_a_finer_sheath_alone_is_not_named(one_joint):

@@ -9,6 +9,10 @@ from endoscope_core.physics.effect import Effect, Parameter, Stage, Symptom, Tra
 from endoscope_core.physics.hooks import on_samples
 from endoscope_core.physics.samples import RecordingFaults
 
+STARTS = (-5e-4, 5e-4, -5e-3, 5e-3, -0.015, 0.015, -0.03, 0.03)
+"""A skew is found from a start by which no angle of a motion of seconds over tens of seconds is off
+by more than about a quarter of its period."""
+
 EFFECT = Effect(
     'clock_skew',
     Stage.RECORDING,
@@ -17,7 +21,7 @@ EFFECT = Effect(
     equation='stamp = start + (1 + skew) (t - start)',
     source='Moon, Skelly, Towsley, IEEE INFOCOM 1999',
     parameters=(
-        Parameter('skew', '-', -0.05, 0.05, 1e-3, off=0.0, starts=(-5e-4, 5e-4), comparable=True),
+        Parameter('skew', '-', -0.05, 0.05, 1e-3, off=0.0, starts=STARTS, comparable=True),
     ),
     traits=Traits(depends_on_time=True, of_device=True, symptom=Symptom.CLOCK_RATE),
 )
