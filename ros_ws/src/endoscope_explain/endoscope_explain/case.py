@@ -11,7 +11,7 @@ from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.recording import Recording
 
 Ladder = Mapping[str, Mapping[str, ChannelFit]]
-"""By rung (`nominal`, `refitted`, `augmented`, black boxes), then by signal."""
+"""By compared model (`nominal`, `refitted`, `augmented`, black boxes), then by signal."""
 
 
 @dataclass(frozen=True)

@@ -9,3 +9,5 @@ BEYOND_FORM = 1.61
 of right explanations leave less."""
 REACH = 1.31
 """Factor on intervals that makes them hold 90% of the true numbers."""
+CERTAINTY = (0.5, 3.0, -1.0)
+"""Weights of the features of a name in the logarithm of the odds that it is right."""

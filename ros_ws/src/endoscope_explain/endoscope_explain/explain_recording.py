@@ -24,19 +24,19 @@ from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.intervals import nominal_estimates
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import (
-    Anchors,
+    ReferenceFits,
     against_baseline,
-    all_anchors,
-    anchored,
+    all_references,
     beside,
     simulated_bending,
+    with_references,
 )
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.held_noise import with_held_noise
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.recording import Recording
 from endoscope_explain.search.levels import MOST_EFFECTS, JointSearch, search
-from endoscope_explain.search.refit import Composition
+from endoscope_explain.search.refit import Candidate
 
 Progress = Callable[[str], None]
 
@@ -86,15 +86,15 @@ def explain_recording(
         tell('searching what the baseline lacks')
         observations, well = _healthy(observations, baseline, plant, band, left_out, jobs)
         band = SAME_RIG
-    observations, anchors = anchored(recording, observations, well, band, jobs)
+    observations, references = with_references(recording, observations, well, band, jobs)
 
-    def explained(pair: Anchors) -> Explained:
+    def explained(pair: ReferenceFits) -> Explained:
         if given is not None:
             return explained_by(pair, given[pair[0].model.observation.joint], jobs)
         tried = search(pair, jobs, most_effects, left_out)
         return tried, decide(tried, jobs)
 
-    searches, decisions = _explained_together(anchors, explained, tell)
+    searches, decisions = _explained_together(references, explained, tell)
     tell('judging on held-out blocks')
     effects = named(observations, decisions)
     return Explanation(
@@ -107,7 +107,7 @@ def explain_recording(
         plant,
         plant_of(well, [refitted(s, d) for s, d in zip(searches, decisions, strict=True)]),
         plant_of(well, [d.chosen for d in decisions]),
-        ladder(anchors, searches, decisions),
+        ladder(references, searches, decisions),
         candidates(observations, searches),
         missing_function(decisions),
         all(d.adequate for d in decisions),
@@ -133,34 +133,34 @@ def _healthy(
     before = with_held_noise(observe(baseline, plant))
     packed = {o.joint: packed_joint(plant, o.joint) for o in before}
 
-    def described(anchors: tuple[Fit, Fit]) -> Composition:
-        tried = search(anchors, jobs, 1, left_out)
+    def described(references: tuple[Fit, Fit]) -> Candidate:
+        tried = search(references, jobs, 1, left_out)
         found = [level.best for level in tried.levels if level.is_found]
         # What depends on time was the first recording's own.
-        lasting = [c for c in found if not any(t.term.traits.depends_on_time for t in c.terms)]
+        lasting = [c for c in found if not any(t.effect.traits.depends_on_time for t in c.terms)]
         return lasting[0] if lasting else tried.nominal
 
-    healthy = [described(pair) for pair in all_anchors(before, packed, jobs, band)]
+    healthy = [described(pair) for pair in all_references(before, packed, jobs, band)]
     by_joint = {c.fit.model.observation.joint: c for c in healthy}
     seen = tuple(against_baseline(o, by_joint[o.joint].fit) for o in observations)
     return seen, plant_of(plant, healthy)
 
 
 def _explained_together(
-    anchors: list[Anchors], explained: Callable[[Anchors], Explained], tell: Progress
+    references: list[ReferenceFits], explained: Callable[[ReferenceFits], Explained], tell: Progress
 ) -> tuple[list[JointSearch], list[Decision]]:
     """Explain each joint beside the other as that is explained, until no tracker sees a change.
 
     Where the nominal plant leaves no more than noise, nothing that the other joint does is missing.
     """
     found = []
-    for pair in anchors:
+    for pair in references:
         tell(f'searching what {pair[0].model.observation.joint} lacks')
         found.append(explained(pair))
-    observations = [refitted.model.observation for refitted, _ in anchors]
+    observations = [refitted.model.observation for refitted, _ in references]
     # How the other joint moved as each was explained: as in its nominal fit, at first.
     seen = [observation.inputs[0, :, IN_OTHER_JOINT] for observation in observations]
-    for index in [0, 1] * ROUNDS if len(anchors) == 2 else []:
+    for index in [0, 1] * ROUNDS if len(references) == 2 else []:
         (_, of_other), (_, own) = found[1 - index], found[index]
         angle = simulated_bending(of_other.chosen.fit)
         off = float(np.sqrt(np.mean((angle - seen[index]) ** 2)))
@@ -168,7 +168,7 @@ def _explained_together(
             continue
         tell(f'searching what {observations[index].joint} lacks beside the other one as explained')
         seen[index] = angle
-        found[index] = explained(beside(anchors[index], of_other.chosen.fit))
+        found[index] = explained(beside(references[index], of_other.chosen.fit))
     return [tried for tried, _ in found], [decision for _, decision in found]
 
 

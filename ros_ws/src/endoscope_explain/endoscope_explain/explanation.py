@@ -63,6 +63,8 @@ class NamedEffect:
     alternatives: tuple[str, ...] = ()  # ids that the data cannot tell from this one, nearest first
     # each key has its meaning in `report.sentences.EVIDENCE`
     evidence: Mapping[str, float] = field(default_factory=dict)
+    # How often names as clear as this one are right, as measured; NaN where that was not.
+    probability: float = math.nan
     # A second recording is predicted no better with it.
     doubtful: bool = False
 
@@ -106,8 +108,8 @@ class Fitting:
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """One composition of effects that was tried."""
+class Tried:
+    """One combination of effects that was tried."""
 
     joint: str
     effects: tuple[str, ...]  # and places of functions
@@ -176,7 +178,7 @@ class Explanation:
     augmented: PlantDescription  # with the named effects
     # By 'nominal', 'refitted', 'augmented' and signal, written `wires/measured_js:wire_x_pos`.
     fit: Mapping[str, Mapping[str, ChannelFit]]
-    candidates: tuple[Candidate, ...] = ()  # compositions that were refitted, best first
+    candidates: tuple[Tried, ...] = ()  # candidates that were refitted, best first
     unknown: UnknownTerm | None = None  # the missing term for `unknown_physics`
     adequate: bool = True  # the augmented plant leaves nothing but noise and small errors of form
     # What it leaves over what rigs of another form leave, of the worst joint.

@@ -233,8 +233,8 @@ def _csv(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return text.getvalue()
 
 
-def _largest(rung: Mapping[str, Mapping[str, float]]) -> float | None:
-    return max((fit['rmse_over_noise'] for fit in rung.values()), default=None)
+def _largest(fits: Mapping[str, Mapping[str, float]]) -> float | None:
+    return max((fit['rmse_over_noise'] for fit in fits.values()), default=None)
 
 
 def _write(reported: Reported, folder: Path) -> None:

@@ -11,14 +11,14 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_core.physics.effects import describe, lacking
 from endoscope_explain.decide.given_physics import GivenJoints, GivenPhysics, without_recording
-from endoscope_explain.fit.nominal import anchored
-from endoscope_explain.fit.pooled import told_alone
+from endoscope_explain.fit.nominal import with_references
+from endoscope_explain.fit.pooled import judged_alone
 from endoscope_explain.observe.held_noise import with_held_noise
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.pipeline import JointsDifferError, Sources, read_inputs
 from endoscope_explain.search.levels import FALSE_ALARMS
 from endoscope_explain.search.shared_choice import (
-    Anchors,
+    ReferenceFits,
     SharedChoice,
     settled_together,
     with_one_more,
@@ -36,13 +36,13 @@ def physics_of_all(
     Returns: for each recording.
     Raises BagError: if a recording cannot be used, or has other joints than the first one.
     """
-    recordings: list[dict[str, Anchors]] = []
+    recordings: list[dict[str, ReferenceFits]] = []
     with threadpool_limits(1, 'blas'):
         for one in sources:
             inputs = read_inputs(one)
             recording = inputs.audit.recording
             tell(f'{recording.name}: refitting the nominal plant')
-            _, anchors = anchored(
+            _, references = with_references(
                 recording,
                 with_held_noise(observe(recording, inputs.plant)),
                 inputs.plant,
@@ -55,28 +55,28 @@ def physics_of_all(
                     f'{one.bag}: has {", ".join(joints)}, but {sources[0].bag} has '
                     f'{", ".join(recordings[0])}'
                 )
-            recordings.append(dict(zip(joints, anchors, strict=True)))
+            recordings.append(dict(zip(joints, references, strict=True)))
         return shared_effects(recordings, sources[0].most_effects, jobs, tell)
 
 
 def shared_effects(
-    recordings: Sequence[Mapping[str, Anchors]],
+    recordings: Sequence[Mapping[str, ReferenceFits]],
     most_effects: int,
     jobs: int,
     tell: Callable[[str], None],
 ) -> list[GivenJoints]:
     """Choose effects for all recordings of a rig together.
 
-    `recordings`: nominal fits of each joint of each recording; see `search.refit.look`.
+    `recordings`: nominal fits of each joint of each recording; see `search.refit.trial_fit`.
     `most_effects`: largest number of effects on a joint.
     Returns: for each recording; the effects are those of all, in the order in which they were
         added.
     """
     given: list[dict[str, GivenPhysics]] = [{} for _ in recordings]
     for joint in recordings[0]:
-        nominal = SharedChoice(joint, (), tuple(anchors[joint] for anchors in recordings))
+        nominal = SharedChoice(joint, (), tuple(references[joint] for references in recordings))
         chosen, _ = searched(nominal, most_effects, jobs, tell)
-        alone = told_alone([anchors[0] for anchors in chosen.recordings])
+        alone = judged_alone([references[0] for references in chosen.recordings])
         for physics, found in zip(given, alone, strict=True):
             own = tuple(e for e in chosen.effects if found.model.flags[describe(e).flag])
             physics[joint] = without_recording(own, found)

@@ -20,7 +20,7 @@ from endoscope_explain.explanation import (
     UnknownTerm,
     Verdict,
 )
-from endoscope_explain.observe.predicted_signals import rung, view
+from endoscope_explain.observe.predicted_signals import fits_by, view
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.recording import Recording, Series
 
@@ -103,7 +103,7 @@ def stribeck_case(stribeck_recording):
         plant,
         plant,
         augmented,
-        {name: rung(recorded, name) for name in ('nominal', 'refitted', 'augmented')},
+        {name: fits_by(recorded, name) for name in ('nominal', 'refitted', 'augmented')},
     )
     inputs = Inputs(Sources(Path('synthetic'), plant, quick=True), audit)
     return explain_case(inputs, lambda *_, **__: explanation)

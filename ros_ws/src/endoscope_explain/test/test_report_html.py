@@ -13,16 +13,16 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import AuditReport, Finding, Severity
 from endoscope_explain.case import NextExperiment, Provenance
 from endoscope_explain.explanation import (
-    Candidate,
     Estimate,
     Fitting,
     NamedEffect,
     NominalEstimate,
+    Tried,
     Verdict,
 )
 from endoscope_explain.fit.free_parameters import tolerance
 from endoscope_explain.notebook.explained import Explained
-from endoscope_explain.observe.predicted_signals import rung, view
+from endoscope_explain.observe.predicted_signals import fits_by, view
 from endoscope_explain.recording import Series
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.numbers import in_degrees, judged, moving_joints, shown
@@ -72,7 +72,7 @@ def consistent(stribeck_case, record):
     refitted = dataclasses.replace(PLANT, joints={**PLANT.joints, 'bend_x': joint})
     recording = record(PLANT, duration=8.0)
     seen = view(recording, {'nominal': PLANT, 'refitted': refitted})
-    ladder = {name: rung(seen, name) for name in ('nominal', 'refitted')}
+    ladder = {name: fits_by(seen, name) for name in ('nominal', 'refitted')}
     ladder['augmented'] = dict(ladder['refitted'])
     return with_explanation(
         stribeck_case,
@@ -93,10 +93,10 @@ def consistent(stribeck_case, record):
 @pytest.fixture(scope='module')
 def page(stribeck_case):
     ranked = (
-        Candidate('bend_x', ('stribeck_friction',), 10.0, 1.0),
-        Candidate('bend_x', (), 60.0, 6.0, True),
-        *(Candidate('bend_x', ('gravity', e), 70.0, 9.0) for e in ('contact', 'breathing')),
-        Candidate('bend_x', (), 90.0, 9.0),
+        Tried('bend_x', ('stribeck_friction',), 10.0, 1.0),
+        Tried('bend_x', (), 60.0, 6.0, True),
+        *(Tried('bend_x', ('gravity', e), 70.0, 9.0) for e in ('contact', 'breathing')),
+        Tried('bend_x', (), 90.0, 9.0),
     )
     made = Provenance('bags/rig', 'a1' * 32, 'plant.yaml', 'b2' * 32, '1.2', 'endoscope x', 'today')
     return html_page(with_explanation(stribeck_case, candidates=ranked, provenance=made))

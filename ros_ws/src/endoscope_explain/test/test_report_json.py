@@ -58,8 +58,12 @@ def check_report(report):
             'evidence',
         }
         assert effect['stage'] in STAGES
-        assert effect['probability'] is None, 'not measured yet'
-        assert effect['evidence'].get('margin', 0) >= 0
+        # It was measured of names that the search gives, not of what an audit finds.
+        searched = 'margin' in effect['evidence']
+        assert (effect['probability'] is not None) == searched
+        if searched:
+            assert 0.0 < effect['probability'] < 1.0
+            assert effect['evidence']['margin'] >= 0
         assert effect['equation']
         assert effect['source']
         for estimate in effect['parameters'].values():
@@ -73,8 +77,8 @@ def check_report(report):
         for estimate in joint.values():
             assert {'nominal', 'value', 'low', 'high'} <= set(estimate)
     assert {'nominal', 'refitted', 'augmented'} <= set(report['fit'])
-    for rung in ('nominal', 'refitted', 'augmented'):
-        for fit in report['fit'][rung].values():
+    for fits in ('nominal', 'refitted', 'augmented'):
+        for fit in report['fit'][fits].values():
             assert fit['rmse_over_noise'] == pytest.approx(fit['rmse'] / fit['noise'])
     symbolic = report['symbolic']
     assert symbolic is None or symbolic['expression']

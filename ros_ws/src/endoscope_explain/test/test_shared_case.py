@@ -9,7 +9,7 @@ import pytest
 from endoscope_core.physics import load_plant
 from endoscope_explain.fit.evidence import misfit
 from endoscope_explain.fit.free_parameters import BAND, FORM_INDICES
-from endoscope_explain.fit.nominal import anchored
+from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.recording import recording_from_bag
 
@@ -26,8 +26,8 @@ pytestmark = pytest.mark.skipif(
 def test_the_plant_as_described_leaves_the_noise_and_its_refit_stays_there():
     plant = load_plant(FOLDER / 'plant.yaml')
     recording = recording_from_bag(CASE, plant)
-    _, anchors = anchored(recording, observe(recording, plant), plant, BAND, 1)
-    for refitted, described in anchors:
+    _, references = with_references(recording, observe(recording, plant), plant, BAND, 1)
+    for refitted, described in references:
         assert np.sqrt(misfit(refitted).channels.max()) < 1.5
         for item, coordinate, truth in zip(
             refitted.model.free, refitted.theta, described.theta, strict=True

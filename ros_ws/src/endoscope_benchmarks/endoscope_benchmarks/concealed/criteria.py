@@ -59,7 +59,9 @@ def bank_of(rows: Sequence[Row]) -> Bank:
         np.array([row.beyond_form for row in left]),
         np.array([row.exact for row in left], dtype=bool),
         errors[np.isfinite(errors)],
-        np.array([features(each, row.beyond_form) for _, row, each in named]).reshape(-1, 3),
+        np.array(
+            [features(each['gain'], each['margin'], row.beyond_form) for _, row, each in named]
+        ).reshape(-1, 3),
         np.array([each['right'] > 0.0 for *_, each in named], dtype=bool),
         np.array([n for n, *_ in named], dtype=np.int64),
     )

@@ -11,9 +11,9 @@ from scipy import constants
 
 from endoscope_benchmarks.concealed.judge import Statement
 from endoscope_benchmarks.peers.problem import OwnExample, Problem
-from endoscope_explain.search.candidate import effects, functions
-from endoscope_explain.search.refit import composition, look, polish
-from endoscope_explain.search.screen import background, directions, promises
+from endoscope_explain.search.refit import candidate, refit, trial_fit
+from endoscope_explain.search.screen import background, directions, screened
+from endoscope_explain.search.term import effects, functions
 
 Array = NDArray[np.float64]
 MODELS = 3
@@ -30,12 +30,12 @@ def by_empirical_risk(problem: Problem) -> Statement | None:
     left = behind.left(problem.refitted.residuals * behind.weight)
     terms = (*effects(problem.refitted, problem.left_out), *functions(problem.refitted, left))
     ways = directions(behind, terms, 1)
-    ranked = {each.candidate.id: each.candidate for each in promises(behind, ways)[::-1]}
-    nominal = composition((), problem.refitted)
+    ranked = {each.term.id: each.term for each in screened(behind, ways)[::-1]}
+    nominal = candidate((), problem.refitted)
     fits = {'': problem.refitted}
     for name in list(ranked)[: -MODELS - 1 : -1]:
-        seen = look((problem.refitted, problem.described), ranked[name], behind.offset)
-        fits[name] = polish(seen, nominal).fit
+        seen = trial_fit((problem.refitted, problem.described), ranked[name], behind.offset)
+        fits[name] = refit(seen, nominal).fit
     draw = np.random.default_rng(1)
     chosen = draw.choice(len(problem.refitted.residuals), SAMPLES)
     ideal = 0.5 * draw.standard_normal((len(fits), SAMPLES)) ** 2

@@ -14,7 +14,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.fit.nominal import anchored
+from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.fit.simulated_joint import simulate_joint
 from endoscope_explain.observe.held_noise import with_held_noise
 from endoscope_explain.observe.observation import Channel, JointObservation, observe
@@ -97,8 +97,8 @@ def problem_of(case: Case) -> Problem:
     """Refit the nominal plant to a case's recording, and pose the problem that it leaves."""
     plant = case.described
     observed = with_held_noise(observe(case.recording, plant))
-    _, anchors = anchored(case.recording, observed, plant, BAND, 1)
-    refitted, described = max(anchors, key=lambda pair: float(np.mean(pair[0].residuals ** 2)))
+    _, references = with_references(case.recording, observed, plant, BAND, 1)
+    refitted, described = max(references, key=lambda pair: float(np.mean(pair[0].residuals ** 2)))
     observation = refitted.model.observation
     end = min(float(channel.time[-1]) for channel in observation.channels)
     grid = np.arange(2.0 * PERIOD_S, end - PERIOD_S, PERIOD_S)

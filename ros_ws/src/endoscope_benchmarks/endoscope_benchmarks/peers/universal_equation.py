@@ -12,8 +12,8 @@ from scipy.optimize import least_squares
 from endoscope_benchmarks.concealed.judge import Statement
 from endoscope_benchmarks.peers.problem import OwnExample, Problem, is_held_out, predicts
 from endoscope_core.physics.functions.interpolation import NODES, VALUES
-from endoscope_explain.search.candidate import Candidate, functions
 from endoscope_explain.search.screen import Background, background, directions
+from endoscope_explain.search.term import Term, functions
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def by_network(problem: Problem) -> Statement | None:
     behind = background(problem.refitted)
     before = behind.left(problem.refitted.residuals * behind.weight)
     terms = functions(problem.refitted, before)
-    scaled = [each.candidate for each in directions(behind, terms, 1)]
+    scaled = [each.term for each in directions(behind, terms, 1)]
     observation = problem.refitted.model.observation
     time = np.concatenate([channel.time for channel in observation.channels])
     held = is_held_out(time)
@@ -81,7 +81,7 @@ def _species(meet: Callable[[Array], Array]) -> Array:
     return np.nan_to_num(np.array(path), nan=1e3, posinf=1e3, neginf=-1e3)
 
 
-def _trained(behind: Background, place: Candidate, before: Array, seen: NDArray[np.bool_]) -> Array:
+def _trained(behind: Background, place: Term, before: Array, seen: NDArray[np.bool_]) -> Array:
     """Weighted residuals (size,) with a network trained on the samples that are seen."""
     family = place.family
     assert family is not None

@@ -85,7 +85,7 @@ def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
     named = bool(chosen.effects) or refused is None
     if not named and refused is not None:
         chosen = refused
-    explained = [anchors[0] for anchors in chosen.recordings]
+    explained = [references[0] for references in chosen.recordings]
     told = []
     for take, model, start, before, after in zip(
         takes, models, starts, fits, explained, strict=True

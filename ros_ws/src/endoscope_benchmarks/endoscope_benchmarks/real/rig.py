@@ -16,7 +16,7 @@ from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nomin
 from endoscope_explain.fit.model import Fit, JointModel, fit
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.observation import JointObservation
-from endoscope_explain.search.candidate import with_effect
+from endoscope_explain.search.term import with_effect
 
 Array = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.case import Ladder
-from endoscope_explain.compare.black_box.rungs import Exam, black_box_rungs
+from endoscope_explain.compare.black_box.models import Exam, black_box_fits
 from endoscope_explain.explanation import ChannelFit, Explanation
 from endoscope_explain.fit.held_out import fitted_at, judged_at
-from endoscope_explain.observe.predicted_signals import rung, view
+from endoscope_explain.observe.predicted_signals import fits_by, view
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ def ladders(
         return held_out, second
     seen = None if validation is None else view(validation, plants)
     if seen is not None:
-        second = {name: rung(seen, name) for name in PHYSICS}
+        second = {name: fits_by(seen, name) for name in PHYSICS}
     if black_boxes:
         recorded = view(recording, plants)
         blocks = Exam(
@@ -49,8 +49,8 @@ def ladders(
             # The black boxes see all of the first recording before they are judged on the second
             # one.
             exams.append(Exam(_all, validation, seen, _all))
-        rungs = black_box_rungs(recording, recorded, exams, jobs)
-        for ladder, found in zip((held_out, second), rungs, strict=False):
+        compared = black_box_fits(recording, recorded, exams, jobs)
+        for ladder, found in zip((held_out, second), compared, strict=False):
             ladder.update(found)
     return held_out, second
 

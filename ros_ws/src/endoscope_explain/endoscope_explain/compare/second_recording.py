@@ -1,5 +1,6 @@
 """Whether a second recording of a rig confirms what was named in the first one."""
 
+import math
 from collections.abc import Collection
 from dataclasses import replace
 
@@ -40,7 +41,10 @@ def confirmed_by(validation: Recording, explanation: Explanation) -> tuple[Named
             return effect
         chance = chance_of_no_gain(seen, joints)
         evidence = {**effect.evidence, 'second_p_value': chance}
-        return replace(effect, evidence=evidence, doubtful=chance > FALSE_ALARMS)
+        if chance <= FALSE_ALARMS:
+            return replace(effect, evidence=evidence)
+        # How often names are right was measured before any second recording spoke.
+        return replace(effect, evidence=evidence, doubtful=True, probability=math.nan)
 
     return tuple(map(judged, explanation.effects))
 

@@ -1,5 +1,6 @@
 """What is concluded from the decisions on all joints: names, verdict, plants, ladder of fits."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -12,13 +13,14 @@ from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Effect, Stage
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.layout import NOMINAL_KEYS
+from endoscope_explain.decide.certainty import certainty
 from endoscope_explain.decide.decision import Decision, MissingTerm
 from endoscope_explain.explanation import (
-    Candidate,
     ChannelFit,
     Fitting,
     NamedEffect,
     NominalEstimate,
+    Tried,
     UnknownTerm,
     Verdict,
 )
@@ -34,10 +36,10 @@ from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.simulated_joint import joint_of
 from endoscope_explain.fit.solver import Ended
 from endoscope_explain.observe.observation import JointObservation
-from endoscope_explain.search.candidate import Candidate as Term
 from endoscope_explain.search.formula import fitted_function, nearest_formula
 from endoscope_explain.search.levels import JointSearch
-from endoscope_explain.search.refit import Composition
+from endoscope_explain.search.refit import Candidate
+from endoscope_explain.search.term import Term
 
 Array = NDArray[np.float64]
 
@@ -58,9 +60,10 @@ def named(
     observations: tuple[JointObservation, ...], decisions: list[Decision]
 ) -> tuple[NamedEffect, ...]:
     """Chosen effects of all joints, what explains most first; each id once before any again."""
+    left = max((decision.beyond_form for decision in decisions), default=math.nan)
     ordered = sorted(
         (
-            _named(observation.joint, decision, term)
+            _named(observation.joint, decision, term, left)
             for observation, decision in zip(observations, decisions, strict=True)
             for term in decision.missing
             if term.is_known
@@ -77,8 +80,10 @@ def named(
     return tuple(sorted(once.values(), key=lambda e: e is not first[e.id]))
 
 
-def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
+def _named(joint: str, decision: Decision, term: MissingTerm, left: float) -> NamedEffect:
     definition = describe(term.name)
+    # Of physics that was given, no other name was tried.
+    measured = math.isfinite(term.p_value)
     modelled = term.name in decision.chosen.effects
     fitted = decision.chosen if modelled else term.formula
     return NamedEffect(
@@ -99,6 +104,7 @@ def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
             'explained': decision.explained,
             'as_formula': float(modelled),
         },
+        certainty(term.gain, term.margin, left) if measured else math.nan,
     )
 
 
@@ -138,7 +144,7 @@ def has_changed(name: str, estimate: NominalEstimate) -> bool:
     return outside and abs(np.log(value / nominal)) > CHANGED
 
 
-def plant_of(plant: PlantDescription, fits: list[Composition]) -> PlantDescription:
+def plant_of(plant: PlantDescription, fits: list[Candidate]) -> PlantDescription:
     """A plant with the numbers of its joints' fits, and with their effects and functions.
 
     What is of a device that joints share has the numbers of the joint that shows it best.
@@ -153,17 +159,17 @@ def plant_of(plant: PlantDescription, fits: list[Composition]) -> PlantDescripti
             if term.is_function:
                 terms.append(unknown_term(one, term).term())
                 continue
-            spec = spec_of(term.term, joint, packed)
+            spec = spec_of(term.effect, joint, packed)
             specs.append(spec)
             if term.is_nominal:
                 # Its numbers stand there.
-                first = term.term.parameters[0]
+                first = term.effect.parameters[0]
                 absent: dict[str, Any] = {first.name: first.off}
                 joints[joint] = replace(joints[joint], **absent)
-            if term.term.traits.of_device:
+            if term.effect.traits.of_device:
                 known = shared.get(term.id, (np.inf, {}))
                 shared[term.id] = min(
-                    known, (_width(one.fit, term.term), spec.parameters), key=lambda each: each[0]
+                    known, (_width(one.fit, term.effect), spec.parameters), key=lambda each: each[0]
                 )
     specs = [replace(s, parameters=shared[s.id][1]) if s.id in shared else s for s in specs]
     return replace(plant, joints=joints, effects=tuple(specs), terms=tuple(terms))
@@ -183,7 +189,7 @@ def spec_of(effect: Effect, joint: str, packed: Array) -> EffectSpec:
     return EffectSpec(effect.id, joint, dict(zip(names, values, strict=True)))
 
 
-def unknown_term(one: Composition, term: Term) -> UnknownTerm:
+def unknown_term(one: Candidate, term: Term) -> UnknownTerm:
     """A function of a fitted joint, with the formula that comes nearest to it."""
     function = fitted_function(one.fit, term.id)
     formula = nearest_formula(function)
@@ -230,30 +236,30 @@ def missing_function(decisions: list[Decision]) -> UnknownTerm | None:
     )
 
 
-def refitted(tried: JointSearch, decision: Decision) -> Composition:
+def refitted(tried: JointSearch, decision: Decision) -> Candidate:
     """The nominal plant of a joint: beyond its band where that is all that was chosen."""
     return tried.nominal if decision.chosen.terms else decision.chosen
 
 
 def ladder(
-    anchors: list[tuple[Fit, Fit]],
+    references: list[tuple[Fit, Fit]],
     searches: list[JointSearch],
     decisions: list[Decision],
 ) -> dict[str, dict[str, ChannelFit]]:
     """Misfit of the plant as described, refitted and augmented, on held-out blocks."""
-    rungs: dict[str, dict[str, ChannelFit]] = {'nominal': {}, 'refitted': {}, 'augmented': {}}
-    for (_, described), tried, decision in zip(anchors, searches, decisions, strict=True):
+    compared: dict[str, dict[str, ChannelFit]] = {'nominal': {}, 'refitted': {}, 'augmented': {}}
+    for (_, described), tried, decision in zip(references, searches, decisions, strict=True):
         observation = described.model.observation
         judged, _ = held_out_masks(observation)
-        rungs['nominal'] |= on_samples(observation, described.residuals, judged)
+        compared['nominal'] |= on_samples(observation, described.residuals, judged)
         before = refitted(tried, decision).fit
-        rungs['refitted'] |= held_out_fit(before)
-        rungs['augmented'] |= (
+        compared['refitted'] |= held_out_fit(before)
+        compared['augmented'] |= (
             held_out_fit(decision.chosen.fit)
             if decision.chosen.terms
-            else {s.signal: rungs['refitted'][s.signal] for s in observation.channels}
+            else {s.signal: compared['refitted'][s.signal] for s in observation.channels}
         )
-    return rungs
+    return compared
 
 
 def fitting(found: Fit) -> Fitting:
@@ -268,13 +274,13 @@ def fitting(found: Fit) -> Fitting:
 
 def candidates(
     observations: tuple[JointObservation, ...], searches: list[JointSearch]
-) -> tuple[Candidate, ...]:
-    """All compositions that were tried, the best first."""
+) -> tuple[Tried, ...]:
+    """All candidates that were tried, the best first."""
     found = []
     for observation, tried in zip(observations, searches, strict=True):
         for c in tried.tried():
             found.append(
-                Candidate(
+                Tried(
                     observation.joint,
                     tuple(term.id for term in c.terms),
                     tried.nominal.evidence - c.evidence,

@@ -9,9 +9,9 @@ from endoscope_explain.criteria import BEYOND_FORM
 from endoscope_explain.fit.evidence import misfit
 from endoscope_explain.fit.intervals import may_be_absent
 from endoscope_explain.fit.other_forms import with_form
-from endoscope_explain.search.candidate import Candidate
 from endoscope_explain.search.levels import JointSearch, Level
-from endoscope_explain.search.refit import Composition
+from endoscope_explain.search.refit import Candidate
+from endoscope_explain.search.term import Term
 
 
 @dataclass(frozen=True)
@@ -28,13 +28,13 @@ class MissingTerm:
     `formula`: with the formula of `name`, where it was fitted.
     """
 
-    term: Candidate
+    term: Term
     name: str
     alternatives: tuple[str, ...]
     gain: float
     margin: float
     p_value: float
-    formula: Composition | None
+    formula: Candidate | None
 
     @property
     def is_known(self) -> bool:
@@ -52,7 +52,7 @@ class Decision:
     `instead`: names of terms that the recording does not tell from other numbers, nearest first.
     """
 
-    chosen: Composition
+    chosen: Candidate
     missing: tuple[MissingTerm, ...]
     explained: float
     instead: tuple[str, ...] = ()
@@ -69,8 +69,8 @@ class Decision:
 
 
 def decide(search: JointSearch, jobs: int) -> Decision:
-    """Choose a composition, name its terms and their rivals, and judge whether it is adequate."""
-    chosen: Composition = search.nominal
+    """Choose a candidate, name its terms and their rivals, and judge whether it is adequate."""
+    chosen: Candidate = search.nominal
     missing: tuple[MissingTerm, ...] = ()
     instead: tuple[str, ...] = ()
     for level in search.levels:
@@ -81,7 +81,7 @@ def decide(search: JointSearch, jobs: int) -> Decision:
             chosen, instead = best, _instead(level)
             continue
         best = replace(best, fit=with_form(best.fit, jobs))
-        if any(not t.is_function and may_be_absent(best.fit, t.term) for t in best.terms):
+        if any(not t.is_function and may_be_absent(best.fit, t.effect) for t in best.terms):
             break
         chosen, instead = best, ()
         if not best.terms[-1].multiplies:
@@ -91,8 +91,8 @@ def decide(search: JointSearch, jobs: int) -> Decision:
     return Decision(chosen, missing, share_explained(search.nominal, chosen), instead)
 
 
-def share_explained(nominal: Composition, chosen: Composition) -> float:
-    """Share of the misfit above noise that a composition removes; 1 where there was none."""
+def share_explained(nominal: Candidate, chosen: Candidate) -> float:
+    """Share of the misfit above noise that a candidate removes; 1 where there was none."""
     before, after = misfit(nominal.fit).total, misfit(chosen.fit).total
     above = before - nominal.fit.model.observation.size
     return 1.0 if above <= 0.0 else float(np.clip((before - after) / above, 0.0, 1.0))
@@ -105,7 +105,7 @@ def _instead(level: Level) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_name(level, each) for each in near))
 
 
-def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
+def _missing(level: Level, best: Candidate, jobs: int) -> MissingTerm:
     last = best.terms[-1]
     formulas = [c for c in level.at_the_place_of(best) if not c.terms[-1].is_function]
     formula = best if not last.is_function else (formulas[0] if formulas else None)
@@ -123,15 +123,15 @@ def _missing(level: Level, best: Composition, jobs: int) -> MissingTerm:
     best_other = max((level.gain(each) for each in others), default=0.0)
     if formula is not None and formula is not best:
         formula = replace(formula, fit=with_form(formula.fit, jobs))
-        if may_be_absent(formula.fit, formula.terms[-1].term):
+        if may_be_absent(formula.fit, formula.terms[-1].effect):
             # The function is there; the effect whose formula comes nearest may not be.
             name, formula = last.id, None
     margin = gain - max(best_other, 0.0)
     return MissingTerm(last, name, alternatives, gain, margin, level.p_value, formula)
 
 
-def _name(level: Level, one: Composition) -> str:
-    """The effect whose physics the last term of a composition is, or its place.
+def _name(level: Level, one: Candidate) -> str:
+    """The effect whose physics the last term of a candidate is, or its place.
 
     At the place of a function it is the effect whose formula comes nearest, or the only one there.
     """
@@ -146,7 +146,7 @@ def _name(level: Level, one: Composition) -> str:
 
 
 def _named_as_chosen(
-    search: JointSearch, chosen: Composition, missing: tuple[MissingTerm, ...], jobs: int
+    search: JointSearch, chosen: Candidate, missing: tuple[MissingTerm, ...], jobs: int
 ) -> tuple[MissingTerm, ...]:
     """The missing terms as chosen: a rival of the first one may have led to a better two."""
     named = []

@@ -13,9 +13,9 @@ from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.free_parameters import FreeParameter
 from endoscope_explain.fit.model import Fit, JointModel, fit, without_effect
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.candidate import Candidate
 from endoscope_explain.search.levels import JointSearch, Level, search
-from endoscope_explain.search.refit import Composition, composition
+from endoscope_explain.search.refit import Candidate, candidate
+from endoscope_explain.search.term import Term
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -56,36 +56,36 @@ def settled(model: JointModel, theta: Array) -> Fit:
 
 
 def explained_by(
-    anchors: tuple[Fit, Fit], given: GivenPhysics, jobs: int
+    references: tuple[Fit, Fit], given: GivenPhysics, jobs: int
 ) -> tuple[JointSearch, Decision]:
     """Fit given physics to a joint, and see what each of its effects is needed for.
 
     Each effect gains what the joint loses without it. One term more is searched only where they
-    leave more than another form would. The anchors are the nominal plant refitted, and as
+    leave more than another form would. The reference fits are the nominal plant refitted, and as
     described.
     """
-    nominal = composition((), anchors[0])
-    found = anchors[0]
-    terms: tuple[Candidate, ...] = ()
+    nominal = candidate((), references[0])
+    found = references[0]
+    terms: tuple[Term, ...] = ()
     missing: tuple[MissingTerm, ...] = ()
     if given.effects:
-        model = JointModel(anchors[0].model.observation, given.base, given.flags, given.free)
+        model = JointModel(references[0].model.observation, given.base, given.flags, given.free)
         found = settled(model, given.theta)
-        terms = tuple(Candidate(describe(each)) for each in given.effects)
-        missing = _needed(composition(terms, found), given.effects, jobs)
-    beside = decide(JointSearch(composition((), found), ()), jobs)
+        terms = tuple(Term(describe(each)) for each in given.effects)
+        missing = _needed(candidate(terms, found), given.effects, jobs)
+    beside = decide(JointSearch(candidate((), found), ()), jobs)
     tried: tuple[Level, ...] = ()
     if not beside.adequate:
         tried = search((found,), jobs, 1).levels
-        beside = decide(JointSearch(composition((), found), tried), jobs)
-    chosen = composition((*terms, *beside.chosen.terms), beside.chosen.fit)
+        beside = decide(JointSearch(candidate((), found), tried), jobs)
+    chosen = candidate((*terms, *beside.chosen.terms), beside.chosen.fit)
     everything = (*missing, *beside.missing)
     return JointSearch(nominal, tried), Decision(
         chosen, everything, share_explained(nominal, chosen)
     )
 
 
-def _needed(whole: Composition, effects: tuple[str, ...], jobs: int) -> tuple[MissingTerm, ...]:
+def _needed(whole: Candidate, effects: tuple[str, ...], jobs: int) -> tuple[MissingTerm, ...]:
     """Each given effect with what the joint loses without it."""
     lesser = [without_effect(whole.fit, effect_id) for effect_id in effects]
     fits = parallel_map(lambda less: fit(*less), lesser, jobs)

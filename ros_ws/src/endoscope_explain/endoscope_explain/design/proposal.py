@@ -27,8 +27,8 @@ from endoscope_explain.fit.simulated_joint import joint_of, packed_joint
 from endoscope_explain.observe.observation import TICK, JointObservation, observe
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording, Series
-from endoscope_explain.search.candidate import Candidate, starting_points
-from endoscope_explain.search.screen import background, directions, promises
+from endoscope_explain.search.screen import background, directions, screened
+from endoscope_explain.search.term import Term, starting_points
 
 Array = NDArray[np.float64]
 
@@ -172,15 +172,15 @@ def rival_plant(
     bare = replace(plant, effects=others, terms=functions)
     observation = next(o for o in observe(recording, bare) if o.joint == effect.joint)
     behind = background(refit(bare, observation, 0.2, 2))
-    terms = tuple(Candidate(describe(rival), start) for start in starting_points(describe(rival)))
+    terms = tuple(Term(describe(rival), start) for start in starting_points(describe(rival)))
     ways = directions(behind, terms, 1)
     if not ways:
         return None
     # Beside numbers that are bent by what was taken out, a rival may promise nothing at its starts.
-    ranked = [promised.candidate for promised in promises(behind, ways)] or [ways[0].candidate]
+    ranked = [promised.term for promised in screened(behind, ways)] or [ways[0].term]
     packed = ranked[0].added_to(behind.fit.model).base
-    candidate = replace(bare, effects=(*others, spec_of(describe(rival), effect.joint, packed)))
-    return with_fit(candidate, effect.joint, refit(candidate, observation, 0.2, 6))
+    term = replace(bare, effects=(*others, spec_of(describe(rival), effect.joint, packed)))
+    return with_fit(term, effect.joint, refit(term, observation, 0.2, 6))
 
 
 def safe_family(

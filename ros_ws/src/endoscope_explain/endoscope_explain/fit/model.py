@@ -253,7 +253,7 @@ def fit(
     return _fit_of(model, minimise(objective, start, Effort(iterations, tolerance), known_jacobian))
 
 
-def glance(
+def broyden_fit(
     model: JointModel,
     start: Array,
     known_jacobian: Array,

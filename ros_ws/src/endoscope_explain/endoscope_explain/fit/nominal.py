@@ -76,7 +76,7 @@ def _corrected(channel: Channel, before: Channel, residual: Array, repeated: boo
     return replace(channel, noise=channel.noise * np.sqrt(max(size, 1.0)))
 
 
-Anchors = tuple[Fit, Fit]
+ReferenceFits = tuple[Fit, Fit]
 """A joint's nominal plant refitted, and as described."""
 Flags = NDArray[np.bool_]
 
@@ -85,16 +85,16 @@ FINISHED = 20
 ANY_NUMBER = 20
 """Steps of a fit with numbers that may be any."""
 AT_THE_END = 1e-3
-"""Relative distance from the end of a band within which a number leans on it."""
+"""Relative distance from the end of a band within which a number counts as being at it."""
 
 
-def anchored(
+def with_references(
     recording: Recording,
     observations: tuple[JointObservation, ...],
     plant: PlantDescription,
     band: float,
     jobs: int,
-) -> tuple[tuple[JointObservation, ...], list[Anchors]]:
+) -> tuple[tuple[JointObservation, ...], list[ReferenceFits]]:
     """Fit the nominal plant, and once more where that shows isolated wrong samples.
 
     `recording`: tells which samples the audit found wrong.
@@ -102,33 +102,37 @@ def anchored(
     `plant`: in health.
     `band`: relative tolerance of its parameters.
     Returns `observations`: without the samples that stick out.
-    Returns `anchors`: of each joint, beside the other as refitted.
+    Returns `references`: of each joint, beside the other as refitted.
     """
     packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
-    anchors = all_anchors(observations, packed, jobs, band)
-    cleaned = without_isolated(recording, observations, tuple(fitted for fitted, _ in anchors))
+    references = all_references(observations, packed, jobs, band)
+    cleaned = without_isolated(recording, observations, tuple(fitted for fitted, _ in references))
     if cleaned is observations:
-        return observations, anchors
-    return cleaned, all_anchors(cleaned, packed, jobs, band)
+        return observations, references
+    return cleaned, all_references(cleaned, packed, jobs, band)
 
 
-def all_anchors(
+def all_references(
     observations: tuple[JointObservation, ...],
     packed: dict[str, tuple[Array, Flags]],
     jobs: int,
     band: float = BAND,
-) -> list[Anchors]:
+) -> list[ReferenceFits]:
     """The nominal plant of every joint, each beside the other as refitted."""
-    anchors = parallel_map(lambda o: nominal_anchors(o, *packed[o.joint], band), observations, jobs)
-    if len(anchors) != 2:
-        return anchors
-    return [beside(pair, other) for pair, (other, _) in zip(anchors, anchors[::-1], strict=True)]
+    references = parallel_map(
+        lambda o: nominal_references(o, *packed[o.joint], band), observations, jobs
+    )
+    if len(references) != 2:
+        return references
+    return [
+        beside(pair, other) for pair, (other, _) in zip(references, references[::-1], strict=True)
+    ]
 
 
-def beside(anchors: Anchors, other: Fit) -> Anchors:
-    """A joint's anchors where the other joint moves as it does in a fit of its own."""
+def beside(references: ReferenceFits, other: Fit) -> ReferenceFits:
+    """A joint's reference fits where the other joint moves as it does in a fit of its own."""
     angle = simulated_bending(other)
-    fitted, described = (_seen_with(one, angle) for one in anchors)
+    fitted, described = (_seen_with(one, angle) for one in references)
     return fitted, described
 
 
@@ -148,12 +152,12 @@ def simulated_bending(fitted: Fit) -> Array:
     return simulate_joint(fitted.model.observation, parameters, fitted.model.flags)[:, OUT_JOINT]
 
 
-def nominal_anchors(
+def nominal_references(
     observation: JointObservation,
     base: Array,
     flags: Flags,
     band: float = BAND,
-) -> Anchors:
+) -> ReferenceFits:
     """The nominal plant refitted, and as described, each with its derivative.
 
     `base` (parameters,), `flags` (flags,): packed plant as described, with what effects it has.
@@ -177,7 +181,7 @@ def nominal_anchors(
     return finished if is_noise(finished) else refitted, described
 
 
-def leans(fitted: Fit) -> bool:
+def is_at_tolerance(fitted: Fit) -> bool:
     """Whether a fit holds a nominal number at an end of its band."""
     low, high = fitted.model.bounds()
     at_the_end = np.minimum(fitted.theta - low, high - fitted.theta) < AT_THE_END

@@ -18,7 +18,7 @@ from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
 from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_explain.fit.evidence import counts, mean_squares, weights
 from endoscope_explain.fit.free_parameters import FRICTION_PROFILE_NAMES
-from endoscope_explain.fit.model import Fit, glance
+from endoscope_explain.fit.model import Fit, broyden_fit
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
@@ -73,7 +73,7 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
     def fitted(rig: Array) -> tuple[Array, Array]:
         readings = reading(model.observation, model.residuals_of(rig, lead))
         seen = replace(model, observation=readings, free=free)
-        near = glance(seen, found.theta, found.jacobian, STEPS, weight)
+        near = broyden_fit(seen, found.theta, found.jacobian, STEPS, weight)
         return near.residuals, near.theta - found.theta
 
     results = parallel_map(fitted, [drawn() for _ in range(count)], jobs)

@@ -125,7 +125,7 @@ def deviations(fits: Sequence[Fit]) -> list[Array]:
     return [deviation[columns] for columns in layout.columns]
 
 
-def told_alone(fits: Sequence[Fit]) -> list[Fit]:
+def judged_alone(fits: Sequence[Fit]) -> list[Fit]:
     """Each recording's fit as it can be gone on with without the others.
 
     `fits`: of `fit_together`.

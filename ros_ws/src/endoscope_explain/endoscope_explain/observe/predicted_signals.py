@@ -136,7 +136,7 @@ def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> Record
     return RecordedView(observations, signals, by_joint, begin)
 
 
-def rung(recorded: RecordedView, name: str) -> dict[str, ChannelFit]:
+def fits_by(recorded: RecordedView, name: str) -> dict[str, ChannelFit]:
     """Return rmse and noise of every signal, on all samples, under one of a view's plants."""
     return {
         signal: ChannelFit.of(v.measured - v.predicted[name], v.noise)

@@ -42,6 +42,7 @@ from endoscope_explain.report.sentences import (
     LEAST_SHARE,
     before_and_after,
     fitting_sentences,
+    how_sure,
     label,
     next_step,
     physics_of,
@@ -112,6 +113,7 @@ def html_page(case: ExplainedCase) -> str:
         effects_title=_effects_title(case),
         numbers_of=numbers_of,
         label=label,
+        how_sure=how_sure,
         physics_of=physics_of,
         meaning=EVIDENCE,
         joint=joint,
@@ -287,7 +289,7 @@ def _tried(case: ExplainedCase) -> list[dict[str, Any]]:
 
 
 def _not_refitted(case: ExplainedCase, observation: JointObservation) -> dict[str, Any]:
-    """Effects that no composition of a joint holds, and why."""
+    """Effects that no candidate of a joint has, and why."""
     sets = [c.effects for c in case.explanation.candidates if c.joint == observation.joint]
     known = {effect for effects in sets for effect in effects}
     rest = [e for e in CATALOGUE.values() if e.id not in known and not e.traits.audited]

@@ -54,8 +54,7 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         'id': effect.id,
         'joint': effect.joint,
         'stage': effect.stage,
-        # As long as it is not measured on cases that go wrong, too; evidence has the margin.
-        'probability': None,
+        'probability': effect.probability if math.isfinite(effect.probability) else None,
         'equation': effect.definition.equation,
         'source': effect.definition.source,
         'parameters': {
@@ -96,11 +95,11 @@ def _ladder(case: ExplainedCase) -> dict[str, Any]:
 
 def _rungs(ladder: Ladder) -> dict[str, Any]:
     return {
-        rung: {
+        fits: {
             signal: {'rmse': fit.rmse, 'noise': fit.noise, 'rmse_over_noise': fit.ratio}
             for signal, fit in signals.items()
         }
-        for rung, signals in ladder.items()
+        for fits, signals in ladder.items()
     }
 
 

@@ -1,5 +1,6 @@
 """What was found, in sentences of at most twenty words."""
 
+import math
 from collections.abc import Sequence
 
 from endoscope_core.physics.effects import CATALOGUE
@@ -78,6 +79,14 @@ def physics_of(effect: NamedEffect) -> str:
     said = form(effect)
     physics = f'{effect.definition.physics.rstrip(".")}.'
     return f'{physics} Here: {", ".join(said)}.' if said else physics
+
+
+def how_sure(effect: NamedEffect) -> str:
+    """How often a name given as clearly is right; empty where that was not measured."""
+    if math.isnan(effect.probability):
+        return ''
+    of_hundred = min(round(100.0 * effect.probability), 99)
+    return f'On simulated rigs, {of_hundred} of a hundred names as clear were right.'
 
 
 def where(place: Place) -> str:

@@ -7,6 +7,7 @@ from endoscope_explain.explanation import Verdict
 from endoscope_explain.report.numbers import PLANTS, digits, judged, numbers_of, shown
 from endoscope_explain.report.sentences import (
     differing,
+    how_sure,
     label,
     next_step,
     not_shown,
@@ -32,7 +33,8 @@ def told(case: ExplainedCase) -> str:
     """Say what was found, in lines of which the first one is the verdict's sentence."""
     lines = [verdict_sentence(case), *reservations(case)]
     for effect in case.effects:
-        lines.append(f'  {label(effect)}: {physics_of(effect)}')
+        said = ' '.join(filter(None, (physics_of(effect), how_sure(effect))))
+        lines.append(f'  {label(effect)}: {said}')
         lines += [f'    {one}' for one in numbers_of(effect)]
     if case.rest is Verdict.PARAMETERS_DIFFER:
         for (joint, name), e in differing(case).items():

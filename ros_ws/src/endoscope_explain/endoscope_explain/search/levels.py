@@ -14,46 +14,47 @@ from endoscope_core.physics.effects import lacking
 from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.held_out import predicts_better
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.fit.nominal import leans, with_any_numbers
+from endoscope_explain.fit.nominal import is_at_tolerance, with_any_numbers
 from endoscope_explain.fit.other_forms import with_form
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.candidate import (
-    Candidate,
-    Variant,
-    effects,
-    functions,
-)
-from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, null_rigs
+from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN, Null, null_rigs
 from endoscope_explain.search.refit import (
-    Composition,
-    Look,
+    Candidate,
+    TrialFit,
     begun_beside,
     by_fine_derivatives,
-    composition,
-    look,
-    polish,
+    candidate,
+    converged,
     refined,
-    until_it_stands,
+    refit,
+    trial_fit,
 )
 from endoscope_explain.search.screen import (
     Background,
     Directions,
-    Promised,
+    Screened,
     background,
     directions,
-    promises,
+    screened,
+)
+from endoscope_explain.search.term import (
+    Term,
+    Variant,
+    effects,
+    functions,
 )
 
 MOST_EFFECTS = 2
 FALSE_ALARMS = 0.025
 """Chance that rigs in which nothing is missing show as much, above which no term is added: 2 % are
 wanted, and 39 rigs tell no less."""
-LOOKED_AT, POLISHED = 10, 4
+TRIED, REFITTED = 10, 4
 """Terms that get a first fit and a full one: in the study the truth was among the first three of
 the screen in 46 cases of 48, and among the first five in 47."""
 STARTS = 2
-"""Starting points of each of these: what is far from linear promises most where it fits least."""
+"""Starting points of each of these: far from linear, the one with the largest linearised gain may be
+the one that fits least."""
 REFINED = 3
 """Functions of these, the best, that are let vary faster."""
 SETTLED = 2
@@ -65,12 +66,12 @@ MOST_FITS, WORTH_A_FIT = 6, 1.0
 """Fits of what every rig has, without which all other numbers were bent, and the gain of evidence
 in nats that is worth another one."""
 PARENTS = 2
-"""Compositions that are added to."""
+"""Candidates that are added to."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """Compositions with one term more.
+    """Candidates with one term more.
 
     `parent`: the best of those that were added to.
     `found`: best first.
@@ -78,26 +79,26 @@ class Level:
     `predicts`: whether the best one predicts blocks that it has not seen better than its parent.
     """
 
-    parent: Composition
-    found: tuple[Composition, ...]
+    parent: Candidate
+    found: tuple[Candidate, ...]
     null: Null
     predicts: bool = True
 
-    def gain(self, one: Composition) -> float:
-        """Logarithm of the evidence of a composition over its parent's."""
+    def gain(self, one: Candidate) -> float:
+        """Logarithm of the evidence of a candidate over its parent's."""
         return one.evidence - self.parent.evidence
 
     @property
-    def best(self) -> Composition:
-        """The composition to go on with.
+    def best(self) -> Candidate:
+        """The candidate to go on with.
 
         Other numbers, then what every rig has, and then a formula stand where they lose no more
         than form is worth.
         """
         top, worth = self.found[0], self.form_is_worth()
 
-        def first(compositions: Iterable[Composition]) -> Composition | None:
-            return next((c for c in compositions if top.evidence - c.evidence <= worth), None)
+        def first(candidates: Iterable[Candidate]) -> Candidate | None:
+            return next((c for c in candidates if top.evidence - c.evidence <= worth), None)
 
         stands = first(c for c in self.found if self.adds_nothing(c))
         stands = stands or first(c for c in self.found if c.adds_nominal)
@@ -105,16 +106,16 @@ class Level:
             stands = first(c for c in self.at_the_place_of(top) if not c.terms[-1].is_function)
         return stands or top
 
-    def adds_nothing(self, one: Composition) -> bool:
-        """Whether a composition has other numbers than its parent, and no term more."""
+    def adds_nothing(self, one: Candidate) -> bool:
+        """Whether a candidate has other numbers than its parent, and no term more."""
         return len(one.terms) == len(self.parent.terms)
 
     def form_is_worth(self) -> float:
         """Evidence by which an error of form as large as what is left may mislead."""
         return max(float(np.quantile(self.null.doubt, 1.0 - FALSE_ALARMS)), 0.0)
 
-    def at_the_place_of(self, one: Composition) -> tuple[Composition, ...]:
-        """Compositions whose last term is at the same place, beside the same other terms."""
+    def at_the_place_of(self, one: Candidate) -> tuple[Candidate, ...]:
+        """Candidates whose last term is at the same place, beside the same other terms."""
         rest = {term.id for term in one.terms[:-1]}
         return tuple(
             each
@@ -126,7 +127,7 @@ class Level:
 
     @property
     def p_value(self) -> float:
-        """Chance that a rig in which nothing is missing shows as much as the best composition."""
+        """Chance that a rig in which nothing is missing shows as much as the best candidate."""
         return self.null.p_value(self.gain(self.best)) if self.found else 1.0
 
     @property
@@ -140,15 +141,15 @@ class Level:
             return self.gain(self.best) > 0.0 and self.predicts
         return self.p_value <= FALSE_ALARMS and self.predicts
 
-    def variants(self) -> tuple[Composition, ...]:
-        """The best composition's effects acting on something else: beside another they may win."""
+    def variants(self) -> tuple[Candidate, ...]:
+        """The best candidate's effects acting on something else: beside another they may win."""
         ids = [term.id for term in self.best.terms]
         return tuple(
             c for c in self.found if c is not self.best and [term.id for term in c.terms] == ids
         )
 
-    def rivals(self) -> tuple[Composition, ...]:
-        """Compositions behind the best one by no more than form is worth."""
+    def rivals(self) -> tuple[Candidate, ...]:
+        """Candidates behind the best one by no more than form is worth."""
         least = self.found[0].evidence - self.form_is_worth()
         return tuple(c for c in self.found if c is not self.best and c.evidence >= least)
 
@@ -161,32 +162,32 @@ class JointSearch:
     `levels`: with one, two, ... terms; the last one may have found nothing.
     """
 
-    nominal: Composition
+    nominal: Candidate
     levels: tuple[Level, ...]
 
-    def tried(self) -> list[Composition]:
-        """All compositions, the one without any term first."""
+    def tried(self) -> list[Candidate]:
+        """All candidates, the one without any term first."""
         return [self.nominal, *(c for level in self.levels for c in level.found)]
 
 
 def search(
-    anchors: tuple[Fit, ...],
+    references: tuple[Fit, ...],
     jobs: int,
     depth: int = MOST_EFFECTS,
     left_out: tuple[str, ...] = (),
 ) -> JointSearch:
     """Search what is missing from one joint.
 
-    `anchors`: nominal plant refitted, and as described if given.
+    `references`: nominal plant refitted, and as described if given.
     `depth`: largest number of terms, beside the nominal physics that the plant lacks.
     `left_out`: effects whose formulas are not tried.
     """
-    nominal = composition((), anchors[0])
-    depth += len(lacking(anchors[0].model.base))
+    nominal = candidate((), references[0])
+    depth += len(lacking(references[0].model.base))
     if not is_noise(nominal.fit):
         # What only the numbers are still worth is no gain of a term.
-        nominal = until_it_stands(until_it_stands(nominal))
-    parents: list[tuple[Composition, tuple[Fit, ...]]] = [(nominal, (nominal.fit, *anchors[1:]))]
+        nominal = converged(converged(nominal))
+    parents: list[tuple[Candidate, tuple[Fit, ...]]] = [(nominal, (nominal.fit, *references[1:]))]
     levels: list[Level] = []
     while len(parents[0][0].terms) < depth and not is_noise(parents[0][0].fit):
         described = not any(each.adds_nothing(each.best) for each in levels)
@@ -206,14 +207,14 @@ def search(
             break
         others = [] if level.adds_nothing(best) else [*level.variants(), *level.rivals()]
         others = [c for c in others if not level.adds_nothing(c)][: PARENTS - 1]
-        parents = [(each, (each.fit,)) for each in (best, *map(until_it_stands, others))]
+        parents = [(each, (each.fit,)) for each in (best, *map(converged, others))]
     return JointSearch(nominal, tuple(levels))
 
 
-def _from_afar(one: Composition) -> Composition:
-    """A composition whose numbers have far to go, fitted again by what each fit leaves."""
+def _from_afar(one: Candidate) -> Candidate:
+    """A candidate whose numbers have far to go, fitted again by what each fit leaves."""
     for _ in range(MOST_FITS):
-        again = until_it_stands(one)
+        again = converged(one)
         if again.evidence - one.evidence < WORTH_A_FIT:
             break
         one = again
@@ -221,39 +222,39 @@ def _from_afar(one: Composition) -> Composition:
 
 
 def _level(
-    parents: Sequence[tuple[Composition, tuple[Fit, ...]]],
+    parents: Sequence[tuple[Candidate, tuple[Fit, ...]]],
     jobs: int,
     left_out: tuple[str, ...],
     *,
     other_numbers: bool,
 ) -> Level:
     first, _ = parents[0]
-    grown = [_grown(parent, anchors, jobs, left_out) for parent, anchors in parents]
-    found = [each for _, _, compositions in grown for each in compositions]
+    grown = [_grown(parent, references, jobs, left_out) for parent, references in parents]
+    found = [each for _, _, candidates in grown for each in candidates]
     found += [
-        until_it_stands(composition(parent.terms, with_any_numbers(parent.fit)))
+        converged(candidate(parent.terms, with_any_numbers(parent.fit)))
         for parent, _ in parents
-        if other_numbers and leans(parent.fit)
+        if other_numbers and is_at_tolerance(parent.fit)
     ]
-    best: dict[frozenset[Variant], Composition] = {}
+    best: dict[frozenset[Variant], Candidate] = {}
     for each in sorted(found, key=lambda c: -c.evidence):
         best.setdefault(frozenset(term.variant for term in each.terms), each)
     ranked = tuple(best.values())
     if not ranked:
-        return Level(first, (), NOTHING_SHOWN)
+        return Level(first, (), NO_DETECTABLE_GAIN)
     ranked = _that_predict(ranked, first)
     if not is_noise(ranked[0].fit):
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     behind, ways, _ = grown[0]
     rigs = null_rigs(behind, ways, ranked[0].fit, jobs)
-    level = Level(first, ranked, rigs.as_screened() if rigs else NOTHING_SHOWN)
+    level = Level(first, ranked, rigs.as_screened() if rigs else NO_DETECTABLE_GAIN)
     if rigs and not level.best.adds_nominal:
         level = replace(level, null=rigs.beside(level.gain(level.best), FALSE_ALARMS, jobs))
     return replace(level, predicts=predicts_better(level.best.fit, first.fit))
 
 
-def _that_predict(ranked: tuple[Composition, ...], first: Composition) -> tuple[Composition, ...]:
-    """Compositions, best first, from the first one on that predicts blocks better than its parent.
+def _that_predict(ranked: tuple[Candidate, ...], first: Candidate) -> tuple[Candidate, ...]:
+    """Candidates, best first, from the first one on that predicts blocks better than its parent.
 
     A function of time can be anything: what it gains where it was fitted it loses where it was not.
     """
@@ -264,101 +265,100 @@ def _that_predict(ranked: tuple[Composition, ...], first: Composition) -> tuple[
 
 
 def _grown(
-    parent: Composition, anchors: tuple[Fit, ...], jobs: int, left_out: tuple[str, ...]
-) -> tuple[Background, tuple[Directions, ...], list[Composition]]:
+    parent: Candidate, references: tuple[Fit, ...], jobs: int, left_out: tuple[str, ...]
+) -> tuple[Background, tuple[Directions, ...], list[Candidate]]:
     behind = background(parent.fit)
     left = behind.left(behind.fit.residuals * behind.weight)
     terms = (*effects(parent.fit, left_out), *functions(parent.fit, left))
     ways = directions(behind, terms, jobs)
-    likely = _most_promising(promises(behind, ways))
-    for described in anchors[1:]:
+    likely = _best_screened(screened(behind, ways))
+    for described in references[1:]:
         # What is missing has bent the fitted numbers, but not the described ones.
         unbent = background(described)
-        terms = tuple(way.candidate for way in ways if not way.candidate.is_function)
-        more = _most_promising(promises(unbent, directions(unbent, terms, jobs)))
+        terms = tuple(way.term for way in ways if not way.term.is_function)
+        more = _best_screened(screened(unbent, directions(unbent, terms, jobs)))
         likely += [term for term in more if term.variant not in {t.variant for t in likely}]
-    looks = parallel_map(lambda term: look(anchors, term, behind.offset), likely, jobs)
-    chosen = _worth_a_fit(looks)
-    grown = parallel_map(lambda seen: polish(seen, parent), chosen, jobs)
+    trials = parallel_map(lambda term: trial_fit(references, term, behind.offset), likely, jobs)
+    chosen = _worth_a_fit(trials)
+    grown = parallel_map(lambda seen: refit(seen, parent), chosen, jobs)
     grown.sort(key=lambda c: -c.evidence)
     if grown and not is_noise(grown[0].fit):
         grown = _with_finer_functions(grown, behind, jobs)
-        grown = _with_their_formulas(grown, parent, behind, [way.candidate for way in ways], jobs)
+        grown = _with_their_formulas(grown, parent, behind, [way.term for way in ways], jobs)
     return behind, ways, _settled(grown, jobs)
 
 
-def _settled(grown: list[Composition], jobs: int) -> list[Composition]:
-    """The best compositions, and those at the place of the best, fitted until they stand."""
-    waiting, settled = list(grown), list[Composition]()
+def _settled(grown: list[Candidate], jobs: int) -> list[Candidate]:
+    """The best candidates, and those at the place of the best, fitted until they stand."""
+    waiting, settled = list(grown), list[Candidate]()
     while waiting and waiting[0] is max([*settled, *waiting], key=lambda c: c.evidence):
         now = waiting[:SETTLED]
         now += [c for c in waiting[SETTLED:] if c.terms[-1].shares_place(now[0].terms[-1])]
         waiting = [c for c in waiting if all(c is not each for each in now)]
-        settled += parallel_map(until_it_stands, now, jobs)
+        settled += parallel_map(converged, now, jobs)
     return [*settled, *waiting]
 
 
-def _with_finer_functions(
-    grown: list[Composition], behind: Background, jobs: int
-) -> list[Composition]:
-    """Compositions, best first, whose best functions are as fine as there is evidence for."""
+def _with_finer_functions(grown: list[Candidate], behind: Background, jobs: int) -> list[Candidate]:
+    """Candidates, best first, whose best functions are as fine as there is evidence for."""
     functions = [c for c in _near_the_best(grown, behind) if c.terms[-1].is_function][:REFINED]
     rest = [c for c in grown if all(c is not each for each in functions)]
     finer = parallel_map(lambda c: refined(c, behind.fit, behind.offset), functions, jobs)
     return sorted([*finer, *rest], key=lambda c: -c.evidence)
 
 
-def _near_the_best(grown: list[Composition], behind: Background) -> list[Composition]:
-    """Compositions, best first, that may yet become the best one."""
+def _near_the_best(grown: list[Candidate], behind: Background) -> list[Candidate]:
+    """Candidates, best first, that may yet become the best one."""
     without = log_evidence(behind.fit)
     least = NEAR * (grown[0].evidence - without)
     return [c for c in grown if c.evidence - without >= least]
 
 
 def _with_their_formulas(
-    grown: list[Composition],
-    parent: Composition,
+    grown: list[Candidate],
+    parent: Candidate,
     behind: Background,
-    terms: list[Candidate],
+    terms: list[Term],
     jobs: int,
-) -> list[Composition]:
-    """Compositions, best first, with formulas fitted from the numbers that functions leave.
+) -> list[Candidate]:
+    """Candidates, best first, with formulas fitted from the numbers that functions leave.
 
     What is missing bends the other numbers, and a formula far from linear, begun beside bent ones,
     ends anywhere. The function at its place has set them straight.
     """
-    tasks: list[tuple[Composition, list[Candidate]]] = []
+    tasks: list[tuple[Candidate, list[Term]]] = []
     for function in (c for c in _near_the_best(grown, behind) if c.terms[-1].is_function):
-        starts: dict[str, list[Candidate]] = {}
+        starts: dict[str, list[Term]] = {}
         for term in terms:
             if not term.is_function and term.shares_place(function.terms[-1]):
                 starts.setdefault(term.id, []).append(term)
         tasks += [(function, own) for own in starts.values()]
 
-    def fitted(task: tuple[Composition, list[Candidate]]) -> Composition:
+    def fitted(task: tuple[Candidate, list[Term]]) -> Candidate:
         function, own = task
-        return polish(begun_beside(function.fit, parent.fit, own, behind.offset), parent)
+        return refit(begun_beside(function.fit, parent.fit, own, behind.offset), parent)
 
     more = parallel_map(fitted, tasks, jobs)
-    best: dict[Variant, Composition] = {}
+    best: dict[Variant, Candidate] = {}
     for each in sorted([*grown, *more], key=lambda c: -c.evidence):
         best.setdefault(each.terms[-1].variant, each)
     return list(best.values())
 
 
-def _most_promising(ranked: list[Promised]) -> list[Candidate]:
+def _best_screened(ranked: list[Screened]) -> list[Term]:
     """The best terms, starts of each, and the formulas at the places of the best functions.
 
-    A formula that is far from linear promises little at a start that is far from the truth; the
-    function at its place is not misled by that. Nominal physics is fitted in any case.
+    The linearised gain of a formula that is far from linear is little at a start that is far from
+    the truth; the function at its place is not misled by that. Nominal physics is fitted in any
+    case.
     """
-    starts: dict[Variant, list[Candidate]] = {}
-    for promised in ranked:
-        starts.setdefault(promised.candidate.variant, []).append(promised.candidate)
+    starts: dict[Variant, list[Term]] = {}
+    for each in ranked:
+        starts.setdefault(each.term.variant, []).append(each.term)
     variants = list(starts.values())
-    chosen = [term for own in variants[:LOOKED_AT] for term in own[:STARTS]]
-    terms = [own[0] for own in variants[LOOKED_AT:]]
-    functions = [term for term in chosen if term.is_function][:POLISHED]
+    chosen = [term for own in variants[:TRIED] for term in own[:STARTS]]
+    terms = [own[0] for own in variants[TRIED:]]
+    functions = [term for term in chosen if term.is_function][:REFITTED]
     chosen += [
         term
         for term in terms
@@ -368,15 +368,15 @@ def _most_promising(ranked: list[Promised]) -> list[Candidate]:
     return chosen
 
 
-def _worth_a_fit(looks: list[Look]) -> list[Look]:
+def _worth_a_fit(trials: list[TrialFit]) -> list[TrialFit]:
     """The best after a first fit, what is nominal, and all that are at the place of the best."""
-    best: dict[Variant, Look] = {}
-    for seen in sorted(looks, key=lambda seen: seen.cost):
-        best.setdefault(seen.candidate.variant, seen)
+    best: dict[Variant, TrialFit] = {}
+    for seen in sorted(trials, key=lambda seen: seen.cost):
+        best.setdefault(seen.term.variant, seen)
     ranked = list(best.values())
-    chosen = ranked[:POLISHED]
+    chosen = ranked[:REFITTED]
     return chosen + [
         seen
-        for seen in ranked[POLISHED:]
-        if seen.candidate.is_nominal or seen.candidate.shares_place(chosen[0].candidate)
+        for seen in ranked[REFITTED:]
+        if seen.term.is_nominal or seen.term.shares_place(chosen[0].term)
     ]

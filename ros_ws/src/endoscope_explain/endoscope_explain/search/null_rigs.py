@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from endoscope_explain.fit.evidence import counts, log_likelihood, mean_squares
-from endoscope_explain.fit.model import Fit, glance, jacobian
+from endoscope_explain.fit.model import Fit, broyden_fit, jacobian
 from endoscope_explain.fit.other_forms import other_forms, reading
 from endoscope_explain.fit.whiteness import WHITE, is_noise
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.candidate import Candidate
-from endoscope_explain.search.refit import LOOK_STEPS
+from endoscope_explain.search.refit import TRIAL_STEPS
 from endoscope_explain.search.screen import Background, Directions, gains
+from endoscope_explain.search.term import Term
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Null:
     """Gains of the best term on rigs in which nothing is missing.
 
     `drawn` (B,): on rigs in which nothing is missing, off by as much as the recording is.
-    `doubt` (B,): the same where they are off by as much as the best composition leaves.
+    `doubt` (B,): the same where they are off by as much as the best candidate leaves.
     """
 
     drawn: Array = field(repr=False)
@@ -60,7 +60,7 @@ class Null:
         return (1.0 + int(np.sum(self.drawn >= gain))) / (1.0 + len(self.drawn))
 
 
-NOTHING_SHOWN = Null(np.zeros(1), np.zeros(1))
+NO_DETECTABLE_GAIN = Null(np.zeros(1), np.zeros(1))
 """Where no term moves anything."""
 
 
@@ -131,7 +131,7 @@ def shown(behind: Background, ways: tuple[Directions, ...], best: Fit | None, jo
 
 @dataclass(frozen=True)
 class NullRigs:
-    """Rigs in which nothing is missing, screened, and what promises most fitted where asked.
+    """Rigs in which nothing is missing, screened, and the most promising ones fitted where asked.
 
     `behind`, `ways`: as for `shown`.
     """
@@ -167,7 +167,7 @@ class NullRigs:
         for first in range(0, len(order), AT_ONCE):
             rigs = order[first : first + AT_ONCE]
             wanted = [int(i) for i in np.unique(ranked[:, rigs]) if int(i) not in slopes]
-            terms = [self.ways[i].candidate for i in wanted]
+            terms = [self.ways[i].term for i in wanted]
             found = parallel_map(lambda term: _slopes(self.behind, term), terms, jobs)
             slopes |= dict(zip(wanted, found, strict=True))
             drawn = null.drawn.copy()
@@ -185,7 +185,7 @@ def null_rigs(
     return NullRigs(behind, ways, shown(behind, ways, best, jobs)) if ways else None
 
 
-def _slopes(behind: Background, term: Candidate) -> Array:
+def _slopes(behind: Background, term: Term) -> Array:
     """Derivative of the residuals by a term's own numbers where it begins."""
     model = term.added_to(behind.coarse)
     theta = model.begun_at(behind.fit.theta)
@@ -196,16 +196,16 @@ def _gain(behind: Background, way: Directions, slopes: Array, off: Array) -> flo
     """Gain of a term by a fit of few simulations to a rig that is off by `off` (size,)."""
     found, weight = behind.fit, behind.weight
     seen = reading(found.model.observation, found.residuals - off)
-    model = way.candidate.added_to(replace(found.model, observation=seen))
+    model = way.term.added_to(replace(found.model, observation=seen))
     coarse = model.on_coarse_ticks(behind.offset)
     theta = model.begun_at(found.theta)
     known = np.hstack([found.jacobian, slopes])
-    after = glance(coarse, theta, known, LOOK_STEPS, weight)
+    after = broyden_fit(coarse, theta, known, TRIAL_STEPS, weight)
     before = behind.left(off * weight) / weight
     number = counts(seen)
     gained = log_likelihood(mean_squares(seen, after.residuals), number)
     gained -= log_likelihood(mean_squares(seen, before), number)
-    if way.candidate.is_function:
+    if way.term.is_function:
         own = model.coefficients(after.theta)[-1]
         _, volume = np.linalg.slogdet(way.columns.T @ way.columns + np.eye(len(own)))
         gained -= 0.5 * (float(own @ own) + float(volume))

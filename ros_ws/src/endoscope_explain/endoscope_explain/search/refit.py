@@ -1,7 +1,7 @@
 """Fit a joint with one term more.
 
 The derivative by the numbers that the fit without it has is shared by all terms that are tried and
-corrected by Broyden's rank-one update (Broyden, Math. Comp. 19, 1965), so that a first look costs
+corrected by Broyden's rank-one update (Broyden, Math. Comp. 19, 1965), so that a trial fit costs
 about ten simulations instead of a hundred.
 """
 
@@ -15,15 +15,15 @@ from endoscope_core.physics.functions.interpolation import NODES
 from endoscope_explain.fit.evidence import log_evidence, weights
 from endoscope_explain.fit.family import COEFFICIENTS, Family, visited_range
 from endoscope_explain.fit.free_parameters import COORDINATE
-from endoscope_explain.fit.model import Fit, JointModel, fit, glance, jacobian
+from endoscope_explain.fit.model import Fit, JointModel, broyden_fit, fit, jacobian
 from endoscope_explain.fit.valleys import out_of_valleys
-from endoscope_explain.search.candidate import Candidate, states_of
+from endoscope_explain.search.term import Term, states_of
 
 Array = NDArray[np.float64]
 
 FINER = (2 * COEFFICIENTS, 4 * COEFFICIENTS, NODES)
 """Coefficients of finer functions: twice as many each time, up to a value for every node."""
-LOOK_STEPS = 6
+TRIAL_STEPS = 6
 FINE_STEPS = 8
 ITERATIONS, ROUGH, SETTLED = 25, 1e-2, 1e-4
 """Steps of a fit, at most, and the shares of the cost below which it tells and below which it
@@ -31,14 +31,14 @@ stands."""
 
 
 @dataclass(frozen=True)
-class Composition:
+class Candidate:
     """A fitted joint with some terms.
 
     `terms`: in the order in which they were added.
     `evidence`: see `log_evidence`.
     """
 
-    terms: tuple[Candidate, ...]
+    terms: tuple[Term, ...]
     fit: Fit
     evidence: float
 
@@ -53,13 +53,13 @@ class Composition:
         return bool(self.terms) and self.terms[-1].is_nominal
 
 
-def composition(terms: tuple[Candidate, ...], found: Fit) -> Composition:
+def candidate(terms: tuple[Term, ...], found: Fit) -> Candidate:
     """A fit with its evidence."""
-    return Composition(terms, found, log_evidence(found))
+    return Candidate(terms, found, log_evidence(found))
 
 
 @dataclass(frozen=True)
-class Look:
+class TrialFit:
     """A term after a first fit of few simulations on coarse ticks.
 
     Shapes: `theta` (n,).
@@ -68,58 +68,58 @@ class Look:
     `cost`: half the squares, weighted by what the fit without it is off by.
     """
 
-    candidate: Candidate
+    term: Term
     model: JointModel
     coarse: JointModel
     theta: Array
     cost: float
 
 
-def look(anchors: tuple[Fit, ...], candidate: Candidate, offset: Array) -> Look:
+def trial_fit(references: tuple[Fit, ...], term: Term, offset: Array) -> TrialFit:
     """First fit of one term more.
 
-    `anchors`: fits of the same model without the term, to start from: what was missing has bent the
-        numbers of the first one, and the description may be nearer. The better one is taken.
+    `references`: fits of the same model without the term, to start from: what was missing has bent
+        the numbers of the first one, and the description may be nearer. The better one is taken.
     `offset` (size,): what coarse ticks do to the residuals of the first of them.
     """
-    model = candidate.added_to(anchors[0].model)
+    model = term.added_to(references[0].model)
     coarse = model.on_coarse_ticks(offset)
-    weight = weights(model.observation, anchors[0].residuals)
-    best: Look | None = None
-    for anchor in anchors:
-        theta = model.begun_at(anchor.theta)
-        new = list(range(len(anchor.theta), len(theta)))
-        derivative = np.hstack([anchor.jacobian, jacobian(coarse, theta, new)])
-        found = glance(coarse, theta, derivative, LOOK_STEPS, weight)
+    weight = weights(model.observation, references[0].residuals)
+    best: TrialFit | None = None
+    for reference in references:
+        theta = model.begun_at(reference.theta)
+        new = list(range(len(reference.theta), len(theta)))
+        derivative = np.hstack([reference.jacobian, jacobian(coarse, theta, new)])
+        found = broyden_fit(coarse, theta, derivative, TRIAL_STEPS, weight)
         if best is None or found.cost < best.cost:
-            best = Look(candidate, model, coarse, found.theta, found.cost)
+            best = TrialFit(term, model, coarse, found.theta, found.cost)
     assert best is not None
     return best
 
 
-def begun_beside(function: Fit, without: Fit, starts: Sequence[Candidate], offset: Array) -> Look:
+def begun_beside(function: Fit, without: Fit, starts: Sequence[Term], offset: Array) -> TrialFit:
     """The start of a formula that leaves least beside the numbers of a fit with a function.
 
     `function`: with the function at the formula's place.
     `without`: the fit to which either is added.
     `starts`: one effect at its starting points.
-    `offset` (size,): as for `look`.
+    `offset` (size,): as for `trial_fit`.
     """
     weight = weights(function.model.observation, without.residuals)
-    best: Look | None = None
-    for candidate in starts:
-        model = candidate.added_to(without.model)
+    best: TrialFit | None = None
+    for term in starts:
+        model = term.added_to(without.model)
         coarse = model.on_coarse_ticks(offset)
         theta = model.begun_at(function.theta[: len(without.theta)])
         cost = coarse.cost(weight * coarse.residuals(theta), theta)
         if best is None or cost < best.cost:
-            best = Look(candidate, model, coarse, theta, cost)
+            best = TrialFit(term, model, coarse, theta, cost)
     assert best is not None
     return best
 
 
-def polish(seen: Look, without: Composition) -> Composition:
-    """Fit of a term from where its first look ended, as far as tells which term is the best.
+def refit(seen: TrialFit, without: Candidate) -> Candidate:
+    """Fit of a term from where its trial fit ended, as far as tells which term is the best.
 
     `without`: by what this is off, channels are weighted at first; then by what is left.
     Returns: fitted on coarse ticks; see `until_it_stands`.
@@ -127,15 +127,15 @@ def polish(seen: Look, without: Composition) -> Composition:
     weight = weights(seen.model.observation, without.fit.residuals)
     found = _twice(seen.model, seen.coarse.offset, seen.theta, weight)
     found = out_of_valleys(found, weights(seen.model.observation, found.residuals))
-    return composition((*without.terms, seen.candidate), _on_fine_ticks(found, seen.model))
+    return candidate((*without.terms, seen.term), _on_fine_ticks(found, seen.model))
 
 
-def refined(one: Composition, without: Fit, offset: Array) -> Composition:
-    """A composition whose last function is as fine as the evidence is for.
+def refined(one: Candidate, without: Fit, offset: Array) -> Candidate:
+    """A candidate whose last function is as fine as the evidence is for.
 
     `one`: its last term is a function.
     `without`: the fit without that function.
-    `offset` (size,): as for `look`.
+    `offset` (size,): as for `trial_fit`.
     Returns: fitted on coarse ticks.
     """
     best, term = one, one.terms[-1]
@@ -155,7 +155,7 @@ def refined(one: Composition, without: Fit, offset: Array) -> Composition:
         low, high = model.bounds()
         weight = weights(model.observation, best.fit.residuals)
         found = _twice(model, offset, np.clip(theta, low, high), weight)
-        again = composition((*one.terms[:-1], finer), _on_fine_ticks(found, model))
+        again = candidate((*one.terms[:-1], finer), _on_fine_ticks(found, model))
         if again.evidence <= best.evidence:
             break
         best = again
@@ -188,17 +188,17 @@ def _on_fine_ticks(found: Fit, model: JointModel) -> Fit:
     return replace(found, model=model, residuals=model.residuals(found.theta))
 
 
-def until_it_stands(one: Composition) -> Composition:
-    """A composition fitted on fine ticks until nothing moves any more."""
+def converged(one: Candidate) -> Candidate:
+    """A candidate fitted on fine ticks until nothing moves any more."""
     weight = weights(one.fit.model.observation, one.fit.residuals)
     found = fit(one.fit.model, one.fit.theta, weight, ITERATIONS, SETTLED, one.fit.jacobian)
-    return composition(one.terms, found)
+    return candidate(one.terms, found)
 
 
-def by_fine_derivatives(one: Composition) -> Composition:
-    """A composition fitted on by derivatives on fine ticks, where coarse ones may mislead."""
+def by_fine_derivatives(one: Candidate) -> Candidate:
+    """A candidate fitted on by derivatives on fine ticks, where coarse ones may mislead."""
     model = replace(one.fit.model, coarse=1)
     weight = weights(model.observation, one.fit.residuals)
     found = fit(model, one.fit.theta, weight, FINE_STEPS, SETTLED)
-    again = composition(one.terms, replace(found, model=one.fit.model))
+    again = candidate(one.terms, replace(found, model=one.fit.model))
     return again if again.evidence > one.evidence else one

@@ -1,4 +1,4 @@
-"""What each term promises before it is fitted: all of them at once, by linear algebra.
+"""What each term would gain, linearised, before it is fitted: all of them at once.
 
 A term moves the residual along few directions. What is left of these after the numbers that are
 free already have done their best is projected on the residual: Rao's score test with differences in
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from endoscope_explain.fit.evidence import counts, log_likelihood, weights
 from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.candidate import Candidate, mirrored
+from endoscope_explain.search.term import Term, mirrored
 
 Array = NDArray[np.float64]
 
@@ -29,14 +29,14 @@ _NOTHING = 1e-6
 
 
 @dataclass(frozen=True)
-class Promised:
-    """A term and what it promises.
+class Screened:
+    """A term and its linearised gain.
 
     `candidate`: a function has the size of its prior.
     `gain`: logarithm of the evidence with it over that without it.
     """
 
-    candidate: Candidate
+    term: Term
     gain: float
 
 
@@ -88,19 +88,17 @@ class Directions:
     Shapes: `columns` (size, k).
     """
 
-    candidate: Candidate
+    term: Term
     columns: Array = field(repr=False)
 
 
-def directions(
-    behind: Background, terms: tuple[Candidate, ...], jobs: int
-) -> tuple[Directions, ...]:
+def directions(behind: Background, terms: tuple[Term, ...], jobs: int) -> tuple[Directions, ...]:
     """Directions of all terms that move anything."""
     found = parallel_map(lambda term: _directions(behind, term), terms, jobs)
     return tuple(each for each in found if each is not None)
 
 
-def _directions(behind: Background, term: Candidate) -> Directions | None:
+def _directions(behind: Background, term: Term) -> Directions | None:
     if term.family is None:
         model = term.added_to(behind.coarse)
         moved = model.residuals(model.begun_at(behind.fit.theta)) - behind.at
@@ -166,7 +164,7 @@ def gains(behind: Background, found: tuple[Directions, ...], residuals: Array) -
         grams = [each.columns[part].T @ each.columns[part] for part in parts]
         towards = [each.columns[part].T @ residuals[part] for part in parts]
         precision = np.sum(grams, axis=0) + np.eye(each.columns.shape[1])
-        if each.candidate.is_linear:
+        if each.term.is_linear:
             shares = -np.linalg.solve(precision, np.sum(towards, axis=0))
             _, volume = np.linalg.slogdet(precision)
         else:
@@ -177,25 +175,25 @@ def gains(behind: Background, found: tuple[Directions, ...], residuals: Array) -
             left[i, :, c] = before[:, c] + moved / number[c]
         price = 0.5 * np.sum(shares**2, axis=0) + 0.5 * volume
         values[i] = log_likelihood(left[i] / floor, number) - base
-        values[i] -= price if each.candidate.is_linear else 0.0
+        values[i] -= price if each.term.is_linear else 0.0
     return Gains(values, left)
 
 
-def promises(behind: Background, found: tuple[Directions, ...]) -> list[Promised]:
-    """What each term promises on the recording itself, the best start of each effect first."""
+def screened(behind: Background, found: tuple[Directions, ...]) -> list[Screened]:
+    """Each term's linearised gain on the recording itself, the best start of each effect first."""
     residuals = behind.left(behind.fit.residuals * behind.weight)[:, None]
     ranked = []
     for each, gain in zip(found, gains(behind, found, residuals).values[:, 0], strict=True):
-        candidate = sided(behind, each, residuals)
-        if candidate is not None:
-            ranked.append(Promised(candidate, float(gain)))
+        term = sided(behind, each, residuals)
+        if term is not None:
+            ranked.append(Screened(term, float(gain)))
     return sorted(ranked, key=lambda p: -p.gain)
 
 
-def sided(behind: Background, each: Directions, residuals: Array) -> Candidate | None:
+def sided(behind: Background, each: Directions, residuals: Array) -> Term | None:
     """The effect on the side of nothing on which it helps; None where it does not on any."""
-    candidate = each.candidate
+    term = each.term
     helps = float((each.columns.T @ residuals)[0, 0]) < 0.0
-    if candidate.is_function or helps or not candidate.is_linear:
-        return candidate
-    return mirrored(candidate)
+    if term.is_function or helps or not term.is_linear:
+        return term
+    return mirrored(term)

@@ -15,19 +15,19 @@ from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.candidate import Candidate, Variant, effects
-from endoscope_explain.search.levels import LOOKED_AT, STARTS
-from endoscope_explain.search.null_rigs import NOTHING_SHOWN, Null, shown
-from endoscope_explain.search.refit import Look, composition, look, polish
+from endoscope_explain.search.levels import STARTS, TRIED
+from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN, Null, shown
+from endoscope_explain.search.refit import TrialFit, candidate, refit, trial_fit
 from endoscope_explain.search.repeated_motion import motion_repeats
-from endoscope_explain.search.screen import background, directions, promises
+from endoscope_explain.search.screen import background, directions, screened
+from endoscope_explain.search.term import Term, Variant, effects
 
 Array = NDArray[np.float64]
-Anchors = tuple[Fit, ...]
+ReferenceFits = tuple[Fit, ...]
 Begun = tuple[list[JointModel], list[Array]]
 """Models of all recordings, and the coordinates at which their fit begins."""
 
-POLISHED_FIRST, POLISHED = 6, 3
+REFITTED_FIRST, REFITTED = 6, 3
 """Effects that are fitted to all recordings, beside no other one and beside others."""
 _SEED = 11
 _TINY = 1e-12
@@ -38,17 +38,17 @@ class SharedChoice:
     """Effects for all recordings of a joint.
 
     `effects`: in the order in which they were added.
-    `recordings`: fits of each recording; see `search.refit.look`. One that has no use for an effect
-        lacks it.
+    `recordings`: fits of each recording; see `search.refit.trial_fit`. One that has no use for an
+        effect lacks it.
     """
 
     joint: str
     effects: tuple[str, ...]
-    recordings: tuple[Anchors, ...]
+    recordings: tuple[ReferenceFits, ...]
 
     def total(self) -> float:
         """Sum of the evidence of all recordings."""
-        return sum(log_evidence(anchors[0]) for anchors in self.recordings)
+        return sum(log_evidence(references[0]) for references in self.recordings)
 
     def gain_of(self, other: 'SharedChoice') -> float:
         """Gain of evidence from this choice to another."""
@@ -58,22 +58,22 @@ class SharedChoice:
         """What recordings show of one effect more, and rigs in which nothing more is missing.
 
         Returns: gains by the screen of the effect that gains most in all recordings together: one
-            is looked for that serves all of them, and the best of each recording would gain more.
+            is tried for that serves all of them, and the best of each recording would gain more.
             Every shape of the tube has a profile of its own, so that what is drawn for one says
             nothing of another.
         """
         order = np.random.default_rng(_SEED)
-        by_recording = [_shown(anchors[0], order, jobs) for anchors in self.recordings]
+        by_recording = [_shown(references[0], order, jobs) for references in self.recordings]
         everywhere = set.intersection(*(set(each) for each in by_recording))
         if not everywhere:
-            return 0.0, NOTHING_SHOWN
+            return 0.0, NO_DETECTABLE_GAIN
         sums = [np.sum([each[effect] for each in by_recording], axis=0) for effect in everywhere]
         largest = np.max(sums, axis=0)
         return float(largest[0]), Null(largest[1:], largest[1:])
 
     def leaves_noise(self) -> bool:
         """Whether nothing is left to explain in any recording."""
-        return all(is_noise(anchors[0]) for anchors in self.recordings)
+        return all(is_noise(references[0]) for references in self.recordings)
 
 
 def _shown(found: Fit, order: np.random.Generator, jobs: int) -> dict[str, Array]:
@@ -86,7 +86,7 @@ def _shown(found: Fit, order: np.random.Generator, jobs: int) -> dict[str, Array
     drawn = screened.drawn[:, order.permutation(screened.drawn.shape[1])]
     gained: dict[str, Array] = {}
     for way, row in zip(ways, np.column_stack([screened.observed, drawn]), strict=True):
-        gained[way.candidate.id] = np.maximum(gained.get(way.candidate.id, row), row)
+        gained[way.term.id] = np.maximum(gained.get(way.term.id, row), row)
     return gained
 
 
@@ -95,12 +95,12 @@ def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
 
     Returns: best first.
     """
-    looks = _looks(choice, jobs)
+    trials = _trial_fits(choice, jobs)
     variants: dict[str, Variant] = {}
-    for variant in sorted(looks, key=lambda v: _logarithm_of_costs(choice, looks[v])):
+    for variant in sorted(trials, key=lambda v: _logarithm_of_costs(choice, trials[v])):
         variants.setdefault(variant[0], variant)
-    promising = list(variants.values())[: POLISHED if choice.effects else POLISHED_FIRST]
-    begun = [_begun(choice, looks[variant]) for variant in promising]
+    promising = list(variants.values())[: REFITTED if choice.effects else REFITTED_FIRST]
+    begun = [_begun(choice, trials[variant]) for variant in promising]
     fitted = _side_by_side(begun, jobs, rough=True)
     return sorted(
         (
@@ -112,59 +112,63 @@ def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
     )
 
 
-def _effects(found: Fit) -> tuple[Candidate, ...]:
+def _effects(found: Fit) -> tuple[Term, ...]:
     """Effects that may be added: what was fitted to one motion is not told from time by another."""
     repeats = motion_repeats(found.model.observation)
-    return tuple(term for term in effects(found) if repeats or not term.term.traits.resembles_time)
-
-
-def _looks(choice: SharedChoice, jobs: int) -> dict[Variant, list[Look | None]]:
-    """The best cheap fit of each promising variant of an effect, for each recording."""
-    looks: dict[Variant, list[Look | None]] = {}
-    everywhere = set.intersection(
-        *({t.id for t in _effects(anchors[0])} for anchors in choice.recordings)
+    return tuple(
+        term for term in effects(found) if repeats or not term.effect.traits.resembles_time
     )
-    for n, anchors in enumerate(choice.recordings):
-        behind = background(anchors[0])
+
+
+def _trial_fits(choice: SharedChoice, jobs: int) -> dict[Variant, list[TrialFit | None]]:
+    """The best cheap fit of each promising variant of an effect, for each recording."""
+    trials: dict[Variant, list[TrialFit | None]] = {}
+    everywhere = set.intersection(
+        *({t.id for t in _effects(references[0])} for references in choice.recordings)
+    )
+    for n, references in enumerate(choice.recordings):
+        behind = background(references[0])
         offset = behind.offset
-        terms = tuple(t for t in _effects(anchors[0]) if t.id in everywhere)
-        starts: dict[Variant, list[Candidate]] = {}
-        for promised in promises(behind, directions(behind, terms, jobs)):
-            starts.setdefault(promised.candidate.variant, []).append(promised.candidate)
-        tasks = [term for own in list(starts.values())[:LOOKED_AT] for term in own[:STARTS]]
+        terms = tuple(t for t in _effects(references[0]) if t.id in everywhere)
+        starts: dict[Variant, list[Term]] = {}
+        for each in screened(behind, directions(behind, terms, jobs)):
+            starts.setdefault(each.term.variant, []).append(each.term)
+        tasks = [term for own in list(starts.values())[:TRIED] for term in own[:STARTS]]
 
-        def looked(term: Candidate, anchors: Anchors = anchors, offset: Array = offset) -> Look:
-            return look(anchors, term, offset)
+        def tried(
+            term: Term, references: ReferenceFits = references, offset: Array = offset
+        ) -> TrialFit:
+            return trial_fit(references, term, offset)
 
-        for item in parallel_map(looked, tasks, jobs):
-            found = looks.setdefault(item.candidate.variant, [None] * len(choice.recordings))
+        for item in parallel_map(tried, tasks, jobs):
+            found = trials.setdefault(item.term.variant, [None] * len(choice.recordings))
             before = found[n]
             if before is None or item.cost < before.cost:
                 found[n] = item
-    return looks
+    return trials
 
 
-def _logarithm_of_costs(choice: SharedChoice, looks: list[Look | None]) -> float:
+def _logarithm_of_costs(choice: SharedChoice, trials: list[TrialFit | None]) -> float:
     return sum(
-        math.log(_cost(anchors[0]) if item is None else min(item.cost, _cost(anchors[0])))
-        for anchors, item in zip(choice.recordings, looks, strict=True)
+        math.log(_cost(references[0]) if item is None else min(item.cost, _cost(references[0])))
+        for references, item in zip(choice.recordings, trials, strict=True)
     )
 
 
 def _cost(found: Fit) -> float:
-    """Half the squares of a fit, weighted as those of a first look beside it are."""
+    """Half the squares of a fit, weighted as those of a trial fit beside it are."""
     weighted = found.residuals * weights(found.model.observation, found.residuals)
     return found.model.cost(weighted, found.theta)
 
 
-def _begun(choice: SharedChoice, looks: list[Look | None]) -> Begun:
+def _begun(choice: SharedChoice, trials: list[TrialFit | None]) -> Begun:
     """Models of all recordings with one more effect, and where their fit begins.
 
     A recording that has no use for the effect stays without it.
     """
     models, starts = [], []
-    for anchors, item in zip(choice.recordings, looks, strict=True):
-        found = anchors[0] if item is None else polish(item, composition((), anchors[0])).fit
+    for references, item in zip(choice.recordings, trials, strict=True):
+        found = references[0] if item is None else refit(item, candidate((), references[0])).fit
         models.append(found.model)
         starts.append(found.theta)
     return models, starts
@@ -180,7 +184,7 @@ def settled_together(choices: Sequence[SharedChoice], jobs: int) -> list[SharedC
     twice: list[SharedChoice] = []
     begun: list[Begun] = []
     for choice in choices:
-        own = [anchors[0] for anchors in choice.recordings]
+        own = [references[0] for references in choice.recordings]
         for starts in ([f.theta for f in own], with_common_numbers(own)):
             twice.append(choice)
             begun.append(([f.model for f in own], starts))
@@ -192,6 +196,8 @@ def settled_together(choices: Sequence[SharedChoice], jobs: int) -> list[SharedC
     return sorted(best.values(), key=SharedChoice.total, reverse=True)
 
 
-def _side_by_side(begun: Sequence[Begun], jobs: int, *, rough: bool) -> list[tuple[Anchors, ...]]:
+def _side_by_side(
+    begun: Sequence[Begun], jobs: int, *, rough: bool
+) -> list[tuple[ReferenceFits, ...]]:
     found = parallel_map(lambda task: fit_together(*task, rough=rough), begun, jobs)
     return [tuple((f,) for f in fits) for fits in found]

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from endoscope_core.physics.packing import pack
 from endoscope_explain.decide.conclusions import plant_of
-from endoscope_explain.fit.nominal import nominal_anchors
+from endoscope_explain.fit.nominal import nominal_references
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.candidate import effects, functions
-from endoscope_explain.search.refit import Composition
+from endoscope_explain.search.refit import Candidate
+from endoscope_explain.search.term import effects, functions
 
 
 @pytest.fixture(scope='module')
@@ -21,7 +21,7 @@ def described(one_joint):
     """A rig of one joint, and its plant as described."""
     plant = one_joint.rig()
     (observation,) = observe(one_joint.record(plant, one_joint.motion(6.0)), plant)
-    _, described = nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+    _, described = nominal_references(observation, *packed_joint(plant, 'bend_x'))
     return plant, described
 
 
@@ -42,6 +42,6 @@ def test_whatever_is_put_together_a_joint_holds_each_term_once(described, picks)
         found = replace(found, model=model, theta=theta, jacobian=slopes)
         terms = (*terms, chosen)
     known = tuple(term for term in terms if not term.is_function)
-    made = plant_of(plant, [Composition(known, found, 0.0)])
+    made = plant_of(plant, [Candidate(known, found, 0.0)])
     assert [each.id for each in made.effects] == [term.id for term in known]
     pack(made)

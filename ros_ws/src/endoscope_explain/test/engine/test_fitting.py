@@ -10,23 +10,23 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.fit.evidence import log_evidence, weights
 from endoscope_explain.fit.intervals import intervals, may_be_absent, nominal_estimates
 from endoscope_explain.fit.model import fit, jacobian
-from endoscope_explain.fit.nominal import beside, nominal_anchors
+from endoscope_explain.fit.nominal import beside, nominal_references
 from endoscope_explain.fit.other_forms import other_forms
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.fit.solver import Ended
 from endoscope_explain.fit.valleys import out_of_valleys
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.candidate import with_effect
+from endoscope_explain.search.term import with_effect
 
 LOAD = CATALOGUE['external_load']
 
 
-def anchors(one_joint, *effects, band=0.15):
+def references(one_joint, *effects, band=0.15):
     """Nominal plant, refitted and as described, of a rig that has effects."""
     plant = one_joint.rig()
     true = one_joint.rig(*(EffectSpec(name, 'bend_x', values) for name, values in effects))
     (observation,) = observe(one_joint.record(true, one_joint.motion()), plant)
-    return nominal_anchors(observation, *packed_joint(plant, 'bend_x'), band)
+    return nominal_references(observation, *packed_joint(plant, 'bend_x'), band)
 
 
 def test_beside_another_joint_a_fit_is_another_one_and_the_old_one_stays(one_joint):
@@ -34,7 +34,7 @@ def test_beside_another_joint_a_fit_is_another_one_and_the_old_one_stays(one_joi
     for effects, moved in (((), False), ((coupled,), True)):
         plant = one_joint.rig(*effects)
         (observation,) = observe(one_joint.record(plant, one_joint.motion()), plant)
-        pair = nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+        pair = nominal_references(observation, *packed_joint(plant, 'bend_x'))
         before = pair[0].model.residuals(pair[0].theta)
         seen, described = beside(pair, pair[0])
         np.testing.assert_array_equal(pair[0].model.residuals(pair[0].theta), before)
@@ -45,7 +45,7 @@ def test_beside_another_joint_a_fit_is_another_one_and_the_old_one_stays(one_joi
 
 
 def test_a_fit_tells_whether_it_converged_and_what_lies_at_a_bound(one_joint):
-    refitted, described = anchors(one_joint)
+    refitted, described = references(one_joint)
     assert described.ended is None
     assert refitted.ended in (Ended.CONVERGED, Ended.NO_STEP)
     assert refitted.at_bounds() == ()
@@ -63,7 +63,7 @@ def evenly(found):
 
 
 def test_a_load_that_was_dated_seconds_late_is_dated_again(one_joint):
-    refitted, _ = anchors(one_joint, ('external_load', {'moment_nm': 0.0008, 'time_s': 3.2}))
+    refitted, _ = references(one_joint, ('external_load', {'moment_nm': 0.0008, 'time_s': 3.2}))
     model = with_effect(refitted.model, LOAD, {'moment_nm': 0.0006, 'time_s': 8.0})
     late = fit(model, model.begun_at(refitted.theta), iterations=0)
     again = out_of_valleys(late, evenly(late))
@@ -73,7 +73,7 @@ def test_a_load_that_was_dated_seconds_late_is_dated_again(one_joint):
 
 
 def test_a_load_after_the_end_has_no_other_date(one_joint):
-    refitted, _ = anchors(one_joint, ('gravity', {'moment_nm': 0.0006, 'phase_rad': 0.0}))
+    refitted, _ = references(one_joint, ('gravity', {'moment_nm': 0.0006, 'phase_rad': 0.0}))
     model = with_effect(refitted.model, LOAD, {'moment_nm': 0.0, 'time_s': 60.0})
     never = fit(model, model.begun_at(refitted.theta), iterations=0)
     again = out_of_valleys(never, evenly(never))
@@ -81,7 +81,7 @@ def test_a_load_after_the_end_has_no_other_date(one_joint):
 
 
 def test_a_number_that_may_hardly_move_has_a_derivative_over_a_wide_step(one_joint):
-    refitted, _ = anchors(one_joint, ('stribeck_friction', {'rise': 0.5}), band=0.03)
+    refitted, _ = references(one_joint, ('stribeck_friction', {'rise': 0.5}), band=0.03)
     narrow = refitted.model
     start = {'rise': 0.5, 'stribeck_speed': 2e-3}
     model = with_effect(narrow, CATALOGUE['stribeck_friction'], start)
@@ -94,7 +94,7 @@ def test_a_number_that_may_hardly_move_has_a_derivative_over_a_wide_step(one_joi
 
 
 def test_differences_on_coarse_ticks_are_those_on_fine_ones(one_joint):
-    refitted, _ = anchors(one_joint)
+    refitted, _ = references(one_joint)
     model, theta = refitted.model, refitted.theta
     coarse = jacobian(model, theta)
     for k in range(len(theta)):
@@ -107,7 +107,7 @@ def test_differences_on_coarse_ticks_are_those_on_fine_ones(one_joint):
 
 def test_an_effect_that_is_there_has_more_evidence_and_one_that_is_not_has_less(one_joint):
     for concealed, more in ((('joint_backlash', {'gap_rad': 0.06}),), True), ((), False):
-        refitted, _ = anchors(one_joint, *concealed)
+        refitted, _ = references(one_joint, *concealed)
         model = with_effect(refitted.model, CATALOGUE['joint_backlash'], {'gap_rad': 0.02})
         found = fit(model, model.begun_at(refitted.theta), iterations=20)
         assert (log_evidence(found) > log_evidence(refitted)) is more
@@ -115,7 +115,7 @@ def test_an_effect_that_is_there_has_more_evidence_and_one_that_is_not_has_less(
 
 
 def test_channels_that_are_off_count_less(one_joint):
-    refitted, _ = anchors(one_joint, ('tracker_bias', {'bias_rad': 0.2}))
+    refitted, _ = references(one_joint, ('tracker_bias', {'bias_rad': 0.2}))
     observation = refitted.model.observation
     residuals = refitted.residuals.copy()
     first, *_ = observation.slices()
@@ -126,7 +126,7 @@ def test_channels_that_are_off_count_less(one_joint):
 
 
 def test_another_form_widens_intervals_by_what_it_moves_the_numbers(one_joint):
-    refitted, _ = anchors(one_joint)
+    refitted, _ = references(one_joint)
     forms = other_forms(refitted, 8, 2)
     assert forms.residuals.shape == (len(refitted.residuals), 8)
     moved = np.sqrt(np.mean(forms.moved**2, axis=1))
@@ -145,7 +145,7 @@ def told_of(one_joint, desired, *, cells=True):
     recording = recording if cells else replace(recording, tension=None)
     (observation,) = observe(recording, plant)
     packed = packed_joint(plant, 'bend_x')
-    fitted, _ = nominal_anchors(observation, *packed)
+    fitted, _ = nominal_references(observation, *packed)
     return nominal_estimates(fitted, packed[0], {})
 
 

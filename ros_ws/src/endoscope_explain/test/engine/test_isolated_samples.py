@@ -6,7 +6,7 @@ import numpy as np
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.fit.isolated_samples import with_isolated_marked, without_isolated
-from endoscope_explain.fit.nominal import all_anchors
+from endoscope_explain.fit.nominal import all_references
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.observation import observe
 
@@ -27,7 +27,7 @@ def spiked(recording, known):
 def cleaned(recording, plant):
     observations = observe(recording, PLANT)
     packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
-    fits = tuple(fitted for fitted, _ in all_anchors(observations, packed, 1))
+    fits = tuple(fitted for fitted, _ in all_references(observations, packed, 1))
     return observations, without_isolated(recording, observations, fits)
 
 

@@ -7,10 +7,10 @@ import pytest
 from endoscope_core.physics.effects import NOMINAL_PHYSICS
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.fit.nominal import nominal_anchors
+from endoscope_explain.fit.nominal import nominal_references
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.candidate import effects
+from endoscope_explain.search.term import effects
 
 PIECE = NOMINAL_PHYSICS['servo_lag']
 FIRST = PIECE.parameters[0]
@@ -34,7 +34,7 @@ def test_what_the_nominal_plant_lacks_is_named_with_its_number(one_joint):
 def test_only_what_a_plant_lacks_is_looked_for(one_joint):
     whole = one_joint.rig()
     (seen,) = observe(one_joint.record(whole, one_joint.motion(4.0)), whole)
-    fitted, _ = nominal_anchors(seen, *packed_joint(whole, 'bend_x'))
+    fitted, _ = nominal_references(seen, *packed_joint(whole, 'bend_x'))
     assert not {term.id for term in effects(fitted)} & set(NOMINAL_PHYSICS)
     base = fitted.model.base.copy()
     base[PIECE.first_parameter] = FIRST.off

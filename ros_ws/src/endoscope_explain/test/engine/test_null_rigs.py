@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec
-from endoscope_explain.fit.nominal import nominal_anchors
+from endoscope_explain.fit.nominal import nominal_references
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.candidate import effects
 from endoscope_explain.search.null_rigs import AT_ONCE, SLOWEST, Null, null_rigs, wandering
 from endoscope_explain.search.screen import background, directions
+from endoscope_explain.search.term import effects
 
 
 def test_sensors_wander_by_as_much_as_their_noise_and_no_slower_than_a_drift(one_joint):
@@ -39,7 +39,7 @@ def test_rigs_are_fitted_until_it_is_clear_whether_they_show_as_much(one_joint):
     plant = one_joint.rig()
     true = one_joint.rig(EffectSpec('gravity', 'bend_x', {'moment_nm': 0.003, 'phase_rad': 0.5}))
     (observation,) = observe(one_joint.record(true, one_joint.motion(6.0)), plant)
-    nominal, _ = nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+    nominal, _ = nominal_references(observation, *packed_joint(plant, 'bend_x'))
     behind = background(nominal)
     ways = directions(behind, effects(nominal), 1)
     rigs = null_rigs(behind, ways, nominal, 1)

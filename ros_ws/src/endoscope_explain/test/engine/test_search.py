@@ -15,26 +15,26 @@ from endoscope_explain.decide.decision import decide
 from endoscope_explain.fit.evidence import misfit
 from endoscope_explain.fit.family import family_at
 from endoscope_explain.fit.model import jacobian
-from endoscope_explain.fit.nominal import nominal_anchors
+from endoscope_explain.fit.nominal import nominal_references
 from endoscope_explain.fit.simulated_joint import packed_joint, simulate_joint
 from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search import levels
-from endoscope_explain.search.candidate import (
+from endoscope_explain.search.levels import Level, search
+from endoscope_explain.search.null_rigs import Null
+from endoscope_explain.search.refit import Candidate, candidate
+from endoscope_explain.search.screen import background, directions, gains, screened
+from endoscope_explain.search.term import (
     LAGS,
-    Candidate,
+    Term,
     effects,
     functions,
     starting_points,
 )
-from endoscope_explain.search.levels import Level, search
-from endoscope_explain.search.null_rigs import Null
-from endoscope_explain.search.refit import Composition, composition
-from endoscope_explain.search.screen import background, directions, gains, promises
 
 
 @pytest.fixture
-def anchors(one_joint):
+def references(one_joint):
     """Makes the nominal plant, refitted and as described, of a rig with effects and functions."""
 
     def made(*terms, seconds=12.0):
@@ -43,7 +43,7 @@ def anchors(one_joint):
         plant = one_joint.rig()
         true = replace(one_joint.rig(*known), terms=functions)
         (observation,) = observe(one_joint.record(true, one_joint.motion(seconds)), plant)
-        return nominal_anchors(observation, *packed_joint(plant, 'bend_x'))
+        return nominal_references(observation, *packed_joint(plant, 'bend_x'))
 
     return made
 
@@ -53,38 +53,38 @@ def effect(name, **values):
 
 
 def starts_of(name):
-    return tuple(Candidate(CATALOGUE[name], start) for start in starting_points(CATALOGUE[name]))
+    return tuple(Term(CATALOGUE[name], start) for start in starting_points(CATALOGUE[name]))
 
 
 def promised(found, name):
     behind = background(found)
-    return promises(behind, directions(behind, starts_of(name), 1))
+    return screened(behind, directions(behind, starts_of(name), 1))
 
 
-def test_a_disturbance_in_the_opposite_phase_is_promised_there(anchors):
+def test_a_disturbance_in_the_opposite_phase_is_promised_there(references):
     hidden = effect('breathing', moment_nm=0.0006, frequency_hz=0.3, phase_rad=-2.5)
-    refitted, _ = anchors(hidden)
+    refitted, _ = references(hidden)
     near = [
-        p.candidate.start['phase_rad']
+        p.term.start['phase_rad']
         for p in promised(refitted, 'breathing')
-        if p.candidate.start['frequency_hz'] == pytest.approx(0.3)
+        if p.term.start['frequency_hz'] == pytest.approx(0.3)
     ]
     assert np.cos(near[0] + 2.5) > 0.0
 
 
-def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(anchors):
-    _, described = anchors(effect('torque_limit', limit_nm=0.01))
+def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(references):
+    _, described = references(effect('torque_limit', limit_nm=0.01))
     found = promised(described, 'torque_limit')
-    assert found[0].candidate.start['limit_nm'] == pytest.approx(0.01, rel=0.05)
-    reached = [p.candidate.start['limit_nm'] for p in found]
+    assert found[0].term.start['limit_nm'] == pytest.approx(0.01, rel=0.05)
+    reached = [p.term.start['limit_nm'] for p in found]
     assert max(reached) < 0.03
 
 
-def test_what_is_there_already_is_not_tried_again(anchors):
-    refitted, _ = anchors()
+def test_what_is_there_already_is_not_tried_again(references):
+    refitted, _ = references()
     tried = {term.id for term in (*effects(refitted), *functions(refitted, refitted.residuals))}
     assert {'gravity', 'load_of_angle', 'contact'} <= tried
-    with_function = Candidate(FUNCTIONS['load_of_angle'], family=_family(refitted)).added_to(
+    with_function = Term(FUNCTIONS['load_of_angle'], family=_family(refitted)).added_to(
         refitted.model
     )
     model = replace(refitted, model=with_function, theta=with_function.begun_at(refitted.theta))
@@ -102,8 +102,8 @@ def _family(found):
     return next(term.family for term in terms if term.id == 'load_of_angle')
 
 
-def test_gains_by_linear_algebra_are_those_of_the_residuals_themselves(anchors):
-    refitted, _ = anchors(effect('gravity', moment_nm=0.002))
+def test_gains_by_linear_algebra_are_those_of_the_residuals_themselves(references):
+    refitted, _ = references(effect('gravity', moment_nm=0.002))
     behind = background(refitted)
     ways = directions(behind, starts_of('gravity')[:2], 1)
     residuals = behind.left(refitted.residuals * behind.weight)[:, None]
@@ -115,9 +115,9 @@ def test_gains_by_linear_algebra_are_those_of_the_residuals_themselves(anchors):
         assert found.left[0, 0, c] == pytest.approx(float(np.mean(left[part] ** 2)), rel=1e-9)
 
 
-def test_an_effect_is_found_by_its_formula_with_nothing_left(anchors):
+def test_an_effect_is_found_by_its_formula_with_nothing_left(references):
     hidden = effect('joint_backlash', gap_rad=0.05)
-    tried = search(anchors(hidden), 2)
+    tried = search(references(hidden), 2)
     decision = decide(tried, 2)
     assert [term.name for term in decision.missing] == [hidden.id]
     assert decision.missing[0].alternatives == ()
@@ -126,39 +126,39 @@ def test_an_effect_is_found_by_its_formula_with_nothing_left(anchors):
     assert decision.missing[0].p_value < 0.05
 
 
-def test_two_effects_are_found_one_after_the_other(anchors):
+def test_two_effects_are_found_one_after_the_other(references):
     hidden = (
         effect('joint_inertia', inertia_kg_m2=2e-5),
         effect('tracker_drift', rate_rad_per_s=0.002),
     )
-    decision = decide(search(anchors(*hidden, seconds=10.0), 2), 2)
+    decision = decide(search(references(*hidden, seconds=10.0), 2), 2)
     assert {term.name for term in decision.missing} == {each.id for each in hidden}
     assert is_noise(decision.chosen.fit)
 
 
-def test_nothing_is_searched_where_only_noise_is_left(anchors):
-    tried = search(anchors(), 2)
+def test_nothing_is_searched_where_only_noise_is_left(references):
+    tried = search(references(), 2)
     assert tried.levels == ()
     assert decide(tried, 2).missing == ()
 
 
-def _composition(evidence, *terms, found=None):
-    return Composition(terms, found, evidence)
+def _candidate(evidence, *terms, found=None):
+    return Candidate(terms, found, evidence)
 
 
 def _level(evidences, null):
     """A level whose compositions are a function of the angle, its formulas, and a tracker's."""
     place = FUNCTIONS['load_of_angle']
-    function = Candidate(place, family=family_at(place, (-1.0, 1.0)))
+    function = Term(place, family=family_at(place, (-1.0, 1.0)))
     terms = {
         'function': function,
-        'gravity': Candidate(CATALOGUE['gravity']),
-        'tracker_delay': Candidate(CATALOGUE['tracker_delay']),
+        'gravity': Term(CATALOGUE['gravity']),
+        'tracker_delay': Term(CATALOGUE['tracker_delay']),
     }
-    found = [_composition(value, terms[name]) for name, value in evidences.items()]
+    found = [_candidate(value, terms[name]) for name, value in evidences.items()]
     found.sort(key=lambda c: -c.evidence)
     null = np.asarray(null, dtype=float)
-    return Level(_composition(0.0), tuple(found), Null(null, null))
+    return Level(_candidate(0.0), tuple(found), Null(null, null))
 
 
 def test_a_formula_is_taken_where_it_loses_no_more_than_form_is_worth():
@@ -178,16 +178,16 @@ def test_rivals_are_those_behind_by_no_more_than_form_is_worth():
 
 def test_other_numbers_stand_where_a_term_does_hardly_more():
     near = _level({'gravity': 500.0}, np.linspace(0.0, 50.0, 39))
-    numbers = _composition(470.0)
+    numbers = _candidate(470.0)
     assert replace(near, found=(*near.found, numbers)).best is numbers
-    far = _composition(300.0)
+    far = _candidate(300.0)
     assert replace(near, found=(*near.found, far)).best is near.found[0]
     # Beside a term that was found before, too.
     (gravity,) = near.found[0].terms
-    delay = Candidate(CATALOGUE['tracker_delay'])
+    delay = Term(CATALOGUE['tracker_delay'])
     beside = Level(
-        _composition(400.0, gravity),
-        (_composition(500.0, gravity, delay), _composition(470.0, gravity)),
+        _candidate(400.0, gravity),
+        (_candidate(500.0, gravity, delay), _candidate(470.0, gravity)),
         near.null,
     )
     assert beside.best.terms == (gravity,)
@@ -195,7 +195,7 @@ def test_other_numbers_stand_where_a_term_does_hardly_more():
 
 def test_what_loses_on_blocks_not_seen_gives_way_to_what_predicts_them(monkeypatch):
     found = _level({'function': 500.0, 'gravity': 400.0, 'tracker_delay': 300.0}, [0.0]).found
-    first = _composition(0.0)
+    first = _candidate(0.0)
     predicting = {'gravity', 'tracker_delay'}
     monkeypatch.setattr(levels, 'predicts_better', lambda one, _: one in predicting)
     named = tuple(replace(each, fit=each.terms[0].id) for each in found)
@@ -209,7 +209,7 @@ def test_a_finer_sheath_alone_is_not_named(one_joint):
     plant = one_joint.rig()
     true = one_joint.rig(friction_profile=(0.0, 0.2, -0.1, 0.5, -0.4, 0.3))
     (observation,) = observe(one_joint.record(true, one_joint.motion(7.0)), plant)
-    tried = search(nominal_anchors(observation, *packed_joint(plant, 'bend_x')), 2)
+    tried = search(nominal_references(observation, *packed_joint(plant, 'bend_x')), 2)
     assert decide(tried, 2).missing == ()
 
 
@@ -221,10 +221,10 @@ def test_nothing_is_found_that_rigs_without_it_show_as_well():
     assert not replace(_level({'gravity': 1001.0}, null), predicts=False).is_found
 
 
-def test_a_function_of_two_states_is_exported_as_a_product(anchors):
-    refitted, _ = anchors()
+def test_a_function_of_two_states_is_exported_as_a_product(references):
+    refitted, _ = references()
     family = _family(refitted)
-    alone = Candidate(family.place, family=family.scaled(1e-4))
+    alone = Term(family.place, family=family.scaled(1e-4))
     model = alone.added_to(refitted.model)
     found = replace(refitted, model=model, theta=model.begun_at(refitted.theta))
     both = next(
@@ -238,7 +238,7 @@ def test_a_function_of_two_states_is_exported_as_a_product(anchors):
     theta[model.places_of_coefficients()[1]] = 0.02
     fitted = replace(refitted, model=model, theta=theta, jacobian=jacobian(model, theta))
     described = PlantDescription().of_joints(['bend_x'])
-    plant = plant_of(described, [composition((alone, both), fitted)])
+    plant = plant_of(described, [candidate((alone, both), fitted)])
     assert [(term.place, term.multiplies) for term in plant.terms] == [
         ('load_of_angle', False),
         ('load_of_speed', True),
@@ -249,8 +249,8 @@ def test_a_function_of_two_states_is_exported_as_a_product(anchors):
     assert np.isfinite(outputs).all()
 
 
-def test_a_device_that_joints_share_has_one_number_in_the_plant(anchors):
-    refitted, _ = anchors()
+def test_a_device_that_joints_share_has_one_number_in_the_plant(references):
+    refitted, _ = references()
     skew = next(term for term in effects(refitted) if term.id == 'clock_skew')
     fits = []
     for joint, rate in (('bend_x', 0.010), ('bend_y', 0.011)):
@@ -260,15 +260,15 @@ def test_a_device_that_joints_share_has_one_number_in_the_plant(anchors):
         theta[-1] = model.free[-1].coordinate(rate)
         slopes = jacobian(model, theta) * (1.0 if joint == 'bend_x' else 2.0)
         fitted = replace(refitted, model=model, theta=theta, jacobian=slopes)
-        fits.append(composition((skew,), fitted))
+        fits.append(candidate((skew,), fitted))
     plant = plant_of(PlantDescription(), fits)
     # The second one shows it twice as well.
     assert [s.parameters['skew'] for s in plant.effects] == pytest.approx([0.011, 0.011])
     pack(plant)
 
 
-def test_an_argument_that_lags_is_tried_with_several_lags_and_the_fit_may_move_them(anchors):
-    refitted, _ = anchors()
+def test_an_argument_that_lags_is_tried_with_several_lags_and_the_fit_may_move_them(references):
+    refitted, _ = references()
     lagging = [
         term
         for term in functions(refitted, refitted.residuals)

@@ -11,16 +11,16 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.layout import JOINT_RADIUS
 from endoscope_explain.fit.intervals import covariance
 from endoscope_explain.fit.model import fit
-from endoscope_explain.fit.nominal import anchored
+from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.fit.pooled import (
     SPREAD,
     deviations,
     fit_together,
-    told_alone,
+    judged_alone,
     with_common_numbers,
 )
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.candidate import with_effect
+from endoscope_explain.search.term import with_effect
 
 GAIN = 0.9
 STIFFNESS = 0.005
@@ -48,7 +48,7 @@ def separate(one_joint):
         )
         recording = one_joint.record(rig, size * one_joint.motion(3.0))
         plant = one_joint.rig()
-        _, ((nominal, _),) = anchored(recording, observe(recording, plant), plant, 0.5, 1)
+        _, ((nominal, _),) = with_references(recording, observe(recording, plant), plant, 0.5, 1)
         model = with_effect(nominal.model, CATALOGUE['load_cell_gain'], {'gain': 0.95, 'wire': 1.0})
         fits.append(fit(model, model.begun_at(nominal.theta), iterations=20))
     return fits
@@ -130,7 +130,7 @@ def test_common_numbers_are_those_of_joint_and_wires(together):
 
 
 def test_a_fit_goes_on_alone_with_the_device_held_and_the_joint_drawn_to_the_others(together):
-    for found, alone in zip(together, told_alone(together), strict=True):
+    for found, alone in zip(together, judged_alone(together), strict=True):
         names = {item.name for item in alone.model.free}
         assert not names & {'gain', 'motor_bandwidth', 'motor_damping_ratio'}
         gain = CATALOGUE['load_cell_gain'].first_parameter

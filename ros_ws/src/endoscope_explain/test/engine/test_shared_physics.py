@@ -8,10 +8,10 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.decide.given_physics import without_recording
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.fit.model import fit
-from endoscope_explain.fit.nominal import anchored
+from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.candidate import with_effect
 from endoscope_explain.search.shared_choice import SharedChoice
+from endoscope_explain.search.term import with_effect
 from endoscope_explain.shared_physics import shared_effects
 
 GAIN = 0.9
@@ -34,23 +34,23 @@ def recordings(one_joint):
 
 
 @pytest.fixture(scope='module')
-def anchors(one_joint, recordings):
+def references(one_joint, recordings):
     found = []
     for recording in recordings:
         observations = observe(recording, one_joint.rig())
-        _, (pair,) = anchored(recording, observations, one_joint.rig(), 0.15, 1)
+        _, (pair,) = with_references(recording, observations, one_joint.rig(), 0.15, 1)
         found.append({'bend_x': pair})
     return found
 
 
 @pytest.fixture(scope='module')
-def chosen(anchors):
-    return [given['bend_x'] for given in shared_effects(anchors, 1, 2, lambda _: None)]
+def chosen(references):
+    return [given['bend_x'] for given in shared_effects(references, 1, 2, lambda _: None)]
 
 
-def test_another_form_gains_by_one_effect_for_all_recordings(anchors):
-    own = [SharedChoice('bend_x', (), (each['bend_x'],)).null(2)[1].drawn for each in anchors]
-    both = SharedChoice('bend_x', (), tuple(each['bend_x'] for each in anchors)).null(2)[1].drawn
+def test_another_form_gains_by_one_effect_for_all_recordings(references):
+    own = [SharedChoice('bend_x', (), (each['bend_x'],)).null(2)[1].drawn for each in references]
+    both = SharedChoice('bend_x', (), tuple(each['bend_x'] for each in references)).null(2)[1].drawn
     assert np.mean(both) < np.mean(own[0]) + np.mean(own[1]) - 1.0
 
 
@@ -83,7 +83,7 @@ def test_a_recording_is_explained_by_the_physics_it_is_given(one_joint, recordin
 def test_what_given_physics_leaves_is_searched_for(one_joint, recordings):
     plant = one_joint.rig()
     observations = observe(recordings[0], plant)
-    _, ((refitted, _),) = anchored(recordings[0], observations, plant, 0.15, 1)
+    _, ((refitted, _),) = with_references(recordings[0], observations, plant, 0.15, 1)
     model = with_effect(refitted.model, CATALOGUE['cogging'], {})
     given = without_recording(('cogging',), fit(model, model.begun_at(refitted.theta)))
     explanation = explain_recording(recordings[0], plant, band=0.15, given={'bend_x': given})

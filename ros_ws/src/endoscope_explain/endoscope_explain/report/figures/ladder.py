@@ -26,8 +26,8 @@ WIDTH, LEFT, RIGHT, ROW, TOP = 1000.0, 200.0, 20.0, 32.0, 40.0
 
 def ladder_figure(ladder: Ladder) -> str:
     """Draw rmse / noise of every signal for every model, on samples not used for fitting."""
-    rungs = list(ladder)
-    signals = list(ladder[rungs[0]])
+    compared = list(ladder)
+    signals = list(ladder[compared[0]])
     known = [max(fit.ratio, LEAST) for fits in ladder.values() for fit in fits.values()]
     low, high = math.log10(min(*known, 1.0) / 1.3), math.log10(max(*known, 1.0) * 1.3)
     bottom = TOP + ROW * len(signals)
@@ -36,7 +36,7 @@ def ladder_figure(ladder: Ladder) -> str:
         share = (math.log10(max(ratio, LEAST)) - low) / (high - low)
         return LEFT + (WIDTH - LEFT - RIGHT) * share
 
-    drawn = [_keys(rungs)]
+    drawn = [_keys(compared)]
     for ratio in _ticks(10.0**low, 10.0**high):
         x = across(ratio)
         noise = ratio == 1.0
@@ -52,12 +52,12 @@ def ladder_figure(ladder: Ladder) -> str:
             f'<text x="{LEFT - 14:g}" y="{middle + 5:g}" text-anchor="end" fill="var(--ink)">'
             f'{escape(plain(signal))}</text>'
         )
-        for place, name in enumerate(rungs):
+        for place, name in enumerate(compared):
             fit = ladder[name].get(signal)
             if fit is None:
                 continue
             # Beside each other, so that none is hidden where two models are as good.
-            y = middle + 0.17 * ROW * (place - 0.5 * (len(rungs) - 1))
+            y = middle + 0.17 * ROW * (place - 0.5 * (len(compared) - 1))
             said = f'{LABEL[name]}, {plain(signal)}: {digits(fit.ratio)} times the noise'
             drawn.append(_marker(name, across(fit.ratio), y, said))
     drawn.append(
@@ -71,11 +71,11 @@ def ladder_figure(ladder: Ladder) -> str:
     )
 
 
-def _keys(rungs: list[str]) -> str:
+def _keys(compared: list[str]) -> str:
     """The legend, in one line above the rows, further left where it is long."""
-    widths = [44.0 + 8.2 * len(LABEL[name]) for name in rungs]
+    widths = [44.0 + 8.2 * len(LABEL[name]) for name in compared]
     drawn, x = [], min(LEFT, WIDTH - sum(widths))
-    for name, width in zip(rungs, widths, strict=True):
+    for name, width in zip(compared, widths, strict=True):
         drawn.append(
             f'{_marker(name, x + 6, 14, LABEL[name])}<text x="{x + 18:g}" y="19">'
             f'{escape(LABEL[name])}</text>'

@@ -1,4 +1,4 @@
-"""The black boxes' rungs of the ladder: nominal parameters refitted, then the residual learnt."""
+"""The black boxes of the ladder: nominal parameters refitted, then the residual learnt."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ class Exam:
     test: Callable[[Array], Mask]
 
 
-def black_box_rungs(
+def black_box_fits(
     recording: Recording, recorded: RecordedView, exams: Sequence[Exam], jobs: int
 ) -> list[dict[str, dict[str, ChannelFit]]]:
     """Train both black boxes for each joint and exam, and judge them.
@@ -89,12 +89,12 @@ def black_box_rungs(
         index, kind, joint = task
         return _judged(kind, recording, recorded, exams[index], joint)
 
-    rungs: list[dict[str, dict[str, ChannelFit]]] = [{kind: {} for kind in KINDS} for _ in exams]
+    compared: list[dict[str, dict[str, ChannelFit]]] = [{kind: {} for kind in KINDS} for _ in exams]
     with training():
         answers = parallel_map(judged, tasks, jobs)
     for (index, kind, _), found in zip(tasks, answers, strict=True):
-        rungs[index][kind] |= found
-    return rungs
+        compared[index][kind] |= found
+    return compared
 
 
 def _judged(

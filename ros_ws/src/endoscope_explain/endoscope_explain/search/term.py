@@ -36,29 +36,29 @@ LAGS = 3
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Term:
     """One term more.
 
-    `term`: of the catalogue, or the place of a function.
+    `effect`: of the catalogue, or the place of a function.
     `start`: parameters of an effect at which its fit begins.
     `family`: of the function.
     """
 
-    term: Effect
+    effect: Effect
     start: Mapping[str, float] = field(default_factory=dict)
     family: Family | None = None
 
     @property
     def id(self) -> str:
         """Of the effect or place."""
-        return self.term.id
+        return self.effect.id
 
     @property
     def variant(self) -> Variant:
         """Its id, and what it acts on or which of its forms it has."""
         if self.multiplies:
             return self.id, (float(MULTIPLIES),)
-        choices = [p.name for p in self.term.parameters if p.choices and p.name in self.start]
+        choices = [p.name for p in self.effect.parameters if p.choices and p.name in self.start]
         return self.id, tuple(self.start[name] for name in choices)
 
     @property
@@ -69,7 +69,7 @@ class Candidate:
     @property
     def is_nominal(self) -> bool:
         """Whether it is a piece of the nominal physics, which every rig has."""
-        return isinstance(self.term, NominalPhysics)
+        return isinstance(self.effect, NominalPhysics)
 
     @property
     def multiplies(self) -> bool:
@@ -81,14 +81,14 @@ class Candidate:
         """Places whose functions it is one of."""
         if self.multiplies:
             return ()
-        return (self.term.id,) if self.is_function else self.term.traits.families
+        return (self.effect.id,) if self.is_function else self.effect.traits.families
 
     @property
     def is_linear(self) -> bool:
         """Whether a multiple of it does a multiple of what it does."""
-        return self.is_function or not any(p.scale for p in self.term.parameters)
+        return self.is_function or not any(p.scale for p in self.effect.parameters)
 
-    def shares_place(self, other: 'Candidate') -> bool:
+    def shares_place(self, other: 'Term') -> bool:
         """Whether both are functions of the same state at the same place."""
         return bool(set(self.places) & set(other.places))
 
@@ -96,7 +96,7 @@ class Candidate:
         """The model with this term, free."""
         if self.family is not None:
             return _with_function(model, self.family)
-        return with_effect(model, self.term, self.start)
+        return with_effect(model, self.effect, self.start)
 
 
 def with_effect(model: JointModel, effect: Effect, start: Mapping[str, float]) -> JointModel:
@@ -132,7 +132,7 @@ def _require_absent(model: JointModel, term: Effect) -> None:
         raise ValueError(f'{term.id} is there already on {model.observation.joint}')
 
 
-def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Candidate, ...]:
+def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Term, ...]:
     """Effects, and nominal physics that is lacking, that may be added to a fit, at their starts.
 
     Parameters
@@ -147,14 +147,14 @@ def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Candidate, ...]
         Without those that depend on time where the joint makes no motion twice.
     """
     return tuple(
-        Candidate(effect, start)
+        Term(effect, start)
         for effect in _absent(found, KNOWN.values())
         if not effect.traits.audited and effect.id not in left_out
         for start in starting_points(effect)
     )
 
 
-def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Candidate, ...]:
+def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Term, ...]:
     """Functions that may be added to a fit, as tall as their place allows at most.
 
     `residuals` (size,): weighted, without what the fitted numbers could take away.
@@ -176,10 +176,10 @@ def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Candidate, ..
         else:
             families = [family_at(place, visited_range(place, states, observation.tick))]
         alone = [family for family in families if family is not None]
-        candidates += [Candidate(place, family=family) for family in alone]
+        candidates += [Term(place, family=family) for family in alone]
         if place.point in there:
             both = (replace(family, multiplies=True) for family in alone)
-            candidates += [Candidate(place, family=family) for family in both]
+            candidates += [Term(place, family=family) for family in both]
     return tuple(candidates)
 
 
@@ -227,10 +227,10 @@ def starting_points(effect: Effect) -> list[dict[str, float]]:
     return [dict(zip(names, combination, strict=True)) for combination in product(*values)]
 
 
-def mirrored(candidate: Candidate) -> Candidate | None:
+def mirrored(term: Term) -> Term | None:
     """The effect on the other side of no effect at all; None where there is none."""
-    start, changed = dict(candidate.start), False
-    for parameter in candidate.term.parameters:
+    start, changed = dict(term.start), False
+    for parameter in term.effect.parameters:
         value = start[parameter.name]
         if parameter.phase:
             start[parameter.name], changed = value - math.copysign(math.pi, value), True
@@ -239,7 +239,7 @@ def mirrored(candidate: Candidate) -> Candidate | None:
         if parameter.low < parameter.off and parameter.low <= other <= parameter.high:
             start[parameter.name] = other
             changed = changed or other != value
-    return replace(candidate, start=start) if changed else None
+    return replace(term, start=start) if changed else None
 
 
 def states_of(found: Fit) -> dict[tuple[str, str], NDArray[np.float64]]:
