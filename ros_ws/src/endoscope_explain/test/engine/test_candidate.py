@@ -1,4 +1,4 @@
-"""What a composition may hold: each effect and each function once a joint."""
+"""What a candidate may hold: each effect and each function once a joint."""
 
 from dataclasses import replace
 

@@ -147,7 +147,7 @@ def _candidate(evidence, *terms, found=None):
 
 
 def _level(evidences, null):
-    """A level whose compositions are a function of the angle, its formulas, and a tracker's."""
+    """A level whose candidates are a function of the angle, its formulas, and a tracker's."""
     place = FUNCTIONS['load_of_angle']
     function = Term(place, family=family_at(place, (-1.0, 1.0)))
     terms = {
