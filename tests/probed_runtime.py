@@ -54,7 +54,7 @@ class ProbedRuntime(ClosedOnExit):
         self.runtime.spin_until(Future(), seconds)
 
     def situation(self) -> str:
-        """What to tell of a wait in vain."""
+        """What to report when a wait times out."""
         return ', '.join(node.get_name() for node in self.runtime.nodes)
 
     def close(self) -> None:

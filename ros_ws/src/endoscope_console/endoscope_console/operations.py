@@ -325,7 +325,7 @@ class Operations:
             told = await self._ask(move)
             holder.moves = ''
         finally:
-            # Who waited in vain has not ended it.
+            # A wait that timed out has not ended it.
             holder.waits = False
         return told
 

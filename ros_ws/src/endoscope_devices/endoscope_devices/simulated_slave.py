@@ -62,7 +62,7 @@ class SimulatedSlave:
         return ''
 
     def health(self) -> dict[str, object]:
-        """Nor to tell."""
+        """Nothing to report."""
         return {}
 
     def close(self) -> None:

@@ -25,7 +25,7 @@ from endoscope_explain.search.shared_choice import (
 )
 
 BEAM = 3
-"""Choices of effects that are gone on with."""
+"""Choices of effects that are kept at each step (beam search)."""
 
 
 def physics_of_all(

@@ -155,7 +155,7 @@ class GraphClient(GraphListener):
                 if said[REFUSAL_CODE] == CAUSES_PRESENT and self._becomes_whole(said[REFUSAL]):
                     return self._ask(command, done, what, patience_s, withdrawn)
                 raise GraphRefusedError(said[REFUSAL])
-        raise GraphRefusedError(f'waited {patience_s:g} s in vain for {what}')
+        raise GraphRefusedError(f'timed out after {patience_s:g} s waiting for {what}')
 
     def _becomes_whole(self, refused: str) -> bool:
         """Wait where that was the reason of a refusal; whether the streams have come since."""

@@ -208,7 +208,7 @@ class GraphListener(ClosedOnExit):
     ) -> None:
         """Listen until something has come true; GraphRefusedError if it has not within so long."""
         if not self.wait_until(condition, patience_s):
-            raise GraphRefusedError(f'waited {patience_s:g} s in vain for {what}')
+            raise GraphRefusedError(f'timed out after {patience_s:g} s waiting for {what}')
 
     def close(self) -> None:
         """Listen no more; the node remains."""

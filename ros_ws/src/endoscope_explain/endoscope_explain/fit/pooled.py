@@ -126,7 +126,7 @@ def deviations(fits: Sequence[Fit]) -> list[Array]:
 
 
 def judged_alone(fits: Sequence[Fit]) -> list[Fit]:
-    """Each recording's fit as it can be gone on with without the others.
+    """Each recording's fit as it can be continued without the others.
 
     `fits`: of `fit_together`.
     Returns: devices are held as found; a pooled parameter has the others' mean and scatter for a

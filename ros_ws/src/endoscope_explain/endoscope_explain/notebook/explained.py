@@ -1,4 +1,4 @@
-"""What an explanation found, to be looked at, drawn and gone on with."""
+"""What an explanation found, to view, draw and work with."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
