@@ -9,12 +9,12 @@ from itertools import pairwise
 import ndicapy
 import numpy as np
 import pytest
-from aurora_rig import Instrument
+from aurora_rig import Instrument, angle_between
 from device_readings import collect, figure, until
 
 from endoscope_core.kinematics import (
     RegistrationError,
-    angle_between,
+    StraightRegistration,
     bending_from_orientation,
 )
 from endoscope_devices.em_tracker import (
@@ -29,6 +29,7 @@ from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyErr
 from endoscope_devices.em_tracker.aurora_unit import SensorView, sealed
 from endoscope_devices.em_tracker.pose_check import TURN_NOISE, TURN_RATE
 from endoscope_devices.em_tracker.tx_reply import MalformedReplyError, parse_tx
+from endoscope_devices.strict_yaml import DeviceFileError
 
 LATENCY = 0.03
 
@@ -282,6 +283,14 @@ def test_registered_straight_it_gives_both_bending_angles(tracker, instrument, t
             return bending_from_orientation(orientation) == pytest.approx(bending, abs=5e-4)
 
         until(is_read)
+
+
+@pytest.mark.parametrize('orientation', [[0.0] * 4, [1e308] * 4])
+def test_a_registration_that_turns_nowhere_is_refused(tmp_path, orientation):
+    path = tmp_path / 'straight.yaml'
+    save_registration(path, StraightRegistration((0.0, 0.0, 0.0), tuple(orientation)))
+    with pytest.raises(DeviceFileError, match=r'straight.yaml: .* is not an orientation'):
+        load_registration(path)
 
 
 def spoilt(data, rng):
