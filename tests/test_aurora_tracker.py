@@ -6,9 +6,9 @@ import random
 import time
 from itertools import pairwise
 
-import ndicapy
 import numpy as np
 import pytest
+import serial
 from aurora_rig import Instrument, angle_between
 from device_readings import collect, figure, until
 
@@ -134,12 +134,10 @@ def test_a_tracker_that_is_unplugged_is_said_and_found_again(tracker, emulator):
 
 
 def test_a_tracker_left_at_another_rate_is_reset_by_a_break(emulator):
-    first = AuroraPort(str(emulator.link))
-    first.open()
+    with serial.Serial(str(emulator.link), 9600, timeout=5.0) as line:
+        line.write(b'COMM 50000\r')
+        assert line.read_until(b'\r').startswith(b'OKAY')
     assert emulator.unit.baud == 115200
-    first._device, device = None, first._device
-    first.close()
-    ndicapy.ndiClose(device)
     tracker = AuroraTracker(str(emulator.link), TrackerSettings())
     tracker.open()
     try:

@@ -4,8 +4,8 @@
 
 The line has the host's baud rate: what comes at another rate than the tracker's is garbled, and
 bytes take the time that they take at that rate.  A pseudo-terminal carries no serial break.  In its
-place stands what ndicapi does right before each break: both queues are emptied, here after garbled
-bytes had come.
+place stands what ndicapi and our driver do right before each break: both queues are emptied, here
+after garbled bytes had come.
 """
 
 import argparse
