@@ -4,8 +4,14 @@ import time
 from collections import deque
 from itertools import pairwise
 
+from scipy.spatial.transform import Rotation
+
 from endoscope_devices.em_tracker.aurora_emulator import InstrumentInField
 from endoscope_devices.em_tracker.aurora_unit import SensorView
+
+
+def angle_between(first, second) -> float:
+    return (Rotation.from_quat(first).inv() * Rotation.from_quat(second)).magnitude()
 
 
 class Instrument:

@@ -11,10 +11,10 @@ import time
 import ndicapy
 import numpy as np
 import pytest
+from aurora_rig import angle_between
 from device_readings import until
 from sksurgerynditracker.nditracker import NDITracker
 
-from endoscope_core.kinematics import about_z, angle_between
 from endoscope_devices.em_tracker.aurora_emulator import InstrumentInField
 
 BENDING = (0.5, -0.2)
@@ -107,4 +107,3 @@ def test_the_sensor_may_be_mounted_at_any_angle():
     straight = InstrumentInField(lambda _: (0.0, 0.0))(0.0)
     turned = InstrumentInField(lambda _: (0.0, 0.0), roll=1.2)(0.0)
     assert angle_between(straight.orientation, turned.orientation) == pytest.approx(1.2)
-    assert angle_between(about_z(0.0), about_z(1.2)) == pytest.approx(1.2)

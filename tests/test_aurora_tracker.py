@@ -6,15 +6,15 @@ import random
 import time
 from itertools import pairwise
 
-import ndicapy
 import numpy as np
 import pytest
-from aurora_rig import Instrument
+import serial
+from aurora_rig import Instrument, angle_between
 from device_readings import collect, figure, until
 
 from endoscope_core.kinematics import (
     RegistrationError,
-    angle_between,
+    StraightRegistration,
     bending_from_orientation,
 )
 from endoscope_devices.em_tracker import (
@@ -29,6 +29,7 @@ from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyErr
 from endoscope_devices.em_tracker.aurora_unit import SensorView, sealed
 from endoscope_devices.em_tracker.pose_check import TURN_NOISE, TURN_RATE
 from endoscope_devices.em_tracker.tx_reply import MalformedReplyError, parse_tx
+from endoscope_devices.strict_yaml import DeviceFileError
 
 LATENCY = 0.03
 
@@ -133,12 +134,10 @@ def test_a_tracker_that_is_unplugged_is_said_and_found_again(tracker, emulator):
 
 
 def test_a_tracker_left_at_another_rate_is_reset_by_a_break(emulator):
-    first = AuroraPort(str(emulator.link))
-    first.open()
+    with serial.Serial(str(emulator.link), 9600, timeout=5.0) as line:
+        line.write(b'COMM 50000\r')
+        assert line.read_until(b'\r').startswith(b'OKAY')
     assert emulator.unit.baud == 115200
-    first._device, device = None, first._device
-    first.close()
-    ndicapy.ndiClose(device)
     tracker = AuroraTracker(str(emulator.link), TrackerSettings())
     tracker.open()
     try:
@@ -282,6 +281,14 @@ def test_registered_straight_it_gives_both_bending_angles(tracker, instrument, t
             return bending_from_orientation(orientation) == pytest.approx(bending, abs=5e-4)
 
         until(is_read)
+
+
+@pytest.mark.parametrize('orientation', [[0.0] * 4, [1e308] * 4])
+def test_a_registration_that_turns_nowhere_is_refused(tmp_path, orientation):
+    path = tmp_path / 'straight.yaml'
+    save_registration(path, StraightRegistration((0.0, 0.0, 0.0), tuple(orientation)))
+    with pytest.raises(DeviceFileError, match=r'straight.yaml: .* is not an orientation'):
+        load_registration(path)
 
 
 def spoilt(data, rng):

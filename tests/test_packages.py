@@ -25,7 +25,6 @@ IMPORT_NAMES = {
     'dynamixel-sdk': 'dynamixel_sdk',
     'foxglove-sdk': 'foxglove',
     'gp-elite': 'gp_elite',
-    'ndicapi': 'ndicapy',
     'pyserial': 'serial',
     'pyyaml': 'yaml',
     'scikit-learn': 'sklearn',

@@ -25,7 +25,8 @@ from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.plant_file import REACH, plant_to_mapping
+from endoscope_core.physics.plant_file import plant_to_mapping
+from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_nodes import program
 from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.parameters import Described, as_typed, described
@@ -204,8 +205,13 @@ def _plant_keys() -> Iterator[str]:
 
 def _keys(kind: type) -> Iterator[tuple[str, ...]]:
     for key in dataclasses.fields(kind):
-        low, high, unit = REACH[key.name]
-        yield f'`{key.name}`', f'`{as_typed(key.default)}`', _range(low, high), unit
+        known = NUMBERS[key.name]
+        yield (
+            f'`{key.name}`',
+            f'`{as_typed(key.default)}`',
+            _range(known.low, known.high),
+            known.unit,
+        )
 
 
 def _mapping() -> Iterator[str]:

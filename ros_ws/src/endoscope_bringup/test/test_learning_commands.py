@@ -13,7 +13,7 @@ from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bringup.cli import main
 from endoscope_core.classifier.shipped import load_classifier
 from endoscope_core.dataset import load_dataset
-from endoscope_core.hysteresis import BoucWenParameters, bouc_wen_forward
+from endoscope_core.hysteresis import BoucWenParameters, forward
 from endoscope_core.identification import Servo, load_class_parameters
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics import PlantDescription, simulate
@@ -153,7 +153,7 @@ def test_identifying_a_bag_finds_the_width_of_its_loop(calibration, tmp_path, dr
     model = BoucWenParameters.from_dict(found['bend_x']['model'])
     settled = slice(2717, 9000)
     width = width_at_mid_height(angle[settled, 0], trajectory.bending[settled, 0])
-    modelled = bouc_wen_forward(model, Servo().answer(angle[:, 0], 1e-3))
+    modelled = forward(model, Servo().answer(angle[:, 0], 1e-3))
     assert width_at_mid_height(angle[settled, 0], modelled[settled]) == pytest.approx(
         width, abs=np.deg2rad(2.0)
     )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.dataset import CLASSES_DEG
-from endoscope_core.hysteresis import BoucWenParameters, bouc_wen_forward
+from endoscope_core.hysteresis import BoucWenParameters, forward
 from endoscope_core.identification import (
     ClassParameterError,
     IdentificationError,
@@ -22,8 +22,8 @@ TIME = np.arange(0.0, 9.0, 0.02)
 DRIVER = calibration_sinusoid()(TIME)[0]
 
 
-def recording(noise, seed=0, offset=0.0, h0=0.0, rested=True):
-    measured = bouc_wen_forward(TRUE, DRIVER, h0) + offset
+def recording(noise, seed=0, offset=0.0, y0=0.0, rested=True):
+    measured = forward(TRUE, DRIVER, y0) + offset
     measured += np.random.default_rng(seed).normal(0.0, noise, TIME.size)
     return Recording(DRIVER, measured, rested)
 
@@ -37,9 +37,7 @@ def test_it_finds_the_parameters_that_made_a_recording():
 
 
 def test_noise_offset_and_an_unknown_start_are_borne():
-    many = [
-        recording(0.005, k, offset=0.05 * k, h0=0.4 * TRUE.h_max, rested=False) for k in range(3)
-    ]
+    many = [recording(0.005, k, offset=0.05 * k, y0=0.4, rested=False) for k in range(3)]
     fit = fit_model(many)
     assert fit.rmse == pytest.approx(0.005, rel=0.1)
     assert fit.parameters.lag == pytest.approx(TRUE.lag, rel=0.02)

@@ -21,7 +21,6 @@ from endoscope_core.identification import (
     IdentificationError,
     Recording,
     Servo,
-    closed_cycle,
     fit_feedforward,
     fit_model,
 )
@@ -93,17 +92,6 @@ def test_the_feed_forward_of_every_model_makes_a_backlash_follow(model):
     assert found.rmse < 0.35 * found.uncompensated_rmse
     assert found.parameters.inverse_slope <= GREATEST_INVERSE_SLOPE
     assert isinstance(found.parameters, MODELS[model])
-
-
-def test_a_closed_cycle_says_that_loops_close():
-    period = np.arange(0.0, 2.0 * np.pi, 0.02)
-    driver = np.sin(period)
-    actual = answer(TRUTHS['play'], np.tile(driver, 2))[: driver.size]
-    recording = closed_cycle(driver, actual)
-    assert recording.scored.sum() < recording.driver.size
-    assert recording.scored[: driver.size].all()
-    fit = fit_model([recording], 0, 'play')
-    np.testing.assert_allclose(fit.predict(np.tile(driver, 2))[: driver.size], actual, atol=0.003)
 
 
 def test_an_unknown_model_is_refused():

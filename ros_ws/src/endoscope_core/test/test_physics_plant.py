@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
+from wrong_way import wrong_way_motion
 
-from endoscope_core.metrics import wrong_way_motion
 from endoscope_core.physics import JointParameters, PlantDescription, simulate
 
 SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from wrong_way import wrong_way_motion
 
 from endoscope_core.identification.family_fit import (
     PRIORS,
@@ -16,7 +17,6 @@ from endoscope_core.identification.family_fit import (
     read,
 )
 from endoscope_core.identification.tube_files import tube_recordings
-from endoscope_core.metrics import wrong_way_motion
 from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.physics.family import (
     CENTRE,

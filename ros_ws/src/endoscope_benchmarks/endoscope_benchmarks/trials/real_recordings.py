@@ -18,10 +18,10 @@ from endoscope_benchmarks.trials.tension_loop import tension_loop_width
 from endoscope_core.hysteresis.inverse import HysteresisParameters
 from endoscope_core.identification import (
     ModelFit,
+    Recording,
     TableEntry,
     UpdatedTable,
     UpdatedTableError,
-    closed_cycle,
     fit_model,
 )
 from endoscope_core.identification.tube_files import (
@@ -101,6 +101,24 @@ def real_recordings(folder: Path | None = None) -> list[RealRecording]:
 def without_repeats(table: Array) -> Array:
     """Rows of a recording without those that repeat the one before: the file's clock is faster."""
     return np.asarray(table[np.diff(table[:, PHASE], prepend=-1.0) != 0.0])
+
+
+def closed_cycle(driver: Array, actual: Array) -> Recording:
+    """One period from rest, as it would go on for ever.
+
+    A model fitted to the first period alone may drift in the second, for nothing in the first says
+    that loops close. Here the period is followed by itself, and the part before the first turning
+    point, which belongs to the way from rest, counts only the first time.
+
+    Parameters
+    ----------
+    driver, actual : ndarray, shape (N,)
+        Joint-equivalent motor angle and bending angle in rad, from rest, over one whole period.
+    """
+    turn = int(np.argmax(np.abs(driver[: len(driver) // 2])))
+    scored = np.ones(2 * len(driver), dtype=np.bool_)
+    scored[len(driver) : len(driver) + turn] = False
+    return Recording(np.tile(driver, 2), np.tile(actual, 2), scored=scored)
 
 
 def fit_first_cycle(recording: RealRecording, model: str, seed: int) -> ModelFit:

@@ -1,12 +1,7 @@
 """Hysteresis models as pure steps of state over input, and their inverses."""
 
 from endoscope_core.hysteresis.asymmetric_bouc_wen import AsymmetricBoucWenParameters
-from endoscope_core.hysteresis.bouc_wen import (
-    BoucWenParameters,
-    bouc_wen_forward,
-    bouc_wen_inverse,
-    bouc_wen_step,
-)
+from endoscope_core.hysteresis.bouc_wen import BoucWenParameters
 from endoscope_core.hysteresis.dahl import DahlParameters
 from endoscope_core.hysteresis.memory_model import MemoryModel, direct_inverse, forward
 from endoscope_core.hysteresis.play import PlayParameters
@@ -23,9 +18,6 @@ __all__ = [
     'MemoryModel',
     'PlayParameters',
     'PrandtlIshlinskiiParameters',
-    'bouc_wen_forward',
-    'bouc_wen_inverse',
-    'bouc_wen_step',
     'direct_inverse',
     'forward',
     'prandtl_ishlinskii_forward',

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from endoscope_core.hysteresis.bouc_wen_kernel import (
     bouc_wen_normalised_path,
@@ -169,54 +169,3 @@ class BoucWenParameters(NamedNumbers, ConstantLag):
             C=0.5 * (1.0 - rho) * total,
             n=n,
         )
-
-
-def bouc_wen_step(parameters: BoucWenParameters, h: float, delta: float) -> float:
-    """State `h` of equation 4 after the driving angle has moved by `delta` (rad), monotonically.
-
-    ``|h| <= h_max`` holds after a step of any size if it held before, exactly for n = 1 and by
-    construction of the scheme otherwise (see
-    :func:`~endoscope_core.hysteresis.bouc_wen_kernel.bouc_wen_normalised_step`); an `h` outside is
-    brought to the bound first.
-    """
-    scale = parameters.h_max
-    y = min(1.0, max(-1.0, h / scale))
-    return scale * bouc_wen_normalised_step(
-        y, delta, parameters.travel, parameters.rho, parameters.n
-    )
-
-
-def bouc_wen_forward(
-    parameters: BoucWenParameters, theta: ArrayLike, h0: float = 0.0
-) -> NDArray[np.float64]:
-    """Actual angle (N,) by equation 3 for a driving angle (N,), both in rad; `h` begins at `h0`."""
-    driver = np.ascontiguousarray(theta, dtype=float)
-    state = _path(parameters, driver, h0)
-    return parameters.alpha * driver + parameters.beta * state
-
-
-def bouc_wen_inverse(
-    parameters: BoucWenParameters, theta_d: ArrayLike, h0: float = 0.0
-) -> NDArray[np.float64]:
-    """Feed-forward command (N,) by equation 5 for a desired angle (N,), both in rad.
-
-    Equation 4 is driven by the desired angle; `h` begins at `h0`.
-    """
-    driver = np.ascontiguousarray(theta_d, dtype=float)
-    state = _path(parameters, driver, h0)
-    return (driver - parameters.beta * state) / parameters.alpha
-
-
-def _path(
-    parameters: BoucWenParameters, driver: NDArray[np.float64], h0: float
-) -> NDArray[np.float64]:
-    if driver.ndim != 1 or driver.size == 0 or not np.all(np.isfinite(driver)):
-        raise ValueError(
-            'the driving angle must be a non-empty series of finite numbers; '
-            f'its shape is {driver.shape}'
-        )
-    scale = parameters.h_max
-    y0 = min(1.0, max(-1.0, h0 / scale))
-    return scale * bouc_wen_normalised_path(
-        driver, y0, parameters.travel, parameters.rho, parameters.n
-    )

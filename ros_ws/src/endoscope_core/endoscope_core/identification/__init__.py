@@ -12,7 +12,6 @@ from endoscope_core.identification.hysteresis_fit import (
     IdentificationError,
     ModelFit,
     Recording,
-    closed_cycle,
     fit_model,
 )
 from endoscope_core.identification.parameter_blend import KINDS, LawParameters, blend
@@ -40,7 +39,6 @@ __all__ = [
     'UpdatedTableError',
     'blend',
     'class_parameter_sets',
-    'closed_cycle',
     'fit_feedforward',
     'fit_model',
     'fit_plant',

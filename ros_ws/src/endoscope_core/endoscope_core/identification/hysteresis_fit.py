@@ -67,24 +67,6 @@ class Recording:
         return counted - np.mean(counted, axis=0)
 
 
-def closed_cycle(driver: Array, actual: Array) -> Recording:
-    """One period from rest, as it would go on for ever.
-
-    A model fitted to the first period alone may drift in the second, for nothing in the first says
-    that loops close. Here the period is followed by itself, and the part before the first turning
-    point, which belongs to the way from rest, counts only the first time.
-
-    Parameters
-    ----------
-    driver, actual : ndarray, shape (N,)
-        Joint-equivalent motor angle and bending angle in rad, from rest, over one whole period.
-    """
-    turn = int(np.argmax(np.abs(driver[: len(driver) // 2])))
-    scored = np.ones(2 * len(driver), dtype=np.bool_)
-    scored[len(driver) : len(driver) + turn] = False
-    return Recording(np.tile(driver, 2), np.tile(actual, 2), scored=scored)
-
-
 @dataclass(frozen=True)
 class ModelFit:
     """A model of a transmission.

@@ -6,15 +6,6 @@ from endoscope_core.kinematics.constant_curvature import (
     tip_pose,
 )
 from endoscope_core.kinematics.robot_description import robot_description
-from endoscope_core.kinematics.rotation import (
-    about_z,
-    angle_between,
-    conjugate,
-    mean_orientation,
-    multiply,
-    rotate,
-    unit_quaternion,
-)
 from endoscope_core.kinematics.straight_registration import (
     RegistrationError,
     StillnessLimits,
@@ -30,16 +21,9 @@ __all__ = [
     'StraightRegistration',
     'Transform',
     'Vertebrae',
-    'about_z',
-    'angle_between',
     'bending_from_orientation',
     'centre_line',
-    'conjugate',
-    'mean_orientation',
-    'multiply',
     'register_straight',
     'robot_description',
-    'rotate',
     'tip_pose',
-    'unit_quaternion',
 ]

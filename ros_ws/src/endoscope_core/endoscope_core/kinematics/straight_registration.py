@@ -11,17 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.kinematics.rotation import (
-    about_z,
-    angle_between,
-    conjugate,
-    mean_orientation,
-    multiply,
-    rotate,
-    unit_quaternion,
-)
 
 Array = NDArray[np.float64]
 
@@ -87,12 +79,11 @@ class StraightRegistration:
         orientation : ndarray, shape (4,)
             Unit quaternion x, y, z, w.
         """
-        back = conjugate(self.orientation)
-        mounted = about_z(roll)
-        moved = rotate(back, np.asarray(position, dtype=float) - np.asarray(self.position))
-        turned = multiply(back, unit_quaternion(orientation))
-        tip = rotate(mounted, moved) + np.array([0.0, 0.0, length])
-        return tip, multiply(multiply(mounted, turned), conjugate(mounted))
+        mounted = Rotation.from_rotvec((0.0, 0.0, roll))
+        to_base = mounted * Rotation.from_quat(self.orientation).inv()
+        moved = np.asarray(position, dtype=float) - np.asarray(self.position)
+        turned = to_base * Rotation.from_quat(orientation) * mounted.inv()
+        return to_base.apply(moved) + np.array([0.0, 0.0, length]), turned.as_quat()
 
 
 def register_straight(
@@ -128,15 +119,15 @@ def register_straight(
             'keep the sensor in the measurement volume and ask again'
         )
     place = np.asarray(positions, dtype=float)
-    turn = np.asarray(orientations, dtype=float)
-    position, orientation = place.mean(axis=0), mean_orientation(turn)
+    turn = Rotation.from_quat(orientations)
+    position, orientation = place.mean(axis=0), turn.mean()
     half = count // 2
     checks = (
-        ('turned by', _rms([angle_between(orientation, q) for q in turn]), limits.angle, 'rad'),
+        ('turned by', _rms((orientation.inv() * turn).magnitude()), limits.angle, 'rad'),
         ('moved by', _rms(np.linalg.norm(place - position, axis=1)), limits.distance, 'm'),
         (
             'kept turning, by',
-            angle_between(mean_orientation(turn[:half]), mean_orientation(turn[half:])),
+            float((turn[:half].mean().inv() * turn[half:].mean()).magnitude()),
             limits.drift_angle,
             'rad',
         ),
@@ -153,7 +144,9 @@ def register_straight(
                 f'the tip {what} {found:.2g} {unit} within a second, {allowed:.2g} {unit} is '
                 'allowed: let the straight instrument rest and ask again'
             )
-    return StraightRegistration(tuple(position.tolist()), tuple(orientation.tolist()))
+    return StraightRegistration(
+        tuple(position.tolist()), tuple(orientation.as_quat(canonical=True).tolist())
+    )
 
 
 def _rms(values: ArrayLike) -> float:

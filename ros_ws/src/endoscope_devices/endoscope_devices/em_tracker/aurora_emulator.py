@@ -4,8 +4,8 @@
 
 The line has the host's baud rate: what comes at another rate than the tracker's is garbled, and
 bytes take the time that they take at that rate.  A pseudo-terminal carries no serial break.  In its
-place stands what ndicapi does right before each break: both queues are emptied, here after garbled
-bytes had come.
+place stands what ndicapi and our driver do right before each break: both queues are emptied, here
+after garbled bytes had come.
 """
 
 import argparse
@@ -22,8 +22,11 @@ import tty
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from endoscope_core.closed_on_exit import ClosedOnExit
-from endoscope_core.kinematics import about_z, multiply, rotate, tip_pose
+from endoscope_core.kinematics import tip_pose
 from endoscope_devices.em_tracker.aurora_unit import AuroraUnit, SensorSource, SensorView
 
 _TERMIOS_BAUD = {
@@ -155,17 +158,18 @@ class InstrumentInField:
         length: float = 0.02,
     ) -> None:
         self.bending = bending
-        self._base = (tuple(base_position), tuple(base_orientation))
-        self._roll = about_z(roll)
+        self._place = np.array(base_position)
+        self._turn = Rotation.from_quat(base_orientation)
+        self._roll = Rotation.from_rotvec((0.0, 0.0, roll))
         self._length = length
 
     def __call__(self, seconds: float) -> SensorView:
         """Where the sensor is, some seconds since frame 0."""
         position, orientation = tip_pose(self.bending(seconds), self._length)
-        place, turn = self._base
+        turned = self._turn * Rotation.from_quat(orientation) * self._roll
         return SensorView(
-            tuple((rotate(turn, position) + place).tolist()),
-            tuple(multiply(multiply(turn, orientation), self._roll).tolist()),
+            tuple((self._place + self._turn.apply(position)).tolist()),
+            tuple(turned.as_quat().tolist()),
         )
 
 

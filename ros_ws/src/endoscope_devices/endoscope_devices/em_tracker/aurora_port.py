@@ -1,16 +1,44 @@
-"""An Aurora at a serial port, spoken to by ndicapi behind a guard.
+"""An Aurora at a serial port: a command goes out, a whole reply or none comes back.
 
-ndicapi frees the interpreter while it waits for a reply to a command; its ``ndiProbe`` keeps it for
-up to seven seconds and is not used.
+A reply counts once its CRC and its characters have been checked (Aurora API Guide, communication).
 """
 
-import ndicapy
+import re
+import termios
+import time
 
-from endoscope_devices.em_tracker.line_guard import NdiLineGuard
+import serial
+
+from endoscope_devices.em_tracker.ndi_crc import crc16
 from endoscope_devices.motor_device import DeviceError
 
+_FIRST_BAUD = 9600
 _FRAME_BAUD = 115200
-_COMM = f'COMM:{{}}{ndicapy.NDI_8N1:03d}{ndicapy.NDI_NOHANDSHAKE}'
+_COMM_FIRST, _COMM_FRAME = 'COMM:00000', 'COMM:50000'  # these rates, with 8N1 and no handshake
+_CHUNK = 4096
+_LONGEST = 2000
+_FRAME_S = 0.1
+_COMMAND_S = 1.0
+_RESET_S = 5.0
+_SETTLED_S = 0.03
+_WHOLE = re.compile(rb'[\x20-\x7e\n]*[0-9A-F]{4}\r')
+_REFUSAL = re.compile(r'ERROR([0-9A-F]{2})')
+# Of the guide's table of error codes, those with which a command of ours may be answered.
+_WORDS = {
+    '01': 'Invalid command',
+    '04': 'Invalid CRC calculated for command',
+    '05': 'Time-out on command execution',
+    '06': 'Unable to set up new communication parameters',
+    '08': 'Invalid port handle selected',
+    '0C': 'Command is invalid while in the current mode',
+    '0D': 'No tool assigned to the selected port handle',
+    '0E': 'Selected port handle not initialized',
+    '10': 'System not initialized',
+    '12': 'Unable to start tracking',
+    '13': 'Unable to initialize Tool-in-Port',
+    '15': 'Unable to initialize the Measurement System',
+}
+_Gone = (serial.SerialException, OSError, termios.error)
 
 
 class TrackerReplyError(DeviceError):
@@ -26,8 +54,7 @@ class AuroraPort:
 
     def __init__(self, path: str) -> None:
         self._path = path
-        self._guard: NdiLineGuard | None = None
-        self._device: object | None = None
+        self._line: serial.Serial | None = None
 
     def open(self) -> None:
         """Open the port and bring the tracker to 115200 baud and set-up mode, or raise DeviceError.
@@ -35,29 +62,44 @@ class AuroraPort:
         A tracker that does not answer at 9600 baud was left at another rate: a serial break resets
         it.
         """
-        self._guard = NdiLineGuard(self._path)
-        self._device = ndicapy.ndiOpen(self._guard.inner)
-        if not self._device:
-            raise DeviceError(f'ndicapi cannot open its end of the line to {self._path}')
+        try:
+            self._line = line = serial.Serial(
+                self._path, _FIRST_BAUD, timeout=0.0, write_timeout=1.0, exclusive=True
+            )
+        except (serial.SerialException, OSError) as error:
+            raise DeviceError(
+                f'serial port {self._path} cannot be opened ({error}): is the tracker plugged in?'
+            ) from error
         try:
             self.ask('INIT:')
         except TrackerReplyError:
-            self._guard.reset()
+            self._reset(line)
             self.ask('INIT:')
-        self.ask(_COMM.format(ndicapy.NDI_115200))
-        self._guard.set_baud(_FRAME_BAUD)
+        self.ask(_COMM_FRAME)
+        line.baudrate = _FRAME_BAUD
 
     def ask(self, command: str) -> str:
         """Reply, without CRC, to a command with its colon but no CRC; or TrackerReplyError."""
-        if self._guard is None:
+        if self._line is None:
             raise TrackerReplyError(command, 'not connected', silent=True)
+        wait = _FRAME_S if command.startswith('TX') else _COMMAND_S
+        asked = command.encode()
         try:
-            return str(ndicapy.ndiCommand(self._device, command))
-        except OSError as error:
-            words = self._guard.trouble
-            raise TrackerReplyError(
-                command, words or str(error), silent=bool(words) and self._guard.silent
-            ) from error
+            self._line.read(_CHUNK)
+            self._line.write(asked + f'{crc16(asked):04X}\r'.encode())
+            reply = _read_line(self._line, time.monotonic() + wait)
+        except _Gone as error:
+            words = f'serial port {self._path} is gone: {error}'
+            raise TrackerReplyError(command, words, silent=True) from error
+        if not reply.endswith(b'\r'):
+            words = f'{len(reply)} bytes within {1e3 * wait:.0f} ms instead of a reply'
+            raise TrackerReplyError(command, words, silent=not reply)
+        if not _WHOLE.fullmatch(reply) or crc16(reply[:-5]) != int(reply[-5:-1], 16):
+            raise TrackerReplyError(command, 'a reply with a wrong CRC')
+        text = reply[:-5].decode()
+        if refusal := _REFUSAL.fullmatch(text):
+            raise TrackerReplyError(command, _WORDS.get(refusal[1], text))
+        return text
 
     def fence(self) -> None:
         """Make sure that no earlier reply is still to come; DeviceError where it has not come yet.
@@ -65,25 +107,56 @@ class AuroraPort:
         The tracker answers in order: once the line has been quiet and the tracker then told its
         revision, nothing older is under way.
         """
-        if self._guard is not None:
-            self._guard.settle()
+        if self._line is not None:
+            try:
+                self._line.timeout = _SETTLED_S
+                while self._line.read(_CHUNK):
+                    pass
+                self._line.timeout = 0.0
+            except _Gone as error:
+                raise self._gone(error) from error
         reply = self.ask('APIREV:')
         if len(reply) != len('G.000.000'):
             raise TrackerReplyError('APIREV:', 'another reply')
 
     def close(self) -> None:
         """Let the tracker be found at 9600 baud, and let go of the port."""
-        if self._guard is None:
+        if self._line is None:
             return
         try:
-            if self._device:
-                self.ask(_COMM.format(ndicapy.NDI_9600))
+            self.ask(_COMM_FIRST)
         except TrackerReplyError:
             # It is gone; a break will bring it back the next time.
             pass
         finally:
-            if self._device:
-                ndicapy.ndiClose(self._device)
-            self._device = None
-            self._guard.close()
-            self._guard = None
+            self._line.close()
+            self._line = None
+
+    def _reset(self, line: serial.Serial) -> None:
+        """Send a serial break; the tracker says it is at 9600 baud (Aurora API Guide, RESET)."""
+        try:
+            line.baudrate = _FIRST_BAUD
+            termios.tcflush(line.fileno(), termios.TCIOFLUSH)
+            line.send_break()
+            reply = _read_line(line, time.monotonic() + _RESET_S)
+        except _Gone as error:
+            raise self._gone(error) from error
+        if b'RESETBE6F' not in reply:
+            raise DeviceError(
+                f'no Aurora answers at {self._path}: is it switched on, and the port the right one?'
+            )
+
+    def _gone(self, error: Exception) -> DeviceError:
+        return DeviceError(f'serial port {self._path} is gone: {error}')
+
+
+def _read_line(line: serial.Serial, deadline: float) -> bytes:
+    data = b''
+    while not data.endswith(b'\r') and len(data) < _LONGEST:
+        line.timeout = max(0.0, deadline - time.monotonic())
+        part = line.read(max(1, line.in_waiting))
+        if not part:
+            break
+        data += part
+    line.timeout = 0.0
+    return data

@@ -2,7 +2,8 @@
 
 import math
 
-from endoscope_core.kinematics import angle_between
+from scipy.spatial.transform import Rotation
+
 from endoscope_devices.em_tracker.tx_reply import ToolReading
 
 TURN_RATE = 25.0
@@ -53,7 +54,8 @@ class PoseCheck:
 
     def _near(self, before: ToolReading, now: ToolReading) -> bool:
         seconds = (now.frame - before.frame) / self._rate
-        turned = angle_between(before.orientation, now.orientation)
+        first, second = Rotation.from_quat([before.orientation, now.orientation])
+        turned = float((first.inv() * second).magnitude())
         moved = math.dist(before.position, now.position)
         return (
             turned <= TURN_NOISE + TURN_RATE * seconds and moved <= POSITION_NOISE + SPEED * seconds

@@ -1,15 +1,16 @@
 """Registers the straight instrument from the last second of readings, and keeps the result."""
 
 import datetime
+import math
 from collections import deque
 from pathlib import Path
 
 import yaml
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.kinematics import StraightRegistration, register_straight, unit_quaternion
+from endoscope_core.kinematics import StraightRegistration, register_straight
 from endoscope_devices.em_tracker.aurora_tracker import TrackerReading
-from endoscope_devices.strict_yaml import load_section
+from endoscope_devices.strict_yaml import DeviceFileError, load_section
 
 WINDOW_NS = 1_000_000_000
 
@@ -80,5 +81,8 @@ def load_registration(path: str | Path) -> StraightRegistration:
         It cannot be read as a registration.
     """
     file = load_section(path, 'registration', ('registered', 'position', 'orientation'))
-    orientation = unit_quaternion(file.vector('orientation', 4))
-    return StraightRegistration(file.vector('position', 3), tuple(orientation.tolist()))
+    orientation = file.vector('orientation', 4)
+    norm = math.hypot(*orientation)
+    if not 0.0 < norm < math.inf:
+        raise DeviceFileError(f'registration {path}: {list(orientation)} is not an orientation')
+    return StraightRegistration(file.vector('position', 3), tuple(v / norm for v in orientation))

@@ -3,8 +3,8 @@
 ``NN`` handles, for each ``HH`` and either ``MISSING``, ``DISABLED``, ``UNOCCUPIED`` or the
 transformation (quaternion q0 qx qy qz with 4 decimals implied, position in mm with 2, error in mm
 with 4), then port status and frame number in hexadecimal and a line feed; at the end the system
-status.  TX rather than BX: text can be checked digit by digit, while ndicapi keeps the bytes of BX
-to itself and waits for those that a flipped length byte announces.
+status.  TX rather than BX: text can be checked digit by digit, and ends where it ends; of BX one
+would wait for the bytes that a flipped length byte announces.
 """
 
 import math
