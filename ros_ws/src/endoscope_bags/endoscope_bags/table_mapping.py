@@ -12,8 +12,8 @@ from typing import Any
 
 from endoscope_bags.errors import BagError
 from endoscope_bags.units import TIME_UNITS, UNITS, known_unit
-from endoscope_core.errors import nearest
-from endoscope_core.strict_yaml import YamlError, load_yaml
+from endoscope_core.errors import FileError, nearest
+from endoscope_core.strict_yaml import load_yaml
 
 _TYPES = {str: 'a text', int: 'a whole number', bool: 'true or false'}
 QUANTITIES = ('position', 'velocity', 'effort')
@@ -117,7 +117,7 @@ def load_table_mapping(path: str | Path) -> TableMapping:
     """Read a mapping file."""
     try:
         content = load_yaml(path)
-    except YamlError as error:
+    except FileError as error:
         raise TableMappingError(f'mapping: {error}') from error
     try:
         return _mapping(content)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from endoscope_core.errors import EndoscopeError
-from endoscope_core.strict_yaml import YamlError, load_yaml
+from endoscope_core.errors import EndoscopeError, FileError
+from endoscope_core.strict_yaml import load_yaml
 
 
 class DeviceFileError(EndoscopeError, ValueError):
@@ -105,6 +105,6 @@ def load_section(path: str | Path, what: str, keys: Sequence[str]) -> Section:
     """Read a YAML file, called `what` in messages, of one mapping; DeviceFileError if it is not."""
     try:
         content = load_yaml(path)
-    except YamlError as error:
+    except FileError as error:
         raise DeviceFileError(f'{what}: {error}') from error
     return Section(f'{what} {path}', content, keys)

@@ -19,10 +19,10 @@ import numpy as np
 import yaml
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.errors import EndoscopeError, nearest
+from endoscope_core.errors import EndoscopeError, FileError, nearest
 from endoscope_core.physics.description import JointParameters
 from endoscope_core.physics.layout import NOMINAL_KEYS
-from endoscope_core.strict_yaml import YamlError, load_yaml
+from endoscope_core.strict_yaml import load_yaml
 
 SHIPPED = Path(__file__).with_name('family.yaml')
 CENTRE = math.radians(120.0)
@@ -107,7 +107,7 @@ def load_family(path: str | Path = SHIPPED) -> TubeFamily:
     """Read a family; a FamilyError names the file and the key at fault."""
     try:
         content = load_yaml(path)
-    except YamlError as error:
+    except FileError as error:
         raise FamilyError(f'family of tubes: {error}') from error
     try:
         return _family(content)

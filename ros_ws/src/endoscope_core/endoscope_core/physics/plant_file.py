@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.errors import EndoscopeError, nearest
+from endoscope_core.errors import EndoscopeError, FileError, nearest
 from endoscope_core.physics.description import (
     EffectSpec,
     JointParameters,
@@ -22,7 +22,7 @@ from endoscope_core.physics.layout import PROFILE_TERMS
 from endoscope_core.physics.packing import with_nominal_in_place
 from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_core.physics.recording import recording_faults
-from endoscope_core.strict_yaml import YamlError, load_yaml
+from endoscope_core.strict_yaml import load_yaml
 
 UNKNOWN_TERM = 'unknown_term'
 """Id of what is added to the plant and is no effect of the catalogue."""
@@ -52,7 +52,7 @@ def load_plant(path: str | Path) -> PlantDescription:
     path = Path(path)
     try:
         content = load_yaml(path)
-    except YamlError as error:
+    except FileError as error:
         raise PlantFileError(f'plant file: {error}') from error
     try:
         return plant_from_mapping({} if content is None else content)
