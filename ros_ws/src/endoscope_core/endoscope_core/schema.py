@@ -175,7 +175,7 @@ def _wanted(kind: Any) -> str:
     if is_dataclass(plain):
         return f'a mapping with {", ".join(f.name for f in fields(plain))}'
     if get_origin(plain) is Literal:
-        return f'one of {", ".join(map(str, parts))}'
+        return f'{"one of " if len(parts) > 1 else ""}{", ".join(map(str, parts))}'
     if get_origin(plain) is Mapping:
         return 'a mapping of names to values'
     if get_origin(plain) is tuple:
