@@ -2,14 +2,16 @@
 
 import datetime
 from collections import deque
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.kinematics import StraightRegistration, register_straight, unit_quaternion
+from endoscope_core.schema import blamed_on, load
 from endoscope_devices.em_tracker.aurora_tracker import TrackerReading
-from endoscope_devices.strict_yaml import load_section
 
 WINDOW_NS = 1_000_000_000
 
@@ -76,9 +78,18 @@ def load_registration(path: str | Path) -> StraightRegistration:
 
     Raises
     ------
-    DeviceFileError
+    FileError
         It cannot be read as a registration.
     """
-    file = load_section(path, 'registration', ('registered', 'position', 'orientation'))
-    orientation = unit_quaternion(file.vector('orientation', 4))
-    return StraightRegistration(file.vector('position', 3), tuple(orientation.tolist()))
+    what = 'registration'
+    file = load(_Registration, path, what)
+    with blamed_on(f'{what} {path}: orientation'):
+        orientation = unit_quaternion(file.orientation)
+    return StraightRegistration(file.position, tuple(orientation.tolist()))
+
+
+@dataclass(frozen=True)
+class _Registration:
+    position: tuple[float, float, float]
+    orientation: tuple[float, float, float, float]
+    registered: Any = None
