@@ -36,7 +36,7 @@ def plant(tmp_path):
 @pytest.mark.parametrize(
     ('old', 'new', 'what'),
     [
-        ('pretension: 5.0', 'pretension: 1.0e+308', 'give 0 to 1000 N'),
+        ('pretension: 5.0', 'pretension: 1.0e+308', 'give a number from 0 to 1000 N'),
         ('pretension: 5.0', 'pretension: 5.0\n    pretension: 6.0', 'line 4: key .* given twice'),
         ('pretension: 5.0', 'pretension: ' + '9' * 5000, 'line 3: a number of 5000 characters'),
         ('pretension: 5.0', 'pretension: ' + '[' * 5000, 'line 3: nested deeper'),

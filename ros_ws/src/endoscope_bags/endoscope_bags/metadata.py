@@ -15,7 +15,8 @@ from endoscope_bags.errors import BagNotFoundError, NotABagError, UnsupportedBag
 from endoscope_bags.message_types import MessageType
 from endoscope_bags.qos_profile import QosProfile
 from endoscope_core.atomic_output import write_text
-from endoscope_core.strict_yaml import YamlError, load_yaml
+from endoscope_core.errors import FileError
+from endoscope_core.strict_yaml import load_yaml
 
 METADATA = 'metadata.yaml'
 ROS_DISTRO = 'jazzy'
@@ -49,7 +50,7 @@ def _listed_files(path: Path) -> list[str]:
     """Names of the files that a `metadata.yaml` lists, without their folders."""
     try:
         document = load_yaml(path)
-    except YamlError as error:
+    except FileError as error:
         raise NotABagError(str(error)) from error
     information = document.get(_ROOT) if isinstance(document, dict) else None
     listed = information.get('relative_file_paths') if isinstance(information, dict) else None

@@ -6,7 +6,8 @@ from typing import Any
 
 import yaml
 
-from endoscope_core.strict_yaml import YamlError, parse_yaml
+from endoscope_core.errors import FileError
+from endoscope_core.strict_yaml import parse_yaml
 
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
@@ -51,7 +52,7 @@ def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
     """Return the profiles in the channel metadata of any rosbag2 version; none for no text."""
     entries = parse_yaml(text, 'the quality of service') if text.strip() else []
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise YamlError(f'the quality of service is {text!r}: not a list of profiles')
+        raise FileError(f'the quality of service is {text!r}: not a list of profiles')
     return tuple(_from_entry(entry) for entry in entries)
 
 
@@ -62,12 +63,12 @@ def _from_entry(entry: dict[str, Any]) -> QosProfile:
         if isinstance(value, int):
             return names[value] if 0 <= value < len(names) else 'unknown'
         if value is not None and not isinstance(value, str):
-            raise YamlError(f'the quality of service has {value!r} as its {key}')
+            raise FileError(f'the quality of service has {value!r} as its {key}')
         return value or 'unknown'
 
     depth = entry.get('depth') or 0
     if not isinstance(depth, int):
-        raise YamlError(f'the quality of service has {depth!r} as its depth')
+        raise FileError(f'the quality of service has {depth!r} as its depth')
     return QosProfile(
         reliability=named('reliability', ('system_default', 'reliable', 'best_effort')),
         durability=named('durability', ('system_default', 'transient_local', 'volatile')),

@@ -33,7 +33,8 @@ from endoscope_bags.metadata import bag_files
 from endoscope_bags.qos_profile import QosProfile, qos_from_yaml
 from endoscope_bags.sqlite3_scan import Sqlite3Scan, is_sqlite3, scan_sqlite3
 from endoscope_bags.topic import MessageTimes, RawMessage, Topic
-from endoscope_core.strict_yaml import LARGEST, YamlError
+from endoscope_core.errors import FileError
+from endoscope_core.strict_yaml import LARGEST
 
 IntArray = npt.NDArray[np.int64]
 Scan = McapScan | Sqlite3Scan
@@ -121,7 +122,7 @@ class Recording:
                 )
             try:
                 qos = self._read_qos(channel.metadata.get('offered_qos_profiles', ''))
-            except YamlError as error:
+            except FileError as error:
                 what = f'{scan.path}: topic {channel.topic}: {error}'
                 if not self._salvage:
                     raise CorruptBagError(f'{what}; try `endoscope bag recover`') from error
@@ -140,7 +141,7 @@ class Recording:
     def _read_qos(self, text: str) -> tuple[QosProfile, ...]:
         if text not in self._qos:
             if sum(map(len, self._qos)) + len(text) > LARGEST:
-                raise YamlError(f'quality of service of more than {LARGEST >> 20} MiB')
+                raise FileError(f'quality of service of more than {LARGEST >> 20} MiB')
             self._qos[text] = qos_from_yaml(text)
         return self._qos[text]
 

@@ -14,7 +14,7 @@ from endoscope_bags.delimited_text import DelimitedText, TableError, is_date, is
 from endoscope_bags.errors import NonFiniteError
 from endoscope_bags.message_stream import MessageStream
 from endoscope_bags.message_types import JOINT_STATE
-from endoscope_bags.table_mapping import DROP, Column, TableMapping
+from endoscope_bags.table_mapping import Column, TableMapping
 from endoscope_bags.units import DATE, TIME_UNITS, UNITS
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def convert_table(
     kept = np.ones(len(time), bool)
     if mapping.sample_and_hold:
         time = _between_times(table, time)
-    elif mapping.drop_repeats:
+    elif mapping.drop_repeats is not False:
         kept[1:] = np.diff(time) != 0
     rows, used = len(time), np.zeros(len(time), bool)
     incomplete: dict[str, int] = {}
@@ -70,7 +70,9 @@ def convert_table(
     streams: list[tuple[str, list[str], dict[str, Array], Mask]] = []
     for k, (topic, quantities) in enumerate(mapping.topics.items()):
         progress(topic, 0.1 + 0.5 * k / len(mapping.topics))
-        values, fresh = _values(text, topic, quantities, mapping.drop_incomplete, incomplete, gaps)
+        values, fresh = _values(
+            text, topic, quantities, mapping.incomplete_rows == 'drop', incomplete, gaps
+        )
         fresh &= kept
         if mapping.sample_and_hold:
             fresh[1:] &= np.any([np.diff(v, axis=0).any(axis=1) for v in values.values()], axis=0)
@@ -113,7 +115,7 @@ def _stream(
 
 
 def _times(text: DelimitedText, column: Column, start_s: float) -> Stamps:
-    index = text.column(column.source)
+    index = text.column(column.column)
     cells = text.cells(index)
     unit = column.unit or text.headings[index].unit if index < len(text.headings) else column.unit
     if unit is None:
@@ -149,7 +151,7 @@ def _values(
             absent.append(empty)
             unusable.append(~np.isfinite(numbers))
             if unusable[-1].any():
-                gaps[text.label(text.column(column.source))] = int(unusable[-1].sum())
+                gaps[text.label(text.column(column.column))] = int(unusable[-1].sum())
         values[quantity] = np.stack(read, axis=1)
     sampled: Mask = ~np.all(absent, axis=0)
     if not sampled.any():
@@ -164,7 +166,7 @@ def _values(
         return values, sampled & ~bad
     row = int(np.argmax(bad))
     hint = (
-        f'{int(bad.sum())} of {len(bad)} rows are so; `incomplete_rows: {DROP}` in the mapping '
+        f'{int(bad.sum())} of {len(bad)} rows are so; `incomplete_rows: drop` in the mapping '
         'leaves them out'
     )
     where = f'{text.path}: line {text.lines[row]}'
@@ -175,7 +177,7 @@ def _values(
 
 
 def _si(text: DelimitedText, column: Column) -> tuple[Array, Mask]:
-    index = text.column(column.source)
+    index = text.column(column.column)
     numbers, empty = text.numbers(index)
     unit = column.unit or text.headings[index].unit or '-'
     # What goes beyond all numbers is found by its not being finite.

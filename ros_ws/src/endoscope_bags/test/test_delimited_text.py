@@ -1,6 +1,7 @@
 """Tables as loggers and spreadsheets write them."""
 
 import re
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from endoscope_bags import open_bag
 from endoscope_bags.delimited_text import TableError, date_ns, read_table
 from endoscope_bags.errors import NonFiniteError
 from endoscope_bags.mapping_proposal import propose_mapping
-from endoscope_bags.table_mapping import EXAMPLE, KEYS, load_table_mapping
+from endoscope_bags.table_mapping import EXAMPLE, TableMapping, load_table_mapping
 from endoscope_bags.text_table import convert_table
 
 ROWS = [(0.0, 10.0, -1.5), (0.01, 11.0, -1.25), (0.02, 12.0, -1.0), (0.03, 13.5, 0.5)]
@@ -185,7 +186,8 @@ def test_the_example_in_the_help_is_valid_and_complete(tmp_path):
         'slave/measured_js',
         'wires/measured_js',
     }
-    assert all(f'{key}:' in EXAMPLE for key in KEYS if key != 'sample_and_hold')
+    keys = {f.name for f in fields(TableMapping)} - {'sample_and_hold'}
+    assert all(f'{key}:' in EXAMPLE for key in keys)
 
 
 def test_columns_are_proposed_by_name_range_and_step(tmp_path):

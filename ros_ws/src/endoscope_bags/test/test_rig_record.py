@@ -10,7 +10,8 @@ from endoscope_bags.cutting import cut
 from endoscope_bags.message_types import STRING
 from endoscope_bags.recovery import recover
 from endoscope_bags.rig_record import rig_of_bag, rig_record
-from endoscope_core.rig import RigFileError, shipped_rig
+from endoscope_core.errors import FileError
+from endoscope_core.rig import shipped_rig
 
 MS = 10**6
 RIG = replace(shipped_rig(), joints=replace(shipped_rig().joints, gear=0.53))
@@ -51,5 +52,5 @@ def test_a_recorder_that_was_killed_has_left_it(bag, tmp_path):
 
 def test_a_rig_that_is_none_is_named_with_its_recording(tmp_path):
     bag = write(tmp_path / 'bag.mcap', {'endoscope_rig': {'rig.yaml': 'joints: {gearing: 0.6}'}})
-    with pytest.raises(RigFileError, match=r'the rig of .*bag\.mcap.*gearing.*gear'):
+    with pytest.raises(FileError, match=r'the rig of .*bag\.mcap.*gearing.*gear'):
         rig_of_bag(open_bag(bag))

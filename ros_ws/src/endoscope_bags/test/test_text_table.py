@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from endoscope_bags import BagError, open_bag
-from endoscope_bags.table_mapping import TableMappingError, load_table_mapping
+from endoscope_bags.table_mapping import load_table_mapping
 from endoscope_bags.text_table import TableError, convert_table
+from endoscope_core.errors import FileError
 
 MAPPING = """
 time: {column: 1, unit: s}
@@ -100,14 +101,22 @@ def test_what_samples_and_holds_needs_more_than_one_time(tmp_path):
     ('old', 'new', 'message'),
     [
         ('time: {column: 1, unit: s}', '', 'time is missing'),
-        ('unit: deg}', 'unit: grad}', "unit is 'grad': valid are"),
+        (
+            'unit: deg}',
+            'unit: grad}',
+            "topics.slave/servo_jp.position.bend_x.unit is 'grad': give one of rad, mrad, deg",
+        ),
         ('column: 3', 'colum: 3', 'unknown key colum'),
         ('column: 3', 'column: 0', 'from 1'),
         ('position: {bend_x: {column: 2', 'angle: {bend_x: {column: 2', 'unknown key angle'),
         ('start_s: 100.0', 'start_s: soon', "start_s is 'soon'"),
         ('slave/servo_jp', 'slave/servo_jq', 'did you mean slave/servo_jp?'),
         ('bend_x: {column: 2', 'bnd_x: {column: 2', 'did you mean bend_x?'),
-        ('start_s: 100.0', 'incomplete_rows: skip', "incomplete_rows is 'skip': give refuse or"),
+        (
+            'start_s: 100.0',
+            'incomplete_rows: skip',
+            "incomplete_rows is 'skip': give one of refuse, drop",
+        ),
         (
             'start_s: 100.0',
             'drop_repeats: true\nsample_and_hold: true',
@@ -118,7 +127,7 @@ def test_what_samples_and_holds_needs_more_than_one_time(tmp_path):
 def test_a_wrong_mapping_is_refused_by_its_key(tmp_path, old, new, message):
     path = tmp_path / 'mapping.yaml'
     path.write_text(MAPPING.replace(old, new, 1))
-    with pytest.raises(TableMappingError, match=re.escape(message)):
+    with pytest.raises(FileError, match=re.escape(message)):
         load_table_mapping(path)
 
 

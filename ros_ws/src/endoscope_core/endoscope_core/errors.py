@@ -22,6 +22,10 @@ class EndoscopeError(Exception):
         return printable(text if len(text) <= _LONGEST else f'{text[:_LONGEST]} ...')
 
 
+class FileError(EndoscopeError, ValueError):
+    """A file that cannot be used; the message names the file, the key and what to do."""
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """A hint that names the valid name nearest to a wrong one, and else all of them."""
     valid = list(valid)

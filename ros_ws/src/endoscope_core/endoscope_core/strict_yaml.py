@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import FileError
 
 LARGEST = 1 << 20
 """Bytes of a text. The largest honest file is a `metadata.yaml`: 300 topics of 2 kB each with their
@@ -19,40 +19,36 @@ _COUNTED = tuple(f'tag:yaml.org,2002:{kind}' for kind in ('int', 'float', 'times
 _MERGE = 'tag:yaml.org,2002:merge'
 
 
-class YamlError(EndoscopeError, ValueError):
-    """A text that is not YAML, or not the plain YAML that files are written in here."""
-
-
 def load_yaml(path: str | Path) -> Any:
-    """Content of a UTF-8 YAML file; YamlError, naming file and line, if `parse_yaml` refuses it."""
+    """Content of a UTF-8 YAML file; FileError, naming file and line, if `parse_yaml` refuses it."""
     try:
         with Path(path).open('rb') as file:
             text = file.read(LARGEST + 1).decode()
     except OSError as error:
-        raise YamlError(f'cannot read {path}: {error.strerror}') from error
+        raise FileError(f'cannot read {path}: {error.strerror}') from error
     except UnicodeDecodeError as error:
-        raise YamlError(f'{path} is not YAML: {error.reason} at byte {error.start}') from error
+        raise FileError(f'{path} is not YAML: {error.reason} at byte {error.start}') from error
     return parse_yaml(text, str(path))
 
 
 def parse_yaml(text: str, name: str) -> Any:
     """Content of a YAML text: mappings with unique keys, lists, texts, numbers, dates, nothing.
 
-    YamlError, with `name` and the line, where it is no YAML, larger than `LARGEST`, deeper than
+    FileError, with `name` and the line, where it is no YAML, larger than `LARGEST`, deeper than
     `DEEPEST`, has a key twice, an alias (of which a few lines can make gigabytes), a merge key, a
     tag, or a number that is none.
     """
     if len(text) > LARGEST:
-        raise YamlError(f'{name} is larger than {LARGEST >> 20} MiB: no file of this kind is')
+        raise FileError(f'{name} is larger than {LARGEST >> 20} MiB: no file of this kind is')
     try:
         _check_events(text)
         return yaml.load(text, Loader=_StrictLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f'line {mark.line + 1}: ' if mark else ''
-        raise YamlError(f'{name} is not YAML: {where}{error.problem or error.context}') from error
+        raise FileError(f'{name} is not YAML: {where}{error.problem or error.context}') from error
     except yaml.YAMLError as error:
-        raise YamlError(f'{name} is not YAML: {" ".join(str(error).split())}') from error
+        raise FileError(f'{name} is not YAML: {" ".join(str(error).split())}') from error
 
 
 def _check_events(text: str) -> None:

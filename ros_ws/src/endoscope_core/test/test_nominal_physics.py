@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from endoscope_core.errors import FileError
 from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, simulate
 from endoscope_core.physics.effects import NOMINAL_PHYSICS
 from endoscope_core.physics.packing import pack
-from endoscope_core.physics.plant_file import PlantFileError, load_plant, save_plant
+from endoscope_core.physics.plant_file import load_plant, save_plant
 
 TIME = 1e-3 * np.arange(3000)
 COMMAND = np.stack([0.9 * np.sin(3.0 * TIME)], axis=1)
@@ -69,5 +70,5 @@ def test_a_plant_file_may_have_a_rigid_wire_and_a_servo_without_lag(tmp_path):
         first = NOMINAL_PHYSICS[name].parameters[0]
         assert getattr(joint, first.name) == first.off
     path.write_text('joints: {bend_x: {pretension: .inf}}')
-    with pytest.raises(PlantFileError, match='pretension is inf'):
+    with pytest.raises(FileError, match='pretension is inf'):
         load_plant(path)

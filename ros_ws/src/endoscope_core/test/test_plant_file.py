@@ -4,11 +4,11 @@ from dataclasses import asdict, replace
 
 import pytest
 
+from endoscope_core.errors import FileError
 from endoscope_core.physics import (
     EffectSpec,
     JointParameters,
     PlantDescription,
-    PlantFileError,
     SensorParameters,
     TermSpec,
     load_plant,
@@ -62,25 +62,28 @@ def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
 @pytest.mark.parametrize(
     ('text', 'message'),
     [
-        ('joins: {}', 'unknown key joins in the plant: did you mean joints'),
-        ('joints: {bend_z: {}}', 'unknown key bend_z in joints: did you mean bend_'),
+        ('joins: {}', 'unknown key joins: did you mean joints'),
+        ('joints: {bend_z: {}}', 'joints: unknown key bend_z: did you mean bend_'),
         ('joints: {}', 'joints is empty'),
         ('joints: {bend_x: {capstan_exponant: 1}}', 'did you mean capstan_exponent'),
-        ('joints: {bend_x: {xyz: 1}}', 'unknown key xyz in joints.bend_x: valid are pretension'),
+        ('joints: {bend_x: {xyz: 1}}', 'joints.bend_x: unknown key xyz: valid are pretension'),
         (
             'joints: {bend_x: {pretension: five}}',
             "joints.bend_x.pretension is 'five': give a number",
         ),
         ('joints: {bend_x: {pretension: true}}', 'give a number'),
-        ('joints: {bend_x: {wire_stiffness: -1}}', 'wire_stiffness is -1: give 1 to 1e.07 N/m'),
-        ('joints: {bend_x: {wire_stiffness: .nan}}', 'give a finite number'),
-        ('joints: [bend_x]', 'joints must be a mapping'),
+        (
+            'joints: {bend_x: {wire_stiffness: -1}}',
+            'wire_stiffness is -1: give a number from 1 to 1e.07 N/m',
+        ),
+        ('joints: {bend_x: {wire_stiffness: .nan}}', 'wire_stiffness is nan: give a number from 1'),
+        ('joints: [bend_x]', r'joints is \[.bend_x.\]: give a mapping'),
         ('sensors: {tracker_nois: 1}', 'did you mean tracker_noise'),
-        ('sensors: {tracker_rate: 0}', 'tracker_rate is 0: give 0.1 to 100000 Hz'),
-        ('effects: {}\njoint: 1', 'unknown key joint in the plant: did you mean joints'),
-        ('effects: gravity', 'effects must be a list'),
-        ('effects: [{joint: bend_x}]', r'effects\[0\] has no id'),
-        ('effects: [{id: gravity}]', r'effects\[0\] has no joint'),
+        ('sensors: {tracker_rate: 0}', 'tracker_rate is 0: give a number from 0.1 to 100000 Hz'),
+        ('effects: {}\njoint: 1', 'unknown key joint: did you mean joints'),
+        ('effects: gravity', 'effects is .gravity.: give a list'),
+        ('effects: [{joint: bend_x}]', r'effects\[0\].id is missing: give a text'),
+        ('effects: [{id: gravity}]', r'effects\[0\].joint is missing: give a text'),
         ('effects: [{id: gravty, joint: bend_x}]', 'unknown effect gravty: did you mean gravity'),
         ('effects: [{id: gravity, joint: bend_x, parameter: {}}]', 'did you mean parameters'),
         (
@@ -93,33 +96,42 @@ def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
         ),
         ('joints: {bend_x: }\neffects: [{id: gravity, joint: bend_y}]', 'joint bend_y'),
         ('a: [', 'is not YAML'),
-        ('joints: {bend_x: {pretension: 1e308}}', 'pretension is 1e.308: give 0 to 1000 N'),
-        ('joints: {bend_x: {pretension: 1.0e+308}}', 'pretension is 1e.308: give 0 to 1000 N'),
-        ('sensors: {encoder_counts: 1e12}', 'give 1 to 4.29497e.09 counts a turn'),
+        (
+            'joints: {bend_x: {pretension: 1e308}}',
+            'pretension is .?1.*308.?: give a number from 0 to 1000 N',
+        ),
+        (
+            'joints: {bend_x: {pretension: 1.0e+308}}',
+            'pretension is .?1.*308.?: give a number from 0 to 1000 N',
+        ),
+        ('sensors: {encoder_counts: 1e12}', 'give a number from 1 to 4.29497e.09 counts a turn'),
         ('joints: {bend_x: {pretension: 5,\n pretension: 6}}', 'line 2: key .* is given twice'),
         ('joints: {bend_x: {pretension: ' + '9' * 5000 + '}}', 'line 1: a number of 5000 char'),
-        ('effects: [{id: gravity, joint: bend_x, parameters: {5: 1}}]', 'unknown key 5 in'),
+        (
+            'effects: [{id: gravity, joint: bend_x, parameters: {5: 1}}]',
+            'parameters: key 5 is no name: put it in quotes',
+        ),
         ('joints: ' + '[' * 5000, 'line 1: nested deeper than'),
         ('joints: &all {bend_x: }\nsensors: *all', 'line 2: .all refers to another place'),
     ],
 )
 def test_what_is_wrong_is_named_in_one_line(tmp_path, text, message):
     path = written(tmp_path, text)
-    with pytest.raises(PlantFileError, match=message) as caught:
+    with pytest.raises(FileError, match=message) as caught:
         load_plant(path)
     assert str(path) in str(caught.value)
     assert '\n' not in str(caught.value)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(PlantFileError, match=r'plant file: cannot read .*none\.yaml'):
+    with pytest.raises(FileError, match=r'plant file: cannot read .*none\.yaml'):
         load_plant(tmp_path / 'none.yaml')
 
 
 def test_a_file_that_is_not_text_is_refused(tmp_path):
     path = tmp_path / 'plant.yaml'
     path.write_bytes(b'\xff\xfe\x00\x80')
-    with pytest.raises(PlantFileError, match='is not YAML'):
+    with pytest.raises(FileError, match='is not YAML'):
         load_plant(path)
 
 
@@ -153,7 +165,7 @@ def entry(more):
 @pytest.mark.parametrize(
     ('more', 'message'),
     [
-        ('place: load_of_angle, expression: q', 'has no stage'),
+        ('place: load_of_angle, expression: q', 'effects[0].stage is missing'),
         ('stage: joynt, place: load_of_angle', 'unknown stage joynt: did you mean joint?'),
         ('stage: joint, place: load_of_angle, expression: q, multiplies: 2', 'give true or false'),
         (
@@ -168,16 +180,22 @@ def entry(more):
             'stage: joint, place: load_of_angle, expression: q, multiplies: true',
             'multiplies nothing',
         ),
-        ('stage: joint, expression: q', 'has no place: valid are end_way_of_angle'),
+        ('stage: joint, expression: q', 'place is missing: valid are end_way_of_angle'),
         ('stage: joint, place: load_of_angel', 'did you mean load_of_angle?'),
         ('stage: joint, place: pulley_of_shaft', 'a place of the stage actuator, not joint'),
-        ('stage: joint, place: load_of_angle, law: q', 'unknown key law in effects[0]'),
+        ('stage: joint, place: load_of_angle, law: q', 'effects[0]: unknown key law'),
         ('stage: joint, place: load_of_angle', 'give either an expression or values'),
         ('stage: joint, place: load_of_angle, values: [1, 2]', '2 values: give 41'),
         ('stage: joint, place: load_of_angle, values: [a]', "values[0] is 'a': give a number"),
         ('stage: joint, place: load_of_angle, expression: q, range: [1, 1]', 'the lower first'),
-        ('stage: joint, place: load_of_angle, expression: q, range: 3', 'give [lowest, highest]'),
-        ('stage: joint, place: load_of_angle, expression: q, range: [-1, .inf]', 'two finite'),
+        (
+            'stage: joint, place: load_of_angle, expression: q, range: 3',
+            'range is 3: give a list of 2',
+        ),
+        (
+            'stage: joint, place: load_of_angle, expression: q, range: [-1, .inf]',
+            'range[1] is inf: give a number',
+        ),
         ('stage: joint, place: load_of_angle, expression: 0.01*t', 'unknown name t: valid are q'),
         ('stage: joint, place: load_of_angle, expression: 0.01*tnh(q)', 'did you mean tanh?'),
         ('stage: joint, place: load_of_angle, expression: 0.01/q', 'no finite value at q = 0:'),
@@ -209,7 +227,7 @@ def entry(more):
     ],
 )
 def test_a_wrong_unknown_term_is_named_in_one_line(tmp_path, more, message):
-    with pytest.raises(PlantFileError) as caught:
+    with pytest.raises(FileError) as caught:
         load_plant(written(tmp_path, entry(more)))
     assert message in str(caught.value)
     assert '\n' not in str(caught.value)
@@ -217,7 +235,7 @@ def test_a_wrong_unknown_term_is_named_in_one_line(tmp_path, more, message):
 
 def test_a_place_has_one_function_and_a_joint_that_there_is(tmp_path):
     term = '{id: unknown_term, joint: bend_x, stage: joint, place: load_of_angle, expression: 0}'
-    with pytest.raises(PlantFileError, match='given twice on joint bend_x'):
+    with pytest.raises(FileError, match='given twice on joint bend_x'):
         load_plant(written(tmp_path, f'effects: [{term}, {term}]'))
-    with pytest.raises(PlantFileError, match='unknown_term at load_of_angle is on joint bend_z'):
+    with pytest.raises(FileError, match='unknown_term at load_of_angle is on joint bend_z'):
         load_plant(written(tmp_path, f'effects: [{term.replace("bend_x", "bend_z")}]'))

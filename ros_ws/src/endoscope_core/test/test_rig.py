@@ -2,7 +2,8 @@
 
 import pytest
 
-from endoscope_core.rig import RigFileError, load_rig
+from endoscope_core.errors import FileError
+from endoscope_core.rig import load_rig
 
 
 def written(tmp_path, text):
@@ -26,7 +27,7 @@ def test_what_a_file_does_not_say_is_as_shipped(tmp_path):
         ('motors: {speed: .nan}', 'motors.speed is nan: give a number from 0.01 to 100'),
         ('motors: {speed: 1e9}', 'give a number'),
         ('motors: {speed: fast}', "motors.speed is 'fast': give a number"),
-        ('motors: 3', 'motors has to be a mapping, not 3'),
+        ('motors: 3', 'motors is 3: give a mapping with reach, speed'),
         ('joints: {drive: 9.0}', 'beyond motors.reach 1.6'),
         (
             'devices: {motors: dynamicsel}',
@@ -38,12 +39,12 @@ def test_what_a_file_does_not_say_is_as_shipped(tmp_path):
         ('simulation: {plant: 3}', 'simulation.plant is 3: give a text'),
         ('instrument: {section_length: 20}', 'section_length is 20: give a number from 0.001 to'),
         ('instrument: {base_frame: /base}', "base_frame is '/base': give a name of letters"),
-        ('- 1', 'has to be a mapping'),
+        ('- 1', 'is [1]: give a mapping with joints'),
         ('motors: {speed: 1.0, speed: 2.0}', 'speed'),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path, text, words):
-    with pytest.raises(RigFileError, match=r'rig\.yaml') as refused:
+    with pytest.raises(FileError, match=r'rig\.yaml') as refused:
         load_rig(written(tmp_path, text))
     assert words in str(refused.value)
 
@@ -56,5 +57,5 @@ def test_a_plant_is_named_as_seen_from_the_rig_file(tmp_path):
 
 
 def test_a_file_that_is_not_there_is_said():
-    with pytest.raises(RigFileError, match=r'cannot read nowhere\.yaml'):
+    with pytest.raises(FileError, match=r'cannot read nowhere\.yaml'):
         load_rig('nowhere.yaml')

@@ -7,8 +7,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endoscope_core.errors import EndoscopeError, printable
-from endoscope_core.strict_yaml import DEEPEST, LARGEST, YamlError, load_yaml, parse_yaml
+from endoscope_core.errors import EndoscopeError, FileError, printable
+from endoscope_core.strict_yaml import DEEPEST, LARGEST, load_yaml, parse_yaml
 
 plain = st.recursive(
     st.none()
@@ -48,7 +48,7 @@ def test_what_is_written_plainly_is_read_as_it_is(content):
 def test_what_is_wrong_is_named_by_its_line(tmp_path, text, what):
     path = tmp_path / 'file.yaml'
     path.write_text(text)
-    with pytest.raises(YamlError, match=what) as caught:
+    with pytest.raises(FileError, match=what) as caught:
         load_yaml(path)
     assert str(path) in str(caught.value)
     assert str(caught.value).isprintable()
@@ -56,15 +56,15 @@ def test_what_is_wrong_is_named_by_its_line(tmp_path, text, what):
 
 def test_depth_is_counted_from_the_top():
     assert parse_yaml('[' * DEEPEST + ']' * DEEPEST, 'text') is not None
-    with pytest.raises(YamlError, match='nested'):
+    with pytest.raises(FileError, match='nested'):
         parse_yaml('[' * (DEEPEST + 1) + ']' * (DEEPEST + 1), 'text')
 
 
 def test_a_file_that_is_not_there_or_no_text_is_one_line(tmp_path):
-    with pytest.raises(YamlError, match=r'cannot read .*none'):
+    with pytest.raises(FileError, match=r'cannot read .*none'):
         load_yaml(tmp_path / 'none')
     (tmp_path / 'bytes').write_bytes(b'a: \xff')
-    with pytest.raises(YamlError, match='invalid start byte at byte 3'):
+    with pytest.raises(FileError, match='invalid start byte at byte 3'):
         load_yaml(tmp_path / 'bytes')
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from wrong_way import wrong_way_motion
 
+from endoscope_core.errors import FileError
 from endoscope_core.identification.family_fit import (
     PRIORS,
     FamilyFitError,
@@ -65,11 +66,14 @@ def test_a_file_gives_the_family_back(tmp_path):
 @pytest.mark.parametrize(
     ('text', 'named'),
     [
-        ('schema: 2', 'schema 1'),
+        ('schema: 2', 'schema is 2: give 1'),
         ('schema: 1\nlines: {capstan_exponnt: [1.0]}', 'capstan_exponent'),
         ('schema: 1\nlines: {capstan_exponent: [-1.0]}', 'positive'),
         ('schema: 1\nlines: {capstan_exponent: 1.0}', 'list'),
-        ('schema: 1\nlines: {capstan_exponent: [1.0, .nan]}', 'finite'),
+        (
+            'schema: 1\nlines: {capstan_exponent: [1.0, .nan]}',
+            r'capstan_exponent.1. is nan: give a number',
+        ),
         ('schema: 1\nreading: {}', 'readings'),
         ('schema: 1\nreadings: {load_cell_offset: [1.0]}', 'two numbers'),
     ],
@@ -77,7 +81,7 @@ def test_a_file_gives_the_family_back(tmp_path):
 def test_a_wrong_file_is_refused_by_name(tmp_path, text, named):
     path = tmp_path / 'family.yaml'
     path.write_text(text)
-    with pytest.raises(FamilyError, match=named):
+    with pytest.raises(FileError, match=named):
         load_family(path)
 
 

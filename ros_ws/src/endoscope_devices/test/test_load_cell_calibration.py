@@ -6,9 +6,9 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from endoscope_core.errors import FileError
 from endoscope_devices.load_cells import load_calibration
 from endoscope_devices.load_cells.registers import REGISTER_TYPES, decode_number
-from endoscope_devices.strict_yaml import DeviceFileError
 
 WIRES = ('left', 'right')
 
@@ -38,7 +38,7 @@ def load(tmp_path, text):
 def test_a_file_becomes_a_calibration(tmp_path):
     calibration = load(tmp_path, content())
     assert (calibration.transmitter.unit, calibration.transmitter.function) == (3, 3)
-    assert not calibration.transmitter.big_word_first
+    assert calibration.transmitter.word_order == 'little'
     assert tuple(calibration.wires) == WIRES
     assert calibration.wires['left'].tension(8.0) == pytest.approx(6.0)
     assert calibration.wires['right'].tension(-400.0) == pytest.approx(4.0)
@@ -88,19 +88,19 @@ def given_as(value, key, *path):
         (given_as(500, 'register', 'wires', 'right'), 'one Modbus reply carries 125'),
         (given_as(-40000, 'saturated_below', 'faults'), 'broken_below <= saturated_below'),
         (given_as('mark', 'parity', 'transmitter', 'serial'), "parity is 'mark'"),
-        ('wires: [1, 2]\nfaults: {}', 'has to be a mapping'),
-        ('- 1', 'has to be a mapping'),
+        ('wires: [1, 2]\nfaults: {}', r'wires is \[1, 2\]: give a mapping'),
+        ('- 1', r'is \[1\]: give a mapping'),
         ('{', 'is not YAML'),
     ],
 )
 def test_what_is_wrong_is_named_in_one_line(tmp_path, changed, words):
-    with pytest.raises(DeviceFileError, match=words) as caught:
+    with pytest.raises(FileError, match=words) as caught:
         load(tmp_path, changed)
     assert '\n' not in str(caught.value)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(DeviceFileError, match=r'cannot read .*nowhere'):
+    with pytest.raises(FileError, match=r'cannot read .*nowhere'):
         load_calibration(tmp_path / 'nowhere.yaml', WIRES)
 
 

@@ -1,22 +1,21 @@
 import numpy as np
 import pytest
 
+from endoscope_core.errors import FileError
 from endoscope_devices.load_cells import TareError, apply_saved_tare, save_tare, tare_path
 from endoscope_devices.load_cells.calibration_file import (
     FaultLimits,
     LoadCellCalibration,
-    SerialSettings,
     TareLimits,
     Transmitter,
     WireCell,
 )
 from endoscope_devices.load_cells.tare import TareWindow, with_zero, zero_after_tare
-from endoscope_devices.strict_yaml import DeviceFileError
 
 MS = 1_000_000
 WIRES = ('pos', 'neg')
 CALIBRATION = LoadCellCalibration(
-    Transmitter(1, 4, True, 200.0, 0.02, 0.0, SerialSettings()),
+    Transmitter(),
     {'pos': WireCell(0, 'int32', 0.001, 1, 100.0), 'neg': WireCell(2, 'int32', 0.002, -1, 0.0)},
     FaultLimits(-9e4, 9e4, -8e4, 8e4),
     TareLimits(),
@@ -93,5 +92,5 @@ def test_a_tare_of_another_calibration_is_refused(tmp_path):
     path = tmp_path / 'cells.tare.yaml'
     save_tare(path, CALIBRATION)
     path.write_text(path.read_text().replace('abc', 'abd'))
-    with pytest.raises(DeviceFileError, match='taken with another calibration: remove it'):
+    with pytest.raises(FileError, match='taken with another calibration: remove it'):
         apply_saved_tare(path, CALIBRATION)

@@ -7,6 +7,7 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
 from std_srvs.srv import Trigger
 
+from endoscope_core.errors import FileError
 from endoscope_core.kinematics import (
     RegistrationError,
     StraightRegistration,
@@ -22,7 +23,6 @@ from endoscope_devices.em_tracker import (
     load_registration,
     save_registration,
 )
-from endoscope_devices.strict_yaml import DeviceFileError
 from endoscope_nodes.diagnostics import ERROR, OK, STALE, WARN, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
@@ -89,7 +89,7 @@ class EmTrackerNode(EndoscopeNode):
         if p.registration_file and Path(p.registration_file).exists():
             try:
                 self._registration = load_registration(p.registration_file)
-            except (DeviceFileError, ValueError) as error:
+            except FileError as error:
                 raise ParameterError(
                     f"em_tracker: parameter 'registration_file': {error}"
                 ) from error

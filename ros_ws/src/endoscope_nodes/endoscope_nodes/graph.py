@@ -4,7 +4,8 @@ import sys
 import time
 from functools import partial
 
-from endoscope_core.rig import RigFileError, load_rig
+from endoscope_core.errors import FileError
+from endoscope_core.rig import load_rig
 from endoscope_nodes.calibration_node import CalibrationNode
 from endoscope_nodes.compensator_node import CompensatorNode
 from endoscope_nodes.conductor_node import SelfStartingConductor
@@ -56,7 +57,7 @@ def _is_simulated(runtime: Runtime) -> bool:
         return False
     try:
         devices = load_rig(str(given['motor_driver'].get('rig_file') or '') or None).devices
-    except RigFileError:
+    except FileError:
         # The first node says what is wrong with it.
         return False
     return all(

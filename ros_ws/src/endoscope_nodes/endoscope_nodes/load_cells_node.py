@@ -2,6 +2,7 @@
 
 from std_srvs.srv import Trigger
 
+from endoscope_core.errors import FileError
 from endoscope_core.physics import SensorModel
 from endoscope_devices.load_cells import (
     CONNECTIONS,
@@ -13,7 +14,6 @@ from endoscope_devices.load_cells import (
     tare_path,
 )
 from endoscope_devices.motor_device import DeviceError
-from endoscope_devices.strict_yaml import DeviceFileError
 from endoscope_nodes.diagnostics import ERROR, OK, STALE, Report
 from endoscope_nodes.endoscope_node import EndoscopeNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
@@ -78,7 +78,7 @@ class LoadCellsNode(EndoscopeNode):
                 tare_path(p.calibration_file), load_calibration(p.calibration_file, WIRES)
             )
             cells = CONNECTIONS[device](p.port, calibration)
-        except DeviceFileError as error:
+        except FileError as error:
             raise ParameterError(f"load_cells: parameter 'calibration_file': {error}") from error
         except DeviceError as error:
             raise ParameterError(f"load_cells: parameter 'port': {error}") from error

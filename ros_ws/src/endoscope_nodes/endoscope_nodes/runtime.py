@@ -25,8 +25,9 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.errors import FileError
 from endoscope_core.physics import PlantDescription
-from endoscope_core.rig import Rig, RigFileError, load_rig
+from endoscope_core.rig import Rig, load_rig
 from endoscope_nodes.announcement import Announcement
 from endoscope_nodes.declared_parameters import check_overrides, declare_parameters
 from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
@@ -221,7 +222,7 @@ class Runtime(ClosedOnExit):
         if self._rig is None:
             try:
                 self._rig = load_rig(given.rig_file or None)
-            except RigFileError as error:
+            except FileError as error:
                 raise ParameterError(f"{node.get_name()}: parameter 'rig_file': {error}") from error
         simulation = self._rig.simulation
         self._plant_source = (

@@ -1,6 +1,7 @@
 """The plant that the nodes of a simulated slave share."""
 
-from endoscope_core.physics import PlantDescription, PlantFileError, load_plant
+from endoscope_core.errors import FileError
+from endoscope_core.physics import PlantDescription, load_plant
 from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.effects import describe
 from endoscope_nodes.names import JOINTS
@@ -13,7 +14,7 @@ def load_slave(source: str, path: str) -> PlantDescription:
         return PlantDescription()
     try:
         plant = load_plant(path)
-    except (PlantFileError, OSError) as error:
+    except (FileError, OSError) as error:
         raise ParameterError(f'{source}: {error}') from error
     if plant.joint_names() != JOINTS:
         raise ParameterError(

@@ -1,10 +1,13 @@
 """Opens classifier weights, by default those that come with this package."""
 
-import math
+import sys
+from dataclasses import dataclass, fields
 from importlib.resources import files
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from endoscope_core.classifier.classification import WIRES, ClassifierError
 from endoscope_core.classifier.cnn_classifier import (
@@ -13,8 +16,26 @@ from endoscope_core.classifier.cnn_classifier import (
     cnn_shapes,
     course,
 )
-from endoscope_core.classifier.weights_file import classes_of, fitting, read_weights, unusable
+from endoscope_core.classifier.weights_file import fitting, read_weights, unusable
+from endoscope_core.schema import read, within
 from endoscope_core.signals import SINUSOID, calibration_motion
+
+_Positive = Annotated[float, Meta(gt=0.0, le=sys.float_info.max, description='a positive number')]
+
+
+@dataclass(frozen=True)
+class _Description:
+    """What the classifier needs of a description, which says more."""
+
+    motion: str
+    classes_deg: tuple[Annotated[int, within(0, 360)], ...]
+    inflation: _Positive
+    ceiling: _Positive
+    doubt: _Positive
+
+    def __post_init__(self) -> None:
+        if len(self.classes_deg) < 2 or list(self.classes_deg) != sorted(set(self.classes_deg)):
+            raise ValueError('classes_deg must be two or more, increasing')
 
 
 def shipped_weights(motion: str) -> Path:
@@ -32,24 +53,19 @@ def load_classifier(weights: str | Path | None = None, motion: str = SINUSOID) -
     path = Path(weights) if weights else shipped_weights(motion)
     description, state = read_weights(path)
     try:
-        classes = classes_of(description)
-        calibration = HeldOutCalibration(
-            *(float(description[key]) for key in ('inflation', 'ceiling', 'doubt'))
-        )
-        numbers = tuple(vars(calibration).values())
-        if not all(math.isfinite(x) and x > 0.0 for x in numbers):
-            raise ValueError(f'inflation, ceiling and doubt are {numbers}')
-        if description['motion'] != motion:
-            raise ClassifierError(
-                f'{path} was trained on the {description["motion"]} calibration, not the '
-                f'{motion} one'
-            )
-        own = fitting(state, cnn_shapes(len(classes)), np.float32)
-    except ClassifierError:
-        raise
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        needed = {
+            f.name: description[f.name] for f in fields(_Description) if f.name in description
+        }
+        described = read(_Description, needed, path.with_suffix('.json').name)
+        own = fitting(state, cnn_shapes(len(described.classes_deg)), np.float32)
+    except ValueError as error:
         raise unusable(path, error) from error
-    classifier = CnnClassifier(own, calibration, classes, motion)
+    if described.motion != motion:
+        raise ClassifierError(
+            f'{path} was trained on the {described.motion} calibration, not the {motion} one'
+        )
+    calibration = HeldOutCalibration(described.inflation, described.ceiling, described.doubt)
+    classifier = CnnClassifier(own, calibration, described.classes_deg, motion)
     # Slack wires' constant tension shows whether the numbers go together at all.
     slack = np.full((calibration_motion(motion).samples, WIRES), 1.0)
     judgement = classifier.judged(course(slack, motion)[None])

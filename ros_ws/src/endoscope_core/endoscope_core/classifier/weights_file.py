@@ -105,19 +105,6 @@ def fitting(
     return state
 
 
-def classes_of(description: dict[str, Any]) -> tuple[int, ...]:
-    """Backlash sizes of the classes in deg: whole, increasing, within a turn, or ValueError."""
-    classes = description.get('classes_deg')
-    if (
-        not isinstance(classes, list)
-        or any(type(c) is not int or not 0 <= c <= 360 for c in classes)
-        or len(classes) < 2
-        or classes != sorted(set(classes))
-    ):
-        raise ValueError('classes_deg must be whole, increasing degrees')
-    return tuple(classes)
-
-
 def unusable(path: str | Path, error: Exception) -> ClassifierError:
     """The error to raise where what was read does not fit together."""
     return ClassifierError(f'{path} holds no classifier weights: {error}')

@@ -28,6 +28,7 @@ from endoscope_core.identification.updated_table import (
     shipped_table_path,
 )
 from endoscope_core.rig import shipped_rig
+from endoscope_core.schema import read
 from endoscope_core.signals import CALIBRATION_RATE
 
 _SAMPLE_STEP = 10
@@ -188,18 +189,34 @@ def load_class_parameters(
             f'{model}`'
         )
     try:
-        content: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-        held = str(content['model'])
-        if held != model:
-            raise ClassParameterError(f'{path} holds parameters of {held}, not of {model}')
+        file = read(_File, json.loads(path.read_text(encoding='utf-8')), path.name)
+        if file.model != model:
+            raise ClassParameterError(f'{path} holds parameters of {file.model}, not of {model}')
         return {
-            int(class_deg): parameters_from_dict(model, entry['feedforward'])
-            for class_deg, entry in content['classes'].items()
+            int(class_deg): parameters_from_dict(model, sets.feedforward)
+            for class_deg, sets in file.classes.items()
         }
     except ClassParameterError:
         raise
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, TypeError, RecursionError) as error:
         raise ClassParameterError(f'{path} holds no {model} parameter sets: {error}') from error
+
+
+@dataclass(frozen=True)
+class _Class:
+    feedforward: Mapping[str, Any]
+    model: Any = None
+    model_rmse: Any = None
+
+
+@dataclass(frozen=True)
+class _File:
+    model: str
+    classes: Mapping[str, _Class]
+    schema: Any = 1
+    command: Any = None
+    dataset_manifest_sha256: Any = None
+    lead: Any = None
 
 
 def parameters_for_class(sets: Mapping[int, LawParameters], class_deg: int) -> LawParameters:

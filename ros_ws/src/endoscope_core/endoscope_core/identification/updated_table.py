@@ -15,6 +15,7 @@ from typing import Any
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.parameter_blend import KINDS, LawParameters, blend
+from endoscope_core.schema import read
 
 SAME_SIZE = math.radians(0.5)
 
@@ -166,19 +167,30 @@ class UpdatedTable:
         if not path.is_file():
             raise UpdatedTableError(f'{path} is missing: make a table with `endoscope identify`')
         try:
-            content: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-            model = str(content['model'])
+            file = read(_File, json.loads(path.read_text(encoding='utf-8')), path.name)
             entries = [
                 TableEntry(
-                    float(entry['size']),
-                    parameters_from_dict(model, entry['parameters']),
-                    str(entry.get('source', '')),
+                    entry.size, parameters_from_dict(file.model, entry.parameters), entry.source
                 )
-                for entry in content['entries']
+                for entry in file.entries
             ]
-            return cls.of(model, entries)
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            return cls.of(file.model, entries)
+        except (ValueError, TypeError, RecursionError) as error:
             raise UpdatedTableError(f'{path} holds no updated table: {error}') from error
+
+
+@dataclass(frozen=True)
+class _Entry:
+    size: float
+    parameters: Mapping[str, Any]
+    source: str = ''
+
+
+@dataclass(frozen=True)
+class _File:
+    model: str
+    entries: tuple[_Entry, ...]
+    schema: Any = 1
 
 
 def parameters_to_dict(parameters: LawParameters) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from endoscope_core.physics.description import (
     SensorParameters,
     TermSpec,
 )
-from endoscope_core.physics.plant_file import PlantFileError, load_plant, save_plant
+from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.physics.recording import recording_faults
 from endoscope_core.physics.samples import RecordingFaults
 from endoscope_core.physics.sensing import SensorModel
@@ -22,7 +22,6 @@ __all__ = [
     'EffectSpec',
     'JointParameters',
     'PlantDescription',
-    'PlantFileError',
     'PlantSample',
     'PlantSimulator',
     'PlantTrajectory',

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from endoscope_core.physics.layout import PROFILE_TERMS
+from endoscope_core.schema import Number
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ class EffectSpec:
 
     id: str
     joint: str
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, Number] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

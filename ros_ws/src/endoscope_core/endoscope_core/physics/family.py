@@ -9,20 +9,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
+from msgspec import Meta
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_core.physics.description import JointParameters
 from endoscope_core.physics.layout import NOMINAL_KEYS
-from endoscope_core.strict_yaml import YamlError, load_yaml
+from endoscope_core.schema import Number, load
 
 SHIPPED = Path(__file__).with_name('family.yaml')
 CENTRE = math.radians(120.0)
@@ -38,21 +39,25 @@ _DIGITS = 6
 
 
 class FamilyError(EndoscopeError, ValueError):
-    """A family that cannot be read, or a tube that is none of it."""
+    """A tube that is none of a family."""
 
 
 @dataclass(frozen=True)
 class Readings:
     """How the recorded rig reads its plant."""
 
-    load_cell_offset: tuple[float, float] = (0.0, 0.0)  # of each cell without tension, N
-    load_cell_delay: float = 0.0  # by how much tensions are recorded late, s
-    tracker_delay: float = 0.0  # by how much the angle is recorded late, s
+    # Of each cell without tension, N.
+    load_cell_offset: Annotated[
+        tuple[Number, Number],
+        Meta(description='two numbers, of the positive and negative wire'),
+    ] = (0.0, 0.0)
+    load_cell_delay: Number = 0.0  # by how much tensions are recorded late, s
+    tracker_delay: Number = 0.0  # by how much the angle is recorded late, s
 
 
 @dataclass(frozen=True)
 class TubeFamily:
-    """Joints of one rig over the bend of its tube; a FamilyError if a line is not valid."""
+    """Joints of one rig over the bend of its tube; a ValueError if a line is not valid."""
 
     # Of a nominal key: its value at `CENTRE`, then by how much it, or its logarithm, grows with the
     # bend and with its square, counted in `SPAN` from `CENTRE`. Keys left out are nominal.
@@ -65,11 +70,11 @@ class TubeFamily:
     def __post_init__(self) -> None:
         for key, line in self.lines.items():
             if key not in NOMINAL_KEYS:
-                raise FamilyError(f'unknown key {key}: {nearest(key, NOMINAL_KEYS)}')
+                raise ValueError(f'unknown key {key}: {nearest(key, NOMINAL_KEYS)}')
             if not 1 <= len(line) <= _MOST_TERMS or not np.all(np.isfinite(line)):
-                raise FamilyError(f'{key} is {list(line)}: give 1 to {_MOST_TERMS} finite numbers')
+                raise ValueError(f'{key} is {list(line)}: give 1 to {_MOST_TERMS} finite numbers')
             if key not in SIGNED and line[0] <= 0.0:
-                raise FamilyError(f'{key} is {line[0]} at the centre: it must be positive')
+                raise ValueError(f'{key} is {line[0]} at the centre: it must be positive')
 
     def joint(self, bend: float) -> JointParameters:
         """The joint of a tube bent by `bend` rad; a FamilyError outside of 0 to `MOST_BENT`."""
@@ -104,15 +109,8 @@ class TubeFamily:
 
 
 def load_family(path: str | Path = SHIPPED) -> TubeFamily:
-    """Read a family; a FamilyError names the file and the key at fault."""
-    try:
-        content = load_yaml(path)
-    except YamlError as error:
-        raise FamilyError(f'family of tubes: {error}') from error
-    try:
-        return _family(content)
-    except (FamilyError, TypeError, ValueError) as error:
-        raise FamilyError(f'{path}: {error}') from error
+    """Read a family; a FileError names the file and the key at fault."""
+    return load(_File, path, 'family of tubes').family()
 
 
 @cache
@@ -121,40 +119,24 @@ def shipped_family() -> TubeFamily:
     return load_family()
 
 
-def _family(content: Any) -> TubeFamily:
-    sections = ('schema', 'provenance', 'readings', 'friction_profile', 'lines')
-    if not isinstance(content, dict) or content.get('schema') != 1:
-        raise FamilyError('no family of tubes of schema 1')
-    for key in content:
-        if key not in sections:
-            raise FamilyError(f'unknown key {key}: {nearest(str(key), sections)}')
-    readings = content.get('readings') or {}
-    known = [item.name for item in dataclasses.fields(Readings)]
-    for key in readings:
-        if key not in known:
-            raise FamilyError(f'readings: unknown key {key}: {nearest(str(key), known)}')
-    offset = _numbers(readings.get('load_cell_offset', (0.0, 0.0)), 'load_cell_offset')
-    if len(offset) != 2:
-        raise FamilyError('load_cell_offset: give two numbers, of the positive and negative wire')
-    return TubeFamily(
-        {key: _numbers(line, key) for key, line in (content.get('lines') or {}).items()},
-        _numbers(content.get('friction_profile') or (), 'friction_profile'),
-        Readings(
-            (offset[0], offset[1]),
-            float(readings.get('load_cell_delay', 0.0)),
-            float(readings.get('tracker_delay', 0.0)),
-        ),
-        content.get('provenance') or {},
+@dataclass(frozen=True)
+class _File:
+    schema: Literal[1]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    readings: Readings = field(default_factory=Readings)
+    friction_profile: tuple[Number, ...] = ()
+    lines: Mapping[Literal[NOMINAL_KEYS], tuple[Number, ...]] = (  # type: ignore[valid-type]
+        field(default_factory=dict)
     )
+
+    def __post_init__(self) -> None:
+        self.family()
+
+    def family(self) -> TubeFamily:
+        return TubeFamily(self.lines, self.friction_profile, self.readings, self.provenance)
 
 
 def _rounded(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_rounded(each) for each in value]
     return float(f'{value:.{_DIGITS}g}')
-
-
-def _numbers(given: Sequence[Any], key: str) -> tuple[float, ...]:
-    if not isinstance(given, (list, tuple)):
-        raise FamilyError(f'{key} is {given!r}: give a list of numbers')
-    return tuple(float(value) for value in given)

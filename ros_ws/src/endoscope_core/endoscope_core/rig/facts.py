@@ -1,67 +1,22 @@
 """rig.yaml: gear, limits, time-outs and devices of a rig, said once for every node."""
 
-import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import yaml
+from msgspec import Meta
 
 from endoscope_core.choices import LOAD_CELL_DEVICES, MOTOR_DEVICES, TRACKER_DEVICES
-from endoscope_core.errors import EndoscopeError, nearest
-from endoscope_core.strict_yaml import YamlError, load_yaml, parse_yaml
+from endoscope_core.schema import one_of, read, within
+from endoscope_core.strict_yaml import load_yaml, parse_yaml
 
 SHIPPED = Path(__file__).with_name('rig.yaml')
-
-
-class RigFileError(EndoscopeError, ValueError):
-    """A rig file that cannot be used; the message names the file, the key and what to do."""
-
-
-def _fact(low: float, high: float) -> Any:
-    """A number within bounds."""
-
-    def checked(value: Any) -> float:
-        wanted = f'give a number from {low:g} to {high:g}'
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ValueError(wanted)
-        if not low <= value <= high:
-            raise ValueError(wanted)
-        return float(value)
-
-    return field(metadata={'checked': checked})
-
-
-def _choice(*choices: str) -> Any:
-    def checked(value: Any) -> str:
-        if value not in choices:
-            raise ValueError(f'give one of {", ".join(choices)}')
-        return str(value)
-
-    return field(metadata={'checked': checked})
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError('give a text')
-    return value
-
-
-def _name() -> Any:
-    def checked(value: Any) -> str:
-        if not isinstance(value, str) or not re.fullmatch('[A-Za-z][A-Za-z0-9_]*', value):
-            raise ValueError('give a name of letters, digits and underscores')
-        return value
-
-    return field(metadata={'checked': checked})
-
-
-def _count(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise ValueError('give a whole number from 0 on')
-    return value
+NAME = Meta(
+    pattern=r'^[A-Za-z][A-Za-z0-9_]*\Z', description='a name of letters, digits and underscores'
+)
 
 
 @dataclass(frozen=True)
@@ -87,14 +42,14 @@ class JointFacts:
         Largest distance in rad from the measured pose to the first command of a stream.
     """
 
-    gear: float = _fact(0.01, 100.0)
-    reach: float = _fact(0.1, 3.1)
-    drive: float = _fact(0.1, 10.0)
-    correction: float = _fact(0.0, 3.1)
-    speed: float = _fact(0.01, 100.0)
-    acceleration: float = _fact(0.1, 1e4)
-    hand_speed: float = _fact(0.01, 20.0)
-    entry_step: float = _fact(0.001, 1.0)
+    gear: Annotated[float, within(0.01, 100.0)]
+    reach: Annotated[float, within(0.1, 3.1)]
+    drive: Annotated[float, within(0.1, 10.0)]
+    correction: Annotated[float, within(0.0, 3.1)]
+    speed: Annotated[float, within(0.01, 100.0)]
+    acceleration: Annotated[float, within(0.1, 1e4)]
+    hand_speed: Annotated[float, within(0.01, 20.0)]
+    entry_step: Annotated[float, within(0.001, 1.0)]
 
 
 @dataclass(frozen=True)
@@ -115,12 +70,12 @@ class MotorFacts:
         One count of their encoders in rad.
     """
 
-    reach: float = _fact(0.01, 20.0)
-    speed: float = _fact(0.01, 100.0)
-    acceleration: float = _fact(0.1, 1e5)
-    step: float = _fact(1e-4, 1.0)
-    entry_step: float = _fact(0.001, 1.0)
-    resolution: float = _fact(0.0, 0.1)
+    reach: Annotated[float, within(0.01, 20.0)]
+    speed: Annotated[float, within(0.01, 100.0)]
+    acceleration: Annotated[float, within(0.1, 1e5)]
+    step: Annotated[float, within(1e-4, 1.0)]
+    entry_step: Annotated[float, within(0.001, 1.0)]
+    resolution: Annotated[float, within(0.0, 0.1)]
 
 
 @dataclass(frozen=True)
@@ -137,9 +92,9 @@ class Timeouts:
         Silence of the handle after which it counts as released.
     """
 
-    command: float = _fact(0.001, 1.0)
-    stream: float = _fact(0.005, 10.0)
-    handle: float = _fact(0.01, 1.0)
+    command: Annotated[float, within(0.001, 1.0)]
+    stream: Annotated[float, within(0.005, 10.0)]
+    handle: Annotated[float, within(0.01, 1.0)]
 
     @cached_property
     def command_ns(self) -> int:
@@ -161,8 +116,8 @@ class Timeouts:
 class TensionFacts:
     """Tensions of a wire in N."""
 
-    ceiling: float = _fact(0.1, 500.0)  # at which the slave goes to FAULT
-    calibration_ceiling: float = _fact(0.1, 500.0)  # at which a calibration is aborted
+    ceiling: Annotated[float, within(0.1, 500.0)]  # at which the slave goes to FAULT
+    calibration_ceiling: Annotated[float, within(0.1, 500.0)]  # at which a calibration is aborted
 
 
 @dataclass(frozen=True)
@@ -175,7 +130,7 @@ class HandleFacts:
         One count of its encoders in rad.
     """
 
-    resolution: float = _fact(0.0, 0.1)
+    resolution: Annotated[float, within(0.0, 0.1)]
 
 
 @dataclass(frozen=True)
@@ -190,8 +145,8 @@ class InstrumentFacts:
         Frame of its beginning, z along the straight instrument: that of all poses.
     """
 
-    section_length: float = _fact(0.001, 0.5)
-    base_frame: str = _name()
+    section_length: Annotated[float, within(0.001, 0.5)]
+    base_frame: Annotated[str, NAME]
 
 
 @dataclass(frozen=True)
@@ -204,9 +159,9 @@ class DeviceFacts:
         One of `MOTOR_DEVICES`, `LOAD_CELL_DEVICES` and `TRACKER_DEVICES`.
     """
 
-    motors: str = _choice(*MOTOR_DEVICES)
-    load_cells: str = _choice(*LOAD_CELL_DEVICES)
-    tracker: str = _choice(*TRACKER_DEVICES)
+    motors: Annotated[str, one_of(MOTOR_DEVICES)]
+    load_cells: Annotated[str, one_of(LOAD_CELL_DEVICES)]
+    tracker: Annotated[str, one_of(TRACKER_DEVICES)]
 
 
 @dataclass(frozen=True)
@@ -221,8 +176,8 @@ class RecordingFacts:
         MB of all such recordings in one run of the graph, after which there are no more; 0: none.
     """
 
-    rest: float = _fact(1.0, 1e6)
-    room: float = _fact(0.0, 1e6)
+    rest: Annotated[float, within(1.0, 1e6)]
+    room: Annotated[float, within(0.0, 1e6)]
 
 
 @dataclass(frozen=True)
@@ -237,8 +192,8 @@ class SimulationFacts:
         Of the noise of its sensors.
     """
 
-    plant: str = field(metadata={'checked': _text})
-    seed: int = field(metadata={'checked': _count})
+    plant: str
+    seed: Annotated[int, within(0)]
 
 
 @dataclass(frozen=True)
@@ -280,12 +235,12 @@ def load_rig(path: str | Path | None = None) -> Rig:
 
     Raises
     ------
-    RigFileError
+    FileError
         It cannot be read, has an unknown key, or a value out of range.
     """
     if path is None or not str(path):
         return _rig({}, 'the shipped rig')
-    rig = _rig(_content(Path(path)), f'rig file {path}')
+    rig = _rig(load_yaml(path), f'rig file {path}')
     if not rig.simulation.plant:
         return rig
     plant = Path(path).parent / rig.simulation.plant
@@ -308,13 +263,10 @@ def rig_from_text(text: str, name: str) -> Rig:
 
     Raises
     ------
-    RigFileError
+    FileError
         It has an unknown key, or a value out of range.
     """
-    try:
-        return _rig(_mapping(parse_yaml(text, name), name), name)
-    except YamlError as error:
-        raise RigFileError(str(error)) from error
+    return _rig(parse_yaml(text, name), name)
 
 
 @cache
@@ -323,51 +275,17 @@ def shipped_rig() -> Rig:
     return load_rig()
 
 
-def _content(path: Path) -> Mapping[str, Any]:
-    try:
-        return _mapping(load_yaml(path), f'rig file {path}')
-    except YamlError as error:
-        raise RigFileError(str(error)) from error
+def _rig(own: Any, where: str) -> Rig:
+    return read(Rig, _over(load_yaml(SHIPPED), own), where)
 
 
-def _mapping(content: Any, where: str) -> Mapping[str, Any]:
-    if not isinstance(content, Mapping):
-        raise RigFileError(f'{where} has to be a mapping')
-    return content
-
-
-def _rig(own: Mapping[str, Any], where: str) -> Rig:
-    shipped = _content(SHIPPED)
-    parts = {f.name: f.type for f in fields(Rig)}
-    _check_keys(own, parts, where)
-    made = {
-        name: _part(kind, shipped[name], own.get(name), f'{where}: {name}')
-        for name, kind in parts.items()
-    }
-    try:
-        return Rig(**made)
-    except ValueError as error:
-        raise RigFileError(f'{where}: {error}') from error
-
-
-def _part(kind: Any, shipped: Mapping[str, Any], own: Any, where: str) -> Any:
-    if own is None:
-        own = {}
+def _over(shipped: Mapping[str, Any], own: Any) -> Any:
+    """What a file says, and where it says nothing what the shipped one does."""
     if not isinstance(own, Mapping):
-        raise RigFileError(f'{where} has to be a mapping, not {own!r}')
-    known = {f.name: f.metadata['checked'] for f in fields(kind)}
-    _check_keys(own, known, where)
-    values = {}
-    for name, checked in known.items():
-        value = own.get(name, shipped[name])
-        try:
-            values[name] = checked(value)
-        except ValueError as error:
-            raise RigFileError(f'{where}.{name} is {value!r}: {error}') from error
-    return kind(**values)
-
-
-def _check_keys(given: Mapping[str, Any], known: Mapping[str, Any], where: str) -> None:
-    for key in given:
-        if key not in known:
-            raise RigFileError(f'{where}: unknown key {key}: {nearest(str(key), tuple(known))}')
+        return own
+    said = {
+        key: _over(part, {} if own.get(key) is None else own[key])
+        for key, part in shipped.items()
+        if isinstance(part, Mapping)
+    }
+    return {**shipped, **own, **said}

@@ -3,14 +3,17 @@
 import datetime
 import math
 from collections import deque
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from endoscope_core.atomic_output import write_text
+from endoscope_core.errors import FileError
 from endoscope_core.kinematics import StraightRegistration, register_straight
+from endoscope_core.schema import load
 from endoscope_devices.em_tracker.aurora_tracker import TrackerReading
-from endoscope_devices.strict_yaml import DeviceFileError, load_section
 
 WINDOW_NS = 1_000_000_000
 
@@ -77,12 +80,20 @@ def load_registration(path: str | Path) -> StraightRegistration:
 
     Raises
     ------
-    DeviceFileError
+    FileError
         It cannot be read as a registration.
     """
-    file = load_section(path, 'registration', ('registered', 'position', 'orientation'))
-    orientation = file.vector('orientation', 4)
-    norm = math.hypot(*orientation)
+    what = 'registration'
+    file = load(_Registration, path, what)
+    norm = math.hypot(*file.orientation)
     if not 0.0 < norm < math.inf:
-        raise DeviceFileError(f'registration {path}: {list(orientation)} is not an orientation')
-    return StraightRegistration(file.vector('position', 3), tuple(v / norm for v in orientation))
+        raise FileError(f'{what} {path}: orientation {list(file.orientation)} is no direction')
+    x, y, z, w = (v / norm for v in file.orientation)
+    return StraightRegistration(file.position, (x, y, z, w))
+
+
+@dataclass(frozen=True)
+class _Registration:
+    position: tuple[float, float, float]
+    orientation: tuple[float, float, float, float]
+    registered: Any = None

@@ -85,7 +85,7 @@ class SerialLine(Line):
             self._port = serial.Serial(
                 self._path,
                 self._settings.baud,
-                parity=self._settings.parity,
+                parity=self._settings.parity[0].upper(),
                 stopbits=self._settings.stop_bits,
                 timeout=0.0,
                 write_timeout=1.0,

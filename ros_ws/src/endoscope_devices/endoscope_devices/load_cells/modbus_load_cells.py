@@ -164,7 +164,7 @@ class ModbusLoadCells(ReadingThread[WireReading]):
                 self._judge(reading.asked_ns, reading.registers)
 
     def _judge(self, time_ns: int, registers: tuple[int, ...]) -> None:
-        big = self.calibration.transmitter.big_word_first
+        big = self.calibration.transmitter.word_order == 'big'
         tension = []
         for check in self._checks:
             start = check.cell.register - self._first

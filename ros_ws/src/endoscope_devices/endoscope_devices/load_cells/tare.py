@@ -2,17 +2,18 @@
 
 import datetime
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.errors import EndoscopeError
-from endoscope_devices.load_cells.calibration_file import LoadCellCalibration, TareLimits
-from endoscope_devices.strict_yaml import DeviceFileError, load_section
+from endoscope_core.errors import EndoscopeError, FileError
+from endoscope_core.schema import load
+from endoscope_devices.load_cells.calibration_file import Count, LoadCellCalibration, TareLimits
 
 WINDOW_NS = 1_000_000_000
 _FEWEST = 20
@@ -128,15 +129,25 @@ def apply_saved_tare(path: str | Path, calibration: LoadCellCalibration) -> Load
 
     Raises
     ------
-    DeviceFileError
+    FileError
         The tare cannot be read, or belongs to another state of the calibration file.
     """
     if not Path(path).exists():
         return calibration
-    file = load_section(path, 'tare', ('calibration_sha256', 'tared', 'zero'))
-    if file.text('calibration_sha256') != calibration.digest:
-        raise DeviceFileError(
+    tare = load(_Tare, path, 'tare')
+    if tare.calibration_sha256 != calibration.digest:
+        raise FileError(
             f'tare {path} was taken with another calibration: remove it, then tare again'
         )
-    section = file.section('zero', tuple(calibration.wires))
-    return with_zero(calibration, [section.number(name, -1e12, 1e12) for name in calibration.wires])
+    if set(tare.zero) != set(calibration.wires):
+        raise FileError(
+            f'tare {path}: zero has {", ".join(tare.zero)}: give {", ".join(calibration.wires)}'
+        )
+    return with_zero(calibration, [tare.zero[name] for name in calibration.wires])
+
+
+@dataclass(frozen=True)
+class _Tare:
+    calibration_sha256: str
+    zero: Mapping[str, Count]
+    tared: Any = None

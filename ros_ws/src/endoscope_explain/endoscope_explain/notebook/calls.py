@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from endoscope_bags import open_bag
 from endoscope_core.choices import WAIVABLE
-from endoscope_core.errors import EndoscopeError, nearest
-from endoscope_core.physics import PlantDescription, PlantFileError, load_plant, recording_faults
+from endoscope_core.errors import EndoscopeError, FileError, nearest
+from endoscope_core.physics import PlantDescription, load_plant, recording_faults
 from endoscope_core.physics.packing import pack
 from endoscope_core.rig import Rig, load_rig
 from endoscope_explain.fit.free_parameters import BAND
@@ -184,7 +184,7 @@ def _plant(plant: Plant) -> PlantDescription:
         pack(plant)
         recording_faults(plant)
     except ValueError as error:
-        raise PlantFileError(f'the plant: {error}') from error
+        raise FileError(f'the plant: {error}') from error
     return plant
 
 

@@ -70,7 +70,7 @@ def recording_from_bag(
     BagError
         Any of endoscope_bags: the bag is cut, empty, lacks a topic or every joint, holds NaN ...
         Also if its stamps cannot be used.
-    RigFileError
+    FileError
         The rig that the bag carries cannot be read.
     """
     bag = open_bag(path)

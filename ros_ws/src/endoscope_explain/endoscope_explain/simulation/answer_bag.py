@@ -186,7 +186,7 @@ def write_answer(
     `rig`: whose gear desired angles are times; that which the recording carries by default.
     Returns: number of messages written.
     Raises NoCommandsError, BagError: if the recording has no usable commands, or `out` exists.
-    Raises RigFileError: if the rig that the recording carries cannot be read.
+    Raises FileError: if the rig that the recording carries cannot be read.
     """
     rig = rig or rig_of_bag(recording)
     commands = commands_of_bag(recording, plant, rig)
