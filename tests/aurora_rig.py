@@ -4,8 +4,8 @@ import time
 from collections import deque
 from itertools import pairwise
 
-from endoscope_devices.em_tracker.aurora_emulator import InstrumentInField
-from endoscope_devices.em_tracker.aurora_unit import SensorView
+from endoscope_emulators.aurora import InstrumentInField
+from endoscope_emulators.aurora_unit import SensorView
 
 
 class Instrument:

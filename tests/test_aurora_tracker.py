@@ -24,11 +24,11 @@ from endoscope_devices.em_tracker import (
     load_registration,
     save_registration,
 )
-from endoscope_devices.em_tracker.aurora_emulator import AuroraEmulator
 from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
-from endoscope_devices.em_tracker.aurora_unit import SensorView, sealed
 from endoscope_devices.em_tracker.pose_check import TURN_NOISE, TURN_RATE
 from endoscope_devices.em_tracker.tx_reply import MalformedReplyError, parse_tx
+from endoscope_emulators.aurora import AuroraEmulator
+from endoscope_emulators.aurora_unit import SensorView, sealed
 
 LATENCY = 0.03
 

@@ -19,7 +19,7 @@ from std_msgs.msg import String
 
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_devices.dynamixel.control_table import COUNT
-from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
+from endoscope_emulators.dynamixel.process import EmulatorProcess
 from endoscope_nodes.compensator_node import CompensatorNode
 from endoscope_nodes.console_node import ConsoleNode
 from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription

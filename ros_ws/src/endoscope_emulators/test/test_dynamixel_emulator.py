@@ -6,8 +6,8 @@ from dynamixel_sdk import PacketHandler as SdkPacketHandler
 from patient_clients import PatientPort
 
 from endoscope_devices.dynamixel import control_table as table
-from endoscope_devices.dynamixel.emulator.bus import EmulatedBus
-from endoscope_devices.dynamixel.emulator.servo import EmulatedServo, ErrorNumber
+from endoscope_emulators.dynamixel.bus import EmulatedBus
+from endoscope_emulators.dynamixel.servo import EmulatedServo, ErrorNumber
 
 ACCESS, RANGE, LENGTH, LIMIT = (
     ErrorNumber.ACCESS,

@@ -3,8 +3,8 @@
 import pytest
 
 from endoscope_devices.dynamixel.doctor import examine
-from endoscope_devices.dynamixel.emulator.bus import EmulatedBus
-from endoscope_devices.dynamixel.emulator.servo import EmulatedServo
+from endoscope_emulators.dynamixel.bus import EmulatedBus
+from endoscope_emulators.dynamixel.servo import EmulatedServo
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """An Aurora behind a pseudo-terminal, for drivers and third-party clients alike.
 
-``python -m endoscope_devices.em_tracker.aurora_emulator --link /tmp/aurora`` runs one by itself.
+``python -m endoscope_emulators.aurora --link /tmp/aurora`` runs one by itself.
 
 The line has the host's baud rate: what comes at another rate than the tracker's is garbled, and
 bytes take the time that they take at that rate.  A pseudo-terminal carries no serial break.  In its
@@ -24,7 +24,7 @@ from pathlib import Path
 
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.kinematics import about_z, multiply, rotate, tip_pose
-from endoscope_devices.em_tracker.aurora_unit import AuroraUnit, SensorSource, SensorView
+from endoscope_emulators.aurora_unit import AuroraUnit, SensorSource, SensorView
 
 _TERMIOS_BAUD = {
     getattr(termios, f'B{rate}'): rate for rate in (9600, 19200, 38400, 57600, 115200, 921600)

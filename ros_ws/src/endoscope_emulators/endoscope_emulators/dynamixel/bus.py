@@ -18,8 +18,6 @@ from typing import Self
 
 from endoscope_devices.dynamixel import control_table as table
 from endoscope_devices.dynamixel.control_table import BAUD_CODES, RETURN_DELAY_UNIT
-from endoscope_devices.dynamixel.emulator.faults import LineFaults
-from endoscope_devices.dynamixel.emulator.servo import EmulatedServo, ErrorNumber
 from endoscope_devices.dynamixel.packet import (
     BROADCAST_ID,
     CRC_SIZE,
@@ -32,6 +30,8 @@ from endoscope_devices.dynamixel.packet import (
     encode,
 )
 from endoscope_devices.dynamixel.serial_port import byte_time
+from endoscope_emulators.dynamixel.faults import LineFaults
+from endoscope_emulators.dynamixel.servo import EmulatedServo, ErrorNumber
 
 # Linux: termios with the speeds as numbers (asm-generic/ioctls.h), and the slack of timers.
 _TCGETS2 = 0x802C542A

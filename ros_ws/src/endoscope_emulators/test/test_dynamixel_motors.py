@@ -21,9 +21,6 @@ from endoscope_devices.dynamixel.control_table import (
 )
 from endoscope_devices.dynamixel.doctor import examine
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
-from endoscope_devices.dynamixel.emulator.bus import EmulatedBus
-from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
-from endoscope_devices.dynamixel.emulator.servo import EmulatedServo
 from endoscope_devices.dynamixel.packet_handler import (
     NoReplyError,
     PacketHandler,
@@ -33,6 +30,9 @@ from endoscope_devices.dynamixel.packet_handler import (
 from endoscope_devices.dynamixel.serial_port import BusPort
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_devices.motor_device import DeviceError
+from endoscope_emulators.dynamixel.bus import EmulatedBus
+from endoscope_emulators.dynamixel.process import EmulatorProcess
+from endoscope_emulators.dynamixel.servo import EmulatedServo
 
 # A busy machine may keep the emulator from answering for a while.
 PATIENT_MARGIN_S = 0.3

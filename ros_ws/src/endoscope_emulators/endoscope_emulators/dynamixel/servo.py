@@ -24,7 +24,7 @@ from endoscope_devices.dynamixel.control_table import (
     WATCHDOG_UNIT,
     Register,
 )
-from endoscope_devices.dynamixel.emulator.shaft import FirstOrderShaft
+from endoscope_emulators.dynamixel.shaft import FirstOrderShaft
 
 STEP_S = 1e-3
 REBOOT_S = 0.2

@@ -5,7 +5,7 @@ import tty
 from pathlib import Path
 
 from endoscope_core.closed_on_exit import ClosedOnExit
-from endoscope_devices.emulation.byte_relay import ByteRelay, Tap, faithful
+from endoscope_emulators.cables.byte_relay import ByteRelay, Tap, faithful
 
 
 class SerialCable(ClosedOnExit):

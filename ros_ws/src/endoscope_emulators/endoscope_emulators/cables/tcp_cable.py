@@ -4,7 +4,7 @@ import socket
 import threading
 
 from endoscope_core.closed_on_exit import ClosedOnExit
-from endoscope_devices.emulation.byte_relay import ByteRelay, Tap, faithful
+from endoscope_emulators.cables.byte_relay import ByteRelay, Tap, faithful
 
 
 class TcpCable(ClosedOnExit):

@@ -1,4 +1,4 @@
-"""Runs an emulated bus as a process: ``python -m endoscope_devices.dynamixel.emulator``.
+"""Runs an emulated bus as a process: ``python -m endoscope_emulators.dynamixel``.
 
 The first line of its output is the port.  Each line of its input is a JSON list of a method of
 :class:`EmulatedBus` or of the faults, and arguments; each is answered with a line of JSON.
@@ -12,9 +12,9 @@ from pathlib import Path
 
 from endoscope_devices.dynamixel import control_table as table
 from endoscope_devices.dynamixel.control_table import BAUD_CODES, COUNT, Register
-from endoscope_devices.dynamixel.emulator.bus import EmulatedBus
-from endoscope_devices.dynamixel.emulator.servo import EmulatedServo
-from endoscope_devices.dynamixel.emulator.shaft import FirstOrderShaft
+from endoscope_emulators.dynamixel.bus import EmulatedBus
+from endoscope_emulators.dynamixel.servo import EmulatedServo
+from endoscope_emulators.dynamixel.shaft import FirstOrderShaft
 
 _SHOWN = {
     'torque': table.TORQUE_ENABLE,

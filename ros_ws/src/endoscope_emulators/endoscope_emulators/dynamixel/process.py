@@ -20,7 +20,7 @@ class EmulatorProcess(ClosedOnExit):
         link: Path | None = None,
         stiffness: float = 0.2,
     ) -> None:
-        command = [sys.executable, '-m', 'endoscope_devices.dynamixel.emulator']
+        command = [sys.executable, '-m', 'endoscope_emulators.dynamixel']
         command += ['--ids', *map(str, ids), '--baud', str(baud), '--stiffness', str(stiffness)]
         command += [] if link is None else ['--link', str(link)]
         self._process = subprocess.Popen(
