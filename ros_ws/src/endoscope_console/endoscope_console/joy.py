@@ -11,8 +11,8 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.teleop.frames import MalformedFrameError
 from endoscope_core.teleop.joy_mapping import JoyMapping
 from endoscope_core.teleop.operator import Reason
-from endoscope_nodes.qos import profile
-from endoscope_nodes.raw_subscription import RawSubscription
+from endoscope_nodes.runtime.qos import profile
+from endoscope_nodes.runtime.raw_subscription import RawSubscription
 from endoscope_nodes.topics import Qos
 
 TOPIC = 'joy'

@@ -17,11 +17,15 @@ from endoscope_bringup.operating.terminal import Terminal, TerminalLostError
 from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import printable
 from endoscope_core.teleop import KeyboardHandle, Request, Turn
-from endoscope_nodes.graph_client import GraphClient
-from endoscope_nodes.graph_listener import CONSOLE, GraphRefusedError
-from endoscope_nodes.graph_parameters import read_parameter, request_parameters, set_parameters
-from endoscope_nodes.handle_sender import HandleSender, handle_senders
-from endoscope_nodes.joint_stream import JointReader
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import CONSOLE, GraphRefusedError
+from endoscope_nodes.client.graph_parameters import (
+    read_parameter,
+    request_parameters,
+    set_parameters,
+)
+from endoscope_nodes.client.handle_sender import HandleSender, handle_senders
+from endoscope_nodes.client.order_feedback import HOME, SUCCEEDED
 from endoscope_nodes.names import (
     JOINTS,
     MASTER_CLUTCH,
@@ -31,8 +35,8 @@ from endoscope_nodes.names import (
     SLAVE_COMMAND,
     SLAVE_MEASURED,
 )
-from endoscope_nodes.order_feedback import HOME, SUCCEEDED
-from endoscope_nodes.qos import COMMAND
+from endoscope_nodes.runtime.joint_stream import JointReader
+from endoscope_nodes.runtime.qos import COMMAND
 
 _TURN_NS = 10_000_000
 _SHOWN_NS = 100_000_000
