@@ -9,9 +9,9 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from endoscope_bags.errors import MalformedMessageError
+from endoscope_console.teleop.envelope import Envelope
+from endoscope_console.teleop.frames import POINTS, encode_telemetry
 from endoscope_core.kinematics import centre_line
-from endoscope_core.teleop.envelope import Envelope
-from endoscope_core.teleop.frames import POINTS, encode_telemetry
 from endoscope_nodes.names import (
     JOINTS,
     MOTOR_COMMAND,

@@ -72,10 +72,10 @@ def run(args: argparse.Namespace) -> int:
     """Teleoperate until Q; return 1 if the graph refuses it."""
     import sys
 
-    from endoscope_bringup.operating.terminal import check_terminal
+    from endoscope_bringup.teleop.terminal import check_terminal
 
     check_terminal()
-    from endoscope_bringup.operating.teleoperation import teleoperate
+    from endoscope_bringup.teleop.teleoperation import teleoperate
     from endoscope_nodes.client.graph_listener import GraphRefusedError
     from endoscope_nodes.client.joined_graph import joined_graph
 

@@ -13,10 +13,10 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 from endoscope_bags.errors import MalformedMessageError
-from endoscope_bringup.operating.terminal import Terminal, TerminalLostError
+from endoscope_bringup.teleop.keyboard_handle import KeyboardHandle, Request, Turn
+from endoscope_bringup.teleop.terminal import Terminal, TerminalLostError
 from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import printable
-from endoscope_core.teleop import KeyboardHandle, Request, Turn
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import CONSOLE, GraphRefusedError
 from endoscope_nodes.client.graph_parameters import (

@@ -2,8 +2,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from endoscope_core.teleop import KeyEvent, KeyEventKind, TerminalKeys
-from endoscope_core.teleop.terminal_keys import FOCUS_LOST
+from endoscope_bringup.teleop.terminal_keys import FOCUS_LOST, KeyEvent, KeyEventKind, TerminalKeys
 
 PRESS, REPEAT, RELEASE = KeyEventKind
 

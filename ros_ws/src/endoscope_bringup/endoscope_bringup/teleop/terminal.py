@@ -8,16 +8,17 @@ import sys
 import termios
 import time
 
-from endoscope_core.closed_on_exit import ClosedOnExit
-from endoscope_core.errors import EndoscopeError
-from endoscope_core.teleop import KeyEvent, TerminalKeys
-from endoscope_core.teleop.terminal_keys import (
+from endoscope_bringup.teleop.terminal_keys import (
     ASK_FOR_EVENTS,
     ASK_FOR_FOCUS,
     ASK_WHETHER,
     END_EVENTS,
     END_FOCUS,
+    KeyEvent,
+    TerminalKeys,
 )
+from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.errors import EndoscopeError
 
 _ANSWERED_S = 0.3
 _ESCAPE_S = 0.05

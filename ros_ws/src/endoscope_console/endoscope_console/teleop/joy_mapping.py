@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from endoscope_console.teleop.frames import InputFrame, MalformedFrameError, Source
 from endoscope_core.errors import EndoscopeError, nearest
-from endoscope_core.teleop.frames import InputFrame, MalformedFrameError, Source
 
 DEFAULTS: Mapping[str, bool | int | float] = {
     'require_enable_button': True,

@@ -13,7 +13,8 @@ from hypothesis.stateful import (
 )
 from page_in_virtual_time import MS, Page
 
-from endoscope_core.teleop import DeadManState, Reason, Source
+from endoscope_console.teleop.frames import Source
+from endoscope_console.teleop.operator import DeadManState, Reason
 
 OPEN, READY, ENGAGED = DeadManState
 # So far apart that what is allowed for drifting clocks makes no difference.

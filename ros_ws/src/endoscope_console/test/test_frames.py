@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endoscope_core.teleop import (
+from endoscope_console.teleop.frames import (
+    POINTS,
     InputFrame,
     MalformedFrameError,
     Source,
@@ -16,7 +17,6 @@ from endoscope_core.teleop import (
     encode_input,
     encode_telemetry,
 )
-from endoscope_core.teleop.frames import POINTS
 
 FRAME = InputFrame(
     pressed=True,

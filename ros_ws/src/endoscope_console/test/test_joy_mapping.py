@@ -3,14 +3,9 @@ import math
 import pytest
 from page_in_virtual_time import MS, Page
 
-from endoscope_core.teleop import (
-    DeadManState,
-    JoyMapping,
-    JoyMappingError,
-    MalformedFrameError,
-    Reason,
-    Source,
-)
+from endoscope_console.teleop.frames import MalformedFrameError, Source
+from endoscope_console.teleop.joy_mapping import JoyMapping, JoyMappingError
+from endoscope_console.teleop.operator import DeadManState, Reason
 
 AXES = [0.0] * 6
 NOTHING = [0] * 11

@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from endoscope_core.teleop import Conditions, DeadManState, InputFrame, OperatorDeadMan
+from endoscope_console.teleop.frames import InputFrame
+from endoscope_console.teleop.operator import Conditions, DeadManState, OperatorDeadMan
 
 MS = 1_000_000
 PICTURE_NS = 33 * MS

@@ -3,8 +3,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from endoscope_core.teleop import Claim, Lease
-from endoscope_core.teleop.lease import SILENCE_NS
+from endoscope_console.teleop.lease import SILENCE_NS, Claim, Lease
 
 MS = 1_000_000
 

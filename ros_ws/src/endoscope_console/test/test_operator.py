@@ -3,7 +3,8 @@ from dataclasses import replace
 import pytest
 from page_in_virtual_time import MS, Page
 
-from endoscope_core.teleop import Conditions, DeadManState, OperatorDeadMan, Reason, Source
+from endoscope_console.teleop.frames import Source
+from endoscope_console.teleop.operator import Conditions, DeadManState, OperatorDeadMan, Reason
 
 OPEN, READY, ENGAGED = DeadManState
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from endoscope_core.teleop.frames import InputFrame
+from endoscope_console.teleop.frames import InputFrame
 from endoscope_core.teleop.running_angles import RunningAngles
 
 _RAMP_NS = 20_000_000

@@ -4,8 +4,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endoscope_core.teleop import SPEEDS, KeyboardHandle, KeyEvent, KeyEventKind, Request
-from endoscope_core.teleop.keyboard_handle import FIRST_REPEAT_NS, MOVES, REPEAT_NS
+from endoscope_bringup.teleop.keyboard_handle import (
+    FIRST_REPEAT_NS,
+    MOVES,
+    REPEAT_NS,
+    SPEEDS,
+    KeyboardHandle,
+    Request,
+)
+from endoscope_bringup.teleop.terminal_keys import KeyEvent, KeyEventKind
 
 PRESS, REPEAT, RELEASE = KeyEventKind
 MS = 1_000_000

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from page_in_virtual_time import MS, NEUTRAL
 
-from endoscope_core.teleop import PadHandle
+from endoscope_console.teleop.pad import PadHandle
 
 SPEEDS = ((0.5, 1.0), (0.25, 2.0))
 LIMITS = (3.0, 3.0)
