@@ -6,8 +6,8 @@ from itertools import pairwise
 
 from scipy.spatial.transform import Rotation
 
-from endoscope_devices.em_tracker.aurora_emulator import InstrumentInField
-from endoscope_devices.em_tracker.aurora_unit import SensorView
+from endoscope_emulators.aurora import InstrumentInField
+from endoscope_emulators.aurora_unit import SensorView
 
 
 def angle_between(first, second) -> float:

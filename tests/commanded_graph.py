@@ -15,7 +15,7 @@ from endoscope_nodes.names import (
     MOTORS,
     SLAVE_COMMAND,
 )
-from endoscope_nodes.qos import COMMAND, EVENT, SENSOR_OFFERED
+from endoscope_nodes.runtime.qos import COMMAND, EVENT, SENSOR_OFFERED
 
 RIG = load_rig()
 # What a goal of the shafts may change in a tick: the shaper's speed, and rounding.

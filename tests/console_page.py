@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from endoscope_core.teleop.frames import InputFrame, decode_telemetry, encode_input
+from endoscope_console.teleop.frames import InputFrame, decode_telemetry, encode_input
 
 PERIOD_S = 0.02
 _PATIENCE_S = 60.0

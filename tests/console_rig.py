@@ -13,11 +13,11 @@ from private_domain import private_domain
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, Joy
 
-from endoscope_nodes.graph_parameters import read_parameter, set_parameters
-from endoscope_nodes.joined_graph import joined_graph
-from endoscope_nodes.joint_stream import JointReader
+from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
+from endoscope_nodes.client.joined_graph import joined_graph
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
-from endoscope_nodes.qos import EVENT, profile
+from endoscope_nodes.runtime.joint_stream import JointReader
+from endoscope_nodes.runtime.qos import EVENT, profile
 from endoscope_nodes.topics import Qos
 
 CONSOLE = [sys.executable, '-m', 'endoscope_bringup.cli', 'console']

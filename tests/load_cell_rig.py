@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from endoscope_devices.load_cells.transmitter_emulator import TransmitterEmulator
+from endoscope_emulators.transmitter import TransmitterEmulator
 from endoscope_nodes.names import WIRES
 
 NEWTON_PER_COUNT = 0.001

@@ -22,8 +22,8 @@ from simulated_graph import TICK_RATE, SimulatedGraph
 
 from endoscope_bringup.cli import main
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
-from endoscope_nodes.qos import EVENT
-from endoscope_nodes.recorder_node import RecorderNode
+from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.runtime.qos import EVENT
 
 ENDOSCOPE = [sys.executable, '-m', 'endoscope_bringup.cli']
 # A shell does this for the programs that it starts.

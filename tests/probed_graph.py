@@ -7,10 +7,10 @@ from probed_runtime import ProbedRuntime
 from rclpy.parameter import Parameter
 from std_msgs.msg import Header, String
 
-from endoscope_nodes.matching import all_matched
 from endoscope_nodes.names import MOTION_SESSION, OPERATING_STATE, STATE_COMMAND
-from endoscope_nodes.qos import EVENT, RESULT
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.runtime.matching import all_matched
+from endoscope_nodes.runtime.qos import EVENT, RESULT
+from endoscope_nodes.runtime.runtime import Runtime
 
 
 class ProbedGraph(ProbedRuntime):

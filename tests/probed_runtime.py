@@ -7,7 +7,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from endoscope_core.closed_on_exit import ClosedOnExit
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.runtime.runtime import Runtime
 
 _LOOK_S = 0.002
 

@@ -15,11 +15,11 @@ from std_msgs.msg import Header, String
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_poses
 from endoscope_bags.message_types import TF_MESSAGE
 from endoscope_core.rig import shipped_rig
-from endoscope_nodes.joint_transforms import JointTransforms, section_of
-from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
-from endoscope_nodes.recorded_topics import message_class
-from endoscope_nodes.recorder_node import RecorderNode
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.nodes.joint_transforms import JointTransforms, section_of
+from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
+from endoscope_nodes.runtime.recorded_topics import message_class
+from endoscope_nodes.runtime.runtime import Runtime
 
 PATIENCE_S = 60.0
 

@@ -13,12 +13,6 @@ from rclpy.context import Context
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from endoscope_nodes.compensator_node import CompensatorNode
-from endoscope_nodes.console_node import ConsoleNode
-from endoscope_nodes.em_tracker_node import EmTrackerNode
-from endoscope_nodes.joint_stream import JointSubscription
-from endoscope_nodes.load_cells_node import LoadCellsNode
-from endoscope_nodes.motor_driver_node import MotorDriverNode
 from endoscope_nodes.names import (
     JOINTS,
     MOTOR_MEASURED,
@@ -29,10 +23,16 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.qos import LOCK_STEP
-from endoscope_nodes.recorder_node import RecorderNode
-from endoscope_nodes.runtime import Runtime
-from endoscope_nodes.supervisor_node import SupervisorNode
+from endoscope_nodes.nodes.compensator import CompensatorNode
+from endoscope_nodes.nodes.console import ConsoleNode
+from endoscope_nodes.nodes.em_tracker import EmTrackerNode
+from endoscope_nodes.nodes.load_cells import LoadCellsNode
+from endoscope_nodes.nodes.motor_driver import MotorDriverNode
+from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.nodes.supervisor import SupervisorNode
+from endoscope_nodes.runtime.joint_stream import JointSubscription
+from endoscope_nodes.runtime.qos import LOCK_STEP
+from endoscope_nodes.runtime.runtime import Runtime
 
 PATIENCE_S = 120.0
 NODES = (

@@ -9,12 +9,12 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
-from endoscope_nodes.joint_stream import JointSample, JointSubscription
 from endoscope_nodes.names import CALIBRATION_RESULT, CALIBRATION_RUN, JOINTS
-from endoscope_nodes.qos import LOCK_STEP, RESULT
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.nodes.conductor import ConductorNode
+from endoscope_nodes.runtime.joint_stream import JointSample, JointSubscription
+from endoscope_nodes.runtime.qos import LOCK_STEP, RESULT
+from endoscope_nodes.runtime.runtime import Runtime
 
 PATIENCE_S = 120.0
 TICK_RATE = 500

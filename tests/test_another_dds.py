@@ -15,7 +15,6 @@ from operated_graph import OperatedGraph
 from endoscope_bags.message_types import TF_MESSAGE, message_type
 from endoscope_core.rig import shipped_rig
 from endoscope_nodes.graph import SHOWING_NODES
-from endoscope_nodes.joint_transforms import section_of
 from endoscope_nodes.names import (
     JOINTS,
     MOTOR_MEASURED,
@@ -26,6 +25,7 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
+from endoscope_nodes.nodes.joint_transforms import section_of
 
 PAGE = WORKSPACE / 'doc/other_programs.md'
 STREAMS = {MOTOR_MEASURED: MOTORS, WIRES_MEASURED: WIRES, SLAVE_MEASURED: JOINTS}

@@ -15,7 +15,7 @@ from aurora_rig import angle_between
 from device_readings import until
 from sksurgerynditracker.nditracker import NDITracker
 
-from endoscope_devices.em_tracker.aurora_emulator import InstrumentInField
+from endoscope_emulators.aurora import InstrumentInField
 
 BENDING = (0.5, -0.2)
 
@@ -23,7 +23,7 @@ BENDING = (0.5, -0.2)
 @pytest.fixture(scope='module')
 def port(tmp_path_factory):
     link = tmp_path_factory.mktemp('aurora') / 'ttyAurora'
-    command = [sys.executable, '-m', 'endoscope_devices.em_tracker.aurora_emulator']
+    command = [sys.executable, '-m', 'endoscope_emulators.aurora']
     with subprocess.Popen(
         [*command, '--link', str(link), '--bending', *map(str, BENDING)], stdout=subprocess.PIPE
     ) as process:

@@ -24,12 +24,11 @@ from endoscope_devices.em_tracker import (
     load_registration,
     save_registration,
 )
-from endoscope_devices.em_tracker.aurora_emulator import AuroraEmulator
 from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
-from endoscope_devices.em_tracker.aurora_unit import SensorView, sealed
 from endoscope_devices.em_tracker.pose_check import TURN_NOISE, TURN_RATE
 from endoscope_devices.em_tracker.tx_reply import MalformedReplyError, parse_tx
-from endoscope_devices.strict_yaml import DeviceFileError
+from endoscope_emulators.aurora import AuroraEmulator
+from endoscope_emulators.aurora_unit import SensorView, sealed
 
 LATENCY = 0.03
 
@@ -287,7 +286,7 @@ def test_registered_straight_it_gives_both_bending_angles(tracker, instrument, t
 def test_a_registration_that_turns_nowhere_is_refused(tmp_path, orientation):
     path = tmp_path / 'straight.yaml'
     save_registration(path, StraightRegistration((0.0, 0.0, 0.0), tuple(orientation)))
-    with pytest.raises(DeviceFileError, match=r'straight.yaml: .* is not an orientation'):
+    with pytest.raises(FileError, match=r'straight.yaml: .* is not an orientation'):
         load_registration(path)
 
 

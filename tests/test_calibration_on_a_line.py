@@ -9,10 +9,10 @@ from load_cell_rig import LATENCY, CellsOnWires, transmitter, write_calibration
 from sensor_graph import NODES, SensorGraph
 from tubes import tube_of_size
 
-from endoscope_devices.emulation.serial_cable import SerialCable
-from endoscope_nodes.calibration_node import CalibrationNode
+from endoscope_emulators.cables.serial_cable import SerialCable
 from endoscope_nodes.names import CALIBRATION_RESULT
-from endoscope_nodes.qos import RESULT
+from endoscope_nodes.nodes.calibration import CalibrationNode
+from endoscope_nodes.runtime.qos import RESULT
 
 # What a calibration says where this machine lets the graph or the line wait for too long.
 LONGEST_S = 600.0

@@ -13,7 +13,7 @@ from websockets.sync.client import connect
 
 from endoscope_console.clients import FRAMES_A_SECOND, UNANSWERED
 from endoscope_console.connections import AT_ONCE
-from endoscope_core.teleop.frames import InputFrame, encode_input
+from endoscope_console.teleop.frames import InputFrame, encode_input
 
 _PATIENCE_S = 60.0
 _REQUEST = 'GET / HTTP/1.1\r\n{}\r\n\r\n'

@@ -14,8 +14,8 @@ import pytest
 import yaml
 
 from endoscope_console import command as console_command
-from endoscope_nodes.node_parameters import OF_NODE, BeatParameters
-from endoscope_nodes.parameters import described
+from endoscope_nodes.runtime.node_parameters import OF_NODE, BeatParameters
+from endoscope_nodes.runtime.parameters import described
 
 ROOT = Path(__file__).parents[1]
 COMPOSE_FILE = ROOT / 'docker' / 'compose.yaml'

@@ -113,6 +113,7 @@ def test_the_walk_finds_the_packages() -> None:
         'endoscope_console',
         'endoscope_core',
         'endoscope_devices',
+        'endoscope_emulators',
         'endoscope_explain',
         'endoscope_nodes',
     }

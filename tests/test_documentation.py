@@ -22,8 +22,8 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_explain.report.sentences import EVIDENCE
 from endoscope_nodes import program
-from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
-from endoscope_nodes.parameters import described
+from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
+from endoscope_nodes.runtime.parameters import described
 from endoscope_nodes.topics import SERVICES, TOPICS
 
 ENDOSCOPE = {*COMMANDS, *commands_of_other_packages()}

@@ -14,7 +14,7 @@ from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.rig import load_rig
 from endoscope_nodes.names import CALIBRATION_FEEDBACK, CALIBRATION_NUMBERS
-from endoscope_nodes.qos import RESULT, profile
+from endoscope_nodes.runtime.qos import RESULT, profile
 from endoscope_nodes.topics import Qos
 
 

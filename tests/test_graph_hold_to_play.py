@@ -7,9 +7,9 @@ from sensor_msgs.msg import Joy
 from simulated_graph import TICK_RATE
 
 from endoscope_core.signals.command_file import write_command_file
-from endoscope_nodes.console_node import WAITING
 from endoscope_nodes.names import MASTER_CLUTCH
-from endoscope_nodes.qos import EVENT
+from endoscope_nodes.nodes.console import WAITING
+from endoscope_nodes.runtime.qos import EVENT
 
 REACH = 0.6
 RAMP_S = 1.0

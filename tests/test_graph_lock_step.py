@@ -5,8 +5,8 @@ import pytest
 from simulated_graph import SimulatedGraph
 
 from endoscope_core.physics import PlantDescription, SensorModel, simulate
-from endoscope_nodes.conductor_node import BarrierTimeout
 from endoscope_nodes.names import MOTORS, WIRES
+from endoscope_nodes.nodes.conductor import BarrierTimeout
 
 STREAMS = {
     'slave/servo_jp': ('bend_x', 'bend_y'),

@@ -8,8 +8,8 @@ from tubes import tube_of_size
 from endoscope_core.control import Reach, reach
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import load_plant
-from endoscope_nodes.diagnostics import WARN
 from endoscope_nodes.names import JOINTS, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
+from endoscope_nodes.runtime.diagnostics import WARN
 
 
 def warnings(graph, name):

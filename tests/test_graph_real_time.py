@@ -15,7 +15,7 @@ from std_msgs.msg import Header, String
 
 from endoscope_core.rig import Timeouts, load_rig
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.runtime.runtime import Runtime
 
 NAMESPACE = '/endoscope/'
 PATIENCE_S = 240.0

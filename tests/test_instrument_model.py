@@ -13,7 +13,7 @@ from endoscope_bags.message_types import TF_MESSAGE, message_type, typestore
 from endoscope_core.kinematics import tip_pose
 from endoscope_core.rig import shipped_rig
 from endoscope_nodes.graph import SHOWING_NODES
-from endoscope_nodes.recorder_node import RecorderNode
+from endoscope_nodes.nodes.recorder import RecorderNode
 
 RIG = replace(shipped_rig(), instrument=replace(shipped_rig().instrument, section_length=0.03))
 JOINT_STATES = '/endoscope/joint_states'

@@ -7,11 +7,11 @@ from private_domain import private_domain
 from rclpy.context import Context
 
 from endoscope_nodes.graph import CONTROL_NODES, SHOWING_NODES, SLAVE_NODES
-from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
-from endoscope_nodes.parameters import described
-from endoscope_nodes.qos import profile
-from endoscope_nodes.recorded_topics import message_class
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
+from endoscope_nodes.runtime.parameters import described
+from endoscope_nodes.runtime.qos import profile
+from endoscope_nodes.runtime.recorded_topics import message_class
+from endoscope_nodes.runtime.runtime import Runtime
 from endoscope_nodes.topics import BY_NAME, SERVICES, TOPICS
 
 NAMESPACE = '/endoscope/'

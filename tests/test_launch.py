@@ -11,9 +11,9 @@ from types import ModuleType, SimpleNamespace
 import pytest
 from doc_pages import WORKSPACE
 
-from endoscope_nodes.node_parameters import OF_NODE, BeatParameters
-from endoscope_nodes.parameters import described
 from endoscope_nodes.program import NODES
+from endoscope_nodes.runtime.node_parameters import OF_NODE, BeatParameters
+from endoscope_nodes.runtime.parameters import described
 
 FILE = WORKSPACE / 'src/endoscope_bringup/launch/endoscope.launch.py'
 

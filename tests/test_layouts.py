@@ -16,7 +16,7 @@ from simulated_graph import SimulatedGraph
 from endoscope_bags import open_bag
 from endoscope_bags.message_types import typestore
 from endoscope_nodes.graph import SHOWING_NODES
-from endoscope_nodes.recorder_node import RecorderNode
+from endoscope_nodes.nodes.recorder import RecorderNode
 
 LAYOUTS = WORKSPACE / 'src' / 'endoscope_bringup' / 'layouts'
 FOXGLOVE = json.loads((LAYOUTS / 'foxglove.json').read_text())

@@ -14,9 +14,9 @@ from commanded_graph import BOUND, RIG, STILL, TICK_S, Handle, Moved, run
 from sensor_msgs.msg import JointState, Joy
 from simulated_graph import TICK_RATE, SimulatedGraph
 
-from endoscope_nodes.diagnostics import OK, WARN
 from endoscope_nodes.names import CORRECTION, MOTOR_MEASURED, MOTORS, SLAVE_COMMAND
-from endoscope_nodes.qos import COMMAND
+from endoscope_nodes.runtime.diagnostics import OK, WARN
+from endoscope_nodes.runtime.qos import COMMAND
 
 # pytest looks for the fixtures of a test in its own module.
 foreign, console = commanded_graph.foreign, commanded_graph.console

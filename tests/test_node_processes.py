@@ -15,7 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from endoscope_nodes.qos import EVENT, SENSOR_ASKED
+from endoscope_nodes.runtime.qos import EVENT, SENSOR_ASKED
 
 DOMAIN = private_domain()
 NODES = (

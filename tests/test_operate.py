@@ -11,7 +11,7 @@ from private_domain import private_domain
 from std_msgs.msg import String
 
 from endoscope_bringup.cli import main
-from endoscope_nodes.qos import EVENT
+from endoscope_nodes.runtime.qos import EVENT
 
 
 @pytest.fixture(scope='module')

@@ -24,10 +24,10 @@ from std_srvs.srv import Trigger
 from endoscope_bags import BagError, open_bag
 from endoscope_bags.cdr_encoding import encode_clock, encode_joint_state, encode_string
 from endoscope_bags.message_types import message_type
-from endoscope_nodes.diagnostics import OK, WARN
-from endoscope_nodes.parameters import ParameterError
-from endoscope_nodes.qos import EVENT, LOCK_STEP, RESULT, SENSOR_ASKED, SENSOR_OFFERED
-from endoscope_nodes.recorder_node import new_bag
+from endoscope_nodes.nodes.recorder import new_bag
+from endoscope_nodes.runtime.diagnostics import OK, WARN
+from endoscope_nodes.runtime.parameters import ParameterError
+from endoscope_nodes.runtime.qos import EVENT, LOCK_STEP, RESULT, SENSOR_ASKED, SENSOR_OFFERED
 
 MS = 10**6
 

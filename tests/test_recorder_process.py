@@ -22,7 +22,7 @@ from endoscope_bags.cdr_encoding import encode_joint_state
 from endoscope_bags.errors import TruncatedBagError
 from endoscope_bags.information import bag_information
 from endoscope_bags.recovery import recover
-from endoscope_nodes.qos import EVENT, SENSOR_OFFERED
+from endoscope_nodes.runtime.qos import EVENT, SENSOR_OFFERED
 
 TOPIC = '/endoscope/motor/measured_js'
 

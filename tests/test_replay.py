@@ -12,10 +12,10 @@ from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
 from endoscope_bags.message_types import JOINT_STATE, STRING
 from endoscope_bags.qos_profile import COMMAND_QOS, LATCHED_QOS
-from endoscope_nodes.parameters import ParameterError
-from endoscope_nodes.qos import EVENT, SENSOR_OFFERED
-from endoscope_nodes.replay_node import ReplayNode
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.nodes.replay import ReplayNode
+from endoscope_nodes.runtime.parameters import ParameterError
+from endoscope_nodes.runtime.qos import EVENT, SENSOR_OFFERED
+from endoscope_nodes.runtime.runtime import Runtime
 
 MS = 10**6
 START = 1_790_000_000 * 10**9

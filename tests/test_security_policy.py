@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from simulated_graph import SimulatedGraph
 
-from endoscope_nodes.recorder_node import RecorderNode
+from endoscope_nodes.nodes.recorder import RecorderNode
 
 POLICY = Path(__file__).parents[1] / 'ros_ws' / 'security' / 'policy.xml'
 NAMESPACE = '/endoscope'

@@ -18,7 +18,6 @@ from simulated_graph import PATIENCE_S, TICK_RATE
 from std_msgs.msg import Header, String
 
 from endoscope_core.safety import Refusal
-from endoscope_nodes.diagnostics import ERROR, OK, status
 from endoscope_nodes.names import (
     CALIBRATION_RESULT,
     CORRECTION,
@@ -31,7 +30,8 @@ from endoscope_nodes.names import (
     OPERATING_STATE,
     SLAVE_COMMAND,
 )
-from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, status
+from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
 
 LOW_REACH = {'low': -0.5, 'high': 0.5}
 # pytest looks for the fixtures of a test in its own module.

@@ -18,12 +18,12 @@ from sensor_graph import PATIENCE_S, SensorGraph
 
 from endoscope_bags import open_bag
 from endoscope_bags.errors import BagError
-from endoscope_devices.em_tracker.aurora_emulator import AuroraEmulator
-from endoscope_devices.emulation.serial_cable import SerialCable
-from endoscope_nodes.em_tracker_node import EmTrackerNode
-from endoscope_nodes.load_cells_node import LoadCellsNode
-from endoscope_nodes.parameters import ParameterError
-from endoscope_nodes.runtime import Runtime
+from endoscope_emulators.aurora import AuroraEmulator
+from endoscope_emulators.cables.serial_cable import SerialCable
+from endoscope_nodes.nodes.em_tracker import EmTrackerNode
+from endoscope_nodes.nodes.load_cells import LoadCellsNode
+from endoscope_nodes.runtime.parameters import ParameterError
+from endoscope_nodes.runtime.runtime import Runtime
 
 CELLS = 'load_cells: cells'
 TRACKER = 'em_tracker: tracker'

@@ -14,7 +14,7 @@ from operated_graph import ENDOSCOPE, OperatedGraph, Typist, plain, told
 from sensor_msgs.msg import Joy
 
 from endoscope_nodes.names import MASTER_CLUTCH
-from endoscope_nodes.qos import EVENT
+from endoscope_nodes.runtime.qos import EVENT
 
 UP, W, A, H = plain(b'\x1b[A'), plain(b'w'), plain(b'a'), plain(b'h')
 FAR = 0.06

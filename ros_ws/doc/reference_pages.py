@@ -28,8 +28,8 @@ from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.plant_file import plant_to_mapping
 from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_nodes import program
-from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
-from endoscope_nodes.parameters import Described, as_typed, described
+from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
+from endoscope_nodes.runtime.parameters import Described, as_typed, described
 from endoscope_nodes.topics import RECORDED, SERVICES, TOPICS, TRIGGER, Qos, Topic
 
 PAGES = sorted(Path(__file__).parent.rglob('*.md'))

@@ -17,7 +17,7 @@ setup(
     zip_safe=False,
     maintainer='The endoscope founders',
     maintainer_email='founders@endoscope.invalid',
-    description='Servo, load-cell and tracker protocols with their emulators, free of ROS.',
+    description='Servo, load-cell and tracker protocols, free of ROS.',
     license='Apache-2.0',
     entry_points={'console_scripts': []},
 )

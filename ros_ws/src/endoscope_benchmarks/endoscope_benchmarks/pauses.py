@@ -9,7 +9,7 @@ from sensor_msgs.msg import JointState
 from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
 from endoscope_core.control.smoothing import COUNT
 from endoscope_nodes.names import CALIBRATION_COMMAND, CALIBRATION_RUN, SLAVE_COMMAND
-from endoscope_nodes.qos import COMMAND
+from endoscope_nodes.runtime.qos import COMMAND
 
 ASKED = ('home', 'motion', 'handle', 'calibrate')
 SAID_S = 0.5

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from endoscope_bringup.cli import main
-from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
+from endoscope_emulators.dynamixel.process import EmulatorProcess
 
 SPEEDS = ['--baud', '57600', '1000000']
 

@@ -125,7 +125,7 @@ def test_bash_completes_a_command():
 @pytest.mark.parametrize(('level', 'said'), [('info', True), ('error', False)])
 def test_the_level_of_the_log_holds_for_the_nodes_of_a_command(tmp_path, level, said):
     begun = (
-        'import sys; from endoscope_nodes.runtime import Runtime; '
+        'import sys; from endoscope_nodes.runtime.runtime import Runtime; '
         'Runtime.spin = lambda runtime: None; '
         'from endoscope_bringup.cli import main; sys.exit(main(sys.argv[1:]))'
     )

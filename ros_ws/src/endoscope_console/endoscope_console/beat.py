@@ -13,10 +13,10 @@ from typing import Self
 
 from rclpy.node import Node
 
-from endoscope_core.teleop.frames import InputFrame
-from endoscope_core.teleop.operator import Conditions, DeadManState, OperatorDeadMan, Reason
-from endoscope_core.teleop.pad import PadHandle
-from endoscope_nodes.handle_sender import HandleSender
+from endoscope_console.teleop.frames import InputFrame
+from endoscope_console.teleop.operator import Conditions, DeadManState, OperatorDeadMan, Reason
+from endoscope_console.teleop.pad import PadHandle
+from endoscope_nodes.client.handle_sender import HandleSender
 
 _BEAT_NS = 4_000_000
 _IDLE_NS = 20_000_000

@@ -20,15 +20,15 @@ from endoscope_console.pictures import Pictures
 from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_CLASS, BY_PLANT, PHYSICAL, PLAYS
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.rig import load_rig
-from endoscope_nodes.calibration_result import REACH
-from endoscope_nodes.diagnostics import OK, WARN, status
-from endoscope_nodes.graph_client import GraphClient
-from endoscope_nodes.graph_listener import CONSOLE, GraphRefusedError, Health
-from endoscope_nodes.graph_parameters import read_parameter, set_parameters
-from endoscope_nodes.handle_sender import handle_senders
-from endoscope_nodes.joined_graph import joined_node
+from endoscope_nodes.client.calibration_result import REACH
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import CONSOLE, GraphRefusedError, Health
+from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
+from endoscope_nodes.client.handle_sender import handle_senders
+from endoscope_nodes.client.joined_graph import joined_node
 from endoscope_nodes.names import CONSOLE_LOG, FINISHED
-from endoscope_nodes.qos import EVENT
+from endoscope_nodes.runtime.diagnostics import OK, WARN, status
+from endoscope_nodes.runtime.qos import EVENT
 
 NODE = 'console_web'
 PATIENCE_S = 10.0

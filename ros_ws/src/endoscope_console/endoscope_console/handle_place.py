@@ -10,8 +10,8 @@ from endoscope_console.beat import Beat
 from endoscope_console.graph_side import PATIENCE_S, GraphSide, Settings
 from endoscope_console.orders import OrderRefusedError
 from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
-from endoscope_nodes.graph_listener import GraphRefusedError
-from endoscope_nodes.graph_parameters import read_parameter, set_parameters
+from endoscope_nodes.client.graph_listener import GraphRefusedError
+from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 
 _PLACE_S = 5.0
 _LOOK_S = 0.05

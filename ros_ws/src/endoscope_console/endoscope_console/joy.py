@@ -7,12 +7,12 @@ from endoscope_console.access import OPERATOR
 from endoscope_console.clients import Client
 from endoscope_console.graph_side import GraphSide
 from endoscope_console.operations import Operations
+from endoscope_console.teleop.frames import MalformedFrameError
+from endoscope_console.teleop.joy_mapping import JoyMapping
+from endoscope_console.teleop.operator import Reason
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.teleop.frames import MalformedFrameError
-from endoscope_core.teleop.joy_mapping import JoyMapping
-from endoscope_core.teleop.operator import Reason
-from endoscope_nodes.qos import profile
-from endoscope_nodes.raw_subscription import RawSubscription
+from endoscope_nodes.runtime.qos import profile
+from endoscope_nodes.runtime.raw_subscription import RawSubscription
 from endoscope_nodes.topics import Qos
 
 TOPIC = 'joy'

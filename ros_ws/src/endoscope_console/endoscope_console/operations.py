@@ -33,17 +33,17 @@ from endoscope_console.orders import (
     State,
     in_words,
 )
+from endoscope_console.teleop.frames import InputFrame
+from endoscope_console.teleop.lease import Lease
+from endoscope_console.teleop.operator import DeadManState, Reason
 from endoscope_core.choices import (
     FOLLOW_THE_HANDLE,
     PHYSICAL,
 )
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.teleop.frames import InputFrame
-from endoscope_core.teleop.lease import Lease
-from endoscope_core.teleop.operator import DeadManState, Reason
-from endoscope_nodes.graph_listener import CONSOLE, GraphRefusedError
+from endoscope_nodes.client.graph_listener import CONSOLE, GraphRefusedError
 from endoscope_nodes.names import FINISHED, RECORDER_START, RECORDER_STOP
-from endoscope_nodes.node_parameters import CompensatorParameters
+from endoscope_nodes.runtime.node_parameters import CompensatorParameters
 
 _WAITING_ORDERS = 16
 # The console tells once a second how far it is; a word from before it was asked means nothing.

@@ -9,10 +9,9 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from endoscope_bags.errors import MalformedMessageError
+from endoscope_console.teleop.envelope import Envelope
+from endoscope_console.teleop.frames import POINTS, encode_telemetry
 from endoscope_core.kinematics import centre_line
-from endoscope_core.teleop.envelope import Envelope
-from endoscope_core.teleop.frames import POINTS, encode_telemetry
-from endoscope_nodes.joint_stream import JointReader, JointSample
 from endoscope_nodes.names import (
     JOINTS,
     MOTOR_COMMAND,
@@ -23,8 +22,9 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.qos import profile
-from endoscope_nodes.raw_subscription import RawSubscription
+from endoscope_nodes.runtime.joint_stream import JointReader, JointSample
+from endoscope_nodes.runtime.qos import profile
+from endoscope_nodes.runtime.raw_subscription import RawSubscription
 from endoscope_nodes.topics import Qos
 
 RATE_HZ = 30

@@ -27,11 +27,11 @@ from endoscope_console.joy import JoyHand
 from endoscope_console.operations import Operations
 from endoscope_console.orders import HALTS, MalformedOrderError, State, read_hello, read_order
 from endoscope_console.pictures import RATE_HZ, SIGNALS
+from endoscope_console.teleop.frames import POINTS, VERSION, MalformedFrameError, decode_input
+from endoscope_console.teleop.operator import Reason
 from endoscope_console.view import View
 from endoscope_core.choices import MODES
 from endoscope_core.rig import Rig
-from endoscope_core.teleop.frames import POINTS, VERSION, MalformedFrameError, decode_input
-from endoscope_core.teleop.operator import Reason
 from endoscope_nodes.names import JOINTS
 
 PAGE = Path(__file__).with_name('page')

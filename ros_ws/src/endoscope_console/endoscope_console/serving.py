@@ -32,16 +32,16 @@ from endoscope_console.joy import JoyHand
 from endoscope_console.operations import Operations
 from endoscope_console.orders import LARGEST_BYTES
 from endoscope_console.server import Console
+from endoscope_console.teleop.joy_mapping import JoyMapping, JoyMappingError
+from endoscope_console.teleop.pad import PadHandle
 from endoscope_console.view import View
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.rig import Rig, load_rig
-from endoscope_core.teleop.joy_mapping import JoyMapping, JoyMappingError
-from endoscope_core.teleop.pad import PadHandle
-from endoscope_nodes.graph_client import WHOLE_S
-from endoscope_nodes.graph_listener import RECORDER, SUPERVISOR, Health
+from endoscope_nodes.client.graph_client import WHOLE_S
+from endoscope_nodes.client.graph_listener import RECORDER, SUPERVISOR, Health
 from endoscope_nodes.names import JOINTS
 from endoscope_nodes.program import NODES, REAL_TIME
-from endoscope_nodes.runtime import GC_THRESHOLDS, SWITCH_INTERVAL_S
+from endoscope_nodes.runtime.runtime import GC_THRESHOLDS, SWITCH_INTERVAL_S
 
 # Where this process is killed, the graph ends as it does by Ctrl-C.
 _GRAPH = """

@@ -10,10 +10,10 @@ import msgspec
 from endoscope_console.alarms import Alarm, Level
 from endoscope_console.graph_side import GraphSide
 from endoscope_console.operations import Operations
+from endoscope_console.teleop.operator import STATE_NS, DeadManState, Reason
 from endoscope_core.rig import Rig
-from endoscope_core.teleop.operator import STATE_NS, DeadManState, Reason
-from endoscope_nodes.graph_client import GraphClient
-from endoscope_nodes.graph_listener import COMMANDS, CONSOLE, LOCK_STEP, RECORDER, Health
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import COMMANDS, CONSOLE, LOCK_STEP, RECORDER, Health
 from endoscope_nodes.names import WIRES
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')

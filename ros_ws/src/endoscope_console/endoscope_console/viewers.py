@@ -17,10 +17,10 @@ from rclpy.node import Node
 
 from endoscope_bags.message_types import JOINT_STATE, message_type
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.joined_graph import joined_node
-from endoscope_nodes.qos import profile
-from endoscope_nodes.raw_subscription import RawSubscription
-from endoscope_nodes.recorded_topics import message_class
+from endoscope_nodes.client.joined_graph import joined_node
+from endoscope_nodes.runtime.qos import profile
+from endoscope_nodes.runtime.raw_subscription import RawSubscription
+from endoscope_nodes.runtime.recorded_topics import message_class
 from endoscope_nodes.topics import TOPICS, Qos, Topic
 
 NODE = 'console_viewers'

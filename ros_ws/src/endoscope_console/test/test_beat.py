@@ -6,7 +6,9 @@ from dataclasses import replace
 from rclpy.node import Node
 
 from endoscope_console.beat import Beat, Situation
-from endoscope_core.teleop import DeadManState, InputFrame, PadHandle
+from endoscope_console.teleop.frames import InputFrame
+from endoscope_console.teleop.operator import DeadManState
+from endoscope_console.teleop.pad import PadHandle
 
 MS = 1_000_000
 NEUTRAL = InputFrame(False, False, True, True, False, 0, 1, 0, 1, 0.0, 0.0, 0.0)

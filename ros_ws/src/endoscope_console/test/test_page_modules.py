@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import endoscope_console
-from endoscope_core.teleop.frames import InputFrame, decode_input, encode_telemetry
+from endoscope_console.teleop.frames import InputFrame, decode_input, encode_telemetry
 
 PAGE = Path(endoscope_console.__file__).parent / 'page'
 TESTS = Path(__file__).parent / 'page'

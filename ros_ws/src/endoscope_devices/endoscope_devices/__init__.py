@@ -1,1 +1,1 @@
-"""Servo, load-cell and tracker protocols with their emulators, free of ROS."""
+"""Servo, load-cell and tracker protocols, free of ROS."""

@@ -1,17 +1,20 @@
 """Which rate this machine carries: the simulated graph in real time, its commands counted."""
 
 import os
+from collections.abc import Callable, Sequence
 
 from rclpy.context import Context
 from rclpy.task import Future
 from std_msgs.msg import String
 
-from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
-from endoscope_nodes.motor_driver_node import MotorDriverNode
 from endoscope_nodes.names import OPERATING_STATE, STATE_COMMAND
-from endoscope_nodes.qos import EVENT, RESULT
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.nodes.motor_driver import MotorDriverNode
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.qos import EVENT, RESULT
+from endoscope_nodes.runtime.runtime import Runtime
+
+Nodes = Sequence[Callable[[NodeContext], EndoscopeNode]]
 
 RATES = (1000, 500, 250)
 CARRIED = 0.99
@@ -19,10 +22,10 @@ CARRIED = 0.99
 _FOUND_S, _ENABLED_S, _COUNTED_S = 2.0, 1.5, 4.0
 
 
-def check() -> int:
+def check(nodes: Nodes) -> int:
     """Try one rate after the other and say which is carried; 1 if none is."""
     for rate in RATES:
-        share, trouble = _carried(rate)
+        share, trouble = _carried(nodes, rate)
         said = f'{100.0 * share:.1f} % of the commands reach the motors'
         print(f'{rate:>4} Hz: {said}{trouble and f": {trouble}"}', flush=True)
         if share >= CARRIED and not trouble:
@@ -36,13 +39,13 @@ def check() -> int:
     return 1
 
 
-def _carried(rate: int) -> tuple[float, str]:
+def _carried(nodes: Nodes, rate: int) -> tuple[float, str]:
     """Share of the commands of a played motion that reach the motors, and what ended it."""
     arguments = ['--ros-args', '--log-level', 'fatal', '-r', f'__ns:=/check_{os.getpid()}']
     arguments += ['-p', 'use_sim_time:=false', '-p', f'tick_rate:={rate}']
     played = {'console': {'source': 'motion', 'motion': 'periodic'}}
     with Runtime(arguments, Context(), overrides=played) as runtime:
-        for factory in (*SLAVE_NODES, *CONTROL_NODES):
+        for factory in nodes:
             runtime.add(factory)
         asker = runtime.add(lambda runtime: EndoscopeNode('rate_check', runtime))
         states = ['']

@@ -6,20 +6,20 @@ from functools import partial
 
 from endoscope_core.errors import FileError
 from endoscope_core.rig import load_rig
-from endoscope_nodes.calibration_node import CalibrationNode
-from endoscope_nodes.compensator_node import CompensatorNode
-from endoscope_nodes.conductor_node import SelfStartingConductor
-from endoscope_nodes.console_node import ConsoleNode
-from endoscope_nodes.controller_node import ControllerNode
-from endoscope_nodes.em_tracker_node import EmTrackerNode
-from endoscope_nodes.instrument_model_node import InstrumentModelNode
-from endoscope_nodes.load_cells_node import LoadCellsNode
-from endoscope_nodes.motor_driver_node import MotorDriverNode
 from endoscope_nodes.names import MOTOR_MEASURED
+from endoscope_nodes.nodes.calibration import CalibrationNode
+from endoscope_nodes.nodes.compensator import CompensatorNode
+from endoscope_nodes.nodes.conductor import SelfStartingConductor
+from endoscope_nodes.nodes.console import ConsoleNode
+from endoscope_nodes.nodes.controller import ControllerNode
+from endoscope_nodes.nodes.em_tracker import EmTrackerNode
+from endoscope_nodes.nodes.instrument_model import InstrumentModelNode
+from endoscope_nodes.nodes.load_cells import LoadCellsNode
+from endoscope_nodes.nodes.motor_driver import MotorDriverNode
+from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.nodes.supervisor import SupervisorNode
 from endoscope_nodes.program import CHECK, REAL_TIME, words_for_nobody
-from endoscope_nodes.recorder_node import RecorderNode
-from endoscope_nodes.runtime import Runtime, run
-from endoscope_nodes.supervisor_node import SupervisorNode
+from endoscope_nodes.runtime.runtime import Runtime, run
 
 # The motor driver beats first: the plant advances under the command of the tick before.
 SLAVE_NODES = (MotorDriverNode, LoadCellsNode, EmTrackerNode, SupervisorNode)
@@ -72,5 +72,5 @@ def main() -> int:
     if CHECK in words:
         from endoscope_nodes.carried_rate import check
 
-        return check()
+        return check((*SLAVE_NODES, *CONTROL_NODES))
     return run(partial(compose, real_time=REAL_TIME in words))

@@ -23,9 +23,9 @@ def is_heard(node: str, namespace: str, longest_s: float) -> bool:
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.node import Node
 
-    from endoscope_nodes.discovery import stay_on_this_machine
     from endoscope_nodes.names import DIAGNOSTICS
-    from endoscope_nodes.qos import EVENT
+    from endoscope_nodes.runtime.discovery import stay_on_this_machine
+    from endoscope_nodes.runtime.qos import EVENT
 
     stay_on_this_machine()
     names = {node, f'/{namespace.strip("/")}/{node}'}

@@ -3,8 +3,8 @@
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from endoscope_nodes.node_parameters import OF_NODE, OF_PROCESS
-from endoscope_nodes.parameters import Described, described
+from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
+from endoscope_nodes.runtime.parameters import Described, described
 from endoscope_nodes.topics import SERVICES, TOPICS
 
 _WIDTH = 100

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from endoscope_core.exit_status import exit_status
-from endoscope_nodes.stop_signals import end_when_asked
+from endoscope_nodes.runtime.stop_signals import end_when_asked
 
 REAL_TIME = '--real-time'
 CHECK = '--check'
@@ -20,7 +20,7 @@ class Program:
     """One command of the package."""
 
     name: str  # also of the node, if it runs a single one
-    module: str  # whose ``main()`` runs it
+    module: str  # of this package, whose ``main()`` runs it
     purpose: str  # a sentence or two
     composed: tuple[str, ...] = ()  # nodes that it runs; empty for the one of its name
     options: tuple[tuple[str, str], ...] = ()  # words of its own, and what each does
@@ -72,68 +72,68 @@ def words_for_nobody(argv: Sequence[str]) -> list[str]:
 
 console = Program(
     'console',
-    'console_node',
+    'nodes.console',
     'Turns the motion of the handle into commands while the clutch is held, or plays a motion or '
     'a file.',
 )
 motor_driver = Program(
     'motor_driver',
-    'motor_driver_node',
+    'nodes.motor_driver',
     'Drives the motors of the slave as far as it is safe, simulated or on a bus of servos, and '
     'publishes what the shafts do.',
 )
 load_cells = Program(
     'load_cells',
-    'load_cells_node',
+    'nodes.load_cells',
     'Measures the tensions of the wires, simulated or behind a Modbus transmitter.',
 )
 em_tracker = Program(
     'em_tracker',
-    'em_tracker_node',
+    'nodes.em_tracker',
     'Measures the pose of the tip and from it the bending, simulated or by an electromagnetic '
     'tracker.',
 )
 supervisor = Program(
     'supervisor',
-    'supervisor_node',
+    'nodes.supervisor',
     'Decides whether the slave may move: opens motion sessions, and ends them where anything '
     'vital fails.',
 )
 compensator = Program(
     'compensator',
-    'compensator_node',
+    'nodes.compensator',
     'Turns desired bending into commands for the motors that make up for the hysteresis.',
 )
 controller = Program(
     'controller',
-    'controller_node',
+    'nodes.controller',
     'Learns from the tracker what the compensation leaves over, and corrects it.',
 )
 calibration = Program(
     'calibration',
-    'calibration_node',
+    'nodes.calibration',
     'Moves the slave as a calibration asks, finds the hysteresis class of its tube from the '
     'tensions, and takes the slave home.',
 )
 instrument_model = Program(
     'instrument_model',
-    'instrument_model_node',
+    'nodes.instrument_model',
     'Shows other programs the instrument and its bending: a description as URDF, the angles of its '
     'joints, and where its links are.',
 )
 recorder = Program(
     'recorder',
-    'recorder_node',
+    'nodes.recorder',
     'Records every message of the interface into a bag, counted, with what was lost.',
 )
 replay = Program(
     'replay',
-    'replay_node',
+    'nodes.replay',
     'Publishes the topics of a bag again, at their pace or another, and ends.',
 )
 conductor = Program(
     'conductor',
-    'conductor_node',
+    'nodes.conductor',
     'Makes simulated time, a millisecond at a time, as fast as the graph can follow.',
 )
 

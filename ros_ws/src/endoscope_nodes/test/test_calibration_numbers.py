@@ -2,9 +2,9 @@
 
 import pytest
 
-from endoscope_nodes.calibration_result import aborted_result, numbers_of, refused_result
+from endoscope_nodes.client.calibration_result import aborted_result, numbers_of, refused_result
 from endoscope_nodes.names import CALIBRATION_NUMBERS
-from endoscope_nodes.node_parameters import RecorderParameters
+from endoscope_nodes.runtime.node_parameters import RecorderParameters
 
 
 def test_whoever_shows_the_numbers_sees_that_a_later_calibration_failed() -> None:

@@ -2,7 +2,7 @@
 
 from endoscope_core.choices import FEEDBACK_LAWS, LOAD_CELL_DEVICES, SIMULATED
 from endoscope_devices.load_cells import CONNECTIONS
-from endoscope_nodes.controller_node import LAWS
+from endoscope_nodes.nodes.controller import LAWS
 
 
 def test_every_law_of_feedback_has_its_controller() -> None:

@@ -9,7 +9,7 @@ import pytest
 import rclpy
 from rclpy.context import Context
 
-from endoscope_nodes.discovery import DiscoveryRangeError, stay_on_this_machine
+from endoscope_nodes.runtime.discovery import DiscoveryRangeError, stay_on_this_machine
 
 DOMAIN = 227
 # DDSI-RTPS 9.6.1.1: ports of a domain begin at 7400 + 250 * domain.
@@ -18,7 +18,7 @@ import os
 from pathlib import Path
 from rclpy.context import Context
 from rclpy.node import Node
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.runtime.runtime import Runtime
 with Runtime(['--ros-args'], Context(), {DOMAIN}) as runtime:
     node = Node('listening', context=runtime.context)
     print(os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'])
@@ -101,7 +101,7 @@ import sys, time
 from rclpy.context import Context
 import rclpy
 from std_msgs.msg import String
-from endoscope_nodes.discovery import stay_on_this_machine
+from endoscope_nodes.runtime.discovery import stay_on_this_machine
 stay_on_this_machine()
 context = Context()
 rclpy.init(args=[], context=context, domain_id=DOMAIN)

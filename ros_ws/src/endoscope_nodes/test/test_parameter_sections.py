@@ -1,7 +1,7 @@
 import pytest
 
-from endoscope_nodes.parameter_sections import check_sections
-from endoscope_nodes.parameters import ParameterError
+from endoscope_nodes.runtime.parameter_sections import check_sections
+from endoscope_nodes.runtime.parameters import ParameterError
 
 HERE = '/endoscope'
 

@@ -5,10 +5,10 @@ import pytest
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
-from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.motor_driver_node import MotorDriverNode
-from endoscope_nodes.parameters import ParameterError, parameter
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.nodes.motor_driver import MotorDriverNode
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.parameters import ParameterError, parameter
+from endoscope_nodes.runtime.runtime import Runtime
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ SHOW = f"""
 import os, sys, threading
 from pathlib import Path
 from rclpy.context import Context
-from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.parameters import ParameterError
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.parameters import ParameterError
+from endoscope_nodes.runtime.runtime import Runtime
 
 class Example(EndoscopeNode):
     def __init__(self, runtime):

@@ -6,10 +6,10 @@ from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 
 from endoscope_bags.cdr_encoding import encode_clock
-from endoscope_nodes.endoscope_node import EndoscopeNode
-from endoscope_nodes.parameters import ParameterError
-from endoscope_nodes.qos import LOCK_STEP
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.parameters import ParameterError
+from endoscope_nodes.runtime.qos import LOCK_STEP
+from endoscope_nodes.runtime.runtime import Runtime
 
 MS = 1_000_000
 

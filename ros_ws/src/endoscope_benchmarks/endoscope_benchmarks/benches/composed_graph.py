@@ -15,11 +15,11 @@ from rclpy.task import Future
 from std_msgs.msg import String
 
 from endoscope_core.safety import OperatingState
-from endoscope_nodes.conductor_node import ConductorNode
 from endoscope_nodes.graph import ALL_NODES
 from endoscope_nodes.names import STATE_COMMAND
-from endoscope_nodes.qos import EVENT
-from endoscope_nodes.runtime import Runtime
+from endoscope_nodes.nodes.conductor import ConductorNode
+from endoscope_nodes.runtime.qos import EVENT
+from endoscope_nodes.runtime.runtime import Runtime
 
 TARGET_TICKS = 0.99
 TARGET_LATENCY_P99_MS = 1.0

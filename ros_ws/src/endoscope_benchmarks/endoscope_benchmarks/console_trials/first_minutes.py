@@ -15,8 +15,8 @@ from endoscope_benchmarks.console_trials.chromium import BrowserError
 from endoscope_benchmarks.console_trials.hand import Hand
 from endoscope_benchmarks.console_trials.relay import Relay
 from endoscope_benchmarks.console_trials.served_console import ConsoleError, ServedConsole
-from endoscope_nodes.graph_listener import GraphRefusedError
-from endoscope_nodes.graph_parameters import set_parameters
+from endoscope_nodes.client.graph_listener import GraphRefusedError
+from endoscope_nodes.client.graph_parameters import set_parameters
 
 _PATIENCE_S = 300.0
 _HELD_S = 10.0

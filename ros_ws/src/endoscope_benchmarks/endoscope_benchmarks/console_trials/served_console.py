@@ -18,8 +18,7 @@ from sensor_msgs.msg import JointState, Joy
 
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.joined_graph import joined_graph
-from endoscope_nodes.joint_stream import JointReader
+from endoscope_nodes.client.joined_graph import joined_graph
 from endoscope_nodes.names import (
     JOINTS,
     MASTER_CLUTCH,
@@ -27,7 +26,8 @@ from endoscope_nodes.names import (
     MOTOR_COMMAND,
     MOTORS,
 )
-from endoscope_nodes.qos import EVENT, profile
+from endoscope_nodes.runtime.joint_stream import JointReader
+from endoscope_nodes.runtime.qos import EVENT, profile
 from endoscope_nodes.topics import Qos
 
 PATIENCE_S = 150.0

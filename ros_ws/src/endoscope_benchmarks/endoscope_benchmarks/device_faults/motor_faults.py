@@ -11,7 +11,7 @@ from rclpy.parameter import Parameter
 
 from endoscope_bags import open_bag
 from endoscope_benchmarks.device_faults.motor_rig import MotorRig
-from endoscope_nodes.supervisor_node import SupervisorNode
+from endoscope_nodes.nodes.supervisor import SupervisorNode
 
 AFTERMATH_S = 2.0
 

@@ -19,11 +19,7 @@ from std_msgs.msg import String
 
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_devices.dynamixel.control_table import COUNT
-from endoscope_devices.dynamixel.emulator.process import EmulatorProcess
-from endoscope_nodes.compensator_node import CompensatorNode
-from endoscope_nodes.console_node import ConsoleNode
-from endoscope_nodes.joint_stream import JointPublisher, JointSample, JointSubscription
-from endoscope_nodes.motor_driver_node import MotorDriverNode
+from endoscope_emulators.dynamixel.process import EmulatorProcess
 from endoscope_nodes.names import (
     MOTOR_MEASURED,
     MOTORS,
@@ -32,10 +28,14 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.qos import EVENT, RESULT, SENSOR_ASKED, SENSOR_OFFERED
-from endoscope_nodes.recorder_node import RecorderNode
-from endoscope_nodes.runtime import Runtime
-from endoscope_nodes.supervisor_node import SupervisorNode
+from endoscope_nodes.nodes.compensator import CompensatorNode
+from endoscope_nodes.nodes.console import ConsoleNode
+from endoscope_nodes.nodes.motor_driver import MotorDriverNode
+from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.nodes.supervisor import SupervisorNode
+from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
+from endoscope_nodes.runtime.qos import EVENT, RESULT, SENSOR_ASKED, SENSOR_OFFERED
+from endoscope_nodes.runtime.runtime import Runtime
 
 PATIENCE_S = 240.0
 RATE_HZ = 250

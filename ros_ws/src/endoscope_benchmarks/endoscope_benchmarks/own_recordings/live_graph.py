@@ -12,15 +12,15 @@ from rclpy.task import Future
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.rig import Rig
-from endoscope_nodes.conductor_node import ConductorNode
-from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_parameters import set_parameters
+from endoscope_nodes.client.handle_sender import HandleSender
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
-from endoscope_nodes.graph_client import GraphClient
-from endoscope_nodes.graph_parameters import set_parameters
-from endoscope_nodes.handle_sender import HandleSender
 from endoscope_nodes.names import MOTOR_MEASURED
-from endoscope_nodes.recorder_node import RecorderNode
-from endoscope_nodes.runtime import FOREVER_S, Runtime
+from endoscope_nodes.nodes.conductor import ConductorNode
+from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.runtime import FOREVER_S, Runtime
 
 PATIENCE_S = 60.0
 POLL_S = 0.05

@@ -11,9 +11,7 @@ from rclpy.context import Context
 from sensor_msgs.msg import JointState, Joy
 
 from endoscope_core.closed_on_exit import ClosedOnExit
-from endoscope_nodes.discovery import stay_on_this_machine
-from endoscope_nodes.graph_client import GraphClient
-from endoscope_nodes.joint_stream import JointPublisher, JointReader, JointSample
+from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.names import (
     JOINTS,
     MASTER_CLUTCH,
@@ -24,7 +22,9 @@ from endoscope_nodes.names import (
     SLAVE_COMMAND,
     SLAVE_MEASURED,
 )
-from endoscope_nodes.qos import COMMAND, EVENT, SENSOR_OFFERED, profile
+from endoscope_nodes.runtime.discovery import stay_on_this_machine
+from endoscope_nodes.runtime.joint_stream import JointPublisher, JointReader, JointSample
+from endoscope_nodes.runtime.qos import COMMAND, EVENT, SENSOR_OFFERED, profile
 from endoscope_nodes.topics import Qos
 
 _DEEP = profile(Qos(5000))

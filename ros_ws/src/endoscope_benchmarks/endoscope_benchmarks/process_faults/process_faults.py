@@ -17,7 +17,6 @@ from endoscope_bags.errors import BagError
 from endoscope_benchmarks.process_faults.node_processes import GRAPH, NODES
 from endoscope_benchmarks.process_faults.process_rig import ProcessRig
 from endoscope_benchmarks.process_faults.trace import ShaftTrace, goal_step
-from endoscope_nodes.diagnostics import OK, status
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
     CALIBRATION_RESULT,
@@ -31,7 +30,8 @@ from endoscope_nodes.names import (
     OPERATING_STATE,
     SLAVE_COMMAND,
 )
-from endoscope_nodes.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
+from endoscope_nodes.runtime.diagnostics import OK, status
+from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
 
 STALLS_S = (0.2, 0.5, 2.0)
 _AFTERMATH_S = 1.0

@@ -33,11 +33,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record; return 1 if something is missing from the bag."""
-    from endoscope_nodes.stop_signals import end_when_asked
+    from endoscope_nodes.runtime.stop_signals import end_when_asked
 
     end_when_asked('endoscope')
-    from endoscope_nodes.recorder_node import RecorderNode, new_bag
-    from endoscope_nodes.runtime import run_nodes
+    from endoscope_nodes.nodes.recorder import RecorderNode, new_bag
+    from endoscope_nodes.runtime.runtime import run_nodes
 
     parameters = {'bag': args.out or new_bag(), 'use_sim_time': args.sim_time}
     if args.topics:

@@ -42,11 +42,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     """Replay; return 1 if it was refused."""
     from endoscope_bringup.commands.record import ros_arguments
-    from endoscope_nodes.stop_signals import end_when_asked
+    from endoscope_nodes.runtime.stop_signals import end_when_asked
 
     end_when_asked('endoscope')
-    from endoscope_nodes.replay_node import ReplayNode
-    from endoscope_nodes.runtime import run_nodes
+    from endoscope_nodes.nodes.replay import ReplayNode
+    from endoscope_nodes.runtime.runtime import run_nodes
 
     parameters: dict[str, object] = {
         'bag': args.bag,

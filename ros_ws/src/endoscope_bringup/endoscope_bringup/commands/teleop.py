@@ -72,12 +72,12 @@ def run(args: argparse.Namespace) -> int:
     """Teleoperate until Q; return 1 if the graph refuses it."""
     import sys
 
-    from endoscope_bringup.operating.terminal import check_terminal
+    from endoscope_bringup.teleop.terminal import check_terminal
 
     check_terminal()
-    from endoscope_bringup.operating.teleoperation import teleoperate
-    from endoscope_nodes.graph_listener import GraphRefusedError
-    from endoscope_nodes.joined_graph import joined_graph
+    from endoscope_bringup.teleop.teleoperation import teleoperate
+    from endoscope_nodes.client.graph_listener import GraphRefusedError
+    from endoscope_nodes.client.joined_graph import joined_graph
 
     try:
         with joined_graph('teleop', args.namespace) as client:

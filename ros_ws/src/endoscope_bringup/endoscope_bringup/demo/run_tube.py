@@ -25,16 +25,16 @@ from endoscope_bringup.demo.procedure import (
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.family import shipped_family
 from endoscope_core.signals import calibration_sinusoid, motion_by_name
-from endoscope_nodes.calibration_result import REACH
-from endoscope_nodes.conductor_node import ConductorNode
-from endoscope_nodes.endoscope_node import EndoscopeNode
+from endoscope_nodes.client.calibration_result import REACH
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import GraphRefusedError
+from endoscope_nodes.client.graph_parameters import set_parameters
 from endoscope_nodes.graph import CONTROL_NODES, SHOWING_NODES, SLAVE_NODES
-from endoscope_nodes.graph_client import GraphClient
-from endoscope_nodes.graph_listener import GraphRefusedError
-from endoscope_nodes.graph_parameters import set_parameters
 from endoscope_nodes.names import CALIBRATION_COMMAND, JOINTS
-from endoscope_nodes.recorder_node import RecorderNode
-from endoscope_nodes.runtime import FOREVER_S, Runtime
+from endoscope_nodes.nodes.conductor import ConductorNode
+from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.runtime import FOREVER_S, Runtime
 
 Progress = Callable[[str], None]
 

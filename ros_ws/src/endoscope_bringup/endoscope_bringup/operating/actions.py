@@ -8,9 +8,9 @@ from typing import Any
 
 from endoscope_bringup.operating.status import calibration_in_words, status_of
 from endoscope_bringup.progress_line import ShareBar
-from endoscope_nodes.graph_client import GraphClient
-from endoscope_nodes.graph_listener import GraphRefusedError
-from endoscope_nodes.graph_parameters import read_parameter, read_parameters, set_parameters
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import GraphRefusedError
+from endoscope_nodes.client.graph_parameters import read_parameter, read_parameters, set_parameters
 from endoscope_nodes.names import (
     LOAD_CELLS_TARE,
     MOTOR_REBOOT,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from endoscope_nodes.graph_client import GraphClient
+from endoscope_nodes.client.graph_client import GraphClient
 
 _HUNG_UP = 128 + signal.SIGHUP
 _ANSWERED_S = 2.0

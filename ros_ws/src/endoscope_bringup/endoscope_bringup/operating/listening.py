@@ -13,9 +13,9 @@ from rclpy.serialization import deserialize_message
 from endoscope_bags.message_types import TF_MESSAGE, typestore
 from endoscope_bringup.operating.message_text import fields_of, lines_of
 from endoscope_core.errors import nearest, printable
-from endoscope_nodes.graph_client import GraphClient
-from endoscope_nodes.graph_listener import NoGraphError
-from endoscope_nodes.recorded_topics import message_class, suitable_qos
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import NoGraphError
+from endoscope_nodes.runtime.recorded_topics import message_class, suitable_qos
 from endoscope_nodes.topics import BY_NAME, TOPICS, Topic
 
 _HEADINGS = ('topic', 'type', 'senders', 'readers', '')

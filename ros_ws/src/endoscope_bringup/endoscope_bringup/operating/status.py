@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
-from endoscope_nodes.graph_client import GraphClient
-from endoscope_nodes.graph_listener import CONSOLE, LOCK_STEP, RECORDER, Health
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import CONSOLE, LOCK_STEP, RECORDER, Health
 from endoscope_nodes.names import FACTOR, JOINTS
 from endoscope_nodes.program import NODES
 

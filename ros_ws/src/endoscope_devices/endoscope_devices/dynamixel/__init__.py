@@ -1,1 +1,1 @@
-"""ROBOTIS XM430 servos on a Dynamixel Protocol 2.0 bus, and an emulator of them."""
+"""ROBOTIS XM430 servos on a Dynamixel Protocol 2.0 bus."""

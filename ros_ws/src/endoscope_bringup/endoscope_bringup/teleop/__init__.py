@@ -1,0 +1,1 @@
+"""The slave moved by the keys of a terminal."""

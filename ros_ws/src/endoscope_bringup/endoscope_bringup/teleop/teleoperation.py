@@ -1,0 +1,351 @@
+"""The slave moved by the keyboard: keys in, handle and clutch out, and what is going on shown."""
+
+import argparse
+import math
+import os
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from types import FrameType
+
+from rclpy.task import Future
+from sensor_msgs.msg import JointState
+
+from endoscope_bags.errors import MalformedMessageError
+from endoscope_bringup.teleop.keyboard_handle import KeyboardHandle, Request, Turn
+from endoscope_bringup.teleop.terminal import Terminal, TerminalLostError
+from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
+from endoscope_core.errors import printable
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import CONSOLE, GraphRefusedError
+from endoscope_nodes.client.graph_parameters import (
+    read_parameter,
+    request_parameters,
+    set_parameters,
+)
+from endoscope_nodes.client.handle_sender import HandleSender, handle_senders
+from endoscope_nodes.client.order_feedback import HOME, SUCCEEDED
+from endoscope_nodes.names import (
+    JOINTS,
+    MASTER_CLUTCH,
+    MASTER_MEASURED,
+    MOTOR_COMMAND,
+    MOTORS,
+    SLAVE_COMMAND,
+    SLAVE_MEASURED,
+)
+from endoscope_nodes.runtime.joint_stream import JointReader
+from endoscope_nodes.runtime.qos import COMMAND
+
+_TURN_NS = 10_000_000
+_SHOWN_NS = 100_000_000
+_FRESH_NS = 150_000_000
+_SUPERVISED_NS = 1_000_000_000
+_GONE_S = 5.0
+_SETTLED_S = 0.2
+_SCALES = (0.01, 10.0)
+_LARGER = 1.25
+_STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+
+
+def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
+    """Move the slave by the terminal's keys until the operator has enough; the exit status."""
+    client.find(args.timeout)
+    source = read_parameter(client, 'console.source', args.timeout).value
+    scale = read_parameter(client, 'console.scale', args.timeout).value
+    _check_consent(source, args.take)
+    with ExitStack() as stack:
+        signals = stack.enter_context(_signals_noted())
+        terminal = Terminal()
+        before: dict[str, str | float] = {}
+        stack.callback(_give_back, client, terminal, before, args.timeout)
+        asked: dict[str, str | float] = {}
+        if source != FOLLOW_THE_HANDLE:
+            asked['source'], before['source'] = FOLLOW_THE_HANDLE, source
+        if args.scale is not None:
+            asked['scale'], before['scale'] = args.scale, scale
+        if asked:
+            set_parameters(client, 'console', asked, args.timeout)
+        _wait_for_the_handles_place(client)
+        sender = HandleSender(client.node)
+        stack.callback(sender.close)
+        speed = math.radians(args.speed)
+        scale = args.scale or scale
+        teleoperation = _Teleoperation(client, terminal, sender, signals, speed, scale, before)
+        stack.enter_context(terminal)
+        return teleoperation.run()
+
+
+def _check_consent(source: str, taken: bool) -> None:
+    if source == FOLLOW_THE_HANDLE or taken:
+        return
+    plays = '; what it plays ends' if source in PLAYS else ''
+    print(f'console.source is {source}: the console follows no handle.')
+    try:
+        answer = input(f'Set it to master until teleop ends{plays}? [y/N] ')
+    except EOFError:
+        answer = ''
+    if answer.strip().lower() not in ('y', 'yes'):
+        raise GraphRefusedError(f'console.source stays {source}: nothing would follow the keys')
+
+
+def _wait_for_the_handles_place(client: GraphClient) -> None:
+    """Raise GraphRefusedError where somebody else speaks for the handle and does not go."""
+    if not client.wait_until(lambda: not handle_senders(client.node), _GONE_S):
+        others = ' and '.join(handle_senders(client.node))
+        raise GraphRefusedError(
+            f'{others} speaks for the handle already, on {MASTER_MEASURED} or {MASTER_CLUTCH}; two '
+            'of them would be a fault'
+        )
+
+
+def _give_back(
+    client: GraphClient, terminal: Terminal, before: dict[str, str | float], patience_s: float
+) -> None:
+    """Set the console's parameters back; a motion does not begin anew with nobody looking."""
+    if not before:
+        return
+    # The supervisor has to know that this handle is gone.
+    client.wait_until(lambda: False, _SETTLED_S)
+    source = before.get('source')
+    if source in PLAYS and client.state == 'ENABLED':
+        client.ask('pause', patience_s)
+        terminal.say(f'paused: console.source {source} begins anew when you resume')
+    set_parameters(client, 'console', before, patience_s)
+
+
+class _Signals:
+    """The last signal that asks this program to end, or to stop for a while."""
+
+    def __init__(self) -> None:
+        self.end = 0
+        self.suspend = False
+
+
+@contextmanager
+def _signals_noted() -> Iterator[_Signals]:
+    """Note signals instead of letting them tear the loop apart."""
+    noted = _Signals()
+
+    def note(number: int, frame: FrameType | None) -> None:
+        if number == signal.SIGTSTP:
+            noted.suspend = True
+        else:
+            noted.end = number
+
+    before = {number: signal.signal(number, note) for number in (*_STOPPING, signal.SIGTSTP)}
+    try:
+        yield noted
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+class _Heard:
+    """The last angles of joints or motors on a topic, and when they came by this clock."""
+
+    def __init__(self, client: GraphClient, topic: str, names: tuple[str, ...] = JOINTS) -> None:
+        self.position: tuple[float, ...] | None = None
+        self.ns = 0
+        self._reader = JointReader(names)
+        client.listen(JointState, topic, self._take, qos=COMMAND)
+
+    def _take(self, data: bytes, received_ns: int) -> None:
+        try:
+            self.position = self._reader.read(data).position or None
+        except MalformedMessageError:
+            return
+        self.ns = received_ns
+
+    def since(self, then_ns: int) -> tuple[float, ...] | None:
+        return self.position if self.ns > then_ns else None
+
+
+class _Teleoperation:
+    def __init__(
+        self,
+        client: GraphClient,
+        terminal: Terminal,
+        sender: HandleSender,
+        signals: _Signals,
+        speed: float,
+        scale: float,
+        before: dict[str, str | float],
+    ) -> None:
+        self._client = client
+        self._terminal = terminal
+        self._sender = sender
+        self._signals = signals
+        self._speed = speed
+        self._scale = self._scale_asked = scale
+        self._before = before
+        self._setting: Future | None = None
+        self._wanted = _Heard(client, SLAVE_COMMAND)
+        self._measured = _Heard(client, SLAVE_MEASURED)
+        self._motors = _Heard(client, MOTOR_COMMAND, MOTORS)
+        self._taken_ns = self._gripped_ns = time.time_ns()
+        # Orders that calibration had before the key for home was pressed; None while it is not.
+        self._home: frozenset[int] | None = None
+        self._quit = False
+        self._note = ''
+
+    def run(self) -> int:
+        """Take turns until the operator quits, a signal comes or the terminal is lost."""
+        due_ns = shown_ns = time.monotonic_ns()
+        try:
+            self._open()
+            while not self._quit and not self._signals.end:
+                if self._signals.suspend:
+                    self._suspend()
+                now_ns = time.monotonic_ns()
+                turn = self._take_turn(now_ns)
+                if now_ns >= shown_ns:
+                    shown_ns = now_ns + _SHOWN_NS
+                    self._terminal.show(*self._lines(turn))
+                due_ns = max(due_ns + _TURN_NS, time.monotonic_ns())
+                time.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
+        except TerminalLostError:
+            self._signals.end = self._signals.end or signal.SIGHUP
+        finally:
+            self._let_go()
+        return 128 + self._signals.end if self._signals.end else 0
+
+    def _open(self) -> None:
+        self._terminal.open()
+        self._hand = KeyboardHandle(len(JOINTS), self._speed, self._terminal.told_apart)
+        way = (
+            'from press to release'
+            if self._terminal.told_apart
+            else 'from the first repeat of a key to 0.15 s after the last'
+        )
+        self._terminal.say(
+            f'Arrows or WASD held: bend, {way}. [ ] speed, - = scale, E enable, P pause, H held:\n'
+            'home, Q quit, any other key: stop. Angles are wanted / measured.'
+        )
+
+    def _let_go(self) -> None:
+        """Release the clutch before anything else, and do not leave a way home to itself."""
+        self._sender.press(False, time.time_ns())
+        if self._home is not None and not self._is_home(self._home):
+            self._client.order('pause')
+        self._home = None
+
+    def _suspend(self) -> None:
+        """Stop as Ctrl-Z asks, and go on with a new grip when the shell says so."""
+        self._signals.suspend = False
+        self._let_go()
+        self._terminal.close()
+        handler = signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGTSTP)
+        signal.signal(signal.SIGTSTP, handler)
+        self._speed = self._hand.speed
+        self._open()
+
+    def _take_turn(self, now_ns: int) -> Turn:
+        events = self._terminal.read()
+        self._client.hear()
+        wall_ns = time.time_ns()
+        turn = self._hand.turn(
+            now_ns,
+            events,
+            self._hindrance(wall_ns),
+            self._wanted.since(max(self._gripped_ns, wall_ns - _FRESH_NS)),
+            self._scale,
+        )
+        if turn.clutch != self._sender.clutch:
+            self._gripped_ns = wall_ns
+            self._sender.press(turn.clutch, wall_ns)
+        self._sender.send(wall_ns, turn.position)
+        if turn.homing != (self._home is not None):
+            if turn.homing:
+                self._home = frozenset(self._client.orders)
+                self._client.order(HOME)
+            else:
+                self._let_go()
+        for request in turn.requests:
+            self._obey(request)
+        self._settle()
+        return turn
+
+    def _hindrance(self, wall_ns: int) -> str:
+        """What forbids motion; empty for nothing."""
+        client = self._client
+        if wall_ns - client.state_ns > _SUPERVISED_NS:
+            return 'the supervisor is silent'
+        if client.state != 'ENABLED':
+            todo = {'DISABLED': 'E enables', 'PAUSED': 'E resumes'}.get(client.state, 'FAULT')
+            return client.why or todo
+        console = client.health.get(CONSOLE)
+        if console is not None and console.received_ns > self._taken_ns + 2 * _SUPERVISED_NS:
+            source = console.values.get('source', FOLLOW_THE_HANDLE)
+            if source != FOLLOW_THE_HANDLE:
+                return f'console.source is {source}'
+        if self._home is None and self._client.underway is not None:
+            return 'a calibration or a way home has the slave'
+        return ''
+
+    def _is_home(self, known: frozenset[int]) -> bool:
+        order = self._client.order_since(known, HOME)
+        return order is not None and order.state == SUCCEEDED
+
+    def _obey(self, request: Request) -> None:
+        if request is Request.QUIT:
+            self._quit = True
+        elif request is Request.SUSPEND:
+            self._signals.suspend = True
+        elif request is Request.PAUSE:
+            self._client.order('pause')
+        elif request is Request.ENABLE:
+            self._client.order('resume' if self._client.state == 'PAUSED' else 'enable')
+        elif self._setting is None:
+            factor = _LARGER if request is Request.LARGER else 1.0 / _LARGER
+            scale = min(_SCALES[1], max(_SCALES[0], self._scale * factor))
+            self._scale_asked = scale
+            self._before.setdefault('scale', self._scale)
+            self._setting = request_parameters(self._client, 'console', {'scale': scale})
+
+    def _settle(self) -> None:
+        """Take the console's answer about its scale."""
+        if self._setting is None:
+            return
+        self._client.serve(0.001)
+        if self._setting.done():
+            result = self._setting.result().result
+            self._setting = None
+            self._note = '' if result.successful else result.reason
+            if result.successful:
+                self._scale = self._scale_asked
+
+    def _lines(self, turn: Turn) -> tuple[str, str]:
+        """State, lamp, angles and speed; and why it does not move."""
+        wall_ns = time.time_ns()
+        wanted = self._wanted.since(wall_ns - _FRESH_NS)
+        measured = self._measured.since(wall_ns - 2 * _FRESH_NS)
+        joints = '  '.join(
+            f'{name} {_degrees(wanted, k)}/{_degrees(measured, k)}' for k, name in enumerate(JOINTS)
+        )
+        # What is wanted is obeyed where the compensator makes commands for the motors of it.
+        obeyed = self._motors.since(wall_ns - _FRESH_NS) is not None
+        follows = turn.clutch and wanted is not None and obeyed
+        lamp = 'HOME' if turn.homing else 'FOLLOW' if follows else 'HELD' if turn.clutch else 'OPEN'
+        speed = f'{math.degrees(self._hand.speed):.0f} deg/s x {self._scale:.2g}'
+        line = f'{self._client.state:<8} {lamp:<6} {joints} deg  {speed}'
+        return line, printable(self._why(turn, follows))
+
+    def _why(self, turn: Turn, follows: bool) -> str:
+        """Why it does not move, in few words."""
+        if self._note:
+            return self._note
+        if turn.clutch:
+            at_limit = [name for name, is_at in zip(JOINTS, turn.at_limit, strict=True) if is_at]
+            if at_limit:
+                return f'{" and ".join(at_limit)} at its limit'
+            console = self._client.health.get(CONSOLE)
+            said = console.message if console is not None else 'silent'
+            return '' if follows else f'the console does not follow: {said}'
+        return self._hindrance(time.time_ns()) or self._hand.dead_man.reason
+
+
+def _degrees(angles: tuple[float, ...] | None, k: int) -> str:
+    return f'{math.degrees(angles[k]):+6.1f}' if angles is not None else '    --'

@@ -1,0 +1,110 @@
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+
+from endoscope_console.teleop.lease import SILENCE_NS, Claim, Lease
+
+MS = 1_000_000
+
+
+def test_a_free_lease_is_granted_and_kept_until_it_is_given_back():
+    lease = Lease()
+    assert (lease.holder, lease.since_ns) == ('', 0)
+    assert lease.claim('c1', False, 5) == Claim(True)
+    assert (lease.holder, lease.since_ns) == ('c1', 5)
+    assert lease.claim('c1', False, 9) == Claim(True)
+    assert lease.since_ns == 5
+    lease.release('c2')
+    assert lease.holder == 'c1'
+    lease.release('c1')
+    assert (lease.holder, lease.since_ns) == ('', 0)
+
+
+def test_another_is_refused_by_name_unless_he_takes_it():
+    lease = Lease()
+    lease.claim('c1', False, 0)
+    assert lease.claim('c2', False, 1) == Claim(False, 'c1 is the operator')
+    assert lease.holder == 'c1'
+    assert lease.claim('c2', True, 2) == Claim(True, lost_by='c1')
+    assert (lease.holder, lease.since_ns) == ('c2', 2)
+    lease.release('c1')
+    assert lease.holder == 'c2'
+
+
+@pytest.mark.parametrize('by_claim', [True, False])
+def test_two_seconds_of_silence_end_it_and_say_whose_it_was(by_claim):
+    lease = Lease()
+    lease.claim('c1', False, 0)
+    last = 700 * MS
+    if by_claim:
+        lease.claim('c1', False, last)
+    else:
+        lease.heard('c1', last)
+    lease.heard('c2', last + SILENCE_NS - 1)
+    assert lease.turn(last + SILENCE_NS - 1) == ''
+    assert lease.turn(last + SILENCE_NS) == 'c1'
+    assert lease.holder == ''
+    assert lease.turn(last + 2 * SILENCE_NS) == ''
+
+
+def test_a_sign_that_was_stamped_before_another_does_not_shorten_it():
+    lease = Lease()
+    lease.claim('c1', False, 1000 * MS)
+    lease.heard('c1', 0)
+    assert lease.turn(2500 * MS) == ''
+
+
+def test_a_client_has_a_name():
+    with pytest.raises(ValueError, match='name'):
+        Lease().claim('', True, 0)
+
+
+CLIENTS = st.sampled_from(['c1', 'c2', 'c3'])
+
+
+class OneOperator(RuleBasedStateMachine):
+    def __init__(self):
+        super().__init__()
+        self.lease = Lease()
+        self.now = 0
+        self.holder, self.since, self.heard = '', 0, 0
+
+    @rule(client=CLIENTS, take=st.booleans())
+    def claim(self, client, take):
+        claim = self.lease.claim(client, take, self.now)
+        assert claim.granted == (self.holder in ('', client) or take)
+        assert bool(claim.why) == (not claim.granted)
+        another = claim.granted and self.holder not in ('', client)
+        assert claim.lost_by == (self.holder if another else '')
+        if claim.granted:
+            self.since = self.since if self.holder == client else self.now
+            self.holder, self.heard = client, self.now
+
+    @rule(client=CLIENTS)
+    def go(self, client):
+        self.lease.release(client)
+        if client == self.holder:
+            self.holder, self.since = '', 0
+
+    @rule(client=CLIENTS)
+    def sign(self, client):
+        self.lease.heard(client, self.now)
+        if client == self.holder:
+            self.heard = self.now
+
+    @rule(ms=st.sampled_from([1, 500, 999, 1000, 2000]))
+    def time_goes_by(self, ms):
+        self.now += ms * MS
+        silent = bool(self.holder) and self.now - self.heard >= SILENCE_NS
+        assert self.lease.turn(self.now) == (self.holder if silent else '')
+        if silent:
+            self.holder, self.since = '', 0
+
+    @invariant()
+    def one_holds_it(self):
+        assert (self.lease.holder, self.lease.since_ns) == (self.holder, self.since)
+
+
+TestOneOperator = OneOperator.TestCase
+TestOneOperator.settings = settings(max_examples=100, stateful_step_count=20)

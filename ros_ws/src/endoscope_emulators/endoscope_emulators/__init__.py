@@ -1,0 +1,1 @@
+"""Emulated servos, load cells, tracker and cables, for tests and benchmarks."""

@@ -1,0 +1,1 @@
+"""A running graph as other programs see it: what it says, orders to it, and its parameters."""

@@ -1,0 +1,267 @@
+"""The operator's side of a running graph: asks it for something, and hears what it answers."""
+
+import time
+from collections.abc import Callable
+from typing import Any, cast
+
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.task import Future
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from endoscope_core.safety.operating_state import CAUSES_PRESENT
+from endoscope_nodes.client.graph_listener import (
+    PATIENCE_S,
+    SUPERVISOR,
+    GraphListener,
+    GraphRefusedError,
+    Health,
+    NoGraphError,
+)
+from endoscope_nodes.client.order_feedback import (
+    CALIBRATE,
+    EXECUTING,
+    HOME,
+    REJECTED,
+    SUCCEEDED,
+    OrderFeedback,
+)
+from endoscope_nodes.names import (
+    CALIBRATION_RESULT,
+    CALIBRATION_RUN,
+    REFUSAL,
+    REFUSAL_CODE,
+    REFUSED_NS,
+    STATE_COMMAND,
+)
+from endoscope_nodes.runtime.qos import EVENT
+
+WHOLE_S = 10.0
+"""How long a graph that has just been started may take until all its streams are heard."""
+_OPENS = {'enable': 'ENABLED', 'resume': 'ENABLED', 'disable': 'DISABLED', 'pause': 'PAUSED'}
+_TO_MOTION = ('enable', 'resume', 'home')
+_REPEATED_AFTER_S = 1.0
+# An `enable` that brings a node's trouble to light is a fault within this time.
+_STEADY_S = 0.3
+
+
+def _never() -> bool:
+    return False
+
+
+class GraphClient(GraphListener):
+    """Listens to a graph and asks it for things."""
+
+    def __init__(
+        self,
+        node: Node,
+        serve: Callable[[float], object],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        super().__init__(node, serve, clock)
+        # Called with what is waited for, in words, before an order can be given.
+        self.told: Callable[[str], object] = lambda what: None
+        self._orders = node.create_publisher(String, STATE_COMMAND, EVENT)
+        self._clients: dict[str, Client] = {}
+
+    def is_connected(self) -> bool:
+        """Whether every topic that is heard has a sender, and the commands a reader."""
+        return self._is_heard() and all(s.count_publishers() for s, _ in self._heard)
+
+    def find(self, patience_s: float) -> None:
+        """Wait until the supervisor is heard and hears; NoGraphError if nobody is there."""
+        if self.wait_until(lambda: bool(self.state) and self._is_heard(), patience_s):
+            return
+        others = self.nodes()
+        if others:
+            raise NoGraphError(
+                f'no supervisor answers in {self.where}; there are {", ".join(others)}'
+            )
+        raise NoGraphError(f'no graph answers in {self.where}: start one with `graph`')
+
+    def _is_heard(self) -> bool:
+        known = self.node.get_subscriptions_info_by_topic(self._orders.topic_name)
+        return 0 < len(known) <= self._orders.get_subscription_count()
+
+    def order(self, command: str) -> None:
+        """Give a state command and wait for nothing."""
+        self._orders.publish(String(data=command))
+
+    def ask(
+        self,
+        command: str,
+        patience_s: float = PATIENCE_S,
+        withdrawn: Callable[[], bool] = _never,
+    ) -> str:
+        """Give a state command and wait for the state that it leads to; that state."""
+        target = _OPENS[command]
+        asked_ns = time.time_ns()
+        self._ask(
+            command,
+            lambda: self.state == target and self.state_ns > asked_ns,
+            target,
+            patience_s,
+            withdrawn,
+        )
+        return target
+
+    def ask_and_see(
+        self,
+        command: str,
+        patience_s: float = PATIENCE_S,
+        withdrawn: Callable[[], bool] = _never,
+    ) -> str:
+        """Give a state command, and see whether the state lasts; that state."""
+        state = self.ask(command, patience_s, withdrawn)
+        # A node's trouble may come to light at once; its cause follows.
+        if state == 'ENABLED' and self.wait_until(lambda: self.state != state, _STEADY_S):
+            self.wait_until(lambda: bool(self.why) or withdrawn(), patience_s)
+            raise GraphRefusedError(f'{self.state}: {self.why or "asked for meanwhile"}')
+        return state
+
+    def _ask(
+        self,
+        command: str,
+        done: Callable[[], bool],
+        what: str,
+        patience_s: float,
+        withdrawn: Callable[[], bool],
+    ) -> None:
+        """Give a command, again where it brought no answer, until it is done."""
+        asked_ns = time.time_ns()
+        # A refusal is told until the next one, by a stamp of the supervisor's.
+        self.wait_for(lambda: self.graph_ns > 0, 'the supervisor', patience_s)
+        graph_ns, begun_in = self.graph_ns, self.state
+        end = self._clock() + patience_s
+
+        def is_refused() -> bool:
+            said = self.health.get(SUPERVISOR)
+            if said is None or said.received_ns <= asked_ns or not said.values[REFUSAL]:
+                return False
+            return int(said.values[REFUSED_NS]) >= graph_ns
+
+        while self._clock() <= end:
+            if withdrawn():
+                raise GraphRefusedError(f'{command} was withdrawn before it was answered')
+            if command in _TO_MOTION and begun_in and self.state != begun_in:
+                # What has ended motion meanwhile must not be undone by an order from before it.
+                raise GraphRefusedError(f'{self.state} instead of {what}: {self.why or "no cause"}')
+            self.order(command)
+            if self.wait_until(lambda: done() or is_refused(), _REPEATED_AFTER_S):
+                if not is_refused():
+                    return None
+                said = self.health[SUPERVISOR].values
+                if said[REFUSAL_CODE] == CAUSES_PRESENT and self._becomes_whole(said[REFUSAL]):
+                    return self._ask(command, done, what, patience_s, withdrawn)
+                raise GraphRefusedError(said[REFUSAL])
+        raise GraphRefusedError(f'timed out after {patience_s:g} s waiting for {what}')
+
+    def _becomes_whole(self, refused: str) -> bool:
+        """Wait where that was the reason of a refusal; whether the streams have come since."""
+        if not self.awaited:
+            return False
+        self.told(f'waits until the graph is whole: {refused}')
+        return self.wait_until(lambda: not self.awaited, WHOLE_S)
+
+    def home(self, patience_s: float = PATIENCE_S, withdrawn: Callable[[], bool] = _never) -> str:
+        """Go home, and wait until the slave is there; what calibration says of it."""
+        known = self.known_orders(patience_s)
+        what = 'the way home: calibration does not begin it'
+        self._ask(
+            HOME, lambda: self.order_since(known, HOME) is not None, what, patience_s, withdrawn
+        )
+        ended = self._followed(known, HOME, patience_s)
+        if ended.state != SUCCEEDED:
+            prefix = f'{HOME}: ' if ended.state == REJECTED else ''
+            raise GraphRefusedError(f'{prefix}{ended.words}')
+        return ended.words
+
+    def known_orders(self, patience_s: float = PATIENCE_S) -> frozenset[int]:
+        """Ids of the orders that calibration has been given; a new one gets none of them."""
+        self.wait_for(lambda: bool(self.orders), 'calibration', patience_s)
+        return frozenset(self.orders)
+
+    def order_since(self, known: frozenset[int], name: str) -> OrderFeedback | None:
+        """The first order of a name that is none of those known, rejected ones last."""
+        new = [o for o in list(self.orders.values()) if o.order == name and o.id not in known]
+        return max(new, key=lambda order: order.state != REJECTED, default=None)
+
+    def _followed(
+        self,
+        known: frozenset[int],
+        name: str,
+        patience_s: float,
+        progress: Callable[[str, float], None] = lambda step, share: None,
+    ) -> OrderFeedback:
+        """Wait until an order has ended; how it did."""
+        heard: OrderFeedback | None = None
+
+        def says_more() -> bool:
+            return self.order_since(known, name) != heard
+
+        while heard is None or heard.state == EXECUTING:
+            if not self.wait_until(says_more, patience_s):
+                raise GraphRefusedError(f'calibration has been silent for {patience_s:g} s')
+            heard = self.order_since(known, name)
+            if heard is None:
+                raise GraphRefusedError(f'calibration has begun anew and knows no {name} any more')
+            if heard.state == EXECUTING:
+                progress(heard.words, heard.progress)
+        return heard
+
+    def calibrate(
+        self,
+        progress: Callable[[str, float], None] = lambda step, share: None,
+        patience_s: float = PATIENCE_S,
+    ) -> Health:
+        """Calibrate, and wait for the result; calibration may say nothing for `patience_s`."""
+        known = self.known_orders(patience_s)
+        try:
+            self.trigger(CALIBRATION_RUN, patience_s)
+        except GraphRefusedError as error:
+            if not self._becomes_whole(str(error)):
+                raise
+            self.trigger(CALIBRATION_RUN, patience_s)
+        ended = self._followed(known, CALIBRATE, patience_s, progress)
+        if ended.state != SUCCEEDED:
+            raise GraphRefusedError(ended.words)
+
+        def is_told() -> bool:
+            return self.calibration is not None and self.calibration.stamp_ns > ended.id
+
+        self.wait_for(is_told, CALIBRATION_RESULT, patience_s)
+        return cast(Health, self.calibration)
+
+    def trigger(self, service: str, patience_s: float = PATIENCE_S) -> str:
+        """Call a service that only begins or ends something; what it answers."""
+        answer = self.call(Trigger, service, Trigger.Request(), patience_s)
+        if not answer.success:
+            raise GraphRefusedError(answer.message)
+        return str(answer.message)
+
+    def client(self, kind: type, service: str) -> Client:
+        """Client of a service; made when it is asked for first."""
+        if service not in self._clients:
+            self._clients[service] = self.node.create_client(kind, service)
+        return self._clients[service]
+
+    def call(self, kind: type, service: str, request: Any, patience_s: float = PATIENCE_S) -> Any:
+        """Call a service and wait for its answer; NoGraphError if nobody serves it or answers."""
+        client = self.client(kind, service)
+        if not self.wait_until(client.service_is_ready, patience_s):
+            raise NoGraphError(f'nobody serves {service} in {self.where}')
+        return self.answer(client.call_async(request), service, patience_s)
+
+    def answer(self, future: Future, what: str, patience_s: float = PATIENCE_S) -> Any:
+        """Wait for the answer to a call."""
+        if not self.wait_until(future.done, patience_s):
+            raise NoGraphError(f'{what} has not answered for {patience_s:g} s')
+        return future.result()
+
+    def close(self) -> None:
+        """Listen and ask no more; the node remains."""
+        super().close()
+        for client in self._clients.values():
+            self.node.destroy_client(client)
+        self.node.destroy_publisher(self._orders)

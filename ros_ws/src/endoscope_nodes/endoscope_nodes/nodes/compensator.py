@@ -1,0 +1,433 @@
+"""Turns desired bending into motor commands that make up for the hysteresis."""
+
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.time import Time
+
+from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_CLASS, MODES
+from endoscope_core.control import (
+    DesiredMotion,
+    Feedforward,
+    FeedforwardLaw,
+    FeedforwardSettings,
+    MotorLimits,
+    keep_within,
+    reach_in_words,
+)
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
+from endoscope_core.safety import (
+    CommandGate,
+    CommandLimits,
+    MotionLimits,
+    MotionShaper,
+    Refusal,
+    StandingStill,
+)
+from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
+from endoscope_nodes.names import (
+    CALIBRATION_COMMAND,
+    CALIBRATION_RESULT,
+    COMPENSATOR_STATE,
+    CORRECTION,
+    JOINTS,
+    MOTOR_COMMAND,
+    MOTORS,
+    SLAVE_COMMAND,
+)
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report, status
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
+from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_parameters import CompensatorParameters
+from endoscope_nodes.runtime.qos import COMMAND, RESULT
+from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.runtime.ticker import TICK_S
+from endoscope_nodes.safety.clutch import ClutchWatch
+from endoscope_nodes.safety.command_report import CommandReport
+from endoscope_nodes.safety.senders import SenderWatch
+from endoscope_nodes.safety.sessions import TURN_S, SessionWatch
+
+CONSOLE = 'console'
+CALIBRATION = 'calibration'
+NOBODY = 'nobody'
+
+_AT_ZERO = (0.0,) * len(JOINTS)
+_NOTHING = np.zeros(len(JOINTS))
+_ANY_CLASS = CalibrationFindings(class_deg=70)
+
+
+class CompensatorNode(EndoscopeNode):
+    """The only publisher of ``motor/servo_jp``.
+
+    It obeys commands and corrections of the motion session that it takes part in, each from one
+    sender.  Calibration goes before the console while its commands are fresh, and passes
+    uncompensated.  Every stream begins at the measured pose, and the motors go on from where they
+    are, whatever changes: source, model, parameters or feedback.  A console that falls silent while
+    the clutch is held ends the session.
+    """
+
+    def __init__(self, context: NodeContext) -> None:
+        super().__init__('compensator', context)
+        p = self.parameters(CompensatorParameters, self._on_parameters)
+        self._settings = p
+        facts, motors = self.rig.joints, self.rig.motors
+        timeout_ns = self.rig.timeouts.command_ns
+        self.gate = CommandGate(
+            CommandLimits(facts.reach, facts.speed, facts.entry_step, timeout_ns)
+        )
+        self.calibration_gate = CommandGate(
+            CommandLimits(facts.drive, facts.speed, facts.entry_step, timeout_ns)
+        )
+        self.correction_gate = CommandGate(
+            CommandLimits(facts.correction, motors.speed / facts.gear, facts.correction, timeout_ns)
+        )
+        limits = (facts.drive * facts.gear, motors.speed, motors.acceleration, motors.step)
+        self.shaper = MotionShaper(MotionLimits.either_way(len(MOTORS), *limits))
+        self._feedforward = Feedforward(
+            len(JOINTS),
+            FeedforwardSettings(
+                lead=p.lead,
+                speed_limit=motors.speed / facts.gear,
+                limits=MotorLimits.of(self.rig),
+            ),
+        )
+        self._passing = Feedforward(len(JOINTS))
+        self._desired = DesiredMotion(len(JOINTS))
+        self._choice = LawChoice(len(JOINTS), p.parameter_sets, p.table)
+        self._trouble = self._load()
+        self.findings: CalibrationFindings | None = None
+        self._found: CalibrationFindings | None = None
+        self._news = False
+        self._calibrated_in = ''
+        self._learnt_ns = 0
+        self._source = NOBODY
+        self._last_stamp_ns = 0
+        self._sent = _AT_ZERO
+        self._answer = StandingStill(MOTORS, self.rig.motors.resolution)
+        self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
+        self._corrected = False
+        self._beyond_reach = self._beyond_before = 0
+        self._state_is_news = True
+        self._motors = JointPublisher(self, MOTOR_COMMAND, MOTORS, ('position',), COMMAND)
+        self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
+        self._session = SessionWatch(self, self._start_anew, self._start_anew)
+        self._clutch = ClutchWatch(self, self._session, self._end_stream)
+        self._pose = context.pose_of(self)
+        self._calibration_in = self._listen(
+            CALIBRATION_COMMAND, self._on_calibration, self.calibration_gate
+        )
+        self._console_in = self._listen(SLAVE_COMMAND, self._on_console, self.gate)
+        self._correction_in = self._listen(CORRECTION, self._on_correction, self.correction_gate)
+        results = self.create_subscription(
+            DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
+        )
+        self._results = self._session.senders_of(results, self._doubt_results)
+        self.diagnostics.add('commands', CommandReport(self.gate, self.ticker, self._session.leave))
+        self.diagnostics.add(
+            'calibration commands', CommandReport(self.calibration_gate, self.ticker)
+        )
+        self.diagnostics.add('corrections', CommandReport(self.correction_gate, self.ticker))
+        self.diagnostics.add('output', self._report)
+        self.ticker.every(TURN_S, self._watch_motion)
+        self.ticker.every(0.1, self._publish_state)
+
+    def _listen(self, topic: str, callback: Any, gate: CommandGate) -> SenderWatch:
+        stream = JointSubscription(
+            self,
+            topic,
+            JOINTS,
+            callback,
+            COMMAND,
+            exact=True,
+            on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
+        )
+        if gate is not self.correction_gate:
+            self._session.obeys(topic, gate)
+        return self._session.senders_of(stream.subscription)
+
+    def _on_parameters(self, parameters: CompensatorParameters) -> None:
+        self._settings = parameters
+        self._select_law()
+
+    def _on_result(self, message: DiagnosticArray) -> None:
+        found = findings_of(message)
+        if found is None and not is_of_no_class(message):
+            return
+        crowd = self._results.rivals()
+        if crowd:
+            self._doubt_results(crowd)
+        if crowd or not self._calibrated_in or message.header.frame_id != self._calibrated_in:
+            why = crowd or f'it is of {message.header.frame_id or "no session"}'
+            self.get_logger().warning(f'{CALIBRATION_RESULT} is not taken: {why}')
+            return
+        self._found, self._news = found, True
+
+    def _doubt_results(self, crowd: str) -> None:
+        """Take no result before another calibration: it may be somebody else's."""
+        self._calibrated_in = ''
+        self._session.leave(crowd)
+
+    def _take_news(self) -> None:
+        """Put a new calibration in force: only where nothing moves."""
+        if self._news:
+            self._news = False
+            self.findings = self._found
+            self._select_law()
+
+    def _load(self) -> str:
+        """Load and compile all that the first command would wait for; why a mode is not available."""
+        trouble = ''
+        for mode in dict.fromkeys((*MODES, self._settings.mode)):
+            trial = Feedforward(len(JOINTS))
+            try:
+                trial.select(self._choice.law(mode, BY_CLASS, _ANY_CLASS))
+            except EndoscopeError as error:
+                trouble = str(error) if mode == self._settings.mode else trouble
+                continue
+            trial.step(_NOTHING, _NOTHING, 1e-3)
+            trial.measure(0.0, _NOTHING)
+        return trouble
+
+    def _select_law(self) -> None:
+        """Put mode and findings in force; without findings nothing is compensated."""
+        law, self._trouble = FeedforwardLaw(), ''
+        if self.findings is not None:
+            try:
+                law = self._choice.law(
+                    self._settings.mode, self._settings.selected_by, self.findings
+                )
+            except EndoscopeError as error:
+                self._trouble = str(error)
+        if law != self._feedforward.law:
+            self._feedforward.select(law)
+        self._state_is_news = True
+
+    def _start_anew(self) -> None:
+        for gate in (self.gate, self.calibration_gate, self.correction_gate):
+            gate.reset()
+        self._corrections = (None, None)
+        self._source = NOBODY
+        self._motors.session = self._session.name
+
+    def _end_stream(self) -> None:
+        """The clutch was let go of: whatever is commanded after it begins at the measured pose."""
+        self.gate.reset()
+        if self._source == CONSOLE:
+            self._source = NOBODY
+
+    def _watch_motion(self) -> None:
+        now = self.ticker.monotonic_ns()
+        if self._source == CONSOLE and not self.gate.is_fresh(now):
+            self._source = NOBODY
+            if self._clutch.held:
+                said = f' ({self.gate.last_reason})' if self.gate.last_reason else ''
+                self._session.leave(f'{SLAVE_COMMAND} ended while the clutch was held{said}')
+        elif self._source == CALIBRATION and not self.calibration_gate.is_fresh(now):
+            self._source = NOBODY
+        if self._source == NOBODY:
+            self._take_news()
+            return
+        # By the time of the measurement: motors that are silent do not stand still, and silence
+        # has a reason of its own.
+        trouble = self._answer.look(self._sent, self._pose.shafts(), self._pose.shafts_ns)
+        if trouble:
+            self._session.leave(trouble)
+
+    def _may_pass(self, sample: JointSample, senders: SenderWatch, gate: CommandGate) -> bool:
+        """Whether a message is of the open session and of the one sender of its topic."""
+        if not self._session.belongs(sample.session):
+            gate.refuse(Refusal.SESSION, sample.session or 'none named')
+            return False
+        crowd = senders.rivals()
+        if crowd:
+            gate.refuse(Refusal.SENDER, crowd)
+            self._session.leave(crowd)
+        return not crowd
+
+    def _learn(self, stamp_ns: int) -> None:
+        """Give a measurement from before this command to the law, once."""
+        sample = self._pose.tracked
+        if sample is None or not self._learnt_ns < sample.stamp_ns < stamp_ns:
+            return
+        self._learnt_ns = sample.stamp_ns
+        self._feedforward.measure((stamp_ns - sample.stamp_ns) * 1e-9, sample.position)
+
+    def _on_correction(self, sample: JointSample) -> None:
+        if not self._may_pass(sample, self._correction_in, self.correction_gate):
+            return
+        now = self.ticker.monotonic_ns()
+        if self.correction_gate.check(sample.stamp_ns, sample.position, now, _AT_ZERO) is None:
+            self._corrections = (self._corrections[1], sample)
+
+    def _on_console(self, sample: JointSample) -> None:
+        now = self.ticker.monotonic_ns()
+        if not self._may_pass(sample, self._console_in, self.gate):
+            return
+        if self.calibration_gate.is_fresh(now):
+            return
+        if not self._clutch.held:
+            self.gate.refuse(Refusal.CLUTCH)
+            return
+        bending = self._pose.bending()
+        dt = self._obey(CONSOLE, self.gate, sample, bending)
+        if dt is None:
+            return
+        correction = self._correction(sample.stamp_ns)
+        if dt == 0.0:
+            self._desired.restart()
+        added = _NOTHING if correction is None else correction
+        if dt == 0.0 or self._corrected != (correction is not None):
+            self._corrected = correction is not None
+            self._feedforward.rebase(
+                self._drive_before() - added, sample.position if dt == 0.0 else None
+            )
+        within = self._within_reach(sample)
+        angle, velocity = self._desired.follow(*within, dt or TICK_S)
+        if self._news and not any(velocity):
+            self._take_news()
+        self._learn(sample.stamp_ns)
+        drive = self._feedforward.step(angle, velocity, dt or TICK_S) + added
+        self._put_out(sample.stamp_ns, drive, dt or TICK_S)
+
+    def _within_reach(self, sample: JointSample) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Desired angles and velocities, cut where the tube at hand lets the tip bend no more."""
+        if self.findings is None:
+            return sample.position, sample.velocity
+        angle, velocity = keep_within(self.findings.reaches, sample.position, sample.velocity)
+        if angle != sample.position:
+            self._beyond_reach += 1
+        return angle, velocity
+
+    def _on_calibration(self, sample: JointSample) -> None:
+        if not self._may_pass(sample, self._calibration_in, self.calibration_gate):
+            return
+        shafts = self._pose.shafts()
+        start = None if shafts is None else tuple(x / self.rig.joints.gear for x in shafts)
+        dt = self._obey(CALIBRATION, self.calibration_gate, sample, start)
+        if dt is None:
+            return
+        self._calibrated_in = self._session.name
+        if dt == 0.0:
+            self._passing.rebase(self._drive_before(), sample.position)
+        velocity = sample.velocity or (0.0,) * len(JOINTS)
+        drive = self._passing.step(sample.position, velocity, dt or TICK_S)
+        self._put_out(sample.stamp_ns, drive, dt or TICK_S)
+
+    def _obey(
+        self,
+        source: str,
+        gate: CommandGate,
+        sample: JointSample,
+        measured: tuple[float, ...] | None,
+    ) -> float | None:
+        """Seconds since the command before; 0 for the first of a stream, None if it is refused."""
+        now = self.ticker.monotonic_ns()
+        shafts = self._pose.shafts()
+        if measured is None or shafts is None:
+            gate.refuse(Refusal.STEP, 'no measured position')
+            return None
+        if gate.check(sample.stamp_ns, sample.position, now, measured, sample.velocity) is not None:
+            return None
+        goes_on = source == self._source and not gate.began
+        dt = (sample.stamp_ns - self._last_stamp_ns) * 1e-9
+        self._last_stamp_ns = sample.stamp_ns
+        self._source = source
+        if goes_on:
+            return dt
+        self._sent = shafts
+        self.shaper.restart(shafts)
+        self._answer.restart()
+        return 0.0
+
+    def _correction(self, stamp_ns: int) -> np.ndarray | None:
+        """Newest correction from before this command: which one must not depend on chance."""
+        # This mode learns from the tracker itself.
+        if self._feedforward.law.mode == ADAPTIVE_PHYSICAL:
+            return None
+        for sample in reversed(self._corrections):
+            if sample is not None and sample.stamp_ns < stamp_ns:
+                fresh = (stamp_ns - sample.stamp_ns) <= self.rig.timeouts.command_ns
+                return np.array(sample.position) if fresh else None
+        return None
+
+    def _put_out(self, stamp_ns: int, drive: np.ndarray, dt: float) -> None:
+        gear = self.rig.joints.gear
+        self._sent = self.shaper.shape([gear * angle for angle in drive.tolist()], dt)
+        self._motors.publish(stamp_ns, *self._sent)
+
+    def _drive_before(self) -> np.ndarray:
+        """Joint-equivalent angles that went out last, or that a stream begins at, in rad."""
+        return np.array(self._sent) / self.rig.joints.gear
+
+    def _publish_state(self) -> None:
+        now = self.ticker.now_ns()
+        if now == 0 or not self._state_is_news:
+            return
+        self._state_is_news = False
+        law = self._feedforward.law
+        values: dict[str, object] = {
+            'mode': law.mode,
+            'wanted_mode': self._settings.mode,
+            'selected_by': self._settings.selected_by,
+            'lead': self._settings.lead,
+            'gear': self.rig.joints.gear,
+        }
+        if self.findings is not None and self.findings.class_deg is not None:
+            values['class_deg'] = self.findings.class_deg
+        for joint, parameters in zip(JOINTS, law.parameters, strict=False):
+            values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
+        message = DiagnosticArray()
+        message.header.stamp = Time(nanoseconds=now).to_msg()
+        message.status = [status('compensator: model', OK, self._model_in_words(), values)]
+        self._states.publish(message)
+
+    def _model_in_words(self) -> str:
+        if self._settings.mode == 'none':
+            return 'no feed-forward'
+        if self._trouble:
+            return f'no feed-forward: {self._trouble}'
+        if self.findings is None:
+            return (
+                f'no feed-forward: {self._settings.mode} waits for a calibration; '
+                f'{self.operate("calibrate")}'
+            )
+        return f'{self._settings.mode} by {self._settings.selected_by}: {_in_words(self.findings)}'
+
+    def _report(self) -> Report:
+        waiting = self._settings.mode != 'none' and self.findings is None
+        level = ERROR if self._trouble else WARN if waiting else OK
+        said = self._model_in_words()
+        beyond = self._beyond_reach - self._beyond_before
+        self._beyond_before = self._beyond_reach
+        if beyond and self.findings is not None:
+            level = max(level, WARN)
+            said += f'; {reach_in_words(self.findings.reaches, JOINTS)}, more was asked for'
+        return (
+            level,
+            said,
+            {
+                'cut to the reach': self._beyond_reach,
+                'source': self._source,
+                'published': self._motors.count,
+                'corrected': self._corrected,
+                'bounded': self.shaper.bounded,
+                'learnt': ' '.join(
+                    f'{learnt.joint.capstan_exponent:.3f}' for learnt in self._feedforward.learnt
+                ),
+            },
+        )
+
+
+def _in_words(findings: CalibrationFindings) -> str:
+    parts = [] if findings.class_deg is None else [f'class {findings.class_deg} deg']
+    if findings.size is not None:
+        parts.append(f'size {np.degrees(findings.size):.1f} deg')
+    return ', '.join([*parts, *(['plant identified'] if findings.plants else [])])
+
+
+def main() -> int:
+    """Run the compensator in a process of its own."""
+    return run_nodes([CompensatorNode])

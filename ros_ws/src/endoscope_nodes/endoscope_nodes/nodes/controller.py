@@ -1,0 +1,191 @@
+"""Feedback from the tracker: what the feed-forward leaves over, learnt while it moves."""
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
+
+from endoscope_core.choices import ADAPTIVE, RECURSIVE_LEAST_SQUARES
+from endoscope_core.control import (
+    AdaptiveBacklashController,
+    DesiredMotion,
+    RecursiveHysteresisController,
+    TrackerMeasurement,
+)
+from endoscope_core.safety import CommandGate, CommandLimits, Refusal
+from endoscope_nodes.client.calibration_result import class_of
+from endoscope_nodes.names import (
+    CALIBRATION_COMMAND,
+    CALIBRATION_RESULT,
+    CORRECTION,
+    JOINTS,
+    SLAVE_COMMAND,
+    SLAVE_MEASURED,
+)
+from endoscope_nodes.runtime.diagnostics import OK, WARN, Report
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
+from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_parameters import ControllerParameters
+from endoscope_nodes.runtime.qos import COMMAND, RESULT
+from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.runtime.ticker import TICK_S
+from endoscope_nodes.safety.command_report import CommandReport
+from endoscope_nodes.safety.sessions import SessionWatch
+from endoscope_nodes.safety.streams import StreamWatch
+
+Controller = AdaptiveBacklashController | RecursiveHysteresisController
+LAWS: dict[str, type[Controller]] = {
+    ADAPTIVE: AdaptiveBacklashController,
+    RECURSIVE_LEAST_SQUARES: RecursiveHysteresisController,
+}
+
+_NOTHING = np.zeros(len(JOINTS))
+
+
+class ControllerNode(EndoscopeNode):
+    """Publishes ``controller/correction_js``, to be added to the joint-equivalent motor command.
+
+    It answers every command of the console that may be obeyed, with a correction of zero while it
+    does not act: without a fresh tracker, during a calibration, or when it is not active.
+    """
+
+    def __init__(self, context: NodeContext) -> None:
+        super().__init__('controller', context)
+        p = self.parameters(ControllerParameters, self._on_parameters)
+        self._settings = p
+        self._law = p.law
+        self.controller = self._new_controller()
+        # Loads what is compiled now, which the second step needs: no command must wait for it.
+        trial = AdaptiveBacklashController(len(JOINTS))
+        for time in (0.0, 1e-3):
+            trial.step(time, _NOTHING, _NOTHING)
+        facts, self._timeout_ns = self.rig.joints, self.rig.timeouts.command_ns
+        self._gate = CommandGate(
+            CommandLimits(facts.reach, facts.speed, facts.entry_step, self._timeout_ns)
+        )
+        self._desired = DesiredMotion(len(JOINTS))
+        self._used_ns = 0
+        self._last_stamp_ns = 0
+        self._forget = False
+        self._told = 0
+        self._corrections = JointPublisher(self, CORRECTION, JOINTS, ('position',), COMMAND)
+        self._session = SessionWatch(self, self._start_anew, self._start_anew)
+        self._pose = context.pose_of(self)
+        self._calibration = StreamWatch(self.ticker, CALIBRATION_COMMAND)
+        self.create_subscription(
+            JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True
+        )
+        commands = JointSubscription(
+            self,
+            SLAVE_COMMAND,
+            JOINTS,
+            self._on_command,
+            COMMAND,
+            exact=True,
+            on_malformed=lambda reason: self._gate.refuse(Refusal.MALFORMED, reason),
+        )
+        self._senders = self._session.senders_of(commands.subscription)
+        self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
+        self.diagnostics.add('commands', CommandReport(self._gate, self.ticker))
+        self.diagnostics.add('feedback', self._report)
+
+    def _new_controller(self) -> Controller:
+        return LAWS[self._law](
+            len(JOINTS),
+            stale_after=self._settings.tracker_timeout,
+            fade_time=self._settings.fade_time,
+        )
+
+    def _on_parameters(self, parameters: ControllerParameters) -> None:
+        self._settings = parameters
+
+    def _start_anew(self) -> None:
+        self._gate.reset()
+        self.controller.restart()
+        self._last_stamp_ns = 0
+        self._corrections.session = self._session.name
+
+    def _on_result(self, message: DiagnosticArray) -> None:
+        self._forget = self._forget or class_of(message) is not None
+
+    def _on_command(self, sample: JointSample) -> None:
+        now = self.ticker.monotonic_ns()
+        if not self._session.belongs(sample.session):
+            self._gate.refuse(Refusal.SESSION, sample.session or 'none named')
+            return
+        crowd = self._senders.rivals()
+        if crowd:
+            self._gate.refuse(Refusal.SENDER, crowd)
+            self._session.leave(crowd)
+            return
+        bending = self._pose.bending()
+        if bending is None:
+            self._gate.refuse(Refusal.STEP, 'no measured position')
+            return
+        if (
+            self._gate.check(sample.stamp_ns, sample.position, now, bending, sample.velocity)
+            is not None
+        ):
+            return
+        dt = (sample.stamp_ns - self._last_stamp_ns) * 1e-9
+        if self._gate.began:
+            self.controller.restart()
+            self._desired.restart()
+            dt = TICK_S
+        self._last_stamp_ns = sample.stamp_ns
+        self._choose_whether_to_act()
+        angle, velocity = self._desired.follow(sample.position, sample.velocity, dt)
+        correction = self.controller.step(
+            sample.stamp_ns * 1e-9, angle, velocity, self._fresh(sample.stamp_ns)
+        )
+        self._corrections.publish(sample.stamp_ns, *correction.tolist())
+
+    def _choose_whether_to_act(self) -> None:
+        calibrating = self._calibration.heard(self._timeout_ns)
+        changing = self._settings.law != self._law
+        if changing and self.controller.faded:
+            self._law, changing = self._settings.law, False
+            self.controller = self._new_controller()
+        if self._settings.active and not calibrating and not changing:
+            self.controller.activate()
+        else:
+            self.controller.deactivate()
+        if self._forget:
+            self.controller.forget()
+            self._forget = False
+
+    def _fresh(self, stamp_ns: int) -> TrackerMeasurement | None:
+        """A measurement from before this command that has not been used yet."""
+        sample = self._pose.tracked
+        if sample is None or not self._used_ns < sample.stamp_ns < stamp_ns:
+            return None
+        self._used_ns = sample.stamp_ns
+        return TrackerMeasurement(sample.stamp_ns * 1e-9, np.array(sample.position))
+
+    def _report(self) -> Report:
+        controller = self.controller
+        values: dict[str, object] = {
+            'published': self._corrections.count,
+            'weight': controller.weight,
+            'law': self._law,
+            'measurements refused': controller.refused,
+        }
+        for joint, (gain, backlash) in zip(JOINTS, controller.learnt, strict=True):
+            values |= {f'{joint}.gain': gain, f'{joint}.backlash': backlash}
+        if not self._settings.active:
+            return OK, 'not active', values
+        if not self._pose.tracks:
+            return WARN, f'{SLAVE_MEASURED} is silent: feed-forward alone', values
+        # Measurements are taken with commands: at rest none of them is fresh, however many come.
+        idle = self._corrections.count == self._told
+        self._told = self._corrections.count
+        if idle:
+            return OK, f'waiting for {SLAVE_COMMAND}', values
+        if not controller.tracker_fresh(self._last_stamp_ns * 1e-9):
+            return WARN, f'{SLAVE_MEASURED} is not believed: feed-forward alone', values
+        return OK, 'in the loop', values
+
+
+def main() -> int:
+    """Run the controller in a process of its own."""
+    return run_nodes([ControllerNode])

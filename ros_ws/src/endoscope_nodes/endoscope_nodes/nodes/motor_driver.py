@@ -1,0 +1,229 @@
+"""Drives the motor shafts: the simulated slave or a bus of servos, the same node for both."""
+
+from collections import deque
+
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from endoscope_core.safety import (
+    CommandLimits,
+    MotionLimits,
+    OperatingState,
+    Refusal,
+    ShaftMotion,
+)
+from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
+from endoscope_devices.motor_device import DeviceError, MotorDevice
+from endoscope_devices.simulated_slave import SimulatedSlave
+from endoscope_nodes.names import (
+    JOINTS,
+    MOTOR_COMMAND,
+    MOTOR_MEASURED,
+    MOTOR_REBOOT,
+    MOTOR_SETPOINT,
+    MOTORS,
+    OPERATING_STATE,
+    SIMULATED_BENDING,
+    SIMULATED_WIRES,
+    WIRES,
+)
+from endoscope_nodes.nodes.dynamixel_bus import build_motors
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
+from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_parameters import DynamixelParameters, MotorDriverParameters
+from endoscope_nodes.runtime.parameters import ParameterError
+from endoscope_nodes.runtime.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
+from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.runtime.ticker import TICK_NS, TICK_S
+from endoscope_nodes.safety.command_report import CommandReport
+from endoscope_nodes.safety.sessions import SessionWatch
+
+_REPEATED_NS = 50_000_000
+
+
+class MotorDriverNode(EndoscopeNode):
+    """Obeys ``motor/servo_jp`` as far as it is safe, and publishes what the shafts do.
+
+    A command is obeyed while it belongs to the motion session that the node takes part in, has one
+    sender and passes the gate; what it asks for goes through the motion shaper.  Every tick the
+    shaped goal goes to the device and its reading is published, and the goal where it changes.
+    Without fresh commands, and outside of a session, the shafts go to the position measured at that
+    moment and hold it; only ``DISABLED`` lets them go.  The simulated slave also publishes the
+    noise-free tensions and angles that the simulated load cells and tracker read.
+    """
+
+    def __init__(self, context: NodeContext) -> None:
+        super().__init__('motor_driver', context)
+        device = self.parameters(MotorDriverParameters).device or self.rig.devices.motors
+        self._device_name = device
+        bus = self.parameters(DynamixelParameters)
+        facts, timeout_ns = self.rig.motors, self.rig.timeouts.command_ns
+        # The allowance of the gate holds for the time of receipt, which jitters, and the shaper
+        # bounds what it lets pass.
+        commands = CommandLimits(facts.reach, 1.25 * facts.speed, facts.entry_step, timeout_ns)
+        limits = (facts.reach, facts.speed, facts.acceleration, facts.step)
+        self.motion = ShaftMotion(commands, MotionLimits.either_way(len(MOTORS), *limits))
+        self._slave = None
+        if device == 'simulated':
+            self._slave = SimulatedSlave(context.plant, MOTORS, context.seed_of(0))
+        self._device: MotorDevice = self._slave or self._dynamixel(bus)
+        try:
+            self._device.open()
+        except DeviceError as error:
+            raise ParameterError(f'motor_driver: {error}') from error
+        self._trouble = ''
+        self._arrived: list[tuple[JointSample, int, str]] = []
+        self.latency_ns: deque[int] = deque(maxlen=1000)
+        self._measured = JointPublisher(
+            self, MOTOR_MEASURED, MOTORS, ('position', 'velocity', 'effort'), SENSOR_OFFERED
+        )
+        self._setpoint = JointPublisher(self, MOTOR_SETPOINT, MOTORS, ('position',), SENSOR_OFFERED)
+        self._told: tuple[float, ...] = ()
+        self._told_ns = 0
+        self._torque = False
+        if self._slave is not None:
+            self._wires = JointPublisher(self, SIMULATED_WIRES, WIRES, ('effort',), LOCK_STEP)
+            self._bending = JointPublisher(
+                self, SIMULATED_BENDING, JOINTS, ('position',), LOCK_STEP
+            )
+        self._state = ''
+        self._session = SessionWatch(
+            self, lambda: self._switch_torque(True), self._let_go, self.motion.session
+        )
+        self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
+        self._commands = JointSubscription(
+            self,
+            MOTOR_COMMAND,
+            MOTORS,
+            self._on_command,
+            COMMAND,
+            exact=True,
+            on_malformed=lambda reason: self.motion.gate.refuse(Refusal.MALFORMED, reason),
+        )
+        self._senders = self._session.senders_of(self._commands.subscription)
+        self._session.obeys(MOTOR_COMMAND, self.motion.gate)
+        self.diagnostics.add(
+            'commands', CommandReport(self.motion.gate, self.ticker, self._session.leave)
+        )
+        self.diagnostics.add('device', self._report_device, device)
+        self.ticker.add(self._on_tick)
+
+    @property
+    def announcement(self) -> str:
+        """Name the device."""
+        return f'motors {self._device_name}'
+
+    def _dynamixel(self, parameters: DynamixelParameters) -> MotorDevice:
+        self.require_real_time(self._device_name)
+        motors = build_motors(parameters, MOTORS, self.rig.timeouts.command)
+        self.create_service(Trigger, MOTOR_REBOOT, lambda _, answer: self._reboot(motors, answer))
+        return motors
+
+    def _reboot(self, motors: DynamixelMotors, answer: Trigger.Response) -> Trigger.Response:
+        answer.success = not self._session.name
+        answer.message = 'not while the slave is enabled'
+        if answer.success:
+            motors.reboot()
+            answer.message = 'the servos restart without torque and are set up anew'
+        return answer
+
+    def _on_state(self, message: String) -> None:
+        self._state = message.data
+        self._let_go()
+
+    def _let_go(self) -> None:
+        # Switching torque off needs no more than somebody's word, switching it on needs a session.
+        if self._state == OperatingState.DISABLED and not self._session.name:
+            self._switch_torque(False)
+
+    def _switch_torque(self, on: bool) -> None:
+        self._torque = on
+        self._device.set_torque(on)
+
+    def _on_command(self, sample: JointSample) -> None:
+        self._arrived.append((sample, self.ticker.monotonic_ns(), self._senders.rivals()))
+
+    def _on_tick(self, stamp_ns: int, periods: int) -> None:
+        self._notice_trouble()
+        self._judge_what_arrived()
+        goal = self.motion.turn(self.ticker.monotonic_ns(), periods * TICK_S)
+        self._session.tell()
+        reading = self._device.exchange(goal or (0.0,) * len(MOTORS), periods)
+        if self._slave is not None:
+            # The plant has just gone on under it for these periods.
+            self._tell_setpoint(stamp_ns - periods * TICK_NS, self._slave.goal)
+        elif self._torque:
+            self._tell_setpoint(self.ticker.now_ns(), goal)
+        if reading is None:
+            return
+        self.motion.measure(reading.position)
+        if self._slave is None:
+            stamp_ns = self.ticker.now_ns() - round(reading.age * 1e9)
+        self._measured.publish(stamp_ns, *reading.position, *reading.velocity, *reading.effort)
+        if self._slave is not None:
+            self._wires.publish(stamp_ns, *self._slave.tension)
+            self._bending.publish(stamp_ns, *self._slave.bending)
+
+    def _judge_what_arrived(self) -> None:
+        """Take commands by the session of the turn that gives the goal."""
+        # Within a tick the middleware may bring the last one before or after the end of its
+        # session.
+        for sample, received_ns, rivals in self._arrived:
+            refusal = self.motion.command(
+                sample.session,
+                sample.stamp_ns,
+                sample.position,
+                sample.velocity,
+                received_ns,
+                rivals,
+            )
+            if refusal is None and not self.ticker.simulated:
+                self.latency_ns.append(received_ns - self.ticker.monotonic_of(sample.stamp_ns))
+        self._arrived.clear()
+
+    def _tell_setpoint(self, since_ns: int, goal: tuple[float, ...]) -> None:
+        if goal and (goal != self._told or since_ns - self._told_ns >= _REPEATED_NS):
+            self._told, self._told_ns = goal, since_ns
+            self._setpoint.publish(since_ns, *goal)
+
+    def _notice_trouble(self) -> None:
+        """Tell a trouble of the device in the tick in which it comes or goes."""
+        trouble = self._device.trouble()
+        if bool(trouble) != bool(self._trouble):
+            self._trouble = trouble
+            if trouble:
+                self.get_logger().error(trouble)
+                self.motion.hold()
+            self.diagnostics.publish()
+
+    def _report_device(self) -> Report:
+        trouble = self._device.trouble()
+        values = self._device.health()
+        values |= {
+            'ticks': self.ticker.ticks,
+            'missed ticks': self.ticker.missed,
+            'published': self._measured.count,
+            'times held': self.motion.holds,
+            'holding': self.motion.holding,
+            'commands bounded': self.motion.shaper.bounded,
+        }
+        if self.latency_ns:
+            ordered = sorted(self.latency_ns)
+            values['command latency p50 [ms]'] = ordered[len(ordered) // 2] * 1e-6
+            values['command latency p99 [ms]'] = ordered[len(ordered) * 99 // 100] * 1e-6
+        if trouble:
+            return ERROR, trouble, values
+        if not self.motion.goal:
+            return WARN, 'no reading yet', values
+        return OK, 'holding' if self.motion.holding else 'following commands', values
+
+    def close(self) -> None:
+        """Let go of the device."""
+        self._device.close()
+
+
+def main() -> int:
+    """Run the motor driver in a process of its own."""
+    return run_nodes([MotorDriverNode])

@@ -1,0 +1,374 @@
+"""Records topics into a bag: every message as it came, counted, with what was lost."""
+
+import itertools
+import math
+import struct
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.validate_topic_name import validate_topic_name
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from endoscope_bags.errors import BagError, UnknownTypeError
+from endoscope_bags.message_types import begins_with_header, message_type
+from endoscope_bags.recording_session import (
+    Arrival,
+    RecordingSession,
+    SessionReport,
+    simulated_receipt_ns,
+)
+from endoscope_core.atomic_output import with_final_names
+from endoscope_core.errors import nearest
+from endoscope_nodes.names import OPERATING_STATE, RECORDER_START, RECORDER_STOP
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_parameters import RecorderParameters
+from endoscope_nodes.runtime.parameters import ParameterError
+from endoscope_nodes.runtime.qos import RESULT
+from endoscope_nodes.runtime.raw_subscription import RawSubscription
+from endoscope_nodes.runtime.recorded_topics import (
+    message_class,
+    offered_profiles,
+    suitable_qos,
+)
+from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.topics import BY_NAME
+
+_STAMP = struct.Struct('<iI')
+_SECOND = 1_000_000_000
+_LOOK_PERIOD_S = 0.1
+_UNTYPED_S = 2.0
+_MEGABYTE = 1_000_000
+
+
+@dataclass
+class _Source:
+    name: str
+    kind: type
+    latched: bool
+    has_stamp: bool
+    subscription: RawSubscription
+    number: int
+    publishers_seen: int = -1
+
+    def count_publishers(self) -> int:
+        # The subscription may be replaced by another one.
+        return self.subscription.count_publishers()
+
+
+class RecorderNode(EndoscopeNode):
+    """Records from ``recorder/start`` (or from the beginning) to ``recorder/stop`` or the end.
+
+    In real time a message is recorded with the middleware's stamps of receipt and publication. In
+    simulated time both are the tick of ``/clock`` in which it came, so that the same simulation
+    gives the same bag. Losses, found as gaps in the publishers' numbers, and a full disk are told
+    in the diagnostics, in the bag, and by exit code 1.
+
+    A recording that nobody asked for or named ends once the slave has rested, and the next motion
+    session begins another one, until all of them have taken the rig's ``recording.room``. Whoever
+    calls ``recorder/start`` or ``recorder/stop`` decides alone from then on.
+    """
+
+    def __init__(self, context: NodeContext) -> None:
+        super().__init__('recorder', context)
+        self._bag = ''
+        p = self.parameters(RecorderParameters, self._on_parameters)
+        self._bag = p.bag
+        self._topics = checked_names(p.topics)
+        self._asked_for = p.topics != RecorderParameters().topics
+        self._said_untyped_s = 0.0
+        self._session: RecordingSession | None = None
+        self._sources: list[_Source] = []
+        self._to_look_at: list[_Source] = []
+        self._untyped: list[str] = []
+        self._last_tick_ns = 0
+        self._said_loss = 0
+        self._unasked = p.autostart and not p.bag and self.rig.recording.room > 0
+        self._unasked_bytes = 0
+        self._warning = ''
+        self._active_ns = 0
+        self.last_report: SessionReport | None = None  # none before the first has ended
+        self.create_service(Trigger, RECORDER_START, self._on_start)
+        self.create_service(Trigger, RECORDER_STOP, self._on_stop)
+        if self.ticker.simulated:
+            self.ticker.add(self._on_tick)
+        else:
+            self.ticker.every(p.drain_period, self._drain)
+        # The graph is looked at in real time: publishers come before simulated time begins.
+        self.create_timer(
+            _LOOK_PERIOD_S, self._look_around, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+        self.diagnostics.add('recording', self._report)
+        if self._unasked:
+            self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
+            self.ticker.every(1.0, self._end_unasked)
+        if p.autostart and (p.bag or self._unasked):
+            try:
+                self.start()
+            except BagError as error:
+                raise ParameterError(f"recorder: parameter 'bag': {error}") from error
+
+    @property
+    def announcement(self) -> str:
+        """Say how to begin a recording, where none is being made."""
+        return '' if self._session else f'not recording: {self.operate("record start")}'
+
+    def _on_parameters(self, new: RecorderParameters) -> None:
+        self._bag = new.bag
+
+    def start(self) -> Path:
+        """Begin a recording and return where it goes; BagError if one is under way already."""
+        if self._session is not None:
+            there = with_final_names(str(self._session.path))
+            raise BagError(f'already recording to {there}; stop that first')
+        path = Path(new_bag() if self._unasked else self._bag or new_bag())
+        self._session = RecordingSession(path, rig=self.rig)
+        self._said_loss = 0
+        self._untyped = list(self._topics)
+        self._said_untyped_s = time.monotonic() + _UNTYPED_S
+        self._subscribe_untyped()
+        self.get_logger().info(f'recording to {with_final_names(str(path))}')
+        return path
+
+    def stop(self, ended: str = 'on request') -> SessionReport:
+        """End the recording and say how it went; BagError if there is none."""
+        if self._session is None:
+            raise BagError('not recording')
+        self._collect(self.ticker.now_ns())
+        session, self._session = self._session, None
+        sources, self._sources, self._to_look_at = self._sources, [], []
+        for source in sources:
+            source.subscription.close()
+        report = self.last_report = session.close(ended)
+        silent = [topic for topic, count in report.counts.items() if not count] + self._untyped
+        if silent and (self._asked_for or not report.message_count):
+            self.get_logger().warning(f'no message came on {", ".join(silent)}')
+        if report.complete:
+            self.get_logger().info(str(report))
+        else:
+            self.exit_code = 1
+            self.get_logger().error(str(report))
+        return report
+
+    def extra_readers(self) -> list[tuple[str, int]]:
+        """Topics that are read past the executor, and how many publishers each has found."""
+        return [(source.name, source.count_publishers()) for source in self._sources]
+
+    def close(self) -> None:
+        """Finish a recording that is being made."""
+        if self._session is not None:
+            self.stop()
+
+    def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._unasked, self._warning = False, ''
+        try:
+            response.message = with_final_names(str(self.start()))
+            response.success = True
+        except BagError as error:
+            response.message = str(error)
+        return response
+
+    def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._unasked = False
+        try:
+            report = self.stop()
+            response.message, response.success = str(report), report.complete
+        except BagError as error:
+            response.message = str(error)
+        return response
+
+    def _on_state(self, message: String) -> None:
+        enabled = message.data == 'ENABLED'
+        if enabled or not self._active_ns:
+            self._active_ns = self.ticker.monotonic_ns()
+        if enabled and self._unasked and self._session is None:
+            try:
+                self.start()
+            except BagError as error:
+                self._give_up(str(error))
+
+    def _end_unasked(self) -> None:
+        """End a recording that nobody asked for, at rest and where there is no room for more."""
+        session = self._session
+        if not self._unasked or session is None:
+            return
+        limits = self.rig.recording
+        full = self._unasked_bytes + session.size >= limits.room * _MEGABYTE
+        # Where no supervisor has been heard, nobody knows of rest.
+        idle_ns = self.ticker.monotonic_ns() - self._active_ns if self._active_ns else 0
+        if not full and idle_ns < limits.rest * _SECOND:
+            return
+        self.stop('no room for more' if full else 'at rest')
+        self._unasked_bytes += session.size
+        if full:
+            self._give_up(
+                f'what was recorded automatically has reached {limits.room:g} MB, '
+                'recording.room of rig.yaml'
+            )
+
+    def _give_up(self, why: str) -> None:
+        self._unasked = False
+        self._warning = f'not recording: {why}; `{self.operate("record start")}` records'
+        self.get_logger().warning(self._warning)
+
+    def _subscribe_untyped(self) -> None:
+        """Subscribe to the topics whose type is known by now."""
+        untyped, self._untyped = self._untyped, []
+        for topic in untyped:
+            try:
+                self._subscribe(topic)
+            except UnknownTypeError as error:
+                self.get_logger().error(f'{topic} is not recorded: {error}')
+
+    def _subscribe(self, topic: str) -> None:
+        namespace = self.get_namespace().rstrip('/') + '/'
+        known = BY_NAME.get(topic) or BY_NAME.get(topic.removeprefix(namespace))
+        if known is not None:
+            self._add_source(topic, known.type, known.asked.latched)
+            return
+        types = dict(self.get_topic_names_and_types()).get(self.resolve_topic_name(topic), [])
+        if types:
+            self._add_source(topic, types[0], latched=False)
+        else:
+            self._untyped.append(topic)
+
+    def _add_source(self, topic: str, type_name: str, latched: bool) -> None:
+        assert self._session is not None
+        full = self.resolve_topic_name(topic)
+        kind = message_class(type_name)
+        has_stamp = begins_with_header(message_type(type_name).definition)
+        qos = suitable_qos(latched, self.get_publishers_info_by_topic(full))
+        subscription = RawSubscription(self, kind, topic, qos)
+        source = _Source(full, kind, latched, has_stamp, subscription, 0)
+        source.number = self._session.add_topic(
+            full,
+            type_name,
+            lambda: offered_profiles(self.get_publishers_info_by_topic(full)),
+            source.count_publishers,
+        )
+        self._sources.append(source)
+
+    def _look_around(self) -> None:
+        """Adapt one topic to its publishers; after the last one see what else there is."""
+        session = self._session
+        if session is None:
+            return
+        # One at a time, because the graph's answer for all of them would cost a tick.
+        if self._to_look_at:
+            self._adapt(self._to_look_at.pop())
+            return
+        self._subscribe_untyped()
+        if self._untyped and time.monotonic() > self._said_untyped_s:
+            self._said_untyped_s = math.inf
+            there = [name for name, _ in self.get_topic_names_and_types()]
+            for topic in self._untyped:
+                full = self.resolve_topic_name(topic)
+                self.get_logger().warning(f'nobody publishes {full}: {nearest(full, there)}')
+        self._to_look_at = list(self._sources)
+        report = session.report()
+        if report.lost_count > self._said_loss:
+            self._said_loss = report.lost_count
+            self.get_logger().error(str(report))
+
+    def _adapt(self, source: _Source) -> None:
+        # Who publishes with what profile costs a tick to ask for; how many do costs little.
+        count = self.count_publishers(source.name)
+        if count == source.publishers_seen == source.count_publishers():
+            return
+        source.publishers_seen = count
+        publishers = self.get_publishers_info_by_topic(source.name)
+        qos = suitable_qos(source.latched, publishers)
+        if publishers and (qos.durability, qos.reliability) != (
+            source.subscription.qos.durability,
+            source.subscription.qos.reliability,
+        ):
+            self._collect(self.ticker.now_ns())
+            source.subscription.close()
+            source.subscription = RawSubscription(self, source.kind, source.name, qos)
+
+    def _on_tick(self, stamp_ns: int, periods: int) -> None:
+        self._collect(stamp_ns)
+        self._last_tick_ns = stamp_ns
+
+    def _drain(self) -> None:
+        self._collect(self.ticker.now_ns())
+
+    def _collect(self, now_ns: int) -> None:
+        session = self._session
+        if session is None or now_ns == 0:
+            return
+        arrivals = []
+        simulated = self.ticker.simulated
+        for source in self._sources:
+            number = source.number
+            for data, info in source.subscription.take():
+                if simulated:
+                    received = simulated_receipt_ns(
+                        _stamp_ns(data) if source.has_stamp else None, self._last_tick_ns, now_ns
+                    )
+                    published = received
+                else:
+                    received = info['received_timestamp']
+                    published = info['source_timestamp']
+                arrivals.append(
+                    Arrival(received, number, info['publication_sequence_number'], published, data)
+                )
+        if arrivals:
+            session.accept(arrivals)
+        if not simulated:
+            session.flush_stale(now_ns)
+
+    def _report(self) -> Report:
+        if self._session is None:
+            if self._warning:
+                return WARN, self._warning, {}
+            if self._unasked:
+                return OK, 'at rest: records again once the slave is enabled', {}
+            return OK, 'not recording', {}
+        report = self._session.report()
+        values: dict[str, object] = {
+            'bag': with_final_names(str(report.path)),
+            'messages': report.message_count,
+            'lost': report.lost_count,
+        }
+        for topic, count in report.counts.items():
+            values[topic] = f'{count} recorded, {report.lost[topic]} lost'
+        if report.full:
+            return ERROR, report.full, values
+        if report.lost_count:
+            return ERROR, f'{report.lost_count} messages lost', values
+        return OK, 'recording automatically' if self._unasked else 'recording', values
+
+
+def new_bag() -> str:
+    """Return where a recording goes that has no name; several of one second are numbered."""
+    first = time.strftime('bags/recording-%Y%m%d-%H%M%S')
+    numbered = (f'{first}-{n}' for n in itertools.count(2))
+    return next(name for name in itertools.chain([first], numbered) if not Path(name).exists())
+
+
+def checked_names(topics: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names of topics, if all of them can be some."""
+    for topic in topics:
+        try:
+            validate_topic_name(topic)
+        except InvalidTopicNameException as error:
+            raise ParameterError(
+                f"recorder: parameter 'topics': {topic!r} is no name of a topic"
+            ) from error
+    return topics
+
+
+def _stamp_ns(data: bytes) -> int:
+    seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+    return int(seconds) * _SECOND + int(nanoseconds)
+
+
+def main() -> int:
+    """Run the recorder in a process of its own."""
+    return run_nodes([RecorderNode])

@@ -1,0 +1,168 @@
+"""Decides in which state the slave is, opens motion sessions, watches what may go wrong."""
+
+import math
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header, String
+
+from endoscope_core.safety import Answer, OperatingState, OperatingStateMachine, TensionGuard
+from endoscope_core.safety.motion_session import HEARTBEAT_S
+from endoscope_nodes.names import (
+    AWAITED,
+    DIAGNOSTICS,
+    MOTION_SESSION,
+    MOTOR_COMMAND,
+    MOTOR_MEASURED,
+    OPERATING_STATE,
+    REFUSAL,
+    REFUSAL_CODE,
+    REFUSED_NS,
+    STATE_COMMAND,
+    WIRES,
+    WIRES_MEASURED,
+)
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.joint_stream import JointSample, JointSubscription
+from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.qos import EVENT, RESULT, SENSOR_ASKED
+from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.safety.senders import senders_in_words
+from endoscope_nodes.safety.sessions import SESSION_REPORT
+from endoscope_nodes.safety.streams import StreamWatch
+from endoscope_nodes.topics import TOPICS
+
+# Subcomponents whose errors forbid motion; their nodes tell them at once.
+_VITAL = ('motor_driver: device', 'load_cells: cells')
+
+
+class SupervisorNode(EndoscopeNode):
+    """Publishes ``slave/operating_state`` and ``slave/motion_session``, obeys state commands.
+
+    An ``enable`` opens a motion session, whose name it repeats at 20 Hz; a fault, ``disable`` and
+    ``pause`` end it.  Faults are a wire over its ceiling, silent motors or load cells, an error of
+    a vital device, a node that has left the session, and a second sender on a topic that has one.
+    """
+
+    def __init__(self, context: NodeContext) -> None:
+        super().__init__('supervisor', context)
+        self._timeout_ns = self.rig.timeouts.stream_ns
+        self.machine = OperatingStateMachine()
+        self._guard = TensionGuard(WIRES, self.rig.tension.ceiling)
+        self._refused, self._refused_ns = Answer(True), 0
+        self._own = f'{self.get_namespace().rstrip("/")}/'
+        self._watched = [self.resolve_topic_name(t.name) for t in TOPICS if t.one_sender]
+        self._states = self.create_publisher(String, OPERATING_STATE, RESULT)
+        self._sessions = self.create_publisher(Header, MOTION_SESSION, EVENT)
+        self._motor = StreamWatch(self.ticker, MOTOR_MEASURED)
+        self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
+        self._streams = self._motor, self._wires
+        self.create_subscription(
+            JointState, MOTOR_MEASURED, self._motor.note, SENSOR_ASKED, raw=True
+        )
+        JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
+        self.create_subscription(String, STATE_COMMAND, self._on_command, EVENT)
+        self.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, EVENT)
+        self.diagnostics.add('operating state', self._report)
+        self.ticker.every(HEARTBEAT_S, self._beat)
+        self._check()
+
+    @property
+    def announcement(self) -> str:
+        """Say in which state the slave is, and what to do about it."""
+        state = self.machine.state
+        if state is OperatingState.DISABLED:
+            return f'slave {state}; next: {self.operate("enable")}'
+        return f'slave {state}{f" ({self.machine.cause})" if self.machine.cause else ""}'
+
+    @property
+    def waiting(self) -> str:
+        """Name what forbids motion."""
+        return '; '.join(self.machine.present_causes.values())
+
+    def _beat(self) -> None:
+        self._check()
+        self._publish()
+
+    def _publish(self) -> None:
+        now = self.ticker.now_ns()
+        if not now:
+            return
+        self._states.publish(String(data=str(self.machine.state)))
+        self._sessions.publish(
+            Header(stamp=Time(nanoseconds=now).to_msg(), frame_id=self.machine.session)
+        )
+
+    def _on_command(self, message: String) -> None:
+        before, now = self.machine.state, self.ticker.now_ns()
+        answer = self.machine.command(message.data, now)
+        if not answer.accepted:
+            self._refused, self._refused_ns = answer, now
+            self.get_logger().warning(answer.reason)
+            # Whoever asked waits for the reason.
+            self.diagnostics.publish()
+        elif self.machine.state != before:
+            self._refused = answer
+            self.get_logger().info(f'{before} -> {self.machine.state} {self.machine.session}')
+            self._publish()
+
+    def _on_wires(self, sample: JointSample) -> None:
+        self._wires.note()
+        tension = sample.effort or (math.nan,) * len(WIRES)
+        self._note('tension', self._guard.update(tension))
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if not status.name.startswith(self._own):
+                continue
+            name = status.name.removeprefix(self._own)
+            if name in _VITAL or name.endswith(f': {SESSION_REPORT}'):
+                wrong = status.level == ERROR
+                self._note(status.name, f'{name}: {status.message}' if wrong else '')
+
+    def _check(self) -> None:
+        for watch in self._streams:
+            self._note(watch.topic, watch.trouble(self._timeout_ns))
+        deserted = self.machine.session and not self.count_publishers(MOTOR_COMMAND)
+        self._note('compensator', f'nobody sends {MOTOR_COMMAND}' if deserted else '')
+        for topic in self._watched:
+            crowded = self.count_publishers(topic) > 1
+            self._note(f'senders of {topic}', senders_in_words(self, topic) if crowded else '')
+
+    def _note(self, name: str, trouble: str) -> None:
+        if not trouble:
+            self.machine.clear_cause(name)
+        elif self.machine.report_cause(name, trouble):
+            self.get_logger().error(f'{OperatingState.FAULT}: {trouble}')
+            self._publish()
+
+    def _report(self) -> Report:
+        machine = self.machine
+        values: dict[str, object] = {
+            'state': machine.state,
+            'session': machine.session,
+            'cause': machine.cause,
+            'present causes': '; '.join(machine.present_causes.values()),
+            AWAITED: '; '.join(w.trouble(0) for w in self._streams if not w.ever_heard),
+            REFUSAL: self._refused.reason,
+            REFUSAL_CODE: self._refused.code,
+            REFUSED_NS: self._refused_ns,
+            'peak tension [N]': self._guard.peak,
+        }
+        if machine.state is OperatingState.FAULT:
+            return ERROR, machine.cause, values
+        if machine.present_causes:
+            return WARN, 'cannot be enabled: ' + '; '.join(machine.present_causes.values()), values
+        return OK, str(machine.state), values
+
+    def close(self) -> None:
+        """Say that the slave is no longer supervised."""
+        self.machine.command('disable', self.ticker.now_ns())
+        self._publish()
+
+
+def main() -> int:
+    """Run the supervisor in a process of its own."""
+    return run_nodes([SupervisorNode])

@@ -1,0 +1,1 @@
+"""What every process of nodes has: its ticker, parameters, streams, diagnostics, and who spins."""

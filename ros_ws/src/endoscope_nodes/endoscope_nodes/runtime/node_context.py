@@ -1,0 +1,179 @@
+"""What the nodes of a process share, and what each is given when it is made."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.task import Future
+
+from endoscope_core.errors import FileError
+from endoscope_core.physics import PlantDescription
+from endoscope_core.rig import Rig, load_rig
+from endoscope_nodes.names import CLOCK
+from endoscope_nodes.runtime.declared_parameters import declare_parameters
+from endoscope_nodes.runtime.matching import all_matched
+from endoscope_nodes.runtime.measured_pose import MeasuredPose
+from endoscope_nodes.runtime.node_parameters import BeatParameters, RealTimeParameters
+from endoscope_nodes.runtime.parameter_sections import check_sections
+from endoscope_nodes.runtime.parameters import ParameterError, changed
+from endoscope_nodes.runtime.simulated_plant import load_slave
+from endoscope_nodes.runtime.ticker import Ticker
+
+NAMESPACE = 'endoscope'
+
+
+class NodeContext:
+    """Rig, ticker, measured pose and parameter overrides of a process, for its nodes.
+
+    As :class:`~endoscope_nodes.runtime.runtime.Runtime`, which is one, takes them.
+    """
+
+    def __init__(
+        self,
+        context: Context,
+        args: Sequence[str],
+        overrides: Mapping[str, Mapping[str, object]] | None,
+        rig: Rig | None,
+    ) -> None:
+        self.context = context
+        self.nodes: Sequence[Node] = []
+        self._args = list(args)
+        self._ticker: Ticker | None = None
+        self._pose: MeasuredPose | None = None
+        self._asked_pose: list[Node] = []
+        self._rig = rig
+        self._plant: PlantDescription | None = None
+        self._plant_source = '', ''
+        self._seed = 0
+        self.process_parameters: dict[str, object] = {}  # of the whole process, not the defaults
+        self._real_time = RealTimeParameters()
+        self._overrides = overrides or {}
+        # The conductor's, in a lock-step that nobody has asked for.
+        self.chosen: dict[str, object] = {}
+        self.clock = CLOCK  # topic of the simulated time
+        self._stop = Future()
+
+    def given(self, name: str) -> dict[str, object]:
+        """Parameter values that the command line has for a node of this name."""
+        with self._asked(name) as node:
+            return {key: value.value for key, value in node._parameter_overrides.items()}
+
+    @contextmanager
+    def _asked(self, name: str) -> Iterator[Node]:
+        node = Node(
+            name,
+            context=self.context,
+            namespace=NAMESPACE,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        try:
+            yield node
+        finally:
+            node.destroy_node()
+
+    def keep_lock_step(self, conductor: Mapping[str, object]) -> None:
+        """Simulate time though nobody has asked for it; call it before the first node is added."""
+        self.chosen = {**conductor, **self.given('conductor')}
+        with self._asked('conductor') as node:
+            # Two rigs of a domain do not share a clock.
+            if node.get_namespace() != f'/{NAMESPACE}':
+                self.clock = CLOCK.strip('/')
+
+    def overrides_of(self, name: str) -> list[Parameter]:
+        """Parameter values that this process was told to give the node called ``name``."""
+        values: dict[str, object] = {'use_sim_time': True} if self.chosen else {}
+        values |= self.chosen if name == 'conductor' else {}
+        values |= self._overrides.get(name, {})
+        return [Parameter(key, value=value) for key, value in values.items()]
+
+    def ticker_of(self, node: Node) -> Ticker:
+        """Give the process's ticker; the first node to ask decides whether time is simulated."""
+        simulated = node.get_parameter('use_sim_time').value is True
+        if self._ticker is None:
+            for line in check_sections(self._args, node.get_namespace()):
+                node.get_logger().warning(line)
+            self._ticker = Ticker(node, simulated, self._stride_and_rig(node), self.clock)
+        if self._ticker.simulated != simulated:
+            raise ParameterError(
+                f"{node.get_name()}: parameter 'use_sim_time' differs from that "
+                'of the other nodes in this process; give all the same'
+            )
+        if simulated:
+            # rclpy would subscribe each node to /clock, at the price of a node's own work.
+            node._time_source.detach_node()
+        return self._ticker
+
+    def pose_of(self, node: Node) -> MeasuredPose:
+        """Give the process's view of where the slave is; a node that asks for it hosts it."""
+        if self._pose is None:
+            self._pose = MeasuredPose(node, self.ticker, self.rig)
+        self._asked_pose.append(node)
+        return self._pose
+
+    def _stride_and_rig(self, node: Node) -> int:
+        self._real_time = declare_parameters(node, RealTimeParameters)
+        given = declare_parameters(node, BeatParameters)
+        self.process_parameters = changed(given) | changed(self._real_time)
+        rate = given.tick_rate
+        if 1000 % rate:
+            raise ParameterError(
+                f"{node.get_name()}: parameter 'tick_rate' is {rate}; give a rate that divides 1000"
+            )
+        if self._rig is None:
+            try:
+                self._rig = load_rig(given.rig_file or None)
+            except FileError as error:
+                raise ParameterError(f"{node.get_name()}: parameter 'rig_file': {error}") from error
+        simulation = self._rig.simulation
+        self._plant_source = (
+            (f"{node.get_name()}: parameter 'plant_file'", given.plant_file)
+            if given.plant_file
+            else (f'rig file {given.rig_file}: simulation.plant', simulation.plant)
+        )
+        self._seed = simulation.seed if given.seed < 0 else given.seed
+        return 1000 // rate
+
+    @property
+    def rig(self) -> Rig:
+        """What stands on the table; it is known once a node has been added."""
+        if self._rig is None:
+            raise RuntimeError('no node has been added yet')
+        return self._rig
+
+    @property
+    def plant(self) -> PlantDescription:
+        """The simulated slave, read when it is asked for first."""
+        if self._plant is None:
+            self._plant = load_slave(*self._plant_source)
+        return self._plant
+
+    def seed_of(self, device: int) -> int:
+        """Seed of the noise of a simulated device; each has its own number."""
+        return self._seed + device
+
+    @property
+    def ticker(self) -> Ticker:
+        """The ticker of this process; there is one once a node has been added."""
+        if self._ticker is None:
+            raise RuntimeError('no node has been added yet')
+        return self._ticker
+
+    def _leave_pose(self, node: Node) -> None:
+        self._asked_pose = [other for other in self._asked_pose if other is not node]
+        if self._pose is not None and self._pose.host is node:
+            if self._asked_pose:
+                self._pose.listen(self._asked_pose[0])
+            else:
+                self._pose = None
+
+    def connected(self) -> bool:
+        """Whether the nodes of this process have found each other's topics."""
+        return all_matched(self.nodes)
+
+    def stop(self) -> None:
+        """Let the process end; may be called from any thread, before or while it spins."""
+        if not self._stop.done():
+            self._stop.set_result(None)
