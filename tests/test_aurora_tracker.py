@@ -12,6 +12,7 @@ import serial
 from aurora_rig import Instrument, angle_between
 from device_readings import collect, figure, until
 
+from endoscope_core.errors import FileError
 from endoscope_core.kinematics import (
     RegistrationError,
     StraightRegistration,
