@@ -87,7 +87,9 @@ def load_registration(path: str | Path) -> StraightRegistration:
     file = load(_Registration, path, what)
     norm = math.hypot(*file.orientation)
     if not 0.0 < norm < math.inf:
-        raise FileError(f'{what} {path}: orientation {list(file.orientation)} is not an orientation')
+        raise FileError(
+            f'{what} {path}: orientation {list(file.orientation)} is not an orientation'
+        )
     x, y, z, w = (v / norm for v in file.orientation)
     return StraightRegistration(file.position, (x, y, z, w))
 

@@ -53,8 +53,7 @@ TRIED, REFITTED = 10, 4
 """Terms that get a first fit and a full one: in the study the truth was among the first three of
 the screen in 46 cases of 48, and among the first five in 47."""
 STARTS = 2
-"""Starting points of each of these: far from linear, the largest linearised gain may be of the start
-that fits least."""
+"""Starting points of each: far from linear, that of the largest linearised gain may fit least."""
 REFINED = 3
 """Functions of these, the best, that are let vary faster."""
 SETTLED = 2

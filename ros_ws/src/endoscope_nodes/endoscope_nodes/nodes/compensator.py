@@ -178,7 +178,7 @@ class CompensatorNode(EndoscopeNode):
             self._select_law()
 
     def _load(self) -> str:
-        """Load and compile all that the first command would wait for; why a mode is not available."""
+        """Load and compile what the first command would wait for; why a mode is not available."""
         trouble = ''
         for mode in dict.fromkeys((*MODES, self._settings.mode)):
             trial = Feedforward(len(JOINTS))
