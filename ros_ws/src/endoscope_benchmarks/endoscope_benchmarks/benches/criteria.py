@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
         criteria = derived(bank)
     except ValueError as error:
         raise EndoscopeError(str(error)) from error
-    seeds = ', '.join(map(str, sorted({row.seed for row in rows})))
+    seeds = _in_words(sorted({row.seed for row in rows}))
     strata = ', '.join(dict.fromkeys(row.stratum for row in rows))
     made_by = (
         f'`endoscope bench criteria` from {len(rows)} cases of `endoscope bench concealed`, '
@@ -47,3 +47,10 @@ def run(args: argparse.Namespace) -> int:
     if args.write:
         write_text(args.write, source(criteria, made_by))
     return 0
+
+
+def _in_words(seeds: list[int]) -> str:
+    """Increasing numbers, each stretch by its ends."""
+    begins = [n for n in seeds if n - 1 not in seeds]
+    ends = [n for n in seeds if n + 1 not in seeds]
+    return ', '.join(f'{a} to {b}' if a < b else f'{a}' for a, b in zip(begins, ends, strict=True))
