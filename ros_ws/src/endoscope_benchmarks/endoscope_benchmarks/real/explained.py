@@ -114,7 +114,7 @@ def numbers(fits: Sequence[Fit], jobs: int) -> dict[str, list[Number | None]]:
         form = with_form(one, jobs).moved_by_form
         reach = NINETY_PERCENT * deviation
         if form is not None:
-            reach = np.hypot(reach, student.ppf(0.95, DEGREES) * form)
+            reach = np.hypot(reach, student.ppf(0.95, DEGREES) * np.sqrt(np.diag(form)))
         for item, theta, far in zip(one.model.free, one.theta, reach, strict=True):
             name = owners.get(item.index, '') + item.name
             middle, low, high = (item.value(float(theta + side * far)) for side in (0, -1, 1))

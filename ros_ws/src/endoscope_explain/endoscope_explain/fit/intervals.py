@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.stats import chi2, t
 
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import lacking
@@ -72,7 +72,8 @@ def intervals(fit: Fit) -> Intervals:
     correlation = np.abs(spread) / np.outer(deviation, deviation) - np.eye(len(kept))
     reach = NINETY_PERCENT * deviation
     if fit.moved_by_form is not None:
-        reach = np.hypot(reach, t.ppf(0.95, DEGREES) * fit.moved_by_form[kept])
+        moved = np.sqrt(np.diag(fit.moved_by_form)[kept])
+        reach = np.hypot(reach, t.ppf(0.95, DEGREES) * moved)
     prior = np.array([item.spread for item in free])
     shown = reach <= SHOWN * NINETY_PERCENT * prior
     # Of two that go together the prior of one may have narrowed the other.
@@ -96,17 +97,27 @@ def intervals(fit: Fit) -> Intervals:
 
 
 def may_be_absent(fit: Fit, effect: Effect) -> bool:
-    """Whether the intervals of all strengths of an effect hold the value at which it vanishes."""
+    """Whether the region that holds all strengths of an effect holds none of it (Wald's test).
+
+    Strengths that stand for one another may each be nothing, but not all at once: their 90 % region
+    is an ellipsoid, for one strength its interval.
+    """
     off = {
         index: parameter.off
         for index, parameter in zip(effect.places, effect.parameters, strict=True)
         if math.isfinite(parameter.off)
     }
-    found = intervals(fit)
-    strengths = [k for k, index in enumerate(found.indices) if index in off]
+    free = fit.model.free
+    strengths = [k for k, item in enumerate(free) if item.index in off]
     if not strengths:
         return False
-    return all(found.low[k] <= off[found.indices[k]] <= found.high[k] for k in strengths)
+    among = np.ix_(strengths, strengths)
+    spread = covariance(fit)[among]
+    if fit.moved_by_form is not None:
+        spread = spread + (t.ppf(0.95, DEGREES) / NINETY_PERCENT) ** 2 * fit.moved_by_form[among]
+    distance = np.array([fit.theta[k] - free[k].coordinate(off[free[k].index]) for k in strengths])
+    squared = float(distance @ np.linalg.solve(spread, distance)) / REACH**2
+    return squared <= chi2.ppf(0.9, len(strengths))
 
 
 def nominal_estimates(

@@ -153,8 +153,8 @@ class Fit:
     `residuals` (size,): unweighted, in noise units.
     `jacobian` (size, n): of the residuals, at or near `theta`.
     `cost`: half weighted squares, prior included.
-    `moved_by_form` (n,): by how much (rms) an error of form as large as what is left moves each
-        coordinate.
+    `moved_by_form` (n, n): mean product of the ways by which an error of form as large as what is
+        left moves two coordinates.
     `beyond_form`: what is left of the worst channel over what the worst rig of another form leaves;
         0 where noise is left.
     `steps`: of the solver, the last time that the joint was fitted.

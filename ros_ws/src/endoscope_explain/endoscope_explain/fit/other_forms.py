@@ -100,7 +100,7 @@ def with_form(found: Fit, jobs: int) -> Fit:
     # An error of form moves numbers the further the more of it there is.
     size = counts(observation) / (1.0 + left)
     scale = np.sum(size * left) / max(float(np.sum(size * drawn.mean(axis=0))), _TINY)
-    moved = np.sqrt(scale * np.mean(forms.moved**2, axis=1))
+    moved = scale * forms.moved @ forms.moved.T / FORMS
     return replace(found, moved_by_form=moved, beyond_form=beyond)
 
 

@@ -114,6 +114,24 @@ def test_an_effect_that_is_there_has_more_evidence_and_one_that_is_not_has_less(
         assert may_be_absent(found, CATALOGUE['joint_backlash']) is not more
 
 
+def test_strengths_that_stand_for_one_another_are_not_all_nothing(one_joint):
+    effect = CATALOGUE['tracker_distortion']
+    refitted, _ = references(one_joint, (effect.id, {'linear': -0.3}))
+    model = with_effect(refitted.model, effect, {'cubic': -0.1})
+    found = fit(model, model.begun_at(refitted.theta), iterations=20)
+    # As far as the recording tells, each of them is off by as much as it is large; not their sum.
+    strengths = [k for k, item in enumerate(model.free) if item.name in ('linear', 'cubic')]
+    form = np.zeros((len(found.theta), len(found.theta)))
+    apart = np.array([1.0, -1.0]) * np.abs(found.theta[strengths]).max()
+    form[np.ix_(strengths, strengths)] = np.outer(apart, apart)
+    unsure = replace(found, moved_by_form=form)
+    told = intervals(unsure)
+    for name in ('linear', 'cubic'):
+        k = told.names.index(name)
+        assert told.low[k] < 0.0 < told.high[k]
+    assert not may_be_absent(unsure, effect)
+
+
 def test_channels_that_are_off_count_less(one_joint):
     refitted, _ = references(one_joint, ('tracker_bias', {'bias_rad': 0.2}))
     observation = refitted.model.observation
@@ -129,10 +147,10 @@ def test_another_form_widens_intervals_by_what_it_moves_the_numbers(one_joint):
     refitted, _ = references(one_joint)
     forms = other_forms(refitted, 8, 2)
     assert forms.residuals.shape == (len(refitted.residuals), 8)
-    moved = np.sqrt(np.mean(forms.moved**2, axis=1))
+    moved = forms.moved @ forms.moved.T / 8
     named = [item.name for item in refitted.model.free]
     exponent = named.index('capstan_exponent')
-    assert moved[exponent] > 0.0
+    assert moved[exponent, exponent] > 0.0
     plain, wide = intervals(refitted), intervals(replace(refitted, moved_by_form=moved))
     assert wide.high[exponent] > plain.high[exponent]
     assert np.all(wide.high >= plain.high)
