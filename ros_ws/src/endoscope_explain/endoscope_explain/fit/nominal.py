@@ -73,7 +73,12 @@ def _corrected(channel: Channel, before: Channel, residual: Array, repeated: boo
             value=channel.value + residual * before.noise,
             noise=np.hypot(channel.noise, before.noise),
         )
-    return replace(channel, noise=channel.noise * np.sqrt(max(size, 1.0)))
+    beyond = max(size - 1.0, 0.0)
+    return replace(
+        channel,
+        noise=channel.noise * np.sqrt(1.0 + beyond),
+        lasting=float(np.sqrt(channel.lasting**2 + beyond * np.mean(channel.noise**2))),
+    )
 
 
 ReferenceFits = tuple[Fit, Fit]

@@ -18,7 +18,9 @@ WHITE = frozenset({'tension', 'bending', 'shaft_effort'})
 def excess(fit: Fit) -> dict[str, float]:
     """Return by how many standard deviations each white channel is above noise alone.
 
-    The larger of two tests for each signal: of single samples, and of means over blocks.
+    The larger of two tests for each signal: of single samples, and of means over blocks. The part
+    of the noise that lasts is one reading a block, so that fewer squares scatter independently
+    (Bayley, Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).
     """
     found = {}
     observation = fit.model.observation
@@ -28,10 +30,11 @@ def excess(fit: Fit) -> dict[str, float]:
         values = fit.residuals[part]
         count = len(values) // BLOCK
         means = values[: count * BLOCK].reshape(count, BLOCK).mean(axis=1)
-        # Errors of rounding stay while the reading does: their part of a mean is as large as ever.
-        stays = min(channel.rounding**2 / float(np.mean(channel.noise**2)), 1.0)
+        # What lasts has as large a part in a mean as in a reading.
+        stays = min(channel.lasting**2 / float(np.mean(channel.noise**2)), 1.0)
         means /= np.sqrt(stays + (1.0 - stays) / BLOCK)
-        found[channel.signal] = max(_z(values), _z(means))
+        independent = len(values) / (1.0 + (BLOCK - 1) * stays**2)
+        found[channel.signal] = max(_z(values, independent), _z(means, len(means)))
     return found
 
 
@@ -46,5 +49,5 @@ def slips(observation: JointObservation) -> bool:
     return any(float(np.mean(c.noise > 1.3 * np.min(c.noise))) > NOTABLE for c in wires)
 
 
-def _z(values: np.ndarray) -> float:
-    return float((np.mean(values**2) - 1.0) / np.sqrt(2.0 / max(len(values), 1)))
+def _z(values: np.ndarray, independent: float) -> float:
+    return float((np.mean(values**2) - 1.0) / np.sqrt(2.0 / max(independent, 1.0)))

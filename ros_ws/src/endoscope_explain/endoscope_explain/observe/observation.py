@@ -81,7 +81,8 @@ class Channel:
     `output`: column of the compiled physics' output that this sensor reads.
     `time`, `value`, `noise` (M,): stamp in s from the first command, reading, and its known noise
         (rms).
-    `rounding`: part of the noise that a mean over readings does not lessen.
+    `lasting`: part (rms) of the noise that a mean over readings does not lessen: of rounding, and
+        of what a plant never explained of the healthy rig.
     """
 
     signal: str
@@ -92,7 +93,7 @@ class Channel:
     time: Array
     value: Array
     noise: Array
-    rounding: float = 0.0
+    lasting: float = 0.0
 
     def predicted(self, outputs: Array, lead: float = 0.0, skew: float = 0.0) -> Array:
         """Return the analysis samples (M,) that simulated outputs (N, OUTPUTS) predict.

@@ -15,6 +15,7 @@ from endoscope_explain.fit.other_forms import other_forms
 from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.fit.solver import Ended
 from endoscope_explain.fit.valleys import out_of_valleys
+from endoscope_explain.fit.whiteness import BLOCK, is_noise
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.term import with_effect
 
@@ -130,6 +131,32 @@ def test_strengths_that_stand_for_one_another_are_not_all_nothing(one_joint):
         k = told.names.index(name)
         assert told.low[k] < 0.0 < told.high[k]
     assert not may_be_absent(unsure, effect)
+
+
+def test_what_lasts_in_the_noise_scatters_as_few_readings_do(one_joint):
+    refitted, _ = references(one_joint)
+    observation = refitted.model.observation
+    rng = np.random.default_rng(3)
+
+    def with_noise(lasting, told):
+        channels, residuals = [], np.empty_like(refitted.residuals)
+        for channel, part in zip(observation.channels, observation.slices(), strict=True):
+            count = part.stop - part.start
+            steady = np.repeat(rng.normal(size=count // BLOCK + 1), BLOCK)[:count]
+            white = np.sqrt(1.0 - lasting) * rng.normal(size=count)
+            residuals[part] = white + np.sqrt(lasting) * steady
+            rms = float(np.sqrt(told * np.mean(channel.noise**2)))
+            channels.append(replace(channel, lasting=rms))
+        seen = replace(observation, channels=tuple(channels))
+        model = replace(refitted.model, observation=seen)
+        return replace(refitted, model=model, residuals=residuals)
+
+    # Of 40 drawn noises, none is taken for a misfit that lasts as it is told to; most are by the
+    # test of white noise.
+    assert all(is_noise(with_noise(0.7, 0.7)) for _ in range(40))
+    assert sum(is_noise(with_noise(0.7, 0.0)) for _ in range(40)) < 10
+    twice = with_noise(0.7, 0.7)
+    assert not is_noise(replace(twice, residuals=2.0 * twice.residuals))
 
 
 def test_channels_that_are_off_count_less(one_joint):
