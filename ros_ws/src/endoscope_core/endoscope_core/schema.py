@@ -36,9 +36,10 @@ def within(low: float, high: float | None = None, unit: str = '') -> msgspec.Met
 
     Without `high`, infinity is a number too.
     """
-    kind = _WORDS[type(low)]
-    ends = f'{low:g} on' if high is None else f'{low:g} to {high:{"" if type(low) is int else "g"}}'
-    return msgspec.Meta(ge=low, le=high, description=f'{kind} from {ends} {unit}'.rstrip())
+    first, last = (f'{end:g}' if isinstance(end, float) else end for end in (low, high))
+    ends = f'{first} on' if high is None else f'{first} to {last}'
+    wanted = f'{_WORDS[type(low)]} from {ends} {unit}'.rstrip()
+    return msgspec.Meta(ge=low, le=high, description=wanted)
 
 
 def one_of(choices: Iterable[str]) -> msgspec.Meta:
@@ -110,7 +111,7 @@ def _read(kind: Any, value: Any, where: str, key: str) -> Any:
         raise _refused(kind, value, where, key) from error
     bounded = any(isinstance(note, msgspec.Meta) for note in notes)
     if isinstance(made, float) and not math.isfinite(made) and not bounded:
-        raise _refused(kind, value, where, key)
+        raise FileError(f'{_at(where, key)} is {made}: give a finite number')
     return made
 
 

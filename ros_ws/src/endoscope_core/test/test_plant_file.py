@@ -194,7 +194,7 @@ def entry(more):
         ),
         (
             'stage: joint, place: load_of_angle, expression: q, range: [-1, .inf]',
-            'range[1] is inf: give a number',
+            'range[1] is inf: give a finite number',
         ),
         ('stage: joint, place: load_of_angle, expression: 0.01*t', 'unknown name t: valid are q'),
         ('stage: joint, place: load_of_angle, expression: 0.01*tnh(q)', 'did you mean tanh?'),

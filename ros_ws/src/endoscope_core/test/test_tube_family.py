@@ -72,7 +72,7 @@ def test_a_file_gives_the_family_back(tmp_path):
         ('schema: 1\nlines: {capstan_exponent: 1.0}', 'list'),
         (
             'schema: 1\nlines: {capstan_exponent: [1.0, .nan]}',
-            r'capstan_exponent.1. is nan: give a number',
+            r'capstan_exponent.1. is nan: give a finite number',
         ),
         ('schema: 1\nreading: {}', 'readings'),
         ('schema: 1\nreadings: {load_cell_offset: [1.0]}', 'two numbers'),

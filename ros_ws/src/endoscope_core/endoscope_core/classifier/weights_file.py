@@ -13,7 +13,7 @@ from safetensors import SafetensorError
 
 from endoscope_core.atomic_output import write_bytes, write_text
 from endoscope_core.classifier.classification import ClassifierError
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import FileError
 
 SCHEMA = 5
 SEAL = 'sha256'
@@ -21,15 +21,11 @@ LARGEST_WEIGHTS, LARGEST_DESCRIPTION = 16 << 20, 1 << 20
 """In bytes. The largest that come with this package have 218 kB and 3 kB."""
 
 
-class WeightsFileError(EndoscopeError, ValueError):
-    """A name under which weights cannot be kept."""
-
-
 def weights_path(path: str | Path) -> Path:
     """Check a weights file's name before long work: not a folder, nor .json like its twin."""
     path = Path(path)
     if path.suffix == '.json' or path.is_dir():
-        raise WeightsFileError(f'{path} cannot hold weights: name a file with suffix .safetensors')
+        raise FileError(f'{path} cannot hold weights: name a file with suffix .safetensors')
     return path
 
 

@@ -83,7 +83,10 @@ class JointParameters:
                 f'pretension_profile is {self.pretension_profile}: friction holds -1 to 1'
             )
         if len(self.friction_profile) > PROFILE_TERMS:
-            raise ValueError(f'friction_profile has more than {PROFILE_TERMS} coefficients')
+            raise ValueError(
+                f'friction_profile has {len(self.friction_profile)} coefficients: give '
+                f'{PROFILE_TERMS} at most'
+            )
         for value in self.friction_profile:
             if not math.isfinite(value):
                 raise ValueError(f'friction_profile has {value}: give finite numbers')

@@ -94,7 +94,7 @@ class _Plant:
         default_factory=lambda: dict.fromkeys(JOINT_NAMES, _Joint())
     )
     sensors: _Sensors = field(default_factory=_Sensors)  # type: ignore[valid-type]
-    effects: tuple[Any, ...] = ()
+    effects: Annotated[tuple[Any, ...], Before(lambda given: given or ())] = ()
 
     def __post_init__(self) -> None:
         if not self.joints:
