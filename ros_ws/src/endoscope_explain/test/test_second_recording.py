@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conftest import EXPLAINED
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.compare.second_recording import confirmed_by
@@ -29,6 +28,13 @@ def motion(seconds=12.0):
 
 
 @pytest.fixture(scope='module')
+def concealed(stribeck_case):
+    """The effect that the first recording shows."""
+    (effect,) = stribeck_case.explanation.augmented.effects
+    return effect
+
+
+@pytest.fixture(scope='module')
 def explained(stribeck_case, record):
     """A function that explains the first recording, with a second one of a rig with effects."""
 
@@ -42,8 +48,8 @@ def explained(stribeck_case, record):
     return explained
 
 
-def test_what_predicts_the_second_recording_better_is_asserted(explained):
-    case = explained(EXPLAINED)
+def test_what_predicts_the_second_recording_better_is_asserted(explained, concealed):
+    case = explained(concealed)
     assert case.effects[0].evidence['second_p_value'] < 0.01
     assert told(case).startswith('The simulation leaves out stribeck_friction')
     assert 'in doubt' not in html_page(case)
@@ -64,9 +70,9 @@ def test_what_does_not_is_named_in_doubt_everywhere(explained):
     assert effect['evidence']['second_p_value'] > 0.5
 
 
-def test_where_another_form_leaves_less_a_doubted_name_leaves_unknown_physics(explained):
+def test_where_another_form_leaves_less_a_doubted_name_leaves_unknown_physics(explained, concealed):
     assert explained(adequate=False).verdict is Verdict.UNKNOWN_PHYSICS
-    assert explained(EXPLAINED, adequate=False).verdict is Verdict.MISSING_PHYSICS
+    assert explained(concealed, adequate=False).verdict is Verdict.MISSING_PHYSICS
 
 
 def test_a_second_recording_does_not_refute_what_acted_at_a_time_of_the_first(
@@ -78,10 +84,10 @@ def test_a_second_recording_does_not_refute_what_acted_at_a_time_of_the_first(
     assert 'better; it acted in this one alone, or stands for something else.' in told(case)
 
 
-def test_a_name_that_survives_is_asserted_beside_one_in_doubt(explained, stribeck_case):
+def test_a_name_that_survives_is_asserted_beside_one_in_doubt(explained, concealed, stribeck_case):
     (first,) = stribeck_case.effects
     other = replace(first, id='gravity', joint='bend_y', parameters={}, alternatives=())
-    case = explained(EXPLAINED, effects=(first, other), adequate=False)
+    case = explained(concealed, effects=(first, other), adequate=False)
     assert [effect.doubtful for effect in case.effects] == [False, True]
     assert case.verdict is Verdict.MISSING_PHYSICS
     first_line, *rest = told(case).splitlines()
