@@ -169,4 +169,4 @@ class SimulatedGraph(ProbedGraph):
 
 def node_name(factory: type) -> str:
     """Name of the node that a class makes, by its module."""
-    return factory.__module__.rpartition('.')[2].removesuffix('_node')
+    return factory.__module__.rpartition('.')[2]

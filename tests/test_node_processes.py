@@ -106,7 +106,7 @@ def rig(tmp_path):
 
 def test_each_node_is_a_process_and_stops_cleanly(operator, rig):
     processes = {
-        node: start(f'{node}_node', *rig, *(['-p', 'source:=motion'] * (node == 'console')))
+        node: start(f'nodes.{node}', *rig, *(['-p', 'source:=motion'] * (node == 'console')))
         for node in NODES
     }
     try:
@@ -153,7 +153,7 @@ def test_the_whole_graph_in_motion_stops_cleanly(operator, rig, tmp_path, number
     ],
 )
 def test_wrong_parameters_are_one_line_and_exit_code_2(tmp_path, node, override, words):
-    module = node if node == 'graph' else f'{node}_node'
+    module = node if node == 'graph' else f'nodes.{node}'
     extra = ['-p', f'bag:={tmp_path / "bag"}'] if node == 'graph' else []
     process = start(module, '-p', override, *extra)
     _, errors = process.communicate(timeout=PATIENCE_S)

@@ -217,7 +217,7 @@ class MotorRig(ClosedOnExit):
 
 
 def _start(name: str, parameters: dict[str, Any], domain: int) -> subprocess.Popen:
-    code = f'import sys; from endoscope_nodes.{name}_node import main; sys.exit(main())'
+    code = f'import sys; from endoscope_nodes.nodes.{name} import main; sys.exit(main())'
     arguments = [word for k, v in parameters.items() for word in ('-p', f'{k}:={v}')]
     return subprocess.Popen(
         [sys.executable, '-c', code, '--ros-args', *arguments],

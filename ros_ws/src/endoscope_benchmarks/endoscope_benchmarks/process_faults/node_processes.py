@@ -103,7 +103,7 @@ class NodeProcesses(ClosedOnExit):
 
 
 def _module(name: str) -> str:
-    return f'endoscope_nodes.{name}' if name == GRAPH else f'endoscope_nodes.{name}_node'
+    return f'endoscope_nodes.{name}' if name == GRAPH else f'endoscope_nodes.nodes.{name}'
 
 
 def _run(name: str, words: list[str], domain: int, log: str) -> None:
