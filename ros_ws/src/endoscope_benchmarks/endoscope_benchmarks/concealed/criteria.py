@@ -70,7 +70,8 @@ def bank_of(rows: Sequence[Row]) -> Bank:
 def derived(bank: Bank) -> Criteria:
     """Criteria from a bank of cases; ValueError if it has too few for the quantiles."""
     return Criteria(
-        conformal(bank.beyond[bank.exact], ADEQUATE),
+        # What no more than another form leaves is adequate, whatever right explanations leave.
+        max(conformal(bank.beyond[bank.exact], ADEQUATE), 1.0),
         conformal(bank.errors, HOLDS),
         _logistic(bank.named, bank.right),
     )
@@ -152,8 +153,8 @@ def source(criteria: Criteria, made_by: str) -> str:
 """
 
 BEYOND_FORM = {criteria.BEYOND_FORM:.3g}
-"""What is left over what the worst rig of another form leaves, of the worst channel: {ADEQUATE:.0%}
-of right explanations leave less."""
+"""What is left over what the worst rig of another form leaves, of the worst channel: one, or what
+{ADEQUATE:.0%} of right explanations stay below."""
 REACH = {criteria.REACH:.3g}
 """Factor on intervals that makes them hold {HOLDS:.0%} of the true numbers."""
 CERTAINTY = ({', '.join(f'{weight:.3g}' for weight in criteria.CERTAINTY)})
