@@ -45,18 +45,14 @@ def held_out_fit(final: Fit) -> dict[str, ChannelFit]:
     return on_samples(final.model.observation, residuals, judged)
 
 
-def predicts_better(one: Fit, other: Fit) -> bool:
-    """Whether a fit predicts held-out blocks better than another one of the same recording."""
-
-    def misfit(found: Fit) -> float:
-        judged, residuals = _held_out(found)
-        return sum(
-            float(np.log(np.maximum(np.mean(residuals[part][judged[part]] ** 2), 1.0)))
-            for part in found.model.observation.slices()
-            if judged[part].any()
-        )
-
-    return misfit(one) < misfit(other)
+def held_out_misfit(final: Fit) -> float:
+    """Sum over the signals of the logarithm of what a refit leaves on blocks it has not seen."""
+    judged, residuals = _held_out(final)
+    return sum(
+        float(np.log(np.maximum(np.mean(residuals[part][judged[part]] ** 2), 1.0)))
+        for part in final.model.observation.slices()
+        if judged[part].any()
+    )
 
 
 def _held_out(final: Fit) -> tuple[Mask, Array]:

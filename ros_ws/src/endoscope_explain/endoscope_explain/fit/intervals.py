@@ -62,18 +62,24 @@ def covariance(fit: Fit) -> Array:
     return np.asarray(np.linalg.inv(precision + ridge))
 
 
+def _with_form(spread: Array, fit: Fit) -> Array:
+    """A fit's covariance (n, n) and what another form moves, as few rigs tell (Student's t)."""
+    if fit.moved_by_form is None:
+        return spread
+    scale = t.ppf(0.95, DEGREES) / NINETY_PERCENT
+    return np.asarray(spread + scale**2 * fit.moved_by_form)
+
+
 def intervals(fit: Fit) -> Intervals:
     """90 % intervals of a fit, within the parameters' bounds."""
     kept = [k for k, item in enumerate(fit.model.free) if item.index != COEFFICIENT]
     free = [fit.model.free[k] for k in kept]
     theta = fit.theta[kept]
-    spread = covariance(fit)[np.ix_(kept, kept)]
+    whole = covariance(fit)
+    spread = whole[np.ix_(kept, kept)]
     deviation = np.sqrt(np.diag(spread))
     correlation = np.abs(spread) / np.outer(deviation, deviation) - np.eye(len(kept))
-    reach = NINETY_PERCENT * deviation
-    if fit.moved_by_form is not None:
-        moved = np.sqrt(np.diag(fit.moved_by_form)[kept])
-        reach = np.hypot(reach, t.ppf(0.95, DEGREES) * moved)
+    reach = NINETY_PERCENT * np.sqrt(np.diag(_with_form(whole, fit))[kept])
     prior = np.array([item.spread for item in free])
     shown = reach <= SHOWN * NINETY_PERCENT * prior
     # Of two that go together the prior of one may have narrowed the other.
@@ -111,10 +117,7 @@ def may_be_absent(fit: Fit, effect: Effect) -> bool:
     strengths = [k for k, item in enumerate(free) if item.index in off]
     if not strengths:
         return False
-    among = np.ix_(strengths, strengths)
-    spread = covariance(fit)[among]
-    if fit.moved_by_form is not None:
-        spread = spread + (t.ppf(0.95, DEGREES) / NINETY_PERCENT) ** 2 * fit.moved_by_form[among]
+    spread = _with_form(covariance(fit), fit)[np.ix_(strengths, strengths)]
     distance = np.array([fit.theta[k] - free[k].coordinate(off[free[k].index]) for k in strengths])
     squared = float(distance @ np.linalg.solve(spread, distance)) / REACH**2
     return squared <= chi2.ppf(0.9, len(strengths))

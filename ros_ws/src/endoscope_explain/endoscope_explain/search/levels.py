@@ -12,7 +12,7 @@ import numpy as np
 
 from endoscope_core.physics.effects import lacking
 from endoscope_explain.fit.evidence import log_evidence
-from endoscope_explain.fit.held_out import predicts_better
+from endoscope_explain.fit.held_out import held_out_misfit
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import is_at_tolerance, with_any_numbers
 from endoscope_explain.fit.other_forms import with_form
@@ -241,7 +241,8 @@ def _level(
     ranked = tuple(best.values())
     if not ranked:
         return Level(first, (), NO_DETECTABLE_GAIN)
-    ranked = _that_predict(ranked, first)
+    before = held_out_misfit(first.fit)
+    ranked = _that_predict(ranked, first, before)
     if not is_noise(ranked[0].fit):
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     behind, ways, _ = grown[0]
@@ -249,16 +250,19 @@ def _level(
     level = Level(first, ranked, rigs.as_screened() if rigs else NO_DETECTABLE_GAIN)
     if rigs and not level.best.adds_nominal:
         level = replace(level, null=rigs.beside(level.gain(level.best), FALSE_ALARMS, jobs))
-    return replace(level, predicts=predicts_better(level.best.fit, first.fit))
+    return replace(level, predicts=held_out_misfit(level.best.fit) < before)
 
 
-def _that_predict(ranked: tuple[Candidate, ...], first: Candidate) -> tuple[Candidate, ...]:
+def _that_predict(
+    ranked: tuple[Candidate, ...], first: Candidate, before: float
+) -> tuple[Candidate, ...]:
     """Candidates, best first, from the first one on that predicts blocks better than its parent.
 
     A function of time can be anything: what it gains where it was fitted it loses where it was not.
+    `before`: what the parent leaves there.
     """
     for k, each in enumerate(ranked):
-        if each.evidence > first.evidence and predicts_better(each.fit, first.fit):
+        if each.evidence > first.evidence and held_out_misfit(each.fit) < before:
             return ranked[k:]
     return ranked
 

@@ -197,11 +197,11 @@ def test_what_loses_on_blocks_not_seen_gives_way_to_what_predicts_them(monkeypat
     found = _level({'function': 500.0, 'gravity': 400.0, 'tracker_delay': 300.0}, [0.0]).found
     first = _candidate(0.0)
     predicting = {'gravity', 'tracker_delay'}
-    monkeypatch.setattr(levels, 'predicts_better', lambda one, _: one in predicting)
+    monkeypatch.setattr(levels, 'held_out_misfit', lambda one: 1.0 if one in predicting else 3.0)
     named = tuple(replace(each, fit=each.terms[0].id) for each in found)
-    assert [c.fit for c in levels._that_predict(named, first)] == ['gravity', 'tracker_delay']
+    assert [c.fit for c in levels._that_predict(named, first, 2.0)] == ['gravity', 'tracker_delay']
     predicting.clear()
-    assert levels._that_predict(named, first) == named
+    assert levels._that_predict(named, first, 2.0) == named
 
 
 def test_a_finer_sheath_alone_is_not_named(one_joint):
