@@ -181,7 +181,7 @@ def test_ctrl_z_lets_go_and_the_shell_brings_it_back(graph):
         typist.hold(W, until=lambda: moved(typist)[1] > FAR)
         typist.type(b'\x1a')
         typist.until(lambda: ' icanon' in typist.text and ' echo ' in typist.text)
-        assert graph.clutches[-1] == 0
+        typist.until(lambda: graph.clutches[-1] == 0, 'the release')
         typist.shows('ENABLED')
         assert typist.stands()
         typist.wanted.clear()
