@@ -15,11 +15,6 @@ import yaml
 ROOT = Path(__file__).parents[1]
 WORKSPACE = ROOT / 'ros_ws'
 PACKAGES = sorted(path.parent for path in WORKSPACE.glob('src/*/package.xml'))
-FREE_OF_ROS = (
-    *('endoscope_core', 'endoscope_bags', 'endoscope_devices', 'endoscope_emulators'),
-    'endoscope_explain',
-)
-ROS_MODULES = {'rclpy', 'launch', 'launch_ros', 'ament_index_python'}
 NOT_SOURCE = {'__pycache__', '.mypy_cache', '.pytest_cache', '.ruff_cache'}
 
 # Names under which a distribution is imported, where they differ from its own.
@@ -52,11 +47,11 @@ def _imported_modules(folder: Path) -> dict[str, Path]:
     return found
 
 
-def _declared(package: Path) -> set[str]:
+def _declared(package: Path, *more: str) -> set[str]:
+    """What the manifest declares under `depend`, `exec_depend` and `more` tags."""
     manifest = ElementTree.parse(package / 'package.xml').getroot()
-    return {
-        str(element.text) for tag in ('depend', 'exec_depend') for element in manifest.iter(tag)
-    }
+    tags = ('depend', 'exec_depend', *more)
+    return {str(element.text) for tag in tags for element in manifest.iter(tag)}
 
 
 def _locked_modules() -> set[str]:
@@ -194,9 +189,11 @@ def test_imports_are_declared(package: Path) -> None:
 
 
 @each_package
-def test_functional_core_imports_no_ros(package: Path) -> None:
-    if package.name in FREE_OF_ROS:
-        assert not ROS_MODULES & _imported_modules(package / package.name).keys()
+def test_tests_import_only_declared_packages(package: Path) -> None:
+    imported = {
+        name for name in _imported_modules(package / 'test') if name.startswith('endoscope_')
+    }
+    assert imported <= _declared(package, 'test_depend') | {package.name}
 
 
 @each_package
