@@ -262,8 +262,8 @@ class Typist:
         self.shows('DISABLED')
         for _ in range(_TIMES):
             self.type(b'e')
-            pressed = time.monotonic()
-            self.until(lambda: 'ENABLED' in self.line or time.monotonic() > pressed + _AGAIN_S)
+            again = time.monotonic() + _AGAIN_S
+            self.until(lambda at=again: 'ENABLED' in self.line or time.monotonic() > at)
             if 'ENABLED' in self.line:
                 return
         raise AssertionError(f'E enables nothing: {self.line!r}')
