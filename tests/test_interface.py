@@ -97,7 +97,11 @@ def test_every_node_declares_the_parameters_that_are_listed(nodes):
     of_process = {name for kind in OF_PROCESS for name in kind.__dataclass_fields__}
     of_ros = {'use_sim_time', 'start_type_description_service'}
     for name, node in nodes.items():
-        declared = {p for p in node._parameters if not p.startswith('qos_overrides')}
+        declared = {
+            name
+            for name in node.get_parameters_by_prefix('')
+            if not name.startswith('qos_overrides')
+        }
         listed = {parameter.name for kind in OF_NODE[name] for parameter in described(kind)}
         assert declared - of_process - of_ros == listed, name
 

@@ -30,7 +30,7 @@ def zero_errors(tension: Array) -> Array:
 
 
 def words_of(errors: Array, wires: Sequence[str]) -> str:
-    """Sentence that names the cells whose zero is to be set anew; empty if there are none."""
+    """Sentence that names the cells whose zero is off by much of `errors` (N); empty if none is."""
     told = [
         f'{wire} by {error:+.2f} N'
         for wire, error in zip(wires, errors.tolist(), strict=True)

@@ -98,13 +98,14 @@ class PrandtlIshlinskiiParameters:
         check_range(name, 'sum of weights', sum(self.weights), 0.2, GREATEST_ALPHA * 1.000001)
 
     @cached_property
-    def _stack(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def stack(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Thresholds (rad) and weights of the plays."""
         return np.array(self.thresholds), np.array(self.weights)
 
     @cached_property
     def inverse_stack(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Thresholds and weights of the exact inverse (Krejci and Kuhnen 2001, section 3)."""
-        r, w = self._stack
+        r, w = self.stack
         total = np.cumsum(w)
         thresholds = np.array(
             [float(np.sum(w[: j + 1] * (r[j] - r[: j + 1]))) for j in range(r.size)]
@@ -154,7 +155,7 @@ def prandtl_ishlinskii_forward(
     parameters: PrandtlIshlinskiiParameters, theta: ArrayLike
 ) -> NDArray[np.float64]:
     """Actual angle (N,) for a driving angle (N,) in rad, from rest at zero."""
-    thresholds, weights = parameters._stack
+    thresholds, weights = parameters.stack
     driver = np.ascontiguousarray(theta, dtype=float)
     states = play_states(thresholds, driver, np.zeros(thresholds.size))
     result: NDArray[np.float64] = parameters.offset + states @ weights

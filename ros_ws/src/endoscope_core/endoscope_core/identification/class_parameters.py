@@ -61,6 +61,7 @@ def identify_classes(
     Parameters
     ----------
     dataset : CalibrationDataset
+        Recordings of all classes.
     lead : float
         s, of the compensator.
     seed : int
@@ -147,7 +148,7 @@ def class_parameter_sets(
     lead: float,
     model: str = 'bouc_wen',
 ) -> dict[str, object]:
-    """The content of a parameter file, with the command that made it."""
+    """The content of a parameter file for a lead (s), with the command that made it."""
     return {
         'schema': 1,
         'model': model,

@@ -128,6 +128,7 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
     Parameters
     ----------
     recordings : sequence of Recording
+        Of one tube or class.
     seed : int
         Of the search.
     model : str

@@ -104,14 +104,6 @@ class _Plant:
 def load_plant(path: str | Path) -> PlantDescription:
     """Read a plant.yaml; missing keys take their nominal values.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    PlantDescription
-
     Raises
     ------
     FileError
@@ -189,11 +181,6 @@ def _term_mapping(term: TermSpec) -> dict[str, Any]:
 
 def save_plant(plant: PlantDescription, path: str | Path) -> None:
     """Write a plant.yaml that `load_plant` reads back to an equal plant.
-
-    Parameters
-    ----------
-    plant : PlantDescription
-    path : str or Path
 
     Raises
     ------

@@ -121,6 +121,7 @@ class PlantSimulator:
         shaft_command : array (J,)
             Motor shaft angle in rad.
         n_ticks : int
+            How long it is held.
 
         Returns
         -------
@@ -168,6 +169,7 @@ def simulate(
     Parameters
     ----------
     plant : PlantDescription
+        Its J joints.
     shaft_command : array (N, J)
         Motor shaft angle in rad, command k in force from tick k to tick k + 1.
     tick : float

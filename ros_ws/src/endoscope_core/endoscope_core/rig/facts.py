@@ -257,8 +257,9 @@ def rig_from_text(text: str, name: str) -> Rig:
 
     Parameters
     ----------
-    text
-    name
+    text : str
+        YAML.
+    name : str
         Where it stands, for messages.
 
     Raises

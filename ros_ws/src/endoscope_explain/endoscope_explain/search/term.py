@@ -138,12 +138,13 @@ def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Term, ...]:
     Parameters
     ----------
     found : Fit
+        What they are added to.
     left_out : tuple of str
         Those that are not tried.
 
     Returns
     -------
-    tuple of Candidate
+    tuple of Term
         Without those that depend on time where the joint makes no motion twice.
     """
     return tuple(

@@ -85,8 +85,8 @@ def _watch(
 
 def check_overrides(nodes: list[Node]) -> None:
     """Refuse parameter overrides that no node declared, naming the nearest valid parameter."""
-    declared = {node: set(node._parameters) for node in nodes}
-    given = {node: set(node._parameter_overrides) for node in nodes}
+    declared = {node: set(node.get_parameters_by_prefix('')) for node in nodes}
+    given = {node: set(node._parameter_overrides) for node in nodes}  # noqa: SLF001
     for node in nodes:
         for name in sorted(given[node]):
             if name in declared[node] or name.startswith('qos_overrides.'):

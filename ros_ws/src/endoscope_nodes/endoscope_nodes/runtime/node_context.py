@@ -58,7 +58,9 @@ class NodeContext:
     def given(self, name: str) -> dict[str, object]:
         """Parameter values that the command line has for a node of this name."""
         with self._asked(name) as node:
-            return {key: value.value for key, value in node._parameter_overrides.items()}
+            # rclpy has no public way to what the command line gave.
+            given = node._parameter_overrides  # noqa: SLF001
+            return {key: value.value for key, value in given.items()}
 
     @contextmanager
     def _asked(self, name: str) -> Iterator[Node]:
@@ -103,7 +105,7 @@ class NodeContext:
             )
         if simulated:
             # rclpy would subscribe each node to /clock, at the price of a node's own work.
-            node._time_source.detach_node()
+            node._time_source.detach_node()  # noqa: SLF001
         return self._ticker
 
     def pose_of(self, node: Node) -> MeasuredPose:
