@@ -16,8 +16,7 @@ from endoscope_explain.explanation import Verdict
 from endoscope_explain.many_bags import explained_case
 from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.pipeline import Sources
-from endoscope_explain.recording import recording_from_bag
-from endoscope_explain.recording.series import SETPOINT
+from endoscope_explain.recording import SETPOINT, recording_from_bag
 
 PLANT = PlantDescription()
 

@@ -15,7 +15,7 @@ from endoscope_benchmarks.concealed.criteria import (
 )
 from endoscope_benchmarks.concealed.limits import SHARES
 from endoscope_benchmarks.concealed.strata import as_strong
-from endoscope_explain.decide.certainty import probability
+from endoscope_explain.decide.decision import probability
 
 RNG = np.random.default_rng(1)
 WEIGHTS = (-1.0, 4.0, 0.0)

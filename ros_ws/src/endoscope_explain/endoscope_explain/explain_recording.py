@@ -22,7 +22,7 @@ from endoscope_explain.decide.given_physics import GivenJoints, explained_by
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.intervals import nominal_estimates
-from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.model import Fit, packed_joint
 from endoscope_explain.fit.nominal import (
     ReferenceFits,
     against_baseline,
@@ -31,9 +31,7 @@ from endoscope_explain.fit.nominal import (
     simulated_bending,
     with_references,
 )
-from endoscope_explain.fit.simulated_joint import packed_joint
-from endoscope_explain.observe.held_noise import with_held_noise
-from endoscope_explain.observe.observation import JointObservation, observe
+from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
 from endoscope_explain.recording import Recording
 from endoscope_explain.search.levels import MOST_EFFECTS, JointSearch, search
 from endoscope_explain.search.refit import Candidate

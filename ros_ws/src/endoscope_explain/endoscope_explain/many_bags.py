@@ -15,8 +15,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.worker_pool import worker_pool
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
-from endoscope_explain.report.sentences import verdict_sentence
-from endoscope_explain.report.terminal import told
+from endoscope_explain.report.sentences import told, verdict_sentence
 from endoscope_explain.report.writing import REPORT_HTML, REPORT_JSON, provenance, write_report
 from endoscope_explain.shared_physics import physics_of_all
 

@@ -11,18 +11,24 @@ from endoscope_bags.errors import BagError
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
 from endoscope_explain.audit import AuditReport, audit_recording
-from endoscope_explain.case import ChainCut, ExplainedCase, NextExperiment, Place
-from endoscope_explain.compare.ladder import ladders
-from endoscope_explain.compare.second_recording import confirmed_by
-from endoscope_explain.decide.combine import combined_effects, combined_verdict, improved_plant
+from endoscope_explain.case import (
+    ChainCut,
+    ExplainedCase,
+    NextExperiment,
+    Place,
+    combined_effects,
+    combined_verdict,
+    improved_plant,
+)
+from endoscope_explain.compare.ladder import confirmed_by, ladders
 from endoscope_explain.decide.given_physics import GivenJoints
-from endoscope_explain.design.proposal import propose
+from endoscope_explain.design import propose
 from endoscope_explain.explain_recording import Progress, explain_recording
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.free_parameters import BAND
-from endoscope_explain.fit.isolated_samples import with_isolated_marked
-from endoscope_explain.locate.chain_cut import cut_at_motor
+from endoscope_explain.fit.nominal import with_isolated_marked
 from endoscope_explain.locate.locating import (
+    cut_at_motor,
     locate_effects,
     locate_findings,
     locate_parameters,

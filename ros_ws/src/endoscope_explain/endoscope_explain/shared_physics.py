@@ -5,24 +5,210 @@ parameters change. Explained one by one, two recordings may well be given differ
 same misfit; the effects are therefore chosen by the sum of the evidence, and fitted together.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.physics.effects import describe, lacking
 from endoscope_explain.decide.given_physics import GivenJoints, GivenPhysics, without_recording
+from endoscope_explain.fit.evidence import is_noise, log_evidence, weights
+from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.fit.nominal import with_references
-from endoscope_explain.fit.pooled import judged_alone
-from endoscope_explain.observe.held_noise import with_held_noise
-from endoscope_explain.observe.observation import observe
+from endoscope_explain.fit.pooled import fit_together, judged_alone, with_common_numbers
+from endoscope_explain.observe.observation import observe, with_held_noise
+from endoscope_explain.parallel import parallel_map
 from endoscope_explain.pipeline import JointsDifferError, Sources, read_inputs
-from endoscope_explain.search.levels import FALSE_ALARMS
-from endoscope_explain.search.shared_choice import (
-    ReferenceFits,
-    SharedChoice,
-    settled_together,
-    with_one_more,
-)
+from endoscope_explain.search.levels import FALSE_ALARMS, STARTS, TRIED
+from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN, Null, shown
+from endoscope_explain.search.refit import TrialFit, candidate, refit, trial_fit
+from endoscope_explain.search.repetition import motion_repeats
+from endoscope_explain.search.screen import background, directions, screened
+from endoscope_explain.search.term import Term, Variant, effects
+
+Array = NDArray[np.float64]
+ReferenceFits = tuple[Fit, ...]
+Begun = tuple[list[JointModel], list[Array]]
+"""Models of all recordings, and the coordinates at which their fit begins."""
+
+REFITTED_FIRST, REFITTED = 6, 3
+"""Effects that are fitted to all recordings, beside no other one and beside others."""
+_SEED = 11
+_TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class SharedChoice:
+    """Effects for all recordings of a joint.
+
+    `effects`: in the order in which they were added.
+    `recordings`: fits of each recording; see `search.refit.trial_fit`. One that has no use for an
+        effect lacks it.
+    """
+
+    joint: str
+    effects: tuple[str, ...]
+    recordings: tuple[ReferenceFits, ...]
+
+    def total(self) -> float:
+        """Sum of the evidence of all recordings."""
+        return sum(log_evidence(references[0]) for references in self.recordings)
+
+    def gain_of(self, other: 'SharedChoice') -> float:
+        """Gain of evidence from this choice to another."""
+        return other.total() - self.total()
+
+    def null(self, jobs: int) -> tuple[float, Null]:
+        """What recordings show of one effect more, and rigs in which nothing more is missing.
+
+        Returns: gains by the screen of the effect that gains most in all recordings together: one
+            is tried for that serves all of them, and the best of each recording would gain more.
+            Every shape of the tube has a profile of its own, so that what is drawn for one says
+            nothing of another.
+        """
+        order = np.random.default_rng(_SEED)
+        by_recording = [_shown(references[0], order, jobs) for references in self.recordings]
+        everywhere = set.intersection(*(set(each) for each in by_recording))
+        if not everywhere:
+            return 0.0, NO_DETECTABLE_GAIN
+        sums = [np.sum([each[effect] for each in by_recording], axis=0) for effect in everywhere]
+        largest = np.max(sums, axis=0)
+        return float(largest[0]), Null(largest[1:], largest[1:])
+
+    def leaves_noise(self) -> bool:
+        """Whether nothing is left to explain in any recording."""
+        return all(is_noise(references[0]) for references in self.recordings)
+
+
+def _shown(found: Fit, order: np.random.Generator, jobs: int) -> dict[str, Array]:
+    """Gains (1 + B,) of each effect: on the recording, and on rigs in any order."""
+    behind = background(found)
+    ways = directions(behind, _effects(found), jobs)
+    if not ways:
+        return {}
+    screened = shown(behind, ways, None, jobs)
+    drawn = screened.drawn[:, order.permutation(screened.drawn.shape[1])]
+    gained: dict[str, Array] = {}
+    for way, row in zip(ways, np.column_stack([screened.observed, drawn]), strict=True):
+        gained[way.term.id] = np.maximum(gained.get(way.term.id, row), row)
+    return gained
+
+
+def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
+    """The choice with one more effect, for each of the most promising effects.
+
+    Returns: best first.
+    """
+    trials = _trial_fits(choice, jobs)
+    variants: dict[str, Variant] = {}
+    for variant in sorted(trials, key=lambda v: _logarithm_of_costs(choice, trials[v])):
+        variants.setdefault(variant[0], variant)
+    promising = list(variants.values())[: REFITTED if choice.effects else REFITTED_FIRST]
+    begun = [_begun(choice, trials[variant]) for variant in promising]
+    fitted = _side_by_side(begun, jobs, rough=True)
+    return sorted(
+        (
+            SharedChoice(choice.joint, (*choice.effects, variant[0]), recordings)
+            for variant, recordings in zip(promising, fitted, strict=True)
+        ),
+        key=SharedChoice.total,
+        reverse=True,
+    )
+
+
+def _effects(found: Fit) -> tuple[Term, ...]:
+    """Effects that may be added: what was fitted to one motion is not told from time by another."""
+    repeats = motion_repeats(found.model.observation)
+    return tuple(
+        term for term in effects(found) if repeats or not term.effect.traits.resembles_time
+    )
+
+
+def _trial_fits(choice: SharedChoice, jobs: int) -> dict[Variant, list[TrialFit | None]]:
+    """The best cheap fit of each promising variant of an effect, for each recording."""
+    trials: dict[Variant, list[TrialFit | None]] = {}
+    everywhere = set.intersection(
+        *({t.id for t in _effects(references[0])} for references in choice.recordings)
+    )
+    for n, references in enumerate(choice.recordings):
+        behind = background(references[0])
+        offset = behind.offset
+        terms = tuple(t for t in _effects(references[0]) if t.id in everywhere)
+        starts: dict[Variant, list[Term]] = {}
+        for each in screened(behind, directions(behind, terms, jobs)):
+            starts.setdefault(each.term.variant, []).append(each.term)
+        tasks = [term for own in list(starts.values())[:TRIED] for term in own[:STARTS]]
+
+        def tried(
+            term: Term, references: ReferenceFits = references, offset: Array = offset
+        ) -> TrialFit:
+            return trial_fit(references, term, offset)
+
+        for item in parallel_map(tried, tasks, jobs):
+            found = trials.setdefault(item.term.variant, [None] * len(choice.recordings))
+            before = found[n]
+            if before is None or item.cost < before.cost:
+                found[n] = item
+    return trials
+
+
+def _logarithm_of_costs(choice: SharedChoice, trials: list[TrialFit | None]) -> float:
+    return sum(
+        math.log(_cost(references[0]) if item is None else min(item.cost, _cost(references[0])))
+        for references, item in zip(choice.recordings, trials, strict=True)
+    )
+
+
+def _cost(found: Fit) -> float:
+    """Half the squares of a fit, weighted as those of a trial fit beside it are."""
+    weighted = found.residuals * weights(found.model.observation, found.residuals)
+    return found.model.cost(weighted, found.theta)
+
+
+def _begun(choice: SharedChoice, trials: list[TrialFit | None]) -> Begun:
+    """Models of all recordings with one more effect, and where their fit begins.
+
+    A recording that has no use for the effect stays without it.
+    """
+    models, starts = [], []
+    for references, item in zip(choice.recordings, trials, strict=True):
+        found = references[0] if item is None else refit(item, candidate((), references[0])).fit
+        models.append(found.model)
+        starts.append(found.theta)
+    return models, starts
+
+
+def settled_together(choices: Sequence[SharedChoice], jobs: int) -> list[SharedChoice]:
+    """Choices fitted until nothing moves any more, also from where all recordings are alike.
+
+    A fit by itself may lie in another valley than those of the same rig in other shapes.
+
+    Returns: best first.
+    """
+    twice: list[SharedChoice] = []
+    begun: list[Begun] = []
+    for choice in choices:
+        own = [references[0] for references in choice.recordings]
+        for starts in ([f.theta for f in own], with_common_numbers(own)):
+            twice.append(choice)
+            begun.append(([f.model for f in own], starts))
+    best: dict[frozenset[str], SharedChoice] = {}
+    for choice, recordings in zip(twice, _side_by_side(begun, jobs, rough=False), strict=True):
+        found = replace(choice, recordings=recordings)
+        key = frozenset(choice.effects)
+        best[key] = max(best.get(key, found), found, key=SharedChoice.total)
+    return sorted(best.values(), key=SharedChoice.total, reverse=True)
+
+
+def _side_by_side(
+    begun: Sequence[Begun], jobs: int, *, rough: bool
+) -> list[tuple[ReferenceFits, ...]]:
+    found = parallel_map(lambda task: fit_together(*task, rough=rough), begun, jobs)
+    return [tuple((f,) for f in fits) for fits in found]
+
 
 BEAM = 3
 """Choices of effects that are kept at each step (beam search)."""

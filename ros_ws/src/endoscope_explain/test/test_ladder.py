@@ -1,10 +1,15 @@
 import numpy as np
 import pytest
 
-from endoscope_explain.compare.black_box.models import PLAY_WIDTHS, motion_features
-from endoscope_explain.compare.black_box.regressors import KINDS, trained, training
+from endoscope_explain.compare.black_boxes import (
+    KINDS,
+    PLAY_WIDTHS,
+    motion_features,
+    trained,
+    training,
+)
 from endoscope_explain.compare.ladder import ladders
-from endoscope_explain.fit.held_out import fitted_at, judged_at
+from endoscope_explain.fit.evidence import fitted_at, judged_at
 
 
 @pytest.mark.parametrize('kind', list(KINDS))

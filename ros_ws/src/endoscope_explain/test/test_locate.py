@@ -5,9 +5,8 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription, TermSpec
 from endoscope_explain.explanation import Estimate, Explanation, NamedEffect, Verdict
-from endoscope_explain.locate.chain_cut import cut_at_motor
-from endoscope_explain.locate.locating import locate_effects, locate_unknown
-from endoscope_explain.locate.regime import information
+from endoscope_explain.locate.conditions import information
+from endoscope_explain.locate.locating import cut_at_motor, locate_effects, locate_unknown
 
 PLANT = PlantDescription()
 

@@ -12,7 +12,7 @@ from endoscope_explain.explanation import Verdict
 from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.report.html_page import html_page
-from endoscope_explain.report.terminal import told
+from endoscope_explain.report.sentences import told
 from endoscope_explain.report.writing import write_report
 
 ONE_JOINT = PlantDescription(joints={'bend_x': JointParameters()})

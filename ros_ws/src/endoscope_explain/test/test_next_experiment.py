@@ -5,8 +5,7 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
-from endoscope_explain.design.proposal import distance, imagine, is_safe, propose
-from endoscope_explain.design.waveforms import family
+from endoscope_explain.design import distance, family, imagine, is_safe, propose
 from endoscope_explain.explanation import NamedEffect
 
 PLANT = PlantDescription()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from endoscope_explain.search.repeated_motion import LEAST_SHARE, share_seen_before
+from endoscope_explain.search.repetition import LEAST_SHARE, share_seen_before
 
 TIME = 1e-3 * np.arange(40_000)
 

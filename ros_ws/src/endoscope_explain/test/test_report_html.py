@@ -26,16 +26,16 @@ from endoscope_explain.observe.predicted_signals import fits_by, view
 from endoscope_explain.recording import Series
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.numbers import in_degrees, judged, moving_joints, shown
-from endoscope_explain.report.report_mapping import report_mapping
 from endoscope_explain.report.sentences import (
     HEADLINES,
     before_and_after,
     next_step,
     physics_of,
     reservations,
+    told,
     verdict_sentence,
 )
-from endoscope_explain.report.terminal import told
+from endoscope_explain.report.writing import report_mapping
 
 PLANT = PlantDescription()
 

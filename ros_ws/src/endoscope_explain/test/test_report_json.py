@@ -11,11 +11,9 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.plant_file import load_plant
 from endoscope_core.signals.command_file import read_command_file
 from endoscope_explain.audit import AuditReport, Finding, Severity
-from endoscope_explain.case import NextExperiment
-from endoscope_explain.decide.combine import combined_effects, combined_verdict
+from endoscope_explain.case import NextExperiment, combined_effects, combined_verdict
 from endoscope_explain.explanation import Estimate, NominalEstimate, Verdict
-from endoscope_explain.report.report_mapping import report_mapping
-from endoscope_explain.report.writing import write_report
+from endoscope_explain.report.writing import report_mapping, write_report
 
 NUMBER = (int, float)
 STAGES = {'actuator', 'transmission', 'joint', 'sensing', 'recording'}

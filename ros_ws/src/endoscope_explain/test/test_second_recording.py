@@ -8,13 +8,13 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
-from endoscope_explain.compare.second_recording import confirmed_by
+from endoscope_explain.compare.ladder import confirmed_by
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.report.html_page import html_page
-from endoscope_explain.report.report_mapping import report_mapping
-from endoscope_explain.report.terminal import told
+from endoscope_explain.report.sentences import told
+from endoscope_explain.report.writing import report_mapping
 
 DOUBT = (
     'stribeck_friction or viscous_friction on bend_x fits this recording, but does not surely '

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from endoscope_benchmarks.concealed.trial import Row
-from endoscope_explain.decide.certainty import features, probability
+from endoscope_explain.decide.decision import features, probability
 
 Array = NDArray[np.float64]
 

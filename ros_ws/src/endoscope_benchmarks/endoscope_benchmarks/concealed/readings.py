@@ -15,8 +15,7 @@ from endoscope_core.physics import (
     simulate,
 )
 from endoscope_core.physics.sensing import quantise
-from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
+from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, Recording, Series
 
 Array = NDArray[np.float64]
 

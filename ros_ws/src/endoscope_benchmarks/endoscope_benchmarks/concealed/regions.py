@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from endoscope_benchmarks.concealed.case import Case
 from endoscope_benchmarks.concealed.readings import in_noise, read
 from endoscope_explain.explanation import Explanation, Verdict
+from endoscope_explain.locate.excess import WINDOW_S
 from endoscope_explain.locate.locating import locate_effects, locate_unknown
-from endoscope_explain.locate.time_windows import WINDOW_S
 
 Mask = NDArray[np.bool_]
 Intervals = Sequence[tuple[float, float]]

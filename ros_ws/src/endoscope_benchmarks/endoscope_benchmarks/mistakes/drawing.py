@@ -15,8 +15,7 @@ from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import motion_by_name
-from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
+from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, Recording, Series
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator

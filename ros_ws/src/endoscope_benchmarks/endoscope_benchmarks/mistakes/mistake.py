@@ -7,8 +7,7 @@ import numpy as np
 
 from endoscope_benchmarks.mistakes.drawing import Generator
 from endoscope_explain.audit import AuditReport
-from endoscope_explain.recording import Recording
-from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
+from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, Recording
 
 Change = Callable[[Recording, Generator], Recording]
 Columns = Callable[[Generator, int], list[int]]

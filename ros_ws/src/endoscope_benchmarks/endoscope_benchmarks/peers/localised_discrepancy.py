@@ -12,7 +12,7 @@ from scipy.stats import false_discovery_control, norm
 
 from endoscope_benchmarks.peers.problem import LEVEL, OwnExample, Problem, Reply, on_grid
 from endoscope_benchmarks.peers.term_library import Term, terms_of
-from endoscope_explain.locate.time_windows import WINDOW_S
+from endoscope_explain.locate.excess import WINDOW_S
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

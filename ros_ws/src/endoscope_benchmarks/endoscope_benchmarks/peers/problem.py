@@ -13,11 +13,14 @@ from endoscope_core.physics import layout
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_explain.fit.free_parameters import BAND
-from endoscope_explain.fit.model import Fit
+from endoscope_explain.fit.model import Fit, simulate_joint
 from endoscope_explain.fit.nominal import with_references
-from endoscope_explain.fit.simulated_joint import simulate_joint
-from endoscope_explain.observe.held_noise import with_held_noise
-from endoscope_explain.observe.observation import Channel, JointObservation, observe
+from endoscope_explain.observe.observation import (
+    Channel,
+    JointObservation,
+    observe,
+    with_held_noise,
+)
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -8,9 +8,16 @@ from endoscope_bags import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bags.rig_record import rig_record
-from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
-from endoscope_explain.recording.signals import motor_name, wire_names
+from endoscope_explain.recording import (
+    BENDING,
+    COMMAND,
+    MOTOR,
+    WIRES,
+    Recording,
+    Series,
+    motor_name,
+    wire_names,
+)
 
 BEGIN_NS = 1_000_000_000
 """First stamp: a simulation's clock that has run for a second."""

@@ -17,7 +17,7 @@ from endoscope_benchmarks.proof.trial import (
 )
 from endoscope_core.pages import zoomable
 from endoscope_core.pages.zoomable import Curve, Plot, figure_html
-from endoscope_explain.report.figures.style import TIME, look
+from endoscope_explain.report.figures import TIME, look
 from endoscope_explain.report.numbers import digits
 from endoscope_explain.report.sentences import plain
 from endoscope_nodes.names import JOINTS

@@ -29,14 +29,12 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.decide.decision import decide
 from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.free_parameters import NINETY_PERCENT
-from endoscope_explain.fit.intervals import DEGREES
+from endoscope_explain.fit.intervals import DEGREES, with_form
 from endoscope_explain.fit.model import Fit, JointModel, jacobian, without_effect
-from endoscope_explain.fit.other_forms import with_form
 from endoscope_explain.fit.pooled import deviations, fit_together
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.levels import search
-from endoscope_explain.search.shared_choice import SharedChoice
-from endoscope_explain.shared_physics import searched
+from endoscope_explain.shared_physics import SharedChoice, searched
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]

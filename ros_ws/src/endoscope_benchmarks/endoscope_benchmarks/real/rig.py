@@ -13,8 +13,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.layout import JOINT_RADIUS
 from endoscope_explain.fit.evidence import mean_squares, weights
 from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
-from endoscope_explain.fit.model import Fit, JointModel, fit
-from endoscope_explain.fit.simulated_joint import packed_joint
+from endoscope_explain.fit.model import Fit, JointModel, fit, packed_joint
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.term import with_effect
 

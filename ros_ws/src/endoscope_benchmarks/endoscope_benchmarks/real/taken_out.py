@@ -12,9 +12,8 @@ from endoscope_core.physics.effect import NominalPhysics
 from endoscope_core.physics.effects import NOMINAL_PHYSICS
 from endoscope_explain.decide.decision import decide
 from endoscope_explain.fit.evidence import log_evidence
-from endoscope_explain.fit.intervals import effect_estimates
+from endoscope_explain.fit.intervals import effect_estimates, with_form
 from endoscope_explain.fit.model import Fit, without_effect
-from endoscope_explain.fit.other_forms import with_form
 from endoscope_explain.search.levels import search
 
 

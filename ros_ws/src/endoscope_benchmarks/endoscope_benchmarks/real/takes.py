@@ -17,10 +17,8 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.tube_files import DESIRED, PHASE
 from endoscope_core.physics.description import JointParameters, PlantDescription, SensorParameters
 from endoscope_core.rig import shipped_rig
-from endoscope_explain.observe.held_noise import with_held_noise
-from endoscope_explain.observe.observation import JointObservation, observe
-from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.series import BENDING, COMMAND, WIRES
+from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
+from endoscope_explain.recording import BENDING, COMMAND, WIRES, Recording, Series
 
 Array = NDArray[np.float64]
 

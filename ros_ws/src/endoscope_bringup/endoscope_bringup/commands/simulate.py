@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.physics import load_plant
     from endoscope_core.physics.functions.term import tabulated
     from endoscope_core.rig import load_rig
-    from endoscope_explain.simulation.answer_bag import write_answer
+    from endoscope_explain.answer_bag import write_answer
 
     plant = load_plant(args.plant)
     for term in plant.terms:

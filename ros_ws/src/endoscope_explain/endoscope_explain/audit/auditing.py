@@ -7,23 +7,19 @@ import numpy as np
 from endoscope_core.physics.description import PlantDescription, SensorParameters
 from endoscope_explain.audit.earlier_motion import with_state_at_start
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
-from endoscope_explain.audit.held_pose import with_held_poses
-from endoscope_explain.audit.held_samples import held, held_before_jump, held_findings
 from endoscope_explain.audit.misreading import as_findings, unlike_the_plant
-from endoscope_explain.audit.outliers import find_outliers, motor_travel, outlier_finding
 from endoscope_explain.audit.plausibility import Comparison, as_meant
-from endoscope_explain.audit.receipt_clock import (
-    clock_skew_from_receipt,
-    retimed,
-    skew_finding,
-)
-from endoscope_explain.audit.saturation import clipped, saturation_finding
 from endoscope_explain.audit.stamps import (
+    clock_skew_from_receipt,
     find_gaps,
     gap_findings,
+    in_seconds,
     missing_in,
     order_stamps,
+    retimed,
     silence_findings,
+    skew_finding,
+    stamp_unit_findings,
     usual_interval,
 )
 from endoscope_explain.audit.standing_still import (
@@ -31,12 +27,20 @@ from endoscope_explain.audit.standing_still import (
     frozen_findings,
     moves,
     resting_motor_findings,
+    with_held_poses,
     without_frozen,
 )
-from endoscope_explain.audit.time_unit import in_seconds, stamp_unit_findings
-from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.series import WIRES
-from endoscope_explain.recording.signals import signal_name
+from endoscope_explain.audit.wrong_samples import (
+    clipped,
+    find_outliers,
+    held,
+    held_before_jump,
+    held_findings,
+    motor_travel,
+    outlier_finding,
+    saturation_finding,
+)
+from endoscope_explain.recording import WIRES, Recording, Series, signal_name
 
 LEAST_DURATION_S = 2.0
 """Length of a recording from which on it can be compared with the plant."""

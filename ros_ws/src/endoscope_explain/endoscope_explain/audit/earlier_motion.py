@@ -24,8 +24,7 @@ from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.audit.standing_still import MOVES_RAD
 from endoscope_explain.observe.observation import ANALYSIS_PERIOD, JointObservation, observe
 from endoscope_explain.observe.predicted_signals import Flags, packed_rig
-from endoscope_explain.recording import Recording
-from endoscope_explain.recording.series import Array, Mask
+from endoscope_explain.recording import Array, Mask, Recording
 
 LEAST_S = 2.0
 """Length of what has to be left where the time until the past no longer shows is not judged."""

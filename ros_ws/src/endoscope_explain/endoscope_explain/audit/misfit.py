@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from endoscope_explain.recording.series import Array
+from endoscope_explain.recording import Array
 
 PERIOD_S = 0.02
 """Between the samples that are compared."""

@@ -10,9 +10,14 @@ import numpy as np
 from endoscope_bags.units import UNITS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit.finding import Finding, Severity
-from endoscope_explain.recording import Recording
-from endoscope_explain.recording.series import DESIRED, Array
-from endoscope_explain.recording.signals import QUANTITY_UNITS, motor_name, signal_name
+from endoscope_explain.recording import (
+    DESIRED,
+    QUANTITY_UNITS,
+    Array,
+    Recording,
+    motor_name,
+    signal_name,
+)
 
 LARGE = 5.0
 """Factor that no gear of this rig has, nor a servo that misses its command."""

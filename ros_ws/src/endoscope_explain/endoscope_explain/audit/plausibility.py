@@ -27,8 +27,7 @@ from endoscope_explain.audit.misreading import (
     scaled,
 )
 from endoscope_explain.audit.standing_still import must_move
-from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.series import Array
+from endoscope_explain.recording import Array, Recording, Series
 
 TURN_RAD = 2.0 * pi
 """No section bends further, from one side to the other."""

@@ -1,12 +1,17 @@
-"""Stamps: out of order, repeated, and missing."""
+"""Stamps: out of order, repeated, missing, of clocks that run apart, or in another unit."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import log
 
 import numpy as np
 
+from endoscope_core.physics.description import SensorParameters
 from endoscope_core.physics.effect import Symptom
 from endoscope_core.physics.effects import showing
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.explanation import Estimate
-from endoscope_explain.recording.series import Array, Series
+from endoscope_explain.recording import BENDING, MOTOR, WIRES, Array, Recording, Series
 
 GAP_FACTOR = 2.5
 """A gap is at least this many usual sample intervals: one lost sample is not one."""
@@ -154,3 +159,182 @@ def gap_findings(
             evidence={'gaps': float(len(every)), 'missing_s': float(sum(missing.values()))},
         )
     ]
+
+
+WINDOW_S = 1.0
+
+
+def delay_slope(series: Series) -> tuple[float, float] | None:
+    """Drift of receipt against stamp and its standard error in s/s, None if it is unknown."""
+    if series.received is None or series.time[-1] - series.time[0] < 5 * WINDOW_S:
+        return None
+    delay = series.received - series.time
+    # The quickest deliveries of each second tell the drift.
+    window = ((series.time - series.time[0]) / WINDOW_S).astype(int)
+    slope, error = 0.0, np.inf
+    # Against a drift the quickest delivery is the window's last or first: it is taken out first.
+    for _ in range(3):
+        flat = delay - slope * series.time
+        quickest = np.array(
+            [
+                np.flatnonzero(window == w)[np.argmin(flat[window == w])]
+                for w in np.unique(window)[:-1]
+            ]
+        )
+        time = series.time[quickest] - series.time[quickest].mean()
+        slope = float(time @ delay[quickest] / (time @ time))
+        rest = delay[quickest] - delay[quickest].mean() - slope * time
+        # Rounding of receipt times would otherwise promise a precision that nobody has.
+        error = max(float(np.std(rest, ddof=2)), 1e-6) / float(np.sqrt(time @ time))
+    return slope, error
+
+
+def clock_skew_from_receipt(series: dict[str, Series]) -> dict[str, Estimate]:
+    """Skew (relative rate minus one) of topics whose clock surely runs apart from most."""
+    slopes = {t: s for t, one in series.items() if (s := delay_slope(one)) is not None}
+    if len(slopes) < 3:
+        return {}
+    usual = float(np.median([slope for slope, _ in slopes.values()]))
+    found = {}
+    for topic, (slope, error) in slopes.items():
+        apart = slope - usual
+        if abs(apart) > max(6.0 * error, 3e-5):
+            skew = -apart / (1.0 + apart)
+            found[topic] = Estimate(skew, skew - 1.645 * error, skew + 1.645 * error, '-')
+    return found
+
+
+def retimed(series: Series, skew: float, start: float = 0.0) -> Series:
+    """Put a series on the common clock; its own ran `1 + skew` times as fast from `start` s."""
+    time: Array = start + (series.time - start) / (1.0 + skew)
+    return replace(series, time=time)
+
+
+def skew_finding(topic: str, joint: str, skew: Estimate, duration: float) -> Finding:
+    """Describe the `clock_skew` of the device behind one topic."""
+    way = 'fast' if skew.value > 0 else 'slow'
+    return Finding(
+        showing(Symptom.CLOCK_RATE).id,
+        Severity.FAULT,
+        joint,
+        'recording',
+        (topic,),
+        ((0.0, duration),),
+        f'the clock behind {topic} runs {way} by {abs(skew.value) * 1e3:.3f} ms in a second',
+        'its stamps were put on the common clock',
+        parameters={'skew': skew},
+        evidence={'z': abs(skew.value) / max((skew.high - skew.low) / 3.29, 1e-12)},
+    )
+
+
+MOTOR_RATE_HZ = 1000.0
+"""At which a simulated motor is read, and a quick bus."""
+UNITS = {1: 'ms', 2: 'us', 3: 'ns'}
+"""By how many powers of a thousand a second is more."""
+NEAR = 10.0
+"""Factor within which sensors are read as described: none of them once in 0.4 s or more."""
+AS_LONG = 4.0
+"""Factor within which topics of one recording are equally long."""
+
+
+def stamp_unit_findings(recording: Recording, sensors: SensorParameters) -> list[Finding]:
+    """Topics whose stamps are a power of 1000 off: to be divided by `evidence['per_second']`."""
+    topics = {s.topic: s for s in (recording.command, *recording.measured().values())}
+    # A sensor's rate alone tells it where all topics agree; where one is as much longer or shorter
+    # than the others, that does.
+    powers = _powers(topics, sensors)
+    return [
+        _unit_finding(recording, [topics[t] for t in powers if powers[t] == power], power)
+        for power in dict.fromkeys(powers.values())
+    ]
+
+
+def in_seconds(recording: Recording, findings: list[Finding]) -> Recording:
+    """Return the recording with the stamps of the found topics as they must be meant."""
+    divisors = {topic: f.evidence['per_second'] for f in findings for topic in f.signals}
+    every = {'command': recording.command, **recording.measured()}
+    return recording.with_series(
+        {
+            name: replace(s, time=s.time / divisors[s.topic], received=None)
+            for name, s in every.items()
+            if s.topic in divisors
+        }
+    )
+
+
+def _powers(topics: Mapping[str, Series], sensors: SensorParameters) -> dict[str, int]:
+    rates = {
+        MOTOR: MOTOR_RATE_HZ,
+        WIRES: sensors.load_cell_rate,
+        BENDING: sensors.tracker_rate,
+    }
+    long = {topic: float(np.ptp(s.time)) for topic, s in topics.items() if len(s.time) > 2}
+    by_rate = {
+        topic: _power(rates[topic] * float(np.median(np.diff(topics[topic].time))), NEAR)
+        for topic in long
+        if topic in rates
+    }
+    by_receipt = {topic: _by_receipt(topics[topic]) for topic in long}
+    if not by_rate:
+        return {}
+    all_alike = set(by_rate.values())
+    found = {}
+    for topic, span in long.items():
+        known = by_receipt[topic]
+        if known is not None:
+            found[topic] = known
+            continue
+        others = float(np.median([other for name, other in long.items() if name != topic]))
+        beside = _power(span / others, AS_LONG)
+        if len(all_alike) == 1 and (common := next(iter(all_alike))):
+            # All sensors are as far from their rates; the command may be as they are, or right.
+            measured = float(np.median([long[name] for name in by_rate]))
+            found[topic] = common + _power(span / measured, AS_LONG)
+        elif beside and by_rate.get(topic, beside) == beside:
+            found[topic] = beside
+    return {topic: power for topic, power in found.items() if power}
+
+
+def _by_receipt(series: Series) -> int | None:
+    """Power of a thousand by which stamps run faster than the recorder's clock; None if unknown."""
+    if series.received is None:
+        return None
+    received = float(np.ptp(series.received))
+    delay = series.received - series.time
+    if received <= 0.0 or np.ptp(delay) < 1e-6:
+        # A table was converted: its stamps were taken for times of receipt.
+        return None
+    return _power(float(np.ptp(series.time)) / received, AS_LONG)
+
+
+def _power(ratio: float, near: float) -> int:
+    """Power of a thousand that a ratio is near to; 0 where it is near none."""
+    if ratio <= 0.0:
+        return 0
+    power = round(log(ratio) / log(1e3))
+    return power if abs(power) in UNITS and abs(log(ratio) - power * log(1e3)) < log(near) else 0
+
+
+def _unit_finding(recording: Recording, series: list[Series], power: int) -> Finding:
+    step = float(np.median(np.diff(series[0].time)))
+    topics = tuple(one.topic for one in series)
+    named = f'the stamps of {" and ".join(topics)}'
+    seen = f'{step:.3g} s apart in {float(np.ptp(series[0].time)):.4g} s'
+    unit = UNITS[abs(power)]
+    if power > 0:
+        text = f'{named} are {seen}: they are in {unit}, not in s'
+        remedy = f'divide them by {1000**power:g}'
+    else:
+        text = f'{named} are {seen}: they are in s and were taken for {unit}'
+        remedy = f'multiply them by {1000**-power:g}'
+    return Finding(
+        'wrong_unit',
+        Severity.MISTAKE,
+        recording.joints[0],
+        'recording',
+        topics,
+        ((0.0, recording.duration),),
+        text,
+        remedy + ', or give the unit of time when the table is converted',
+        evidence={'per_second': 1000.0**power},
+    )

@@ -1,4 +1,4 @@
-"""Topics that stand still while the rig moves, and motors that do not follow at all."""
+"""Topics that stand still while the rig moves, motors that do not follow, and held poses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from endoscope_core.physics.description import SensorParameters
+from endoscope_core.rig import Rig
+from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.audit.misreading import column_name
-from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.series import MOTOR, Array
+from endoscope_explain.audit.stamps import find_gaps, usual_interval
+from endoscope_explain.recording import MOTOR, Array, Recording, Series
 
 MOVES_RAD = 0.01
 """Shaft angle that is a motion."""
@@ -143,3 +146,98 @@ def _finding(
         f'{what} is frozen: it repeats one reading from {since:.3f} s to its end while {meanwhile}',
         'record it anew with its source running',
     )
+
+
+# A motor driver that hears nothing any more holds the shafts where they are at that moment, which
+# is short of the last command if they were on their way. What was commanded then is in no topic.
+
+_THERE_RAD = 1e-6
+
+
+def with_held_poses(
+    recording: Recording, sensors: SensorParameters, findings: list[Finding]
+) -> Recording:
+    """Command the poses that the motors were held at while no commands came, and note it."""
+    command, shaft = recording.command, recording.shaft_position
+    if shaft is None or len(command.time) < 2:
+        return recording
+    count = 2.0 * np.pi / sensors.encoder_counts
+    found = []
+    for begin, end in find_gaps(command, float(command.time[0]), recording.duration):
+        last = command.values[np.searchsorted(command.time, begin)]
+        pose = _held_pose(shaft, begin, end, last, count, recording.rig)
+        if pose is not None:
+            found.append(pose)
+    if not found:
+        return recording
+    findings.append(
+        Finding(
+            'held_pose',
+            Severity.NOTE,
+            recording.joints[0],
+            'recording',
+            (command.topic,),
+            tuple((at, at) for at, _ in found),
+            f'{command.topic} paused in mid-motion, and the motors held where they were '
+            f'({len(found)} times, first at {found[0][0]:.3f} s)',
+            'the poses that were held are taken for commands',
+            evidence={'count': float(len(found))},
+        )
+    )
+    beat = usual_interval(shaft.time)
+    ways = [_way(command, *p, beat, recording.rig) for p in found]
+    return replace(recording, command=_with_ways(command, ways))
+
+
+def _held_pose(
+    shaft: Series, begin: float, end: float, last: Array, count: float, rig: Rig
+) -> tuple[float, Array] | None:
+    """When the shafts were told to hold, and where; None if they went to the last command."""
+    given_up = begin + rig.timeouts.command
+    if end <= given_up:
+        return None
+    inside = (shaft.time >= begin) & (shaft.time < end) & shaft.valid.all(axis=1)
+    time, angle = shaft.time[inside], shaft.values[inside]
+    resting = angle[time >= 0.5 * (begin + end)]
+    if len(resting) < 2 or np.ptp(resting, axis=0).max() > 1.5 * count:
+        return None
+    rest = np.median(resting, axis=0)
+    if np.abs(rest - last).max() <= 1.5 * count:
+        return None
+    beat = usual_interval(shaft.time)
+    # A pose is held if the shafts end at it although they were sent on, and if they came by it no
+    # later than the driver gives a stream up: as a rule at that very moment.
+    there = (np.abs(angle - rest) < 1.5 * count).all(axis=1) & (time <= given_up + 2.0 * beat)
+    if not there.any():
+        return None
+    by = float(time[there][0])
+    return (given_up if (there & (time >= given_up - 2.0 * beat)).any() else by), rest
+
+
+def _way(command: Series, at: float, pose: Array, beat: float, rig: Rig) -> tuple[Array, Array]:
+    """Goals on the way from the last command to a pose, at each beat of the driver."""
+    motors = rig.motors
+    last = command.values[np.searchsorted(command.time, at) - 1]
+    reach = max(motors.reach, float(np.abs([last, pose]).max()))
+    limits = (reach, motors.speed, motors.acceleration, motors.step)
+    shaper = MotionShaper(MotionLimits.either_way(len(pose), *limits))
+    shaper.restart(last.tolist())
+    goals = [np.array(shaper.shape(pose.tolist(), beat))]
+    while np.abs(goals[-1] - pose).max() > _THERE_RAD:
+        goals.append(np.array(shaper.shape(pose.tolist(), beat)))
+    goals[-1] = pose
+    times = np.asarray(at + beat * np.arange(len(goals)), dtype=np.float64)
+    return times, np.stack(goals)
+
+
+def _with_ways(command: Series, ways: Sequence[tuple[Array, Array]]) -> Series:
+    at = np.concatenate([time for time, _ in ways])
+    place = np.searchsorted(command.time, at, side='right')
+    values = np.insert(command.values, place, np.concatenate([goals for _, goals in ways]), axis=0)
+    received = command.received
+    if received is not None:
+        # Heard as long after their stamps as the commands before them.
+        delay = received[place - 1] - command.time[place - 1]
+        received = np.insert(received, place, at + delay)
+    time = np.insert(command.time, place, at)
+    return Series.of(command.topic, time, values, received)

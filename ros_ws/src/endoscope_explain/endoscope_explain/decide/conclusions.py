@@ -13,8 +13,7 @@ from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Effect, Stage
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.layout import NOMINAL_KEYS
-from endoscope_explain.decide.certainty import certainty
-from endoscope_explain.decide.decision import Decision, MissingTerm
+from endoscope_explain.decide.decision import Decision, MissingTerm, certainty
 from endoscope_explain.explanation import (
     ChannelFit,
     Fitting,
@@ -24,16 +23,14 @@ from endoscope_explain.explanation import (
     UnknownTerm,
     Verdict,
 )
-from endoscope_explain.fit.evidence import misfit
+from endoscope_explain.fit.evidence import held_out_fit, held_out_masks, misfit, on_samples
 from endoscope_explain.fit.free_parameters import (
     FITTED_NOMINAL,
     FRICTION_PROFILE_NAMES,
     nominal_number,
 )
-from endoscope_explain.fit.held_out import held_out_fit, held_out_masks, on_samples
 from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
-from endoscope_explain.fit.model import Fit
-from endoscope_explain.fit.simulated_joint import joint_of
+from endoscope_explain.fit.model import Fit, joint_of
 from endoscope_explain.fit.solver import Ended
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.formula import fitted_function, nearest_formula

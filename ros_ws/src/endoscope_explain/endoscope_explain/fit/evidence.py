@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.fit.model import Fit
+from endoscope_explain.explanation import ChannelFit
+from endoscope_explain.fit.model import Fit, fit
 from endoscope_explain.observe.observation import JointObservation
 
 Array = NDArray[np.float64]
@@ -85,3 +86,127 @@ def _prior_precision(found: Fit) -> Array:
     evenly = 12.0 / np.maximum(high - low, 1e-9) ** 2
     own = found.model.prior_weight() ** 2
     return np.where(own > 0.0, own, evenly)
+
+
+BLOCK = 50
+"""Samples of a block whose mean tells slow misfit that single samples hide."""
+LIMIT = 5.0
+"""Standard deviations of the noise's own scatter that a mean square may exceed."""
+NOTABLE = 0.1
+"""Share of a wire's samples with more scatter than noise from which on it is said to slip."""
+WHITE = frozenset({'tension', 'bending', 'shaft_effort'})
+"""Quantities whose noise is white but for rounding; that of the encoder is rounding alone."""
+
+
+def excess(fit: Fit) -> dict[str, float]:
+    """Return by how many standard deviations each white channel is above noise alone.
+
+    The larger of two tests for each signal: of single samples, and of means over blocks. The part
+    of the noise that lasts is one reading a block, so that fewer squares scatter independently
+    (Bayley, Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).
+    """
+    found = {}
+    observation = fit.model.observation
+    for channel, part in zip(observation.channels, observation.slices(), strict=True):
+        if channel.quantity not in WHITE:
+            continue
+        values = fit.residuals[part]
+        count = len(values) // BLOCK
+        means = values[: count * BLOCK].reshape(count, BLOCK).mean(axis=1)
+        # What lasts has as large a part in a mean as in a reading.
+        stays = min(channel.lasting**2 / float(np.mean(channel.noise**2)), 1.0)
+        means /= np.sqrt(stays + (1.0 - stays) / BLOCK)
+        independent = len(values) / (1.0 + (BLOCK - 1) * stays**2)
+        found[channel.signal] = max(_z(values, independent), _z(means, len(means)))
+    return found
+
+
+def is_noise(fit: Fit) -> bool:
+    """Return whether no white channel shows more than noise."""
+    return all(z < LIMIT for z in excess(fit).values())
+
+
+def slips(observation: JointObservation) -> bool:
+    """Return whether wires stick and slip in a notable share of a recording."""
+    wires = [c for c in observation.channels if c.quantity == 'tension']
+    return any(float(np.mean(c.noise > 1.3 * np.min(c.noise))) > NOTABLE for c in wires)
+
+
+def _z(values: np.ndarray, independent: float) -> float:
+    return float((np.mean(values**2) - 1.0) / np.sqrt(2.0 / max(independent, 1.0)))
+
+
+Mask = NDArray[np.bool_]
+
+BLOCK_S = 2.0
+EVERY = 4
+GAP_S = 0.2
+"""Left out on both sides of a held-out block, for the memory of wires and tracker."""
+REFIT_STEPS = 2
+
+
+def judged_at(time: Array) -> Mask:
+    """Tell which samples (N,) are held out, by their time in s from the first command.
+
+    All are where there is no whole held-out block.
+    """
+    inside = np.mod(time, BLOCK_S * EVERY) >= BLOCK_S * (EVERY - 1)
+    return inside if inside.any() else np.ones_like(inside)
+
+
+def fitted_at(time: Array) -> Mask:
+    """Tell which samples (N,) may be fitted or trained on: those far from a held-out block."""
+    phase = np.mod(time, BLOCK_S * EVERY)
+    return np.asarray((phase >= GAP_S) & (phase < BLOCK_S * (EVERY - 1) - GAP_S))
+
+
+def held_out_masks(observation: JointObservation) -> tuple[Mask, Mask]:
+    """Samples to judge on and samples to fit on, over all channels in a row (size,) each."""
+    time = np.concatenate([channel.time for channel in observation.channels])
+    return judged_at(time), fitted_at(time)
+
+
+def held_out_fit(final: Fit) -> dict[str, ChannelFit]:
+    """Refit without the held-out blocks and return the fit of every signal on them."""
+    judged, residuals = _held_out(final)
+    return on_samples(final.model.observation, residuals, judged)
+
+
+def held_out_misfit(final: Fit) -> float:
+    """Sum over the signals of the logarithm of what a refit leaves on blocks it has not seen."""
+    judged, residuals = _held_out(final)
+    return sum(
+        float(np.log(np.maximum(np.mean(residuals[part][judged[part]] ** 2), 1.0)))
+        for part in final.model.observation.slices()
+        if judged[part].any()
+    )
+
+
+def _held_out(final: Fit) -> tuple[Mask, Array]:
+    """Held-out samples (size,), and the residuals (size,) of a fit that has not seen them."""
+    judged, used = held_out_masks(final.model.observation)
+    if judged.all():
+        return judged, final.residuals
+    again = fit(
+        final.model,
+        final.theta,
+        weight=used * weights(final.model.observation, final.residuals),
+        iterations=REFIT_STEPS,
+        known_jacobian=final.jacobian,
+    )
+    return judged, again.residuals
+
+
+def on_samples(
+    observation: JointObservation, residuals: Array, judged: Mask
+) -> dict[str, ChannelFit]:
+    """Return rmse and noise of every signal on the judged samples (size,)."""
+    result = {}
+    for channel, part in zip(observation.channels, observation.slices(), strict=True):
+        use = judged[part]
+        use = use if use.any() else np.ones_like(use)
+        error = residuals[part][use] * channel.noise[use]
+        result[channel.signal] = ChannelFit(
+            float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(channel.noise[use] ** 2)))
+        )
+    return result

@@ -14,8 +14,15 @@ from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_core.physics.plant_file import JOINT_NAMES
 from endoscope_explain.notebook.signals import UNITS, Array, Signal, Signals, name_of, read
-from endoscope_explain.recording.series import BENDING, COMMAND, DESIRED, MOTOR, WIRES
-from endoscope_explain.recording.signals import motor_name, wire_names
+from endoscope_explain.recording import (
+    BENDING,
+    COMMAND,
+    DESIRED,
+    MOTOR,
+    WIRES,
+    motor_name,
+    wire_names,
+)
 
 TIME = 'time'
 LATEST_S = 2.0**31

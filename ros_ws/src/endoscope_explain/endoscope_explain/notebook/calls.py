@@ -14,6 +14,7 @@ from endoscope_core.errors import EndoscopeError, FileError, nearest
 from endoscope_core.physics import PlantDescription, load_plant, recording_faults
 from endoscope_core.physics.packing import pack
 from endoscope_core.rig import Rig, load_rig
+from endoscope_explain.answer_bag import write_answer
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.many_bags import explained_cases
 from endoscope_explain.notebook.arrays import commands_from
@@ -21,7 +22,6 @@ from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.notebook.signals import Signals, read
 from endoscope_explain.pipeline import Progress, Sources
 from endoscope_explain.search.levels import MOST_EFFECTS
-from endoscope_explain.simulation.answer_bag import write_answer
 
 Plant = str | Path | PlantDescription
 Bag = str | Path | Signals

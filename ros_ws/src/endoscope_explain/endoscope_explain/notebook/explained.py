@@ -17,17 +17,17 @@ from endoscope_explain.notebook.signals import OUTSIDE, embedded, html_table
 from endoscope_explain.observe.predicted_signals import RecordedView, view
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.numbers import PLANTS, Shown, numbers_of
-from endoscope_explain.report.report_mapping import report_mapping
 from endoscope_explain.report.sentences import (
     HEADLINES,
+    fits_table,
     label,
     next_step,
     not_shown,
     reservations,
+    told,
     verdict_sentence,
 )
-from endoscope_explain.report.terminal import fits_table, told
-from endoscope_explain.report.writing import write_report
+from endoscope_explain.report.writing import report_mapping, write_report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

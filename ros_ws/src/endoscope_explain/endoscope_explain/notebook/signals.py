@@ -15,8 +15,8 @@ from endoscope_bags import open_bag
 from endoscope_bags.errors import MissingTopicError
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import EndoscopeError, nearest
-from endoscope_explain.recording.series import MOTOR, WIRES
-from endoscope_explain.report.terminal import table
+from endoscope_explain.recording import MOTOR, WIRES
+from endoscope_explain.report.sentences import table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -261,7 +261,7 @@ def read(bag: str | Path, *, namespace: str | None = None) -> Signals:
 
 
 def name_of(topic: str, name: str, quantity: str) -> str:
-    """Name of a signal as in `endoscope_explain.recording.signals`, for topics of all kinds."""
+    """Name of a signal as in `endoscope_explain.recording`, for topics of all kinds."""
     usual = {WIRES: 'effort', MOTOR: ''}.get(topic, 'position')
     return f'{topic}:{name}' + ('' if quantity == usual else f'.{quantity}')
 

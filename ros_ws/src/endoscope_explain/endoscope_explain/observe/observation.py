@@ -11,11 +11,13 @@ noise, is added to the noise there.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from endoscope_core.physics.description import PlantDescription, SensorParameters
 from endoscope_core.physics.layout import (
@@ -30,11 +32,61 @@ from endoscope_core.physics.layout import (
     OUT_TENSION_B,
 )
 from endoscope_core.physics.on_stamps import hold_on_ticks
-from endoscope_explain.observe.stamps_on_ticks import StampsOnTicks
-from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.signals import QUANTITY_UNITS, signal_name
+from endoscope_explain.recording import QUANTITY_UNITS, Recording, Series, signal_name
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class StampsOnTicks:
+    """Raw samples between ticks, and the analysis samples that they make."""
+
+    # (R,): place of each raw sample between simulated ticks `tick` and `tick + 1`.
+    tick: Indices
+    share: Array  # (R,), of the way from the one to the other
+    first: Indices  # (M,), first raw sample of each analysis sample
+    count: Array  # (M,), raw samples in each analysis sample
+
+    def read(self, column: Array, lead: float = 0.0, skew: float = 0.0) -> Array:
+        """Analysis samples (M,) of a simulated output (N,); see `Channel.predicted`."""
+        if skew == 0.0:
+            mean, rise = self._of_ticks
+            rows = column[: mean.shape[1]]
+            return np.asarray(mean @ rows + lead * (rise @ rows))
+        place = (self.tick + self.share) / (1.0 + skew) + lead
+        place = np.clip(place, 0.0, len(column) - 1.001)
+        tick = place.astype(np.int64)
+        left = column[tick]
+        raw = left + (place - tick) * (column[tick + 1] - left)
+        return np.asarray(np.add.reduceat(raw, self.first) / self.count)
+
+    @cached_property
+    def _of_ticks(self) -> tuple[csr_array, csr_array]:
+        """Analysis samples from ticks (M, N), and by how much they rise over a tick."""
+        sample = np.repeat(np.arange(len(self.first)), self.count.astype(np.int64))
+        part = 1.0 / self.count[sample]
+        shape = (len(self.first), int(self.tick.max()) + 2)
+
+        def at(values: Array, ticks: Indices) -> csr_array:
+            return csr_array((values, (sample, ticks)), shape)
+
+        here, after = at(part, self.tick), at(part, self.tick + 1)
+        late = at(part * self.share, self.tick + 1) - at(part * self.share, self.tick)
+        return here + late, after - here
+
+    def coarser(self, factor: int) -> 'StampsOnTicks':
+        """The same samples between ticks that are longer by a factor."""
+        if factor not in self._coarser:
+            place = (self.tick + self.share) / factor
+            tick = place.astype(np.int64)
+            self._coarser[factor] = StampsOnTicks(tick, place - tick, self.first, self.count)
+        return self._coarser[factor]
+
+    @cached_property
+    def _coarser(self) -> dict[int, 'StampsOnTicks']:
+        return {}
+
 
 TICK = 1.0e-3
 ANALYSIS_PERIOD = 0.01
@@ -300,3 +352,66 @@ def _channel(
         noise,
         rounding,
     )
+
+
+Mask = NDArray[np.bool_]
+
+SETTLED_S = 0.4
+"""Time after the command's last change from which on a joint is at rest."""
+LEAST_SAMPLES = 100
+LARGEST_FACTOR = 4.0
+WITH_NOISE = frozenset({'tension', 'bending', 'shaft_effort'})
+
+
+def with_held_noise(observations: tuple[JointObservation, ...]) -> tuple[JointObservation, ...]:
+    """Scale the known noise of each kind of sensor by what is seen in holds."""
+    # Coloured noise averages out less than white noise does, and a sensor may be worse than its
+    # description. Third differences of the readings in holds tell, without any model of the plant.
+    # Sensors of one kind are taken together; where there is no hold, the description stands.
+    squares: dict[str, list[Array]] = {}
+    for observation in observations:
+        still = held(observation)
+        for channel in observation.channels:
+            if channel.quantity in WITH_NOISE:
+                squares.setdefault(channel.quantity, []).append(_squares(channel, still))
+    factors = {}
+    for quantity, found in squares.items():
+        pooled = np.concatenate(found)
+        if len(pooled) >= LEAST_SAMPLES:
+            factors[quantity] = float(np.clip(np.sqrt(np.mean(pooled)), 1.0, LARGEST_FACTOR))
+    return tuple(
+        replace(
+            observation,
+            channels=tuple(
+                replace(c, noise=c.noise * factors.get(c.quantity, 1.0))
+                for c in observation.channels
+            ),
+        )
+        for observation in observations
+    )
+
+
+def held(observation: JointObservation) -> Mask:
+    """Ticks (N,) at which the command has been constant for `SETTLED_S`."""
+    command = observation.inputs[0, :, 0]
+    changes = np.flatnonzero(np.diff(command) != 0.0) + 1
+    ticks = np.arange(len(command))
+    if not len(changes):
+        return np.ones(len(command), dtype=bool)
+    last = np.searchsorted(changes, ticks, side='right') - 1
+    since = ticks - np.where(last >= 0, changes[np.maximum(last, 0)], -len(command))
+    return np.asarray(since * TICK > SETTLED_S)
+
+
+def _squares(channel: Channel, still: Mask) -> Array:
+    at_rest = still[channel.stamps.tick[channel.stamps.first]]
+    whole = at_rest[:-3] & at_rest[3:]
+    regular = np.diff(channel.time)
+    even = np.ptp(np.stack([regular[:-2], regular[1:-1], regular[2:]]), axis=0) < 0.5 * np.median(
+        regular
+    )
+    scaled = channel.value / channel.noise
+    use = whole & even
+    # The mean of the largest squares would be of slips and outliers, not of noise.
+    squares = (np.diff(scaled, 3) ** 2 / 20.0)[use]
+    return squares[squares < 25.0]

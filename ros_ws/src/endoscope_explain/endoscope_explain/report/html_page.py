@@ -9,21 +9,13 @@ from endoscope_core.pages import zoomable
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.place import Argument
-from endoscope_explain.case import ExplainedCase, Ladder
+from endoscope_explain.case import EXPERIMENT_FILE, ExplainedCase, Ladder
 from endoscope_explain.explanation import Explanation, Verdict
+from endoscope_explain.fit.evidence import slips
 from endoscope_explain.fit.free_parameters import tolerance
-from endoscope_explain.fit.whiteness import slips
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.predicted_signals import RecordedView, view
-from endoscope_explain.report.figures.experiment import experiment_figure, unknown_figure
-from endoscope_explain.report.figures.ladder import ladder_figure
-from endoscope_explain.report.figures.loops import (
-    passage_figure,
-    state_of,
-    telling_passage,
-    telling_signals,
-)
-from endoscope_explain.report.figures.timeline import timeline_figure
+from endoscope_explain.report.figures import experiment_figure, ladder_figure, unknown_figure
 from endoscope_explain.report.numbers import (
     MODELS,
     PLANTS,
@@ -35,7 +27,13 @@ from endoscope_explain.report.numbers import (
     rmse,
     shown,
 )
-from endoscope_explain.report.report_mapping import EXPERIMENT_FILE
+from endoscope_explain.report.passage import (
+    passage_figure,
+    state_of,
+    telling_passage,
+    telling_signals,
+    timeline_figure,
+)
 from endoscope_explain.report.sentences import (
     EVIDENCE,
     HEADLINES,
@@ -51,7 +49,7 @@ from endoscope_explain.report.sentences import (
     verdict_sentence,
     what_is_known,
 )
-from endoscope_explain.search.repeated_motion import motion_repeats
+from endoscope_explain.search.repetition import motion_repeats
 
 COLOURS = {
     Verdict.CONSISTENT: 'good',

@@ -7,8 +7,7 @@ from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.plant_file import JOINT_NAMES
 from endoscope_explain.case import ExplainedCase, Ladder
 from endoscope_explain.explanation import ChannelFit, Estimate, NamedEffect
-from endoscope_explain.recording import Recording
-from endoscope_explain.recording.signals import QUANTITY_UNITS, signal_name
+from endoscope_explain.recording import QUANTITY_UNITS, Recording, signal_name
 
 PLANTS = {'nominal': 'described', 'refitted': 'refitted', 'augmented': 'improved'}
 """The one word for each plant of report.json."""

@@ -11,12 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from endoscope_core.physics.effects import lacking
-from endoscope_explain.fit.evidence import log_evidence
-from endoscope_explain.fit.held_out import held_out_misfit
+from endoscope_explain.fit.evidence import held_out_misfit, is_noise, log_evidence
+from endoscope_explain.fit.intervals import with_form
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import is_at_tolerance, with_any_numbers
-from endoscope_explain.fit.other_forms import with_form
-from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN, Null, null_rigs
 from endoscope_explain.search.refit import (

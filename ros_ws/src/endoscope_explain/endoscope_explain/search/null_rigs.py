@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from endoscope_explain.fit.evidence import counts, log_likelihood, mean_squares
+from endoscope_explain.fit.evidence import WHITE, counts, is_noise, log_likelihood, mean_squares
+from endoscope_explain.fit.intervals import other_forms, reading
 from endoscope_explain.fit.model import Fit, broyden_fit, jacobian
-from endoscope_explain.fit.other_forms import other_forms, reading
-from endoscope_explain.fit.whiteness import WHITE, is_noise
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.refit import TRIAL_STEPS

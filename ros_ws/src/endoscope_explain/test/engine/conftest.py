@@ -9,8 +9,7 @@ from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig
-from endoscope_explain.recording import Recording, Series
-from endoscope_explain.recording.series import BENDING, COMMAND, MOTOR, WIRES
+from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, Recording, Series
 
 
 def short_motion(duration: float = 12.0) -> np.ndarray:

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from endoscope_core.physics.packing import pack
 from endoscope_explain.decide.conclusions import plant_of
+from endoscope_explain.fit.model import packed_joint
 from endoscope_explain.fit.nominal import nominal_references
-from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.refit import Candidate
 from endoscope_explain.search.term import effects, functions

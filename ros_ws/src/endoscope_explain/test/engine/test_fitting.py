@@ -7,15 +7,12 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.fit.evidence import log_evidence, weights
-from endoscope_explain.fit.intervals import intervals, may_be_absent, nominal_estimates
-from endoscope_explain.fit.model import fit, jacobian
+from endoscope_explain.fit.evidence import BLOCK, is_noise, log_evidence, weights
+from endoscope_explain.fit.intervals import intervals, may_be_absent, nominal_estimates, other_forms
+from endoscope_explain.fit.model import fit, jacobian, packed_joint
 from endoscope_explain.fit.nominal import beside, nominal_references
-from endoscope_explain.fit.other_forms import other_forms
-from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.fit.solver import Ended
 from endoscope_explain.fit.valleys import out_of_valleys
-from endoscope_explain.fit.whiteness import BLOCK, is_noise
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.term import with_effect
 

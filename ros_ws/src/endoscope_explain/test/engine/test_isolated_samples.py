@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.fit.isolated_samples import with_isolated_marked, without_isolated
-from endoscope_explain.fit.nominal import all_references
-from endoscope_explain.fit.simulated_joint import packed_joint
+from endoscope_explain.fit.model import packed_joint
+from endoscope_explain.fit.nominal import all_references, with_isolated_marked, without_isolated
 from endoscope_explain.observe.observation import observe
 
 PLANT = PlantDescription()

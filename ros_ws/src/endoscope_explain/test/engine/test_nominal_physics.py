@@ -7,8 +7,8 @@ import pytest
 from endoscope_core.physics.effects import NOMINAL_PHYSICS
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Verdict
+from endoscope_explain.fit.model import packed_joint
 from endoscope_explain.fit.nominal import nominal_references
-from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.term import effects
 

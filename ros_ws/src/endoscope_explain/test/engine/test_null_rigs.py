@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec
+from endoscope_explain.fit.model import packed_joint
 from endoscope_explain.fit.nominal import nominal_references
-from endoscope_explain.fit.simulated_joint import packed_joint
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.null_rigs import AT_ONCE, SLOWEST, Null, null_rigs, wandering
 from endoscope_explain.search.screen import background, directions

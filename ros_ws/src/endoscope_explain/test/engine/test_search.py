@@ -12,12 +12,10 @@ from endoscope_core.physics.functions.acting import MULTIPLIES
 from endoscope_core.physics.packing import pack
 from endoscope_explain.decide.conclusions import plant_of
 from endoscope_explain.decide.decision import decide
-from endoscope_explain.fit.evidence import misfit
+from endoscope_explain.fit.evidence import is_noise, misfit
 from endoscope_explain.fit.family import family_at
-from endoscope_explain.fit.model import jacobian
+from endoscope_explain.fit.model import jacobian, packed_joint, simulate_joint
 from endoscope_explain.fit.nominal import nominal_references
-from endoscope_explain.fit.simulated_joint import packed_joint, simulate_joint
-from endoscope_explain.fit.whiteness import is_noise
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search import levels
 from endoscope_explain.search.levels import Level, search

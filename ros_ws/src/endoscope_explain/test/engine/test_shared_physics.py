@@ -10,9 +10,8 @@ from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.fit.model import fit
 from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.shared_choice import SharedChoice
 from endoscope_explain.search.term import with_effect
-from endoscope_explain.shared_physics import shared_effects
+from endoscope_explain.shared_physics import SharedChoice, shared_effects
 
 GAIN = 0.9
 TUBES = (0.8, 1.0)

@@ -29,7 +29,7 @@ from endoscope_core.physics.recording import recording_faults
 from endoscope_core.physics.samples import TOPICS
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import Rig
-from endoscope_explain.recording.series import (
+from endoscope_explain.recording import (
     BENDING,
     COMMAND,
     DESIRED,
@@ -37,9 +37,10 @@ from endoscope_explain.recording.series import (
     MOTOR,
     WIRES,
     input_topic,
+    motor_name,
+    require_running_stamps,
+    wire_names,
 )
-from endoscope_explain.recording.signals import motor_name, wire_names
-from endoscope_explain.recording.usable_stamps import require_running_stamps
 
 POSE_TOPIC = 'tracker/measured_cp'
 

@@ -1,1 +1,0 @@
-"""Black boxes on the residual: what prediction alone can reach, without any physics."""

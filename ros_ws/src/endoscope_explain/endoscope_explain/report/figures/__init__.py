@@ -1,1 +1,0 @@
-"""The plots of the report, each a string of SVG."""

@@ -1,1 +1,0 @@
-"""The plant's answer to the commands of a bag."""
