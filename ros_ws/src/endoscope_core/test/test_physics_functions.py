@@ -15,7 +15,7 @@ from endoscope_core.physics import (
     simulate,
 )
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_core.physics.folds import sum_of
+from endoscope_core.physics.folds import folded
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.interpolation import NODES, VALUES, function_at
 from endoscope_core.physics.functions.place import Shape
@@ -160,7 +160,7 @@ def test_the_slope_of_a_product_is_what_it_changes_by_the_step():
     factor = TermSpec('bend_x', factor.place, '0.5*sin(2*q)', range=(-1.5, 1.5), multiplies=True)
     parameters, flags = pack(PlantDescription(terms=(law, factor)))
     states, _, _ = rest_state(parameters, flags, TICK)
-    moment = sum_of(LOAD)
+    moment = folded(LOAD)
 
     def load(step):
         return moment(flags[0], parameters[0], states[0], 0.3 + step, step, 0.0, 1.0, TICK)

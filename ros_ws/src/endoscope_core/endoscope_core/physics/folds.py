@@ -8,7 +8,7 @@ holds the compiled cache. The functions of all places are the same few compiled 
 
 import importlib.util
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from types import ModuleType
 
 from endoscope_core.atomic_output import write_text
@@ -17,18 +17,20 @@ from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import KEPT_UP
-from endoscope_core.physics.functions.summation import MOST, ROWS
+from endoscope_core.physics.functions.summation import MOST, ROWS, Row
 from endoscope_core.physics.hooks import HOOKS, LINKS, Fold, Function, Hook
 
 _NAME = 'endoscope_folds'
-_SUM = 'endoscope_core.physics.functions.summation import sum_of_functions'
+_IMPORTS = """import math
+
+from endoscope_core.compiled import compiled
+from endoscope_core.physics.functions.acting import functions_act
+from endoscope_core.physics.functions.summation import sum_of_functions"""
 
 
 def source() -> str:
     """Source of a module with one compiled function for each hook."""
-    imports = ['import math', '', 'from endoscope_core.compiled import compiled']
-    imports.append(f'from {_SUM}')
-    functions = []
+    imports, functions = [_IMPORTS], []
     order = {effect_id: i for i, effect_id in enumerate((*CATALOGUE, *FUNCTIONS))}
     for hook in HOOKS:
         links = sorted(LINKS[hook.name], key=lambda link: order[link[0].id])
@@ -37,49 +39,56 @@ def source() -> str:
             name = f'{effect.id}_{function.__name__}'
             imports.append(f'from {function.__module__} import {function.__name__} as {name}')
             names.append((effect, name))
-        functions.append(_function(hook, names))
-        if any(places[0].hook is hook for _, places in ROWS):
-            functions.append(_functions(hook))
+        rows = [row for row in ROWS if row[1][0].hook is hook]
+        if rows:
+            functions.append(_functions(hook, rows))
+        functions.append(_function(hook, names, rows))
     follow = [place for place in FUNCTIONS.values() if place.at in KEPT_UP or place.argument.lags]
-    functions.append(_test('functions_follow', follow))
+    functions.append(_test('functions_follow', (), follow))
     return '\n'.join(imports) + '\n' + ''.join(functions)
 
 
-def _function(hook: Hook, links: list[tuple[Effect, str]]) -> str:
+def _function(hook: Hook, links: list[tuple[Effect, str]], rows: list[Row]) -> str:
+    """Source of a hook's function, and of the test whether anything acts there."""
     results = [f'r{i}' for i in range(hook.results)]
-    given = ', '.join(results)
-    parts = [f'd{i}' for i in range(hook.results)]
+    parts = ', '.join(f'd{i}' for i in range(hook.results))
     start = {Fold.FACTORS: '1.0', Fold.TERMS: '0.0', Fold.LEAST: 'math.inf'}.get(hook.fold)
     lines = [f'\n\n@compiled\ndef {hook.name}(on, {hook.arguments}):']
     if start is not None:
         lines += [f'    {name} = {start}' for name in results]
-    for effect, name in links:
-        call = f'{name}({hook.arguments})'
-        lines.append(f'    if on[{effect.flag}]:')
+
+    def call(condition: str, function: str, through: str = '=') -> None:
+        lines.append(f'    if {condition}:')
         if hook.fold is Fold.THROUGH:
-            lines.append(f'        {hook.value} = {call}')
+            lines.append(f'        {hook.value} {through} {function}')
         elif hook.fold is Fold.LEAST:
-            lines.append(f'        r0 = min(r0, {call})')
+            lines.append(f'        r0 = min(r0, {function})')
         elif hook.fold is Fold.CALLS:
-            lines.append(f'        {call}')
+            lines.append(f'        {function}')
         else:
             sign = '*' if hook.fold is Fold.FACTORS else '+'
-            lines.append(f'        {", ".join(parts)} = {call}')
-            lines += [f'        {r} {sign}= {d}' for r, d in zip(results, parts, strict=True)]
-    if hook.fold is Fold.THROUGH:
-        given = hook.value
+            lines.append(f'        {parts} = {function}')
+            lines.extend(f'        r{i} {sign}= d{i}' for i in range(hook.results))
+
+    for effect, name in links:
+        call(f'on[{effect.flag}]', f'{name}({hook.arguments})')
+    if rows:
+        # What functions give is added to a value that goes through the effects.
+        call('functions_act(on)', f'{hook.name}_functions(on, {hook.arguments})', '+=')
     if hook.fold is not Fold.CALLS:
+        given = hook.value if hook.fold is Fold.THROUGH else ', '.join(results)
         lines.append(f'    return {given}')
     elif not links:
         lines.append('    pass')
-    return '\n'.join(lines) + '\n' + _test(f'{hook.name}_acts', [effect for effect, _ in links])
+    effects = [effect for effect, _ in links]
+    places = [place for _, row in rows for place in row]
+    return '\n'.join(lines) + '\n' + _test(f'{hook.name}_acts', effects, places)
 
 
-def _functions(hook: Hook) -> str:
+def _functions(hook: Hook, rows: list[Row]) -> str:
     """Source of a function that adds up those of a hook's places, and multiplies the sum."""
     lines = [f'\n\n@compiled\ndef {hook.name}_functions(on, {hook.arguments}):']
     lines.append('    r0, r1, m0, m1 = 0.0, 0.0, 1.0, 0.0')
-    rows = [(number, places) for number, places in ROWS if places[0].hook is hook]
     for number, places in rows:
         arguments = [place.at for place in places] + ['0.0'] * (MOST - len(places))
         given = f'on, p, {float(number)}, {float(len(places))}, {", ".join(arguments)}'
@@ -93,13 +102,15 @@ def _functions(hook: Hook) -> str:
         lines.append('        m0 *= factor')
     given = 'math.exp(r0 * m0)' if hook.fold is Fold.FACTORS else 'r0 * m0'
     lines.append(f'    return {given}' + (', r1 * m0 - r0 * m1' if hook.results == 2 else ''))
-    whole = [place for _, places in rows for place in places]
-    return '\n'.join(lines) + '\n' + _test(f'{hook.name}_functions_act', whole)
+    return '\n'.join(lines) + '\n'
 
 
-def _test(name: str, terms: Iterable[Effect]) -> str:
-    """Source of a function that tells whether any of some terms is on."""
-    return f'\n\n@compiled\ndef {name}(on):\n    return {_any_of(terms)}\n'
+def _test(name: str, effects: Iterable[Effect], places: Sequence[Effect]) -> str:
+    """Source of a function that tells whether any of some effects or places is on."""
+    test = _any_of(effects)
+    if places:
+        test += f' or (functions_act(on) and ({_any_of(places)}))'
+    return f'\n\n@compiled\ndef {name}(on):\n    return {test}\n'
 
 
 def _any_of(terms: Iterable[Effect]) -> str:
@@ -125,30 +136,17 @@ _MODULE = _module()
 
 
 def folded(hook: Hook) -> Function:
-    """Compiled function of a hook: flags first, then the hook's arguments."""
+    """Compiled function of a hook: flags first, then the hook's arguments.
+
+    What effects give, and what the functions at the hook's places give beside it.
+    """
     function: Function = getattr(_MODULE, hook.name)
     return function
 
 
 def acting(hook: Hook) -> Function:
-    """Compiled function of the flags that tells whether any link of a hook is on."""
+    """Compiled function of the flags that tells whether anything acts at a hook."""
     function: Function = getattr(_MODULE, f'{hook.name}_acts')
-    return function
-
-
-def sum_of(hook: Hook) -> Function:
-    """Compiled function of what the functions at a hook's places give, with a fold's arguments.
-
-    It belongs behind `functions_act`. Of factors it is one, to be multiplied; else it is to be
-    added.
-    """
-    function: Function = getattr(_MODULE, f'{hook.name}_functions')
-    return function
-
-
-def some_of(hook: Hook) -> Function:
-    """Compiled test of the flags: has any of a hook's places a function? Behind `functions_act`."""
-    function: Function = getattr(_MODULE, f'{hook.name}_functions_act')
     return function
 
 

@@ -69,8 +69,8 @@ LENGTH = Hook('length', Fold.TERMS, 'p, x, wire, time')
 JOINT_FRICTION = Hook('joint_friction', Fold.FACTORS, 'p, x')
 """Factor on the joint's friction in the tick that begins."""
 END_LENGTH = Hook('end_length', Fold.TERMS, 'p, x, other')
-"""What the other joint's angle in rad adds to the way of the positive wire at the joint, m; the
-negative one's is the opposite."""
+"""What the other joint's angle in rad adds to the displacement of the positive wire at the joint in
+m, and takes from that of the negative one."""
 LOAD = Hook('load', Fold.TERMS, 'p, x, angle, step, other, time, tick', results=2)
 """Moment on the joint in N m, bent by `step` to `angle`, and minus its slope by `step`."""
 TIP_ANGLE = Hook('tip_angle', Fold.THROUGH, 'p, x, joint')

@@ -1,18 +1,19 @@
 """The bending joint: overdamped, with friction that builds up over an angle.
 
-``c q' = r (Ta - Tb) - K (q - q0) - tau_f z``, implicit in the angle at the end of a tick. Friction
-is Dahl's (Aerospace Corp. TOR-0158(3107-18)-1, 1968), exact for a step of one sign.
+The symbols are those of the plant's equations: angle q, wire tensions Ta(Phi) and Tb(Phi) at the
+joint, joint radius r, stiffness K, damping c, friction tau_f with Dahl state z, moment tau that
+effects add.
 """
 
 import math
+from typing import NamedTuple
 
 from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics import hooks
-from endoscope_core.physics.folds import acting, folded, some_of, sum_of
-from endoscope_core.physics.functions.acting import functions_act
+from endoscope_core.physics.folds import acting, folded
 from endoscope_core.physics.layout import (
     ELEMENTS,
-    END_WAY,
+    END_LENGTH,
     FILM,
     FLOOR,
     JOINT,
@@ -32,15 +33,11 @@ from endoscope_core.physics.layout import (
 )
 from endoscope_core.physics.sheath import JOINT_END, mean_tension, move, moved
 
-load = folded(hooks.LOAD)
+added_moment = folded(hooks.LOAD)
 film_drag = folded(hooks.FILM_DRAG)
+friction_factor = folded(hooks.JOINT_FRICTION)
 end_length = folded(hooks.END_LENGTH)
 stiffness_factor, stiffness_varies = folded(hooks.STIFFNESS), acting(hooks.STIFFNESS)
-load_functions = sum_of(hooks.LOAD)
-film_functions = sum_of(hooks.FILM_DRAG)
-end_functions = sum_of(hooks.END_LENGTH)
-stiffness_functions, stiffness_has_some = sum_of(hooks.STIFFNESS), some_of(hooks.STIFFNESS)
-friction_functions = sum_of(hooks.JOINT_FRICTION)
 
 _TRIES = 100
 _PRECISION = 1e-11
@@ -48,44 +45,43 @@ _FIRST_STEP = 1e-14
 """Rad: tells only which way the joint turns."""
 
 
-@compiled
-def stiffness_on_the_way(
-    x: Array, wire: int, table: Array, p: Array, on: Flags, way: float
-) -> float:
-    """Stiffness in N/m of a wire that is about to be stretched by `way` m, in the middle of that.
+class _Tick(NamedTuple):
+    """What stays as it is while the joint's balance in a tick is sought."""
 
-    At its beginning it would be too small on every way out and too large on every way back, and
-    tension would leak away with every cycle.
-    """
-    stiffness = p[WIRE_STIFFNESS]
-    if functions_act(on) and stiffness_has_some(on):
-        return _stiffness_of_functions(x, wire, table, p, on, way)
+    k_a: float  # stiffness of each wire, N/m
+    k_b: float
+    film: float  # viscous drag of the sheath on a wire, N s/m
+    tau_f: float  # friction, N m
+    w: float  # by how much the pulley has wound up the positive wire, m
+    q_other: float  # the other joint's angle, rad
+    time: float  # middle of the tick, s
+    length: float  # s
+
+
+@compiled
+def secant_stiffness(x: Array, wire: int, table: Array, p: Array, on: Flags, dw: float) -> float:
+    """Stiffness in N/m of a wire that is about to be stretched by `dw` m, in the middle of that."""
+    # At its beginning it would be too small on every stretch and too large on every release, and
+    # tension would leak away with every cycle.
+    k = p[WIRE_STIFFNESS]
     if not stiffness_varies(on):
-        return stiffness
-    tension = mean_tension(x, wire, table) - x[FLOOR]
-    middle = tension + 0.5 * way * stiffness * stiffness_factor(on, p, x, tension)
-    return stiffness * stiffness_factor(on, p, x, max(0.0, middle))
-
-
-@compiled
-def _stiffness_of_functions(
-    x: Array, wire: int, table: Array, p: Array, on: Flags, way: float
-) -> float:
-    stiffness = p[WIRE_STIFFNESS]
+        return k
     middle = tension = mean_tension(x, wire, table) - x[FLOOR]
     factor = 1.0
     for _ in range(2):
-        factor = stiffness_factor(on, p, x, middle) * stiffness_functions(on, p, x, middle)
-        middle = max(0.0, tension + 0.5 * way * stiffness * factor)
-    return stiffness * factor
+        factor = stiffness_factor(on, p, x, middle)
+        middle = max(0.0, tension + 0.5 * dw * k * factor)
+    return k * factor
 
 
 @compiled
-def _slide(slide: float, step: float, presliding: float) -> tuple[float, float]:
+def _dahl(z: float, dq: float, qs: float) -> tuple[float, float]:
     """Dahl state after a step, and its slope by the step."""
-    way = 1.0 if step >= 0.0 else -1.0
-    left = math.exp(-abs(step) / presliding)
-    return way + (slide - way) * left, (1.0 - way * slide) * left / presliding
+    # z' = (q' / qs) (1 - z sgn q'): Dahl, Aerospace Corp. TOR-0158(3107-18)-1, 1968. Exact for a
+    # step of one sign s: z <- s + (z - s) exp(-|dq| / qs).
+    s = 1.0 if dq >= 0.0 else -1.0
+    left = math.exp(-abs(dq) / qs)
+    return s + (z - s) * left, (1.0 - s * z) * left / qs
 
 
 @compiled
@@ -95,139 +91,95 @@ def _presliding(p: Array, element: int) -> float:
 
 
 @compiled
-def _friction(x: Array, p: Array, most: float, step: float) -> tuple[float, float]:
-    """Friction in N m against a step of the joint, of `most` N m at most, and its slope."""
+def _friction(x: Array, p: Array, tau_f: float, dq: float) -> tuple[float, float]:
+    """Friction tau_f z in N m against a step of the joint, and its slope."""
     if p[JOINT_PRESLIDING_SPREAD] == 0.0:
-        slide, slope = _slide(x[JOINT_SLIDE], step, p[JOINT_PRESLIDING])
-        return most * slide, most * slope
+        z, slope = _dahl(x[JOINT_SLIDE], dq, p[JOINT_PRESLIDING])
+        return tau_f * z, tau_f * slope
     total, steep = 0.0, 0.0
     for i in range(ELEMENTS):
-        slide, slope = _slide(x[JOINT_SLIDE + i], step, _presliding(p, i))
-        total += slide
+        z, slope = _dahl(x[JOINT_SLIDE + i], dq, _presliding(p, i))
+        total += z
         steep += slope
-    return most * total / ELEMENTS, most * steep / ELEMENTS
+    return tau_f * total / ELEMENTS, tau_f * steep / ELEMENTS
 
 
 @compiled
 def _imbalance(
-    x: Array,
-    table: Array,
-    p: Array,
-    on: Flags,
-    step: float,
-    stiff_a: float,
-    stiff_b: float,
-    film: float,
-    most: float,
-    way: float,
-    other: float,
-    time: float,
-    tick: float,
+    x: Array, table: Array, p: Array, on: Flags, now: _Tick, dq: float
 ) -> tuple[float, float]:
-    """What is missing in N m to bend by `step`, and its slope."""
+    """What is missing in N m to bend by `dq`, and its slope."""
+    # c q' = r (Ta(Phi) - Tb(Phi)) - K (q - q0) - tau_f z + tau, implicit in q at the tick's end.
+    # Viscous drag adds film / 2 times the mean sliding speed of both ends to a wire's end.
     r = p[JOINT_RADIUS]
-    angle = x[JOINT] + step
-    ta, sa, _, _, _, _ = moved(x, WIRE_A, table, JOINT_END, -stiff_a * r * step, x[FLOOR])
-    tb, sb, _, _, _, _ = moved(x, WIRE_B, table, JOINT_END, stiff_b * r * step, x[FLOOR])
-    moment, slope = load(on, p, x, angle, step, other, time, tick)
-    if functions_act(on):
-        added, steep = load_functions(on, p, x, angle, step, other, time, tick)
-        moment += added
-        slope += steep
-    friction, steep = _friction(x, p, most, step)
-    damping = (p[JOINT_DAMPING] + 0.5 * r * r * film) / tick
-    moment += r * (ta - tb) - 0.5 * r * film * way / tick
-    moment -= p[JOINT_STIFFNESS] * (angle - p[JOINT_REST_ANGLE]) + friction + damping * step
-    slope += r * r * (stiff_a * sa + stiff_b * sb) + p[JOINT_STIFFNESS] + steep + damping
-    return -moment, slope
+    q = x[JOINT] + dq
+    t_a, slope_a, _, _, _, _ = moved(x, WIRE_A, table, JOINT_END, -now.k_a * r * dq, x[FLOOR])
+    t_b, slope_b, _, _, _, _ = moved(x, WIRE_B, table, JOINT_END, now.k_b * r * dq, x[FLOOR])
+    tau, slope = added_moment(on, p, x, q, dq, now.q_other, now.time, now.length)
+    friction, steep = _friction(x, p, now.tau_f, dq)
+    c = (p[JOINT_DAMPING] + 0.5 * r * r * now.film) / now.length
+    tau += r * (t_a - t_b) - 0.5 * r * now.film * now.w / now.length
+    tau -= p[JOINT_STIFFNESS] * (q - p[JOINT_REST_ANGLE]) + friction + c * dq
+    slope += r * r * (now.k_a * slope_a + now.k_b * slope_b) + p[JOINT_STIFFNESS] + steep + c
+    return -tau, slope
 
 
 @compiled
-def _step(
-    x: Array,
-    table: Array,
-    p: Array,
-    on: Flags,
-    stiff_a: float,
-    stiff_b: float,
-    film: float,
-    most: float,
-    way: float,
-    other: float,
-    time: float,
-    tick: float,
-) -> float:
-    """By how much the joint bends, rad: Newton's method within a bracket.
-
-    The nominal imbalance grows with the step and is concave on either side of zero, where fronts
-    and pre-sliding soften it: from the last step Newton's method comes to the root from one side.
-    """
-    missing, slope = _imbalance(
-        x, table, p, on, 0.0, stiff_a, stiff_b, film, most, way, other, time, tick
-    )
+def _step(x: Array, table: Array, p: Array, on: Flags, now: _Tick) -> float:
+    """By how much the joint bends, rad: Newton's method within a bracket."""
+    # The nominal imbalance grows with the step and is concave on either side of zero, where fronts
+    # and pre-sliding soften it: from the last step Newton's method comes to the root from one side.
+    missing, slope = _imbalance(x, table, p, on, now, 0.0)
     if missing == 0.0:
         return 0.0
     side = -1.0 if missing > 0.0 else 1.0
     near, far = 0.0, math.inf
-    step = x[JOINT_STEP] if x[JOINT_STEP] * side > 0.0 else side * _FIRST_STEP
+    dq = x[JOINT_STEP] if x[JOINT_STEP] * side > 0.0 else side * _FIRST_STEP
     for _ in range(_TRIES):
-        missing, slope = _imbalance(
-            x, table, p, on, step, stiff_a, stiff_b, film, most, way, other, time, tick
-        )
+        missing, slope = _imbalance(x, table, p, on, now, dq)
         if missing * side <= 0.0:
-            near = abs(step)
+            near = abs(dq)
         else:
-            far = abs(step)
-        following = step - missing / slope if slope > 0.0 else math.nan
+            far = abs(dq)
+        following = dq - missing / slope if slope > 0.0 else math.nan
         if not near <= side * following <= far:
             following = side * (2.0 * near if math.isinf(far) else 0.5 * (near + far))
-        if abs(following - step) <= _PRECISION:
+        if abs(following - dq) <= _PRECISION:
             return following
-        step = following
-    return step
+        dq = following
+    return dq
 
 
 @compiled
 def bend(
-    x: Array,
-    table: Array,
-    p: Array,
-    on: Flags,
-    way: float,
-    other: float,
-    time: float,
-    tick: float,
+    x: Array, table: Array, p: Array, on: Flags, w: float, q_other: float, time: float, tick: float
 ) -> None:
     """Bend the joint to where it comes to rest at the end of a tick of length `tick` s.
 
-    `way`: by how much the pulley has wound up the positive wire in this tick, m. `other`: the other
+    `w`: by how much the pulley has wound up the positive wire in this tick, m. `q_other`: the other
     joint's angle, rad. `time`: the middle of the tick, s. Only `x` is changed.
     """
-    # The way at the joint is not known yet: it will be much like the last one.
-    ahead = p[JOINT_RADIUS] * x[JOINT_STEP]
-    stiff_a = stiffness_on_the_way(x, WIRE_A, table, p, on, -ahead)
-    stiff_b = stiffness_on_the_way(x, WIRE_B, table, p, on, ahead)
-    shift = end_length(on, p, x, other)
-    if functions_act(on):
-        shift += end_functions(on, p, x, other)
-    if shift != x[END_WAY]:
-        move(x, WIRE_A, table, JOINT_END, stiff_a * (shift - x[END_WAY]), x[FLOOR])
-        move(x, WIRE_B, table, JOINT_END, stiff_b * (x[END_WAY] - shift), x[FLOOR])
-        x[END_WAY] = shift
-    film = film_drag(on, p, x, abs(x[SLIDING_SPEED]))
-    most = p[JOINT_FRICTION]
-    if functions_act(on):
-        film += film_functions(on, p, x, abs(x[SLIDING_SPEED]))
-        most *= friction_functions(on, p, x)
-    step = _step(x, table, p, on, stiff_a, stiff_b, film, most, way, other, time, tick)
     r = p[JOINT_RADIUS]
-    if step != 0.0:
-        move(x, WIRE_A, table, JOINT_END, -stiff_a * r * step, x[FLOOR])
-        move(x, WIRE_B, table, JOINT_END, stiff_b * r * step, x[FLOOR])
+    # The step is not known yet: it will be much like the last one.
+    ahead = r * x[JOINT_STEP]
+    k_a = secant_stiffness(x, WIRE_A, table, p, on, -ahead)
+    k_b = secant_stiffness(x, WIRE_B, table, p, on, ahead)
+    # w(Phi) = +-(r q - what the other joint adds).
+    length = end_length(on, p, x, q_other)
+    if length != x[END_LENGTH]:
+        move(x, WIRE_A, table, JOINT_END, k_a * (length - x[END_LENGTH]), x[FLOOR])
+        move(x, WIRE_B, table, JOINT_END, k_b * (x[END_LENGTH] - length), x[FLOOR])
+        x[END_LENGTH] = length
+    film = film_drag(on, p, x, abs(x[SLIDING_SPEED]))
+    tau_f = p[JOINT_FRICTION] * friction_factor(on, p, x)
+    dq = _step(x, table, p, on, _Tick(k_a, k_b, film, tau_f, w, q_other, time, tick))
+    if dq != 0.0:
+        move(x, WIRE_A, table, JOINT_END, -k_a * r * dq, x[FLOOR])
+        move(x, WIRE_B, table, JOINT_END, k_b * r * dq, x[FLOOR])
         for i in range(ELEMENTS):
-            x[JOINT_SLIDE + i], _ = _slide(x[JOINT_SLIDE + i], step, _presliding(p, i))
-    x[SLIDING_SPEED] = 0.5 * (way + r * step) / tick
+            x[JOINT_SLIDE + i], _ = _dahl(x[JOINT_SLIDE + i], dq, _presliding(p, i))
+    x[SLIDING_SPEED] = 0.5 * (w + r * dq) / tick
     x[FILM] = film * x[SLIDING_SPEED]
     x[FILM + 1] = -x[FILM]
-    x[JOINT] += step
-    x[JOINT_STEP] = step
+    x[JOINT] += dq
+    x[JOINT_STEP] = dq

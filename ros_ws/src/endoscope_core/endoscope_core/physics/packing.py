@@ -156,11 +156,11 @@ def rest_state(
     states = np.zeros((joints, SLOTS.states))
     histories = np.zeros((joints, HISTORIES, HISTORY))
     sheaths = np.zeros((joints, SHEATH_ROWS, CELLS + 1))
-    way = np.zeros((joints, 1)) if shaft is None else np.reshape(shaft, (joints, -1))
+    angles = np.zeros((joints, 1)) if shaft is None else np.reshape(shaft, (joints, -1))
     for j in range(joints):
         joint = (states[j], histories[j], sheaths[j], parameters[j], on[j])
-        settle(*joint, way[j, 0], tick)
-        for angle in way[j, 1:]:
+        settle(*joint, angles[j, 0], tick)
+        for angle in angles[j, 1:]:
             turn_to(*joint, angle)
     if speed is not None:
         states[:, MOTOR_SPEED] = speed

@@ -10,8 +10,8 @@ trapezoidal rule, so that the tension at a moving end is a continuous function o
 
 Behind a front the tension is an amplitude times one of two shapes, ``exp(-phi)`` and ``exp(phi)``.
 So a wire is two regions, one from each end, and the nodes between them; a motion that goes on costs
-only the nodes that its front passes. Displacements are given as ``force``: the stiffness of the
-whole wire times the way, N.
+only the nodes that its front passes. The symbols are those of the plant's equations; a displacement
+w of an end, or a change of length, is given as ``kw``, the stiffness of the whole wire times it, N.
 """
 
 import math
@@ -89,19 +89,19 @@ def node_tension(x: Array, wire: int, table: Array, i: int) -> float:
 
 
 @compiled
-def _shape(end: int, force: float) -> int:
-    """Shape behind the front of an end that pulls (positive force) or lets go."""
-    return TOWARDS_MOTOR if (end == MOTOR_END) == (force > 0.0) else TOWARDS_JOINT
+def _shape(end: int, kw: float) -> int:
+    """Shape behind the front of an end that is pulled (positive kw) or let go."""
+    return TOWARDS_MOTOR if (end == MOTOR_END) == (kw > 0.0) else TOWARDS_JOINT
 
 
 @compiled
 def moved(
-    x: Array, wire: int, table: Array, end: int, force: float, floor: float
+    x: Array, wire: int, table: Array, end: int, kw: float, floor: float
 ) -> tuple[float, float, int, float, float, float]:
-    """What moving one end by `force` N, positive out of the sheath, would do to a wire in `x`.
+    """What moving one end by `kw` N, positive out of the sheath, would do to a wire in `x`.
 
-    Returns its tension at that end in N and the slope of that by the force; count of nodes behind
-    the front and amplitude there in N; slack left at this and at the other end in N. No node's
+    Returns its tension at that end in N and the slope of that by `kw`; count of nodes behind the
+    front and amplitude there in N; slack left at this and at the other end in N. No node's
     tension can be less than `floor` N: zero, or what load-independent friction adds.
     """
     nodes = table.shape[1]
@@ -109,18 +109,18 @@ def moved(
     other = x[wire + GAP + 1 - end]
     first = 0 if end == MOTOR_END else nodes - 1
     gap = 0.0
-    if force > 0.0:
-        gap = max(0.0, own - force)
-        force = max(0.0, force - own)
+    if kw > 0.0:
+        gap = max(0.0, own - kw)
+        kw = max(0.0, kw - own)
     elif own > 0.0:
-        gap = own - force
-        force = 0.0
-    if force == 0.0:
+        gap = own - kw
+        kw = 0.0
+    if kw == 0.0:
         # Only slack has moved, or nothing.
         slope = 0.0 if gap > 0.0 else 1.0 / table[WEIGHT, first]
         return node_tension(x, wire, table, first), slope, 0, 0.0, gap, other
 
-    shape = _shape(end, force)
+    shape = _shape(end, kw)
     count = int(x[wire + COUNT + end])
     if count > 0 and int(x[wire + SHAPE + end]) == shape:
         load = x[wire + AMPLITUDE + end] * _weight_behind(table, shape, end, count)
@@ -131,20 +131,20 @@ def moved(
     else:
         count = 1
         load = table[WEIGHT, first] * node_tension(x, wire, table, first)
-    load += force
+    load += kw
     weight = _weight_behind(table, shape, end, count)
     while count < nodes:
         i = count if end == MOTOR_END else nodes - 1 - count
         ahead = node_tension(x, wire, table, i)
         behind = load / weight * table[shape, i]
-        if (behind <= ahead) if force > 0.0 else (behind >= ahead):
+        if (behind <= ahead) if kw > 0.0 else (behind >= ahead):
             break
         load += table[WEIGHT, i] * ahead
         count += 1
         weight = _weight_behind(table, shape, end, count)
     amplitude = load / weight
     slope = table[shape, first] / weight
-    if force < 0.0:
+    if kw < 0.0:
         least = floor / table[shape, first]
         if amplitude < least:
             gap = (least - amplitude) * weight
@@ -162,16 +162,16 @@ def moved(
 
 
 @compiled
-def move(x: Array, wire: int, table: Array, end: int, force: float, floor: float) -> None:
-    """Move one end of a wire by `force` N of stretch; see `moved`."""
+def move(x: Array, wire: int, table: Array, end: int, kw: float, floor: float) -> None:
+    """Move one end of a wire by `kw` N; see `moved`."""
     nodes = table.shape[1]
-    _, _, count, amplitude, gap, other_gap = moved(x, wire, table, end, force, floor)
+    _, _, count, amplitude, gap, other_gap = moved(x, wire, table, end, kw, floor)
     x[wire + GAP + end] = gap
     x[wire + GAP + 1 - end] = other_gap
     if count == 0:
         return
     other = 1 - end
-    shape = _shape(end, force)
+    shape = _shape(end, kw)
     had, had_shape = int(x[wire + COUNT + end]), int(x[wire + SHAPE + end])
     if had == nodes and had_shape != shape:
         # A reversal: what slid as a whole now stands before the new front.
@@ -204,16 +204,16 @@ def mean_tension(x: Array, wire: int, table: Array) -> float:
 
 
 @compiled
-def lengthen(x: Array, wire: int, table: Array, force: float, floor: float) -> None:
-    """Let a wire that is held at both ends grow longer by `force` N of stretch.
+def lengthen(x: Array, wire: int, table: Array, kw: float, floor: float) -> None:
+    """Let a wire that is held at both ends grow longer by `kw` N.
 
     It grows in proportion to its tension everywhere, as what creeps under load does: nothing slips.
     What a slack wire grows is slack at the motor; what shrinks there is pulled in.
     """
     had = mean_tension(x, wire, table) - floor
-    left = had - force
+    left = had - kw
     if had <= 0.0 or left > 10.0 * had:
-        move(x, wire, table, MOTOR_END, -force, floor)
+        move(x, wire, table, MOTOR_END, -kw, floor)
         return
     spread(x, wire, table)
     for i in range(table.shape[1]):
@@ -262,14 +262,14 @@ def relax(x: Array, wire: int, table: Array, work: Array) -> None:
     """
     nodes = table.shape[1]
     for shape in range(2):
-        way = 1.0 if shape == TOWARDS_MOTOR else -1.0
+        sign = 1.0 if shape == TOWARDS_MOTOR else -1.0
         blocks = 0
         for i in range(nodes):
             load = table[WEIGHT, i] * x[wire + NODES + i]
             weight = table[WEIGHT, i] * table[shape, i]
             size = 1.0
             # Tension over the falling shape may only grow along the wire, over the rising fall.
-            while blocks > 0 and way * (
+            while blocks > 0 and sign * (
                 work[0, blocks - 1] * weight - load * work[1, blocks - 1]
             ) > 1e-12 * abs(load * work[1, blocks - 1]):
                 blocks -= 1

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.kernel import advance_joints, run_joints
+from endoscope_core.physics.kernel import run_joints
 from endoscope_core.physics.layout import (
     IN_COMMAND,
     IN_MOTOR,
@@ -93,16 +93,13 @@ class PlantSimulator:
         self.tick = tick
         self._parameters, self._on = pack(plant)
         self._states, self._histories, self._sheaths = rest_state(self._parameters, self._on, tick)
-        self._inputs = np.zeros((len(self.joints), INPUTS))
-        self._inputs[:, IN_MOTOR] = np.nan
-        self._outputs = np.zeros((len(self.joints), OUTPUTS))
         self._ticks = 0
-        self._advance(0)
+        self._advance(np.zeros(len(self.joints)), 0)
 
     @property
     def sample(self) -> PlantSample:
         """What the noise-free sensors read now."""
-        out = self._outputs
+        out = self._readings
         return PlantSample(
             self._ticks * self.tick,
             out[:, OUT_MOTOR].copy(),
@@ -139,22 +136,17 @@ class PlantSimulator:
             raise ValueError(f'a command for {self.joints} has shape {command.shape}')
         if not all(abs(angle) <= LARGEST_COMMAND for angle in command.tolist()):
             raise ValueError(f'the command {command} is not finite or beyond {BEYOND}')
-        self._inputs[:, IN_COMMAND] = command
-        self._advance(n_ticks)
+        self._advance(command, n_ticks)
         return self.sample
 
-    def _advance(self, n_ticks: int) -> None:
-        advance_joints(
-            self._states,
-            self._histories,
-            self._sheaths,
-            self._parameters,
-            self._on,
-            self._inputs,
-            n_ticks,
-            self.tick,
-            self._outputs,
-        )
+    def _advance(self, command: Array, n_ticks: int) -> None:
+        inputs = np.zeros((len(self.joints), n_ticks, INPUTS))
+        inputs[:, :, IN_COMMAND] = command[:, None]
+        inputs[:, :, IN_MOTOR] = np.nan
+        out = np.empty((len(self.joints), n_ticks + 1, OUTPUTS))
+        arrays = (self._states, self._histories, self._sheaths, self._parameters, self._on)
+        run_joints(*arrays, inputs, True, self.tick, out)
+        self._readings = out[:, -1]
         self._ticks += n_ticks
 
 

@@ -31,12 +31,14 @@ def _partner(place: Place) -> tuple[float, float]:
     return mirrored.get(place.shape, (-1.0, 0.0) if place.from_zero else (0.0, 1.0))
 
 
+Row = tuple[int, tuple[Place, ...]]
+"""Number of the first of the places that stand in a row, and those places."""
 _ROW = sorted(FUNCTIONS.values(), key=_alike)
-ROWS: tuple[tuple[int, tuple[Place, ...]], ...] = tuple(
+ROWS: tuple[Row, ...] = tuple(
     (_ROW.index(places[0]), places)
     for places in (tuple(each) for _, each in groupby(_ROW, key=_alike))
 )
-"""Number of the first of the places that stand in a row, and those places, by their hooks."""
+"""By their hooks."""
 _FLAGS = np.array([place.flag for place in _ROW])
 _FIRST = np.array([place.first_parameter for place in _ROW])
 _SHARE, _SIDE = np.array([_partner(place) for place in _ROW]).T.copy()
