@@ -57,15 +57,9 @@ def answer_poses(
     bending: Floats,
     joints: Sequence[str],
 ) -> MessageStream:
-    """Poses that a tracker which reads these angles would tell.
-
-    `recorded`: poses of the recording: when they were told, in which frame, of how long a section.
-    `stamp_ns` (N,): when the angles were read; a recorded pose of another time has no answer.
-    `bending` (N, J): angles in rad.
-    `joints`: their J names; a joint that is not among them is straight.
-    Returns: without the poses at which the section would be bent by half a turn or more, which a
-        tracker cannot tell from others.
-    """
+    """Poses that a tracker which reads these angles (N, J) in rad at these stamps would report."""
+    # A pose at another time has no answer, nor has one at which the section would be bent by half a
+    # turn or more: a tracker cannot tell it from others.
     angles = np.zeros((len(stamp_ns), len(JOINT_NAMES)))
     for column, joint in enumerate(joints):
         angles[:, JOINT_NAMES.index(joint)] = bending[:, column]
@@ -93,10 +87,8 @@ def answer_poses(
 
 
 def section_length(recorded: PoseSeries) -> float:
-    """Length in m of the bending section whose tip was recorded; 0 where no pose tells it.
-
-    A circular arc of length L that turns by a has a chord of ``2 L sin(a / 2) / a``.
-    """
+    """Length in m of the bending section whose tip was recorded; 0 where no pose tells it."""
+    # A circular arc of length L that turns by a has a chord of ``2 L sin(a / 2) / a``.
     chord = np.linalg.norm(recorded.position, axis=1)
     half_turn = np.arccos(np.clip(np.abs(recorded.orientation[:, 3]), 0.0, 1.0))
     length = chord / np.sinc(half_turn / np.pi)
@@ -110,26 +102,16 @@ class NoCommandsError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class BagCommands:
-    """Commands of some joints of a plant.
+    """Commands of some joints of a plant."""
 
-    `topic`: full name of the topic they come from.
-    `joints`: joints of the plant that are commanded, in the plant's order.
-    `stamp_ns` (N,): not decreasing.
-    `shaft` (N, J): motor shaft angle in rad.
-    """
-
-    topic: str
-    joints: tuple[str, ...]
-    stamp_ns: NDArray[np.int64]
-    shaft: NDArray[np.float64]
+    topic: str  # full name of the topic they come from
+    joints: tuple[str, ...]  # joints of the plant that are commanded, in the plant's order
+    stamp_ns: NDArray[np.int64]  # (N,), not decreasing
+    shaft: NDArray[np.float64]  # (N, J), motor shaft angle in rad
 
 
 def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
-    """Shaft commands of a recording; desired angles times the rig's gear where it has none.
-
-    Raises NoCommandsError: if neither topic is there, or no joint of the plant is commanded.
-    Raises BagError: if a command is not finite or does not decode, or all are stamped alike.
-    """
+    """Shaft commands of a bag, or desired angles times the gear; NoCommandsError without either."""
     topic = input_topic(recording)
     if not topic:
         raise NoCommandsError(recording.lacking(COMMAND, DESIRED))
@@ -173,21 +155,15 @@ def write_answer(
     noise_seed: int | None = None,
     rig: Rig | None = None,
 ) -> int:
-    """Write the answer of a plant to the commands of a recording.
+    """Write the answer of a plant to the commands of a recording; return the number of messages.
 
     The new bag has the commands as they are, and `motor/measured_js`, `wires/measured_js` and
     `slave/measured_js` at the stamps, under the namespace and with the times of receipt of the
     recording; a topic that the recording lacks comes at its nominal rate. Only joints that are
     commanded answer. Where the recording has `tracker/measured_cp`, the answer has it too, at the
-    stamps that it shares with `slave/measured_js`.
-
-    `recording`: with `motor/servo_jp` or `slave/servo_jp`.
-    `out`: a folder, or a file that ends in ``.mcap``; must not exist.
-    `noise_seed`: seed of the sensors' noise; without it there is neither noise nor quantisation.
-    `rig`: whose gear desired angles are times; that which the recording carries by default.
-    Returns: number of messages written.
-    Raises NoCommandsError, BagError: if the recording has no usable commands, or `out` exists.
-    Raises FileError: if the rig that the recording carries cannot be read.
+    stamps that it shares with `slave/measured_js`. Without a seed there is neither noise nor
+    quantisation. NoCommandsError, BagError or FileError if the recording has no usable commands,
+    its rig cannot be read, or `out` exists.
     """
     rig = rig or rig_of_bag(recording)
     commands = commands_of_bag(recording, plant, rig)
@@ -233,12 +209,10 @@ def _answer_as_stamped(
     stamps: AnswerStamps,
     recorded: JointStateSeries | None,
 ) -> Answer:
-    """Answer by the recording's own habit of stamping its readings.
-
-    A rig that stamps the beginning of its cycle, commands and then reads, records at a stamp what
-    the command of that stamp has already moved. The shafts, whose encoders are the finest clock,
-    tell which habit a recording has.
-    """
+    """Answer by the recording's own habit of stamping its readings."""
+    # A rig that stamps the beginning of its cycle, commands and then reads, records at a stamp what
+    # the command of that stamp has already moved. The shafts, whose encoders are the finest clock,
+    # tell which habit a recording has.
 
     def answer(read_delay: float, at: AnswerStamps) -> Answer:
         return answer_commands(plant, commands.stamp_ns, commands.shaft, at, read_delay=read_delay)

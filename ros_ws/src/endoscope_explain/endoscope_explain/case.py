@@ -20,10 +20,8 @@ from endoscope_explain.recording import Recording
 
 
 def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[NamedEffect, ...]:
-    """Merge the effects that the audit found into the engine's, these after its own.
-
-    An effect that both found is listed once, as the engine fitted it.
-    """
+    """Merge the effects that the audit found into the engine's, these after its own."""
+    # An effect that both found is listed once, as the engine fitted it.
     known = {(e.id, e.joint) for e in explanation.effects}
     found = [
         NamedEffect(f.id, f.joint, f.parameters, (), f.evidence)
@@ -34,13 +32,11 @@ def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[Name
 
 
 def combined_verdict(explanation: Explanation, audit: AuditReport) -> Verdict:
-    """Say in one word what engine and audit found.
-
-    Where the rig hardly moves nothing can be told. Missing physics wins over a faulty sensor, that
-    over a faulty recording, and any of them over differing parameters: these always differ a
-    little. What was mistaken in the recording itself is the verdict: the rest is about another
-    recording than was given.
-    """
+    """Say in one word what engine and audit found."""
+    # Where the rig hardly moves nothing can be told. Missing physics wins over a faulty sensor,
+    # that over a faulty recording, and any of them over differing parameters: these always differ a
+    # little. What was mistaken in the recording itself is the verdict: the rest is about another
+    # recording than was given.
     return Verdict.RECORDING_FAULT if audit.mistakes() else verdict_of_rest(explanation, audit)
 
 
@@ -58,10 +54,8 @@ def verdict_of_rest(explanation: Explanation, audit: AuditReport) -> Verdict:
 
 
 def all_refuted(explanation: Explanation) -> bool:
-    """Whether effects were named, and a second recording refutes all of them.
-
-    It says nothing of what acted at a time of the first one.
-    """
+    """Whether effects were named, and a second recording refutes all of them."""
+    # It says nothing of what acted at a time of the first one.
     refuted = [e.doubtful and not e.definition.traits.depends_on_time for e in explanation.effects]
     return bool(refuted) and all(refuted)
 

@@ -118,10 +118,7 @@ REFIT_STEPS = 3
 def refit(
     plant: PlantDescription, observation: JointObservation, band: float, iterations: int
 ) -> Fit:
-    """Refit one joint of a plant, its effects included, from where it is.
-
-    `band`: relative freedom of the nominal parameters.
-    """
+    """Refit one joint of a plant, its effects included, from where it is."""
     base, flags = packed_joint(plant, observation.joint)
     free = nominal_parameters(base, band)
     for spec in plant.effects:
@@ -145,10 +142,7 @@ def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescriptio
 
 
 def distance(truth: Recording, rival: PlantDescription, joint: str) -> float:
-    """What a rival misses of the other rival's noise-free answer after its refit.
-
-    Returns: root mean square over all samples of the joint's signals, in noise units.
-    """
+    """What a rival misses of the other rival's noise-free answer after its refit."""
     observation = next(o for o in observe(truth, rival) if o.joint == joint)
     found = refit(rival, observation, NOMINAL_BAND, REFIT_STEPS)
     return float(np.sqrt(np.mean(found.residuals**2)))
@@ -189,11 +183,7 @@ def is_safe(recording: Recording, tension_limit: float, bending_limit: float) ->
 def propose(
     recording: Recording, plant: PlantDescription, effect: NamedEffect, jobs: int = 1
 ) -> NextExperiment | None:
-    """Propose the motion that tells an effect, which `plant` has, from its alternatives.
-
-    Returns: none where there is no rival that could be fitted, or no motion is safe for all of
-        them.
-    """
+    """Propose the motion that tells an effect, which `plant` has, from its alternatives."""
     plants = {effect.id: plant} | {
         rival: fitted
         for rival in effect.alternatives[: MOST_RIVALS - 1]

@@ -62,18 +62,7 @@ def explain_recording(
     jobs: int = 2,
     progress: Progress | None = None,
 ) -> Explanation:
-    """Explain why a recording differs from the simulation of a plant.
-
-    `recording`: as audited: increasing stamps, wrong samples marked invalid.
-    `plant`: the simulation that the engineer has.
-    `baseline`: healthy, of the same rig; only what is new since is explained.
-    `band`: relative tolerance by which a healthy rig's parameters may differ from the plant's.
-    `most_effects`: largest number of effects on a joint that are looked for.
-    `given`: the physics of each joint, if it is not to be searched.
-    `left_out`: effects whose formulas are not tried, so that a law in none of the known forms can
-        be met.
-    `progress`: told in a few words what is being done.
-    """
+    """Explain why a recording differs from the simulation of a plant."""
     tell = progress or (lambda _: None)
     observations = tuple(o for o in with_held_noise(observe(recording, plant)) if o.channels)
     if not _is_enough(observations):
@@ -123,11 +112,9 @@ def _healthy(
     left_out: tuple[str, ...],
     jobs: int,
 ) -> tuple[tuple[JointObservation, ...], PlantDescription]:
-    """Observations against a baseline, and the plant in health.
-
-    A rig that never matched the plant is described by the term that comes nearest, right or not:
-    less is left that could hide what is new.
-    """
+    """Observations against a baseline, and the plant in health."""
+    # A rig that never matched the plant is described by the term that comes nearest, right or not:
+    # less is left that could hide what is new.
     before = with_held_noise(observe(baseline, plant))
     packed = {o.joint: packed_joint(plant, o.joint) for o in before}
 
@@ -147,10 +134,9 @@ def _healthy(
 def _explained_together(
     references: list[ReferenceFits], explained: Callable[[ReferenceFits], Explained], tell: Progress
 ) -> tuple[list[JointSearch], list[Decision]]:
-    """Explain each joint beside the other as that is explained, until no tracker sees a change.
-
-    Where the nominal plant leaves no more than noise, nothing that the other joint does is missing.
-    """
+    """Explain each joint beside the other as that is explained, until no tracker sees a change."""
+    # Where the nominal plant leaves no more than noise, nothing that the other joint does is
+    # missing.
     found = []
     for pair in references:
         tell(f'searching what {pair[0].model.observation.joint} lacks')

@@ -203,10 +203,8 @@ def summary_table(reports: Mapping[str, Reported]) -> str:
 
 
 def parameter_table(reports: Mapping[str, Reported]) -> str:
-    """Return one CSV line for each fitted parameter, bags beside each other in columns.
-
-    A cell is empty where a recording does not show the parameter.
-    """
+    """Return one CSV line for each fitted parameter, bags beside each other in columns."""
+    # A cell is empty where a recording does not show the parameter.
     columns: dict[tuple[str, str, str], dict[str, float]] = {}
     for name, reported in reports.items():
         content = reported.content()

@@ -46,51 +46,33 @@ Engine = Callable[..., Explanation]
 
 @dataclass(frozen=True)
 class Sources:
-    """What one explanation is made from.
+    """What one explanation is made from."""
 
-    `bag`: the recording to explain.
-    `plant`: the simulation that an engineer has.
-    `baseline`: a healthy recording of the same rig.
-    `validate`: a second recording of the same rig to judge on.
-    `without`: topics that may be missing.
-    `quick`: whether to leave out the black boxes and the next experiment.
-    `band`: relative tolerance of the plant's parameters.
-    `most_effects`: largest number of effects on a joint that are looked for.
-    `given`: the physics of each joint, if it is not to be searched.
-    `namespace`: of the rig's topics, where a bag has several rigs.
-    `rig`: what was recorded, where that is not what the bag says.
-    `plant_file`: where the plant was read from.
-    `command`: as it was typed.
-    """
-
-    bag: Path
-    plant: PlantDescription
-    baseline: Path | None = None
-    validate: Path | None = None
-    without: Collection[str] = ()
-    quick: bool = False
-    band: float = BAND
-    most_effects: int = MOST_EFFECTS
-    given: GivenJoints | None = None
-    namespace: str | None = None
-    rig: Rig | None = None
-    plant_file: Path | None = None
-    command: str = ''
+    bag: Path  # the recording to explain
+    plant: PlantDescription  # the simulation that an engineer has
+    baseline: Path | None = None  # a healthy recording of the same rig
+    validate: Path | None = None  # a second recording of the same rig to judge on
+    without: Collection[str] = ()  # topics that may be missing
+    quick: bool = False  # whether to leave out the black boxes and the next experiment
+    band: float = BAND  # relative tolerance of the plant's parameters
+    most_effects: int = MOST_EFFECTS  # largest number of effects on a joint that are looked for
+    given: GivenJoints | None = None  # the physics of each joint, if it is not to be searched
+    namespace: str | None = None  # of the rig's topics, where a bag has several rigs
+    rig: Rig | None = None  # what was recorded, where that is not what the bag says
+    plant_file: Path | None = None  # where the plant was read from
+    command: str = ''  # as it was typed
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """The sources, read and audited.
-
-    `baseline`, `validation`: as audited.
-    `said_of_others`: what somebody took wrongly in these two, in words.
-    """
+    """The sources, read and audited."""
 
     sources: Sources
     audit: AuditReport
+    # As audited.
     baseline: Recording | None = None
     validation: Recording | None = None
-    said_of_others: tuple[str, ...] = ()
+    said_of_others: tuple[str, ...] = ()  # what somebody took wrongly in these two, in words
 
     @property
     def plant(self) -> PlantDescription:
@@ -103,10 +85,7 @@ class JointsDifferError(BagError):
 
 
 def read_inputs(sources: Sources) -> Inputs:
-    """Read and audit all recordings of a case.
-
-    Raises BagError: if a recording cannot be used; the message names it.
-    """
+    """Read and audit all recordings of a case; BagError, with its name, if one cannot be used."""
 
     def read(path: Path, plant: PlantDescription) -> Recording:
         return recording_from_bag(
@@ -144,11 +123,9 @@ def explain_case(
     progress: Progress | None = None,
     answered: Callable[[ExplainedCase], None] | None = None,
 ) -> ExplainedCase:
-    """Explain a recording by `engine`, which is told what to explain as `explain_recording` is.
-
-    The case is handed to `answered` once it is explained, before it is compared with black boxes
-    and a next experiment is looked for.
-    """
+    """Explain a recording by `engine`, which is told what to explain as `explain_recording` is."""
+    # The case is handed to `answered` once it is explained, before it is compared with black boxes
+    # and a next experiment is looked for.
     begun = time.monotonic()
     tell = progress or (lambda _: None)
     sources, audit, validation = inputs.sources, inputs.audit, inputs.validation

@@ -38,31 +38,18 @@ the pose that it held once they had ended.
 
 @dataclass(frozen=True)
 class Series:
-    """Samples of one quantity.
+    """Samples of one quantity."""
 
-    Attributes
-    ----------
-    topic : str
-        Topic without namespace that it comes from.
-    time : array (N,)
-        Header stamps in s from the recording's first stamp.
-    values : array (N, J) or (N, J, 2)
-        One column for each joint; tensions have two for each, positive and negative wire.
-    valid : array like values, of bool
-        False where a sample must not be judged: absent, frozen, clipped or wrong.
-    received : array (N,) or None
-        When each sample was received, by the recorder's clock, in s from the recording's first
-        stamp.
-    lost : array (N,) of int or None
-        Messages that were published and not recorded directly before each sample; None where the
-        recorder does not tell.
-    """
-
-    topic: str
-    time: Array
+    topic: str  # topic without namespace that it comes from
+    time: Array  # (N,), header stamps in s from the recording's first stamp
+    # (N, J), one column for each joint, or for tensions (N, J, 2): positive and negative wire.
     values: Array
-    valid: Mask
+    valid: Mask  # false where a sample must not be judged: absent, frozen, clipped or wrong
+    # (N,), when each sample was received, by the recorder's clock, in s from the recording's first
+    # stamp.
     received: Array | None = None
+    # (N,), messages that were published and not recorded directly before each sample; None where
+    # the recorder does not tell.
     lost: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
@@ -92,48 +79,26 @@ class Series:
 
 @dataclass(frozen=True)
 class Recording:
-    """What was commanded and measured.
+    """What was commanded and measured."""
 
-    Attributes
-    ----------
-    name : str
-        What to call it in messages.
-    origin : float
-        First stamp of all, in s of the recording's clock.
-    joints : tuple of str
-        Joints in the order of every series' columns.
-    command : Series
-        Motor shaft command in rad, each in force from its stamp until the next one.
-    tension : Series or None
-        Load cells in N, values (N, J, 2): positive, negative wire; None on a rig without them.
-    bending : Series
-        Bending angle in rad from the tracker.
-    shaft_position, shaft_velocity, shaft_effort : Series or None
-        Motor shaft in rad, rad/s, N m; None where not recorded.
-    notes : tuple of str
-        What is missing or was taken from elsewhere, in words.
-    start : array (J, K) or None
-        Shaft angles in rad to which each motor had gone, one after the other, when the recording
-        began; the first command alone where None.
-    start_speed : array (J,) or None
-        Speed of each motor then, rad/s; they stood where None.
-    rig : Rig
-        Gear, limits and time-outs of what was recorded.
-    """
-
-    name: str
-    origin: float
-    joints: tuple[str, ...]
-    command: Series
+    name: str  # what to call it in messages
+    origin: float  # first stamp of all, in s of the recording's clock
+    joints: tuple[str, ...]  # joints in the order of every series' columns
+    command: Series  # motor shaft command in rad, each in force from its stamp until the next one
+    # Load cells in N, values (N, J, 2): positive, negative wire; None on a rig without them.
     tension: Series | None
-    bending: Series
+    bending: Series  # bending angle in rad from the tracker
+    # Motor shaft in rad, rad/s, N m; None where not recorded.
     shaft_position: Series | None = None
     shaft_velocity: Series | None = None
     shaft_effort: Series | None = None
+    # What is missing or was taken from elsewhere, in words.
     notes: tuple[str, ...] = field(default=())
+    # (J, K), shaft angles in rad to which each motor had gone, one after the other, when the
+    # recording began; the first command alone where None.
     start: Array | None = None
-    start_speed: Array | None = None
-    rig: Rig = field(default_factory=shipped_rig)
+    start_speed: Array | None = None  # (J,), speed of each motor then, rad/s; they stood where None
+    rig: Rig = field(default_factory=shipped_rig)  # gear, limits and time-outs of what was recorded
 
     def measured(self) -> dict[str, Series]:
         """Return the recorded measured series by their name in this class."""
@@ -196,11 +161,9 @@ def motor_name(joint: str) -> str:
 
 
 def signal_name(quantity: str, joint: str, wire: int = 0) -> str:
-    """Return the name of one column of a series, for example `wires/measured_js:wire_x_pos`.
-
-    The three quantities of the motor share a topic and are told apart by a suffix:
-    `motor/measured_js:motor_x.position`.
-    """
+    """The name of one column of a series, for example `wires/measured_js:wire_x_pos`."""
+    # The three quantities of the motor share a topic and are told apart by a suffix:
+    # `motor/measured_js:motor_x.position`.
     topic = QUANTITY_TOPICS[quantity]
     if quantity == 'tension':
         return f'{topic}:{wire_names(joint)[wire]}'
@@ -243,11 +206,7 @@ def require_running_stamps(path: object, series: JointStateSeries) -> None:
 
 
 def require_common_time(path: object, topics: Sequence[JointStateSeries]) -> None:
-    """Refuse topics that cannot be laid beside each other; the first one is that of the commands.
-
-    UnusableStampsError if all of a topic's messages, two at least, have one stamp, or two topics no
-    time in common.
-    """
+    """Refuse topics without running stamps, or time in common with the first: the commands."""
     for one in topics:
         require_running_stamps(path, one)
     commands = topics[0]
@@ -281,31 +240,9 @@ def recording_from_bag(
 ) -> Recording:
     """Read what analysis needs from a bag, in the order in which it was recorded.
 
-    Parameters
-    ----------
-    path : str or Path
-        rosbag2 folder or `.mcap`.
-    plant : PlantDescription
-        Its joints are looked for.
-    without : collection of str
-        Topics of `WAIVABLE` that may be missing.
-    namespace : str, optional
-        Where several rigs are in one bag.
-    rig : Rig, optional
-        What was recorded; that which the bag carries by default, or as shipped.
-
-    Returns
-    -------
-    Recording
-        With the joints that all topics have, and what is missing in its notes.
-
-    Raises
-    ------
-    BagError
-        Any of endoscope_bags: the bag is cut, empty, lacks a topic or every joint, holds NaN ...
-        Also if its stamps cannot be used.
-    FileError
-        The rig that the bag carries cannot be read.
+    It has the joints of the plant that all topics have, and notes of what is missing. Topics of
+    `without`, some of `WAIVABLE`, may be missing. BagError if the bag or its stamps cannot be used,
+    FileError if the rig that it carries cannot be read.
     """
     bag = open_bag(path)
     rig = rig or rig_of_bag(bag)

@@ -42,15 +42,12 @@ _TINY = 1e-12
 
 @dataclass(frozen=True)
 class SharedChoice:
-    """Effects for all recordings of a joint.
-
-    `effects`: in the order in which they were added.
-    `recordings`: fits of each recording; see `search.refit.trial_fit`. One that has no use for an
-        effect lacks it.
-    """
+    """Effects for all recordings of a joint."""
 
     joint: str
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  # in the order in which they were added
+    # Fits of each recording; see `search.refit.trial_fit`. One that has no use for an effect lacks
+    # it.
     recordings: tuple[ReferenceFits, ...]
 
     def total(self) -> float:
@@ -62,13 +59,11 @@ class SharedChoice:
         return other.total() - self.total()
 
     def null(self, jobs: int) -> tuple[float, Null]:
-        """What recordings show of one effect more, and rigs in which nothing more is missing.
-
-        Returns: gains by the screen of the effect that gains most in all recordings together: one
-            is tried for that serves all of them, and the best of each recording would gain more.
-            Every shape of the tube has a profile of its own, so that what is drawn for one says
-            nothing of another.
-        """
+        """What recordings show of one effect more, and rigs in which nothing more is missing."""
+        # Gains by the screen of the effect that gains most in all recordings together: one is tried
+        # for that serves all of them, and the best of each recording would gain more. Every shape
+        # of the tube has a profile of its own, so that what is drawn for one says nothing of
+        # another.
         order = np.random.default_rng(_SEED)
         by_recording = [_shown(references[0], order, jobs) for references in self.recordings]
         everywhere = set.intersection(*(set(each) for each in by_recording))
@@ -98,10 +93,7 @@ def _shown(found: Fit, order: np.random.Generator, jobs: int) -> dict[str, Array
 
 
 def with_one_more(choice: SharedChoice, jobs: int) -> list[SharedChoice]:
-    """The choice with one more effect, for each of the most promising effects.
-
-    Returns: best first.
-    """
+    """The choice with one more effect, for each of the most promising effects, best first."""
     trials = _trial_fits(choice, jobs)
     variants: dict[str, Variant] = {}
     for variant in sorted(trials, key=lambda v: _logarithm_of_costs(choice, trials[v])):
@@ -169,10 +161,8 @@ def _cost(found: Fit) -> float:
 
 
 def _begun(choice: SharedChoice, trials: list[TrialFit | None]) -> Begun:
-    """Models of all recordings with one more effect, and where their fit begins.
-
-    A recording that has no use for the effect stays without it.
-    """
+    """Models of all recordings with one more effect, and where their fit begins."""
+    # A recording that has no use for the effect stays without it.
     models, starts = [], []
     for references, item in zip(choice.recordings, trials, strict=True):
         found = references[0] if item is None else refit(item, candidate((), references[0])).fit
@@ -182,12 +172,8 @@ def _begun(choice: SharedChoice, trials: list[TrialFit | None]) -> Begun:
 
 
 def settled_together(choices: Sequence[SharedChoice], jobs: int) -> list[SharedChoice]:
-    """Choices fitted until nothing moves any more, also from where all recordings are alike.
-
-    A fit by itself may lie in another valley than those of the same rig in other shapes.
-
-    Returns: best first.
-    """
+    """Choices fitted until nothing moves any more, also from where all recordings are alike."""
+    # A fit by itself may lie in another valley than those of the same rig in other shapes.
     twice: list[SharedChoice] = []
     begun: list[Begun] = []
     for choice in choices:
@@ -217,11 +203,7 @@ BEAM = 3
 def physics_of_all(
     sources: Sequence[Sources], jobs: int, tell: Callable[[str], None]
 ) -> list[GivenJoints]:
-    """Read several recordings of a rig and choose the effects that explain all of them.
-
-    Returns: for each recording.
-    Raises BagError: if a recording cannot be used, or has other joints than the first one.
-    """
+    """Effects that explain all recordings of a rig; BagError if one cannot be used."""
     recordings: list[dict[str, ReferenceFits]] = []
     with threadpool_limits(1, 'blas'):
         for one in sources:
@@ -251,13 +233,7 @@ def shared_effects(
     jobs: int,
     tell: Callable[[str], None],
 ) -> list[GivenJoints]:
-    """Choose effects for all recordings of a rig together.
-
-    `recordings`: nominal fits of each joint of each recording; see `search.refit.trial_fit`.
-    `most_effects`: largest number of effects on a joint.
-    Returns: for each recording; the effects are those of all, in the order in which they were
-        added.
-    """
+    """Choose effects for all recordings of a rig by the nominal fits of each joint."""
     given: list[dict[str, GivenPhysics]] = [{} for _ in recordings]
     for joint in recordings[0]:
         nominal = SharedChoice(joint, (), tuple(references[joint] for references in recordings))
@@ -272,11 +248,8 @@ def shared_effects(
 def searched(
     nominal: SharedChoice, most_effects: int, jobs: int, tell: Callable[[str], None]
 ) -> tuple[SharedChoice, SharedChoice | None]:
-    """Add effects one by one to the best few choices: the best single effect may mislead.
-
-    Returns `found`: with the effects that gain more than another form would.
-    Returns `refused`: the best one with an effect more, if another form may gain as much.
-    """
+    """Effects added one by one to the best few choices, and the choice that was refused."""
+    # The best single effect may mislead; another form may gain as much as the refused one.
     best, beam = nominal, [nominal]
     most_effects += len(lacking(nominal.recordings[0][0].model.base))
     while len(best.effects) < most_effects:

@@ -49,20 +49,7 @@ SETTLING_S = 0.5
 
 
 def audit_recording(recording: Recording, plant: PlantDescription) -> AuditReport:
-    """Find what is wrong with a recording, and work around it where that is possible.
-
-    Parameters
-    ----------
-    recording : Recording
-        As it was recorded.
-    plant : PlantDescription
-        For the noise and resolution of the sensors.
-
-    Returns
-    -------
-    AuditReport
-        Where the recording is not what its names say, it is corrected to what it must mean.
-    """
+    """Find what is wrong with a recording, and correct it to what it must mean where it can be."""
     findings: list[Finding] = []
     recording = _on_ordered_stamps(recording, findings)
     in_other_units = stamp_unit_findings(recording, plant.sensors)

@@ -41,11 +41,9 @@ FLIGHT = np.array([1e-3, 0.1])
 def with_state_at_start(
     recording: Recording, plant: PlantDescription, findings: list[Finding]
 ) -> Recording:
-    """Estimate from where the motors had come when a recording began, as its `start`.
-
-    The time until it no longer shows by more than the noise is left out, as long as enough is left.
-    A rig that did not come straight from zero gets a note.
-    """
+    """Estimate from where the motors had come when a recording began, as its `start`."""
+    # The time until it no longer shows by more than the noise is left out, as long as enough is
+    # left. A rig that did not come straight from zero gets a note.
     plant = plant.of_joints(recording.joints)
     observations = observe(recording, plant)
     parameters, flags = packed_rig(observations, plant)

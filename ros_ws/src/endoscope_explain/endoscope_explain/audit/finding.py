@@ -19,58 +19,30 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong with the recording itself.
+    """One thing that is wrong with the recording itself; times are in s from the first stamp."""
 
-    Attributes
-    ----------
-    id : str
-        Catalogue id (`recording_gap`, `clock_skew`, `tracker_outliers`, `load_cell_saturation`),
-        or what was found: `wrong_unit`, `wrong_sign`, `exchanged`, `wrong_gear`, `frozen`,
-        `repeated_stamps`, `unordered_stamps`, `held_samples`, `held_pose`.
-    severity : Severity
-    joint : str
-        Joint it concerns; the first one if it concerns all.
-    stage : str
-        `recording`, `sensing` or, for exchanged or inverted motors, `actuator`.
-    signals : tuple of str
-        Written `wires/measured_js:wire_x_pos`.
-    intervals : tuple of (float, float)
-        In s from the first stamp.
-    text : str
-        One sentence for a person.
-    remedy : str
-        What was done so that the rest can be explained.
-    parameters : mapping of str to Estimate
-    evidence : mapping of str to float
-    """
-
+    # Catalogue id (`recording_gap`, `clock_skew`, `tracker_outliers`, `load_cell_saturation`), or
+    # what was found: `wrong_unit`, `wrong_sign`, `exchanged`, `wrong_gear`, `frozen`,
+    # `repeated_stamps`, `unordered_stamps`, `held_samples`, `held_pose`.
     id: str
     severity: Severity
-    joint: str
-    stage: str
-    signals: tuple[str, ...]
-    intervals: tuple[tuple[float, float], ...]
-    text: str
-    remedy: str
+    joint: str  # joint it concerns; the first one if it concerns all
+    stage: str  # `recording`, `sensing` or, for exchanged or inverted motors, `actuator`
+    signals: tuple[str, ...]  # written `wires/measured_js:wire_x_pos`
+    intervals: tuple[tuple[float, float], ...]  # in s from the first stamp
+    text: str  # one sentence for a person
+    remedy: str  # what was done so that the rest can be explained
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     evidence: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class AuditReport:
-    """A recording made fit for analysis, and what had to be done to it.
+    """A recording made fit for analysis, and what had to be done to it."""
 
-    Attributes
-    ----------
-    recording : Recording
-        As corrected, with strictly increasing stamps; samples that must not be judged are not
-        valid.
-    findings : tuple of Finding
-        Most serious first.
-    """
-
+    # As corrected, with strictly increasing stamps; samples that must not be judged are not valid.
     recording: Recording
-    findings: tuple[Finding, ...]
+    findings: tuple[Finding, ...]  # most serious first
 
     def faults(self) -> tuple[Finding, ...]:
         """Return the findings that change the verdict."""

@@ -69,11 +69,9 @@ class Moments:
         )
 
     def misfit(self, factor: float, bounds: Bounds) -> Array:
-        """Share of each measured column that no lag, offset and scale make of each simulated one.
-
-        Gives the share, 0 where they agree and 1 where they have nothing in common, and the scale:
-        (2, M, P). `factor` is the reading of one SI unit.
-        """
+        """Share of each measured column that no lag, offset and scale make of a simulated one."""
+        # Gives the share, 0 where they agree and 1 where they have nothing in common, and the
+        # scale: (2, M, P). `factor` is the reading of one SI unit.
         mean, variance = self.mean / factor, (self.variance / factor**2)[:, None]
         covariance, power = self.covariance / factor, self.simulated_variance[:, None, :]
         best = np.clip(covariance / np.maximum(power, 1e-300), *bounds.scale)

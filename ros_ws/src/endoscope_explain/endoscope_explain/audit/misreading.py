@@ -38,22 +38,14 @@ Shares = Mapping[str, Array]
 
 @dataclass(frozen=True)
 class Misreading:
-    """One way in which the columns of a quantity may be meant.
+    """One way in which the columns of a quantity may be meant."""
 
-    `quantity`: series of a `Recording`.
-    `kind`: `right`, `unit`, `sign`, `order` or `factor`, which is no unit known.
-    `price`: logarithm of how many mistakes are as likely as this one; 0 for what is right.
-    `source`: measured column that holds each signal.
-    `factor`: reading of one SI unit in each measured column.
-    `unit`: in words.
-    """
-
-    quantity: str
-    kind: str
-    price: float
-    source: tuple[int, ...]
-    factor: tuple[float, ...]
-    unit: str = ''
+    quantity: str  # series of a `Recording`
+    kind: str  # `right`, `unit`, `sign`, `order` or `factor`, which is no unit known
+    price: float  # logarithm of how many mistakes are as likely as this one; 0 for what is right
+    source: tuple[int, ...]  # measured column that holds each signal
+    factor: tuple[float, ...]  # reading of one SI unit in each measured column
+    unit: str = ''  # in words
 
     @property
     def touched(self) -> tuple[int, ...]:
@@ -104,12 +96,7 @@ def known_units(quantity: str, plant: PlantDescription, gear: float) -> dict[str
 def misreadings(
     quantity: str, plant: PlantDescription, gear: float, columns: int
 ) -> Iterator[Misreading]:
-    """Ways to read the columns of a quantity, the right one first.
-
-    `quantity`: series of a `Recording`, or `command`.
-    `gear`: shaft angle for one radian at the joint.
-    `columns`: one for each joint, or for each wire.
-    """
+    """Ways to read the columns of a quantity or of the command, the right one first."""
     whole = tuple(range(columns))
     yield Misreading(quantity, 'right', 0.0, whole, (1.0,) * columns)
     units = known_units(quantity, plant, gear)
@@ -153,10 +140,8 @@ def _parts(columns: int, joints: int) -> list[tuple[tuple[int, ...], int]]:
 def as_findings(
     recording: Recording, mistakes: Sequence[Misreading], before: Shares, after: Shares
 ) -> list[Finding]:
-    """Say each mistake in one line, with the misfits before and after all are put right.
-
-    An exchange of motors is said once.
-    """
+    """Say each mistake in one line, with the misfits before and after all are put right."""
+    # An exchange of motors is said once.
     findings: dict[tuple[str, str, tuple[int, ...]], Finding] = {}
     for mistake in mistakes:
         misfits = _misfit(mistake, before), _misfit(mistake, after)

@@ -39,16 +39,12 @@ MOVES = 0.01
 
 @dataclass(frozen=True)
 class Way:
-    """One way to read a quantity, and what speaks against it.
-
-    `shares` (columns,): misfit of each column.
-    `misfit`: sum of their logarithms.
-    `size`: by how much larger or smaller they are than simulated, in what rigs usually differ by.
-    """
+    """One way to read a quantity, and what speaks against it."""
 
     reading: Misreading
-    shares: Array
-    misfit: float
+    shares: Array  # (columns,), misfit of each column
+    misfit: float  # sum of their logarithms
+    # By how much larger or smaller they are than simulated, in what rigs usually differ by.
     size: float
 
     def against(self, worth: float) -> float:
@@ -57,12 +53,7 @@ class Way:
 
 
 class Comparison:
-    """A recording beside what the described plant makes of its command.
-
-    `recording`: with increasing stamps in s.
-    `plant`: of its joints.
-    `leave_out`: quantities that are not compared.
-    """
+    """A recording with ordered stamps beside what the described plant makes of its command."""
 
     def __init__(
         self,
@@ -144,10 +135,8 @@ class Comparison:
         }
 
     def unlike(self, mistakes: Collection[Misreading]) -> list[tuple[str, int]]:
-        """Quantities and columns that must move and have nothing in common with the simulated ones.
-
-        What they share is worth less than the scale that was fitted for it (Schwarz).
-        """
+        """Quantities and columns that must move and are nothing like the simulated ones."""
+        # What they share is worth less than the scale that was fitted for it (Schwarz).
         worth = self._criteria.worth
         least = exp(-0.5 * log(worth) / worth)
         drive = next((m for m in mistakes if m.quantity == 'command'), self._right())

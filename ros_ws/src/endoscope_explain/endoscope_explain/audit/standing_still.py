@@ -34,10 +34,8 @@ def frozen_findings(
     noise: Mapping[str, float],
     noisy: bool,
 ) -> list[Finding]:
-    """Find topics that repeat one reading to the end, or from first to last, though they must move.
-
-    `expected` (N, columns) is what the plant makes of the command at the grid's times (N,) in s.
-    """
+    """Find topics that repeat one reading to the end, or throughout, though they must move."""
+    # `expected` (N, columns) is what the plant makes of the command at the grid's times (N,) in s.
     findings = []
     by_topic: dict[str, list[tuple[str, Series]]] = {}
     for quantity, series in recording.measured().items():

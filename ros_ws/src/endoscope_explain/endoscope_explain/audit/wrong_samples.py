@@ -38,12 +38,10 @@ def chance_of_repeat(noise: float, resolution: float) -> float:
 
 
 def held(values: Array, noise: float, resolution: float, interval: float) -> tuple[Mask, int]:
-    """Samples (N,) that repeat the one before for longer than chance allows, and the usual run.
-
-    The first of each run is none of them. Noise (rms) and step are in the unit of the values (N,),
-    the interval is in s. The usual run is longer than 1 where the sensor is published faster than
-    it is read.
-    """
+    """Samples (N,) that repeat the one before for longer than chance allows, and the usual run."""
+    # The first of each run is none of them. Noise (rms) and step are in the unit of the values
+    # (N,), the interval is in s. The usual run is longer than 1 where the sensor is published
+    # faster than it is read.
     starts, lengths = runs_of_equal(values)
     period = int(np.median(lengths))
     usual = float(np.mean(lengths > 1))
@@ -200,10 +198,8 @@ def spike_chance(height: Array, noise: float) -> Array:
 
 
 def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
-    """Samples (N,) in rad that stick out as noise (rms) and motion never do, beyond chance.
-
-    Travel is the motor's (N,), in rad of the joint; gaps between the readings must not matter.
-    """
+    """Samples (N,) in rad that stick out as noise (rms) and motion never do, beyond chance."""
+    # Travel is the motor's (N,), in rad of the joint; gaps between the readings must not matter.
     wrong = np.zeros(len(values), bool)
     if len(values) < 20:
         return wrong

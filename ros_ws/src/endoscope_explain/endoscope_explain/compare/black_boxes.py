@@ -121,13 +121,7 @@ LAGS_S = (0.05, 0.3, 2.0)
 
 
 def motion_features(time: Array, angle: Array, at: Array) -> Array:
-    """Describe the motion at some instants by commands alone.
-
-    `time` (N,): stamps of the commands in s.
-    `angle` (N, J): commands in rad, joint-equivalent, the joint of interest first.
-    `at` (M,): in s.
-    Returns (M, J * 9): for each joint: angle, speed, plays of the angle, lagging angles.
-    """
+    """Motion (M, J * 9) by commands (N, J) in rad alone, the joint of interest first."""
     grid = np.arange(min(time[0], at.min()), max(time[-1], at.max()) + GRID_S, GRID_S)
     columns = []
     for j in range(angle.shape[1]):
@@ -154,29 +148,18 @@ def _lagging(u: Array, lag: float) -> Array:
 
 @dataclass(frozen=True)
 class Exam:
-    """What black boxes are trained on, and what they are judged on.
+    """What black boxes are trained on, and what they are judged on."""
 
-    `use`: training samples of the first recording, by their times.
-    `recording`: to judge on.
-    `recorded`: with the prediction `BASE`.
-    `test`: which of its samples count, by their times.
-    """
-
-    use: Callable[[Array], Mask]
-    recording: Recording
-    recorded: RecordedView
-    test: Callable[[Array], Mask]
+    use: Callable[[Array], Mask]  # training samples of the first recording, by their times
+    recording: Recording  # to judge on
+    recorded: RecordedView  # with the prediction `BASE`
+    test: Callable[[Array], Mask]  # which of its samples count, by their times
 
 
 def black_box_fits(
     recording: Recording, recorded: RecordedView, exams: Sequence[Exam], jobs: int
 ) -> list[dict[str, dict[str, ChannelFit]]]:
-    """Train both black boxes for each joint and exam, and judge them.
-
-    `recording`: to train on.
-    `recorded`: with the prediction `BASE`.
-    Returns: for each exam by black box and signal.
-    """
+    """Train both black boxes for each joint and exam; judged, for each exam, by box and signal."""
     tasks = [(e, kind, j) for e in range(len(exams)) for j in recorded.joints for kind in KINDS]
 
     def judged(task: tuple[int, str, str]) -> dict[str, ChannelFit]:

@@ -20,11 +20,9 @@ from endoscope_explain.search.levels import FALSE_ALARMS
 
 
 def confirmed_by(validation: Recording, explanation: Explanation) -> tuple[NamedEffect, ...]:
-    """The named effects, doubtful where the second recording is not predicted better with them.
-
-    Those of a joint are judged together, by the chance at which any term is taken; what is of a
-    device that joints share, on all joints that show it. Of a joint that rests nothing is said.
-    """
+    """The named effects, doubtful where the second recording is not predicted better with them."""
+    # Those of a joint are judged together, by the chance at which any term is taken; what is of a
+    # device that joints share, on all joints that show it. Of a joint that rests nothing is said.
     if not explanation.effects:
         return ()
     plants = {'refitted': explanation.refitted, 'augmented': explanation.augmented}
@@ -53,13 +51,12 @@ def confirmed_by(validation: Recording, explanation: Explanation) -> tuple[Named
 
 
 def chance_of_no_gain(seen: RecordedView, joints: Collection[str]) -> float:
-    """P-value of "the augmented plant predicts joints no better than the refitted one".
-
-    What is left r, and what the augmented plant changes d, lower the squares by d (2 r - d). Their
-    sum is positive where r has a slope of more than a half on d: 1 for the right term, 0 for one
-    that has nothing to do with it. The slope is a ratio of sums over blocks (Cochran, Sampling
-    Techniques, 1977, ch. 6), so blocks in which the term does not act do not speak against it.
-    """
+    """P-value of "the augmented plant predicts joints no better than the refitted one"."""
+    # What is left r, and what the augmented plant changes d, lower the squares by d (2 r - d).
+    # Their sum is positive where r has a slope of more than a half on d: 1 for the right term, 0
+    # for one that has nothing to do with it. The slope is a ratio of sums over blocks (Cochran,
+    # Sampling Techniques, 1977, ch. 6), so blocks in which the term does not act do not speak
+    # against it.
     blocks: dict[int, list[float]] = {}
     for signal in (s for joint in sorted(joints) for s in seen.of_joint(joint)):
         left = signal.residual('refitted')

@@ -142,10 +142,8 @@ def has_changed(name: str, estimate: NominalEstimate) -> bool:
 
 
 def plant_of(plant: PlantDescription, fits: list[Candidate]) -> PlantDescription:
-    """A plant with the numbers of its joints' fits, and with their effects and functions.
-
-    What is of a device that joints share has the numbers of the joint that shows it best.
-    """
+    """A plant with the numbers of its joints' fits, and with their effects and functions."""
+    # What is of a device that joints share has the numbers of the joint that shows it best.
     joints, specs, terms = dict(plant.joints), list(plant.effects), list(plant.terms)
     shared: dict[str, tuple[float, Mapping[str, float]]] = {}
     for one in fits:

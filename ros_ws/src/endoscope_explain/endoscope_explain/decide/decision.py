@@ -20,13 +20,11 @@ Array = NDArray[np.float64]
 
 
 def features(gain: float, margin: float, beyond_form: float) -> tuple[float, float, float]:
-    """What the certainty of a name is judged by.
-
-    One; the share `margin / gain` of its evidence that no other name has; and by how much what is
-    left exceeds what rigs of another form leave, as a logarithm. In the study of forms that differ,
-    names whose next rival had less than half of their gain were right in 27 cases of 28, and what
-    was left told right from wrong in 44 of 48.
-    """
+    """What the certainty of a name is judged by."""
+    # One; the share `margin / gain` of its evidence that no other name has; and by how much what is
+    # left exceeds what rigs of another form leave, as a logarithm. In the study of forms that
+    # differ, names whose next rival had less than half of their gain were right in 27 cases of 28,
+    # and what was left told right from wrong in 44 of 48.
     alone = min(max(margin / gain, 0.0), 1.0) if gain > 0.0 else 0.0
     left = 0.0 if math.isnan(beyond_form) else math.log(max(beyond_form, 1.0))
     return 1.0, alone, left
@@ -44,25 +42,17 @@ def certainty(gain: float, margin: float, beyond_form: float) -> float:
 
 @dataclass(frozen=True)
 class MissingTerm:
-    """One term that is missing from the simulation.
+    """One term that is missing from the simulation."""
 
-    `term`: as it is modelled.
-    `name`: effect of the catalogue whose physics it is; the place of the function where it is
-        none's.
-    `alternatives`: names of terms that the recording does not tell from it, nearest first.
-    `gain`: logarithm of the evidence that it brings.
-    `margin`: by how much more than the best other name.
-    `p_value`: chance that a rig in which nothing is missing shows as much.
-    `formula`: with the formula of `name`, where it was fitted.
-    """
-
-    term: Term
+    term: Term  # as it is modelled
+    # Effect of the catalogue whose physics it is; the place of the function where it is none's.
     name: str
+    # Names of terms that the recording does not tell from it, nearest first.
     alternatives: tuple[str, ...]
-    gain: float
-    margin: float
-    p_value: float
-    formula: Candidate | None
+    gain: float  # logarithm of the evidence that it brings
+    margin: float  # by how much more than the best other name
+    p_value: float  # chance that a rig in which nothing is missing shows as much
+    formula: Candidate | None  # with the formula of `name`, where it was fitted
 
     @property
     def is_known(self) -> bool:
@@ -72,17 +62,12 @@ class MissingTerm:
 
 @dataclass(frozen=True)
 class Decision:
-    """What is said about one joint.
+    """What is said about one joint."""
 
-    `chosen`: the joint with what is missing; the nominal plant where nothing is.
-    `missing`: in the order in which they were found.
-    `explained`: share of the excess misfit that the terms remove; 1 where there was none.
-    `instead`: names of terms that the recording does not tell from other numbers, nearest first.
-    """
-
-    chosen: Candidate
-    missing: tuple[MissingTerm, ...]
-    explained: float
+    chosen: Candidate  # the joint with what is missing; the nominal plant where nothing is
+    missing: tuple[MissingTerm, ...]  # in the order in which they were found
+    explained: float  # share of the excess misfit that the terms remove; 1 where there was none
+    # Names of terms that the recording does not tell from other numbers, nearest first.
     instead: tuple[str, ...] = ()
 
     @property
@@ -159,10 +144,9 @@ def _missing(level: Level, best: Candidate, jobs: int) -> MissingTerm:
 
 
 def _name(level: Level, one: Candidate) -> str:
-    """The effect whose physics the last term of a candidate is, or its place.
-
-    At the place of a function it is the effect whose formula comes nearest, or the only one there.
-    """
+    """The effect whose physics the last term of a candidate is, or its place."""
+    # At the place of a function it is the effect whose formula comes nearest, or the only one
+    # there.
     last = one.terms[-1]
     if not last.is_function:
         return last.id

@@ -26,18 +26,13 @@ SETTLING_STEPS = 20
 
 @dataclass(frozen=True)
 class GivenPhysics:
-    """A fitted joint without its recording.
+    """A fitted joint without its recording."""
 
-    Shapes: `base` (parameters,), `flags` (flags,), `theta` (n,).
-    `effects`: in the order in which they were added.
-    `free`: as in `JointModel`.
-    """
-
-    effects: tuple[str, ...]
-    base: Array
-    flags: Flags
-    free: tuple[FreeParameter, ...]
-    theta: Array
+    effects: tuple[str, ...]  # in the order in which they were added
+    base: Array  # (parameters,)
+    flags: Flags  # (flags,)
+    free: tuple[FreeParameter, ...]  # as in `JointModel`
+    theta: Array  # (n,)
 
 
 GivenJoints = Mapping[str, GivenPhysics]
@@ -58,12 +53,10 @@ def settled(model: JointModel, theta: Array) -> Fit:
 def explained_by(
     references: tuple[Fit, Fit], given: GivenPhysics, jobs: int
 ) -> tuple[JointSearch, Decision]:
-    """Fit given physics to a joint, and see what each of its effects is needed for.
-
-    Each effect gains what the joint loses without it. One term more is searched only where they
-    leave more than another form would. The reference fits are the nominal plant refitted, and as
-    described.
-    """
+    """Fit given physics to a joint, and see what each of its effects is needed for."""
+    # Each effect gains what the joint loses without it. One term more is searched only where they
+    # leave more than another form would. The reference fits are the nominal plant refitted, and as
+    # described.
     nominal = candidate((), references[0])
     found = references[0]
     terms: tuple[Term, ...] = ()

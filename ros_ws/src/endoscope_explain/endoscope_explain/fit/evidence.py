@@ -20,14 +20,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Misfit:
-    """Misfit of one joint.
+    """Misfit of one joint."""
 
-    `channels` (C,): mean squared residual of each channel in noise units.
-    `total`: sum over all samples, in noise units.
-    """
-
-    channels: Array
-    total: float
+    channels: Array  # (C,), mean squared residual of each channel in noise units
+    total: float  # sum over all samples, in noise units
 
 
 def misfit(found: Fit) -> Misfit:
@@ -52,12 +48,7 @@ def weights(observation: JointObservation, residuals: Array) -> Array:
 
 
 def log_likelihood(squares: Array, counts: Array) -> float | Array:
-    """Logarithm of the likelihood of channels with their variance as it is left.
-
-    `squares` (..., C): mean squares in noise units.
-    `counts` (C,): samples of each channel.
-    Returns (...).
-    """
+    """Logarithm of the likelihood of channels with their variance as it is left."""
     variance = np.maximum(squares, 1.0)
     return -0.5 * np.sum(counts * (np.log(variance) + squares / variance), axis=-1)
 
@@ -99,12 +90,10 @@ WHITE = frozenset({'tension', 'bending', 'shaft_effort'})
 
 
 def excess(fit: Fit) -> dict[str, float]:
-    """Return by how many standard deviations each white channel is above noise alone.
-
-    The larger of two tests for each signal: of single samples, and of means over blocks. The part
-    of the noise that lasts is one reading a block, so that fewer squares scatter independently
-    (Bayley, Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).
-    """
+    """Return by how many standard deviations each white channel is above noise alone."""
+    # The larger of two tests for each signal: of single samples, and of means over blocks. The part
+    # of the noise that lasts is one reading a block, so that fewer squares scatter independently
+    # (Bayley, Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).
     found = {}
     observation = fit.model.observation
     for channel, part in zip(observation.channels, observation.slices(), strict=True):
@@ -146,10 +135,8 @@ REFIT_STEPS = 2
 
 
 def judged_at(time: Array) -> Mask:
-    """Tell which samples (N,) are held out, by their time in s from the first command.
-
-    All are where there is no whole held-out block.
-    """
+    """Tell which samples (N,) are held out, by their time in s from the first command."""
+    # All are where there is no whole held-out block.
     inside = np.mod(time, BLOCK_S * EVERY) >= BLOCK_S * (EVERY - 1)
     return inside if inside.any() else np.ones_like(inside)
 

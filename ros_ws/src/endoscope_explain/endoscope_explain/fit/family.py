@@ -42,23 +42,18 @@ LEAST_RANGE = 1e-6
 
 @dataclass(frozen=True)
 class Family:
-    """Functions at a place.
-
-    `low`, `high`: range of the argument; one period where functions repeat themselves.
-    `basis` (NODES, K): values at the nodes for coefficients that are normal, each with a variance
-        of one.
-    `band`: of the periods that functions may have that repeat themselves, or of an argument's lag.
-    `multiplies`: whether they multiply what other functions add there; see `TermSpec`.
-    `lag`: time constant in s of an argument that lags, which a fit may move.
-    """
+    """Functions at a place."""
 
     place: Place
+    # Range of the argument; one period where functions repeat themselves.
     low: float
     high: float
+    # (NODES, K), values at the nodes for coefficients that are normal, each with a variance of one.
     basis: Array
+    # Of the periods that functions may have that repeat themselves, or of an argument's lag.
     band: tuple[float, float] | None = None
-    multiplies: bool = False
-    lag: float | None = None
+    multiplies: bool = False  # whether they multiply what other functions add there; see `TermSpec`
+    lag: float | None = None  # time constant in s of an argument that lags, which a fit may move
 
     @property
     def largest(self) -> float:
@@ -86,10 +81,7 @@ class Family:
         return np.clip(values, -self.largest, self.largest)
 
     def finer(self, count: int, visited: tuple[float, float] | None = None) -> 'Family':
-        """Functions at the same place, of the same size, with more coefficients.
-
-        `visited`: their range, if it is another one.
-        """
+        """Functions of the same place and size with more coefficients, over another range."""
         size = np.sqrt(np.mean(np.sum(self.basis**2, axis=1)))
         found = family_at(self.place, visited or (self.low, self.high), count, self.band)
         assert found is not None
@@ -114,12 +106,9 @@ def family_at(
     count: int = COEFFICIENTS,
     band: tuple[float, float] | None = None,
 ) -> Family | None:
-    """Functions of unit variance over the visited range; None where the state did not move.
-
-    `visited`: one period where functions repeat themselves.
-    `count`: coefficients: the more there are, the shorter the length over which the functions vary.
-    `band`: of their periods, if they repeat themselves, or of their argument's lag.
-    """
+    """Functions of unit variance over the visited range; None where the state did not move."""
+    # The range is one period where functions repeat themselves. The more coefficients there are,
+    # the shorter the length over which the functions vary.
     low, high = visited
     if place.shape in (Shape.ODD, Shape.EVEN):
         high = max(abs(low), abs(high))
@@ -142,10 +131,8 @@ def family_at(
 
 
 def _periodic(side: Array, length: float, count: int) -> Array:
-    """Harmonics (NODES, about `count`) in pairs, each as large as the process of a period has it.
-
-    Its mean is left out: it is the rest angle, or taken away.
-    """
+    """Harmonics (NODES, K) in pairs, each as large as the process of a period has it."""
+    # Its mean is left out: it is the rest angle, or taken away.
     lags = side[:-1]
     images = range(-_IMAGES, _IMAGES + 1)
     covariance = np.sum([_matern((lags + image) / length) for image in images], axis=0)
@@ -160,13 +147,9 @@ def _periodic(side: Array, length: float, count: int) -> Array:
 def visited_states(
     observation: JointObservation, parameters: Array, outputs: Array
 ) -> dict[tuple[str, str], Array]:
-    """States along a simulation, by the symbol and unit of a place's argument.
-
-    Shapes: `outputs` (N, OUTPUTS).
-    `parameters` (parameters,): packed.
-    Returns: values whose ends are those of the range; time, the shaft's angle, and what arguments
-        that lag follow, on ticks (N, ...).
-    """
+    """States along a simulation (N, OUTPUTS), by the symbol and unit of a place's argument."""
+    # The ends of the values are those of the range; time, the shaft's angle, and what arguments
+    # that lag follow, are on ticks (N, ...).
     angle, shaft = outputs[:, OUT_JOINT], outputs[:, OUT_MOTOR]
     speed = np.gradient(angle, observation.tick)
     shaft_speed = outputs[:, OUT_MOTOR_SPEED]
@@ -195,12 +178,7 @@ def visited_states(
 def visited_range(
     place: Place, states: dict[tuple[str, str], Array], tick: float, lag: float | None = None
 ) -> tuple[float, float]:
-    """Range of a place's argument along a simulation.
-
-    `states`: see `visited_states`.
-    `tick`: in s.
-    `lag`: time constant in s of an argument that lags.
-    """
+    """Range of a place's argument, which may lag by `lag` s, along a simulation."""
     state = states[place.argument.symbol, place.argument.unit]
     if lag is not None:
         kept = np.exp(-tick / lag)

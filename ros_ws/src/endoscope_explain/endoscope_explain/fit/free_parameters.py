@@ -45,12 +45,9 @@ def nominal_number(name: str) -> PlantNumber:
 
 
 def tolerance(name: str, described: float, band: float = BAND) -> tuple[float, float]:
-    """Lowest and highest value of a nominal parameter that needs no explanation.
-
-    `described`: its value in the plant file.
-    `band`: share by which parameters may differ: they may be larger, and smaller, by the factor `1
-        + band`. What describes a form may differ by 90 % of what healthy rigs do.
-    """
+    """Lowest and highest value of a nominal parameter that needs no explanation."""
+    # Parameters may be larger, and smaller, by the factor `1 + band`. What describes a form may
+    # differ by 90 % of what healthy rigs do.
     spread = nominal_number(name).spread
     if spread:
         reach = NINETY_PERCENT * spread
@@ -63,25 +60,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FreeParameter:
-    """A number that a fit may move.
+    """A number that a fit may move."""
 
-    `index`: place in the packed parameters, or `LEAD`.
-    `logarithmic`: whether the fit's coordinate is the logarithm; else it is the value over `unit`.
-    `unit`: size of one coordinate step on a scale that is not logarithmic.
-    `low`, `high`: bounds of the value.
-    `mean`, `spread`: Gaussian prior of the coordinate; an infinite spread is no prior.
-    `squared`: whether the fit's coordinate is the square of the value over `unit`: of what does
-        nothing in the first order.
-    """
-
-    index: int
+    index: int  # place in the packed parameters, or `LEAD`
     name: str
+    # Whether the fit's coordinate is the logarithm; else it is the value over `unit`.
     logarithmic: bool
-    unit: float
+    unit: float  # size of one coordinate step on a scale that is not logarithmic
+    # Bounds of the value.
     low: float
     high: float
+    # Gaussian prior of the coordinate; an infinite spread is no prior.
     mean: float = 0.0
     spread: float = math.inf
+    # Whether the fit's coordinate is the square of the value over `unit`: of what does nothing in
+    # the first order.
     squared: bool = False
 
     def coordinate(self, value: float) -> float:
@@ -104,12 +97,9 @@ class FreeParameter:
 
 
 def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, ...]:
-    """The nominal plant's parameters around packed values `base`, and the reading's lead.
-
-    `base` (parameters,): packed parameters as described; those of nominal physics that it lacks are
-        not free.
-    `band`: relative deviation that the fit may not leave by more than a third.
-    """
+    """The nominal plant's parameters around packed values `base`, and the reading's lead."""
+    # Those of nominal physics that the plant lacks are not free; the fit may leave the band by a
+    # third.
     free = []
     absent = {place for each in lacking(base) for place in each.places}
     for key in SCALED_NOMINAL:
@@ -155,10 +145,8 @@ def _of_form(key: str, described: float, share: float) -> FreeParameter:
 def with_free_reference(
     free: tuple[FreeParameter, ...], effect_id: str
 ) -> tuple[FreeParameter, ...]:
-    """Widen the bounds of the nominal parameter that an effect scales over the recording.
-
-    Whether a described value holds before or after a run-in is a matter of definition.
-    """
+    """Widen the bounds of the nominal parameter that an effect scales over the recording."""
+    # Whether a described value holds before or after a run-in is a matter of definition.
     rescales = describe(effect_id).traits.rescales
     if rescales is None:
         return free
@@ -187,10 +175,8 @@ def _of_effect(index: int, parameter: Parameter) -> FreeParameter:
 
 
 def time_scale(place: Place, low: float, high: float) -> FreeParameter:
-    """The period of a function that repeats itself, or the lag of its argument.
-
-    It is anywhere in between, evenly in its logarithm.
-    """
+    """The period of a function that repeats itself, or the lag of its argument."""
+    # It is anywhere in between, evenly in its logarithm.
     name, index = ('lag', LAG) if place.argument.lags else ('period', HIGH)
     return FreeParameter(place.first_parameter + index, f'{place.id}_{name}', True, 1.0, low, high)
 

@@ -49,21 +49,14 @@ _TINY = 1e-12
 
 @dataclass(frozen=True)
 class OtherForms:
-    """What rigs of another form leave, without noise.
+    """What rigs of another form leave, without noise."""
 
-    `residuals` (size, B): in noise units, with the model fitted to each rig.
-    `moved` (n, B): by how much the form moves the fit's coordinates.
-    """
-
-    residuals: Array
-    moved: Array
+    residuals: Array  # (size, B), in noise units, with the model fitted to each rig
+    moved: Array  # (n, B), by how much the form moves the fit's coordinates
 
 
 def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
-    """Simulate rigs of another form at a fit's numbers and fit its model to them.
-
-    `count`: rigs B.
-    """
+    """Residuals (size, B) and coordinates (n, B) of fits to `count` rigs of another form."""
     model = found.model.on_coarse_ticks()
     parameters, lead = model.packed(found.theta)
     # The fitted numbers are these rigs' own: there is nothing that would draw a fit elsewhere.
@@ -98,10 +91,7 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
 
 
 def with_form(found: Fit, jobs: int) -> Fit:
-    """A fit that knows what an error of form does to it.
-
-    Returns: with `moved_by_form` and `beyond_form`.
-    """
+    """A fit with `moved_by_form` and `beyond_form`: what an error of form does to it."""
     if found.beyond_form is not None:
         return found
     if is_noise(found):
@@ -138,20 +128,15 @@ TOGETHER = math.sqrt(0.75)
 
 @dataclass(frozen=True)
 class Intervals:
-    """90 % intervals of a fit's free parameters.
-
-    Shapes: `values`, `low`, `high` (n,).
-    `indices`: places in the packed parameters.
-    `shown` (n,): whether the recording says more of it than the prior.
-    `partners`: number without which the recording does not tell this one; empty where it does.
-    """
+    """90 % intervals of a fit's free parameters."""
 
     names: tuple[str, ...]
-    indices: tuple[int, ...]
-    values: Array
-    low: Array
-    high: Array
-    shown: NDArray[np.bool_]
+    indices: tuple[int, ...]  # places in the packed parameters
+    values: Array  # (n,)
+    low: Array  # (n,)
+    high: Array  # (n,)
+    shown: NDArray[np.bool_]  # (n,), whether the recording says more of it than the prior
+    # Number without which the recording does not tell this one; empty where it does.
     partners: tuple[str, ...]
 
 
@@ -204,11 +189,9 @@ def intervals(fit: Fit) -> Intervals:
 
 
 def may_be_absent(fit: Fit, effect: Effect) -> bool:
-    """Whether the region that holds all strengths of an effect holds none of it (Wald's test).
-
-    Strengths that stand for one another may each be nothing, but not all at once: their 90 % region
-    is an ellipsoid, for one strength its interval.
-    """
+    """Whether the region that holds all strengths of an effect holds none of it (Wald's test)."""
+    # Strengths that stand for one another may each be nothing, but not all at once: their 90 %
+    # region is an ellipsoid, for one strength its interval.
     off = {
         index: parameter.off
         for index, parameter in zip(effect.places, effect.parameters, strict=True)

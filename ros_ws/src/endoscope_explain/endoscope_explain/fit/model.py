@@ -33,13 +33,7 @@ def simulate_joint(
     flags: Flags,
     inputs: Array | None = None,
 ) -> Array:
-    """Noise-free readings of one joint under the recorded commands.
-
-    `parameters` (parameters,): packed parameters of this joint.
-    `flags` (flags,): effects that are on.
-    `inputs` (1, N, INPUTS): instead of the observation's own, for cut chains.
-    Returns (N, OUTPUTS).
-    """
+    """Noise-free readings (N, OUTPUTS) of one joint under the recorded, or other, inputs."""
     inputs = observation.inputs if inputs is None else inputs
     packed, on = parameters[None], flags[None]
     speed = np.array([observation.start_speed])
@@ -52,10 +46,7 @@ def simulate_joint(
 def residuals(
     observation: JointObservation, outputs: Array, lead: float = 0.0, skew: float = 0.0
 ) -> Array:
-    """Return simulated minus measured, in units of the known noise, all channels in a row (size,).
-
-    `lead` in units of `TICK` and `skew` of the tracker's clock are as in `Channel.predicted`.
-    """
+    """Simulated minus measured in noise units (size,); `lead` is in units of `TICK`."""
     lead *= TICK / observation.tick
     return np.concatenate(
         [
@@ -96,24 +87,18 @@ _AT_BOUND = 1e-6
 
 @dataclass(frozen=True)
 class JointModel:
-    """One joint with some of its numbers free.
-
-    Shapes: `flags` (flags,).
-    `base` (parameters,): packed parameters; the free ones are replaced.
-    `wide_step`: difference step of a coordinate where an effect makes the misfit rugged.
-    `families`: of functions that are free; their coefficients are free parameters, in the same
-        order.
-    `coarse`: ticks in one of the simulations from which derivatives are differences.
-    `offset` (size,): added to the residuals: what coarse ticks do to them, as known somewhere near.
-    """
+    """One joint with some of its numbers free."""
 
     observation: JointObservation
-    base: Array
-    flags: Flags
+    base: Array  # (parameters,), packed parameters; the free ones are replaced
+    flags: Flags  # (flags,)
     free: tuple[FreeParameter, ...]
+    # Difference step of a coordinate where an effect makes the misfit rugged.
     wide_step: float = WIDE_STEP
+    # Of functions that are free; their coefficients are free parameters, in the same order.
     families: tuple[Family, ...] = ()
-    coarse: int = COARSE
+    coarse: int = COARSE  # ticks in one of the simulations from which derivatives are differences
+    # (size,), added to the residuals: what coarse ticks do to them, as known somewhere near.
     offset: Array | None = field(default=None, repr=False)
 
     def on_coarse_ticks(self, offset: Array | None = None) -> 'JointModel':
@@ -213,29 +198,21 @@ class JointModel:
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted joint.
-
-    `theta` (n,): coordinates of the free parameters.
-    `residuals` (size,): unweighted, in noise units.
-    `jacobian` (size, n): of the residuals, at or near `theta`.
-    `cost`: half weighted squares, prior included.
-    `moved_by_form` (n, n): mean product of the ways by which an error of form as large as what is
-        left moves two coordinates.
-    `beyond_form`: what is left of the worst channel over what the worst rig of another form leaves;
-        0 where noise is left.
-    `steps`: of the solver, the last time that the joint was fitted.
-    `ended`: why it went no further; None where nothing was fitted.
-    """
+    """A fitted joint."""
 
     model: JointModel
-    theta: Array
-    residuals: Array
-    jacobian: Array = field(repr=False)
-    cost: float
+    theta: Array  # (n,), coordinates of the free parameters
+    residuals: Array  # (size,), unweighted, in noise units
+    jacobian: Array = field(repr=False)  # (size, n), of the residuals, at or near `theta`
+    cost: float  # half weighted squares, prior included
+    # (n, n), mean product of the ways by which an error of form as large as what is left moves two
+    # coordinates.
     moved_by_form: Array | None = field(default=None, repr=False)
+    # What is left of the worst channel over what the worst rig of another form leaves; 0 where
+    # noise is left.
     beyond_form: float | None = None
-    steps: int = 0
-    ended: Ended | None = None
+    steps: int = 0  # of the solver, the last time that the joint was fitted
+    ended: Ended | None = None  # why it went no further; None where nothing was fitted
 
     def at_bounds(self) -> tuple[str, ...]:
         """Names of the free parameters that were driven to an end of what is allowed."""
@@ -261,15 +238,9 @@ def without_effect(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
 
 
 def jacobian(model: JointModel, theta: Array, columns: list[int] | None = None) -> Array:
-    """Difference quotients of the residuals at the coordinates `theta`, on coarser ticks.
-
-    What is left of the error of coarse ticks in a difference turns a step by a few per cent; a fit
-    ends where the residuals on its own ticks do.
-
-    Shapes: `theta` (n,).
-    `columns`: coordinates to differentiate by; all if not given.
-    Returns (columns).
-    """
+    """Difference quotients (size, columns) of the residuals at `theta` (n,), on coarser ticks."""
+    # What is left of the error of coarse ticks in a difference turns a step by a few per cent; a
+    # fit ends where the residuals on its own ticks do.
     low, high = model.bounds()
     columns = list(range(len(theta))) if columns is None else columns
     coarse = model.on_coarse_ticks()
@@ -307,14 +278,9 @@ def fit(
     tolerance: float = 1e-3,
     known_jacobian: Array | None = None,
 ) -> Fit:
-    """Fit the free parameters of a joint.
-
-    `start` (n,): coordinates to start from.
-    `weight` (size,): factors on the residuals (at most 1 where an error of form is allowed for).
-    `iterations`: largest number of steps.
-    `tolerance`: stop when a step lowers the cost by less than this share.
-    `known_jacobian` (size, n): used for the first step.
-    """
+    """Fit the free parameters of a joint from coordinates (n,), residuals times `weight`."""
+    # Weights are at most 1, where an error of form is allowed for. It stops when a step lowers the
+    # cost by less than the tolerance's share.
     objective = _OneJoint(model, weight)
     return _fit_of(model, minimise(objective, start, Effort(iterations, tolerance), known_jacobian))
 
@@ -326,12 +292,7 @@ def broyden_fit(
     steps: int,
     weight: Array | None = None,
 ) -> Fit:
-    """Fit by few simulations: a derivative that is known near `start` is updated, never renewed.
-
-    Shapes: `start` (n,), `known_jacobian` (size, n).
-    `steps`: of the fit, at most: a simulation each.
-    `weight` (size,): factors on the residuals.
-    """
+    """Fit by few simulations: a derivative that is known near `start` is updated, never renewed."""
     effort = Effort(steps, renewal=Renewal.NEVER)
     return _fit_of(model, minimise(_OneJoint(model, weight), start, effort, known_jacobian))
 

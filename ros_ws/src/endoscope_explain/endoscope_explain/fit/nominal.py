@@ -44,13 +44,8 @@ SAME_STAMP_S = 1e-6
 def without_isolated(
     recording: Recording, observations: tuple[JointObservation, ...], fits: tuple[Fit, ...]
 ) -> tuple[JointObservation, ...]:
-    """Leave out tracker samples that stick out of the residual, where some were wrong already.
-
-    `recording`: as audited. Where the audit found no wrong sample, none is left out here: a spike
-        may be physics.
-    `fits`: of the nominal plant to each of them.
-    Returns: the very same tuple where nothing was left out.
-    """
+    """Leave out tracker samples that stick out of the residual; the same tuple where none does."""
+    # Where the audit found no wrong sample, none is left out here: a spike may be physics.
     if recording.bending.valid.all():
         return observations
     cleaned = tuple(
@@ -70,11 +65,7 @@ def _without_isolated(observation: JointObservation, fit: Fit) -> JointObservati
 
 
 def with_isolated_marked(recording: Recording, plant: PlantDescription) -> Recording:
-    """Mark tracker samples that stick out of what a plant predicts as wrong.
-
-    `recording`: as audited. Where the audit found no wrong sample, none is marked here.
-    `plant`: that explains the rig.
-    """
+    """Mark tracker samples that stick out of what a plant predicts as wrong, if others were."""
     bending = recording.bending
     if bending.valid.all():
         return recording
@@ -121,11 +112,7 @@ SAME_COMMAND_RAD = 1e-6
 
 
 def against_baseline(observation: JointObservation, healthy: Fit) -> JointObservation:
-    """A joint's observation as seen against the same joint in health.
-
-    `healthy`: of the baseline recording of the same joint.
-    Returns: with readings or noise corrected by what the plant never explained.
-    """
+    """A joint's observation, corrected by what the plant never explained of it in health."""
     before = healthy.model.observation
     repeated = _same_commands(observation, before)
     parts = dict(zip((c.signal for c in before.channels), before.slices(), strict=True))
@@ -188,15 +175,7 @@ def with_references(
     band: float,
     jobs: int,
 ) -> tuple[tuple[JointObservation, ...], list[ReferenceFits]]:
-    """Fit the nominal plant, and once more where that shows isolated wrong samples.
-
-    `recording`: tells which samples the audit found wrong.
-    `observations`: of the recording.
-    `plant`: in health.
-    `band`: relative tolerance of its parameters.
-    Returns `observations`: without the samples that stick out.
-    Returns `references`: of each joint, beside the other as refitted.
-    """
+    """Fit the nominal plant, and once more where that shows isolated wrong samples."""
     packed = {o.joint: packed_joint(plant, o.joint) for o in observations}
     references = all_references(observations, packed, jobs, band)
     cleaned = without_isolated(recording, observations, tuple(fitted for fitted, _ in references))
@@ -251,11 +230,7 @@ def nominal_references(
     flags: Flags,
     band: float = BAND,
 ) -> ReferenceFits:
-    """The nominal plant refitted, and as described, each with its derivative.
-
-    `base` (parameters,), `flags` (flags,): packed plant as described, with what effects it has.
-    `band`: relative deviation of a healthy rig from its description.
-    """
+    """The nominal plant refitted, and as described, each with its derivative."""
     model = JointModel(observation, base, flags, nominal_parameters(base, band))
     theta = np.array([item.mean for item in model.free])
     residuals = model.residuals(theta)
@@ -283,12 +258,10 @@ def is_at_tolerance(fitted: Fit) -> bool:
 
 
 def with_any_numbers(fitted: Fit) -> Fit:
-    """Refit with nominal numbers that may leave their band.
-
-    A rig that is described wrongly by a third lacks no physics. Within its band no refit shows
-    that, and an effect that can do a wrong number's work would be named for it. The priors stay, so
-    that a number far from its description has its price.
-    """
+    """Refit with nominal numbers that may leave their band."""
+    # A rig that is described wrongly by a third lacks no physics. Within its band no refit shows
+    # that, and an effect that can do a wrong number's work would be named for it. The priors stay,
+    # so that a number far from its description has its price.
     model = fitted.model
     model = replace(model, free=tuple(_widened(item) for item in model.free))
     return fit(model, fitted.theta, iterations=ANY_NUMBER)

@@ -62,15 +62,12 @@ THOROUGH = Effort(30, 1e-4, (STEP, 10.0 * STEP, 60.0 * STEP), Renewal.ALWAYS)
 
 @dataclass(frozen=True)
 class _Layout:
-    """Where the coordinates of all recordings lie in one vector.
+    """Where the coordinates of all recordings lie in one vector."""
 
-    `columns`: of each recording, the place of each of its free parameters; tied ones share theirs.
-    `pools`: places of parameters that scatter around a common mean.
-    `low`, `high` (N,): bounds.
-    """
-
+    # Of each recording, the place of each of its free parameters; tied ones share theirs.
     columns: tuple[Indices, ...]
-    pools: tuple[Indices, ...]
+    pools: tuple[Indices, ...]  # places of parameters that scatter around a common mean
+    # (N,), bounds.
     low: Array
     high: Array
 
@@ -81,13 +78,9 @@ def fit_together(
     *,
     rough: bool = False,
 ) -> list[Fit]:
-    """Fit all recordings of a rig together.
-
-    `models`: of each recording, with the parameters of devices free.
-    `starts` (n,): coordinates to start from; those of devices start from their median.
-    `rough`: whether to stop early: to tell which effect is the better one, few digits are enough.
-    Returns: of each recording; the cost is its own, without what it lies away from the others.
-    """
+    """Fit all recordings of a rig together; the cost of each is its own."""
+    # Coordinates of devices start from their median. To tell which effect is the better one, a
+    # rough fit is enough.
     layout = _layout(models)
     whole = np.zeros(len(layout.low))
     for place in range(len(whole)):
@@ -110,11 +103,7 @@ def with_common_numbers(fits: Sequence[Fit]) -> list[Array]:
 
 
 def deviations(fits: Sequence[Fit]) -> list[Array]:
-    """Standard deviations (n,) of each recording's coordinates, by what is left as white noise.
-
-    `fits`: of `fit_together`: what they share is known by all of them.
-    Returns (n,).
-    """
+    """Standard deviations (n,) of the coordinates of fits of `fit_together`, by white noise."""
     layout, whole = _laid_out(fits)
     weight = [weights(f.model.observation, f.residuals) for f in fits]
     together = _Together([f.model for f in fits], layout, SPREAD, weight)
@@ -126,12 +115,8 @@ def deviations(fits: Sequence[Fit]) -> list[Array]:
 
 
 def judged_alone(fits: Sequence[Fit]) -> list[Fit]:
-    """Each recording's fit as it can be continued without the others.
-
-    `fits`: of `fit_together`.
-    Returns: devices are held as found; a pooled parameter has the others' mean and scatter for a
-        prior.
-    """
+    """Each recording's fit of `fit_together` as it can be continued without the others."""
+    # Devices are held as found; a pooled parameter has the others' mean and scatter for a prior.
     layout, whole = _laid_out(fits)
     means = {int(place): float(np.mean(whole[pool])) for pool in layout.pools for place in pool}
     alone = []

@@ -46,16 +46,12 @@ class Ended(StrEnum):
 
 @dataclass(frozen=True)
 class Effort:
-    """How long a fit goes on.
+    """How long a fit goes on."""
 
-    `iterations`: largest number of steps.
-    `tolerance`: stop when a step lowers the cost by less than this share.
-    `strides`: difference steps, each used until it leads no further: the misfit is rough on a small
-        scale, and a longer step looks over that.
-    """
-
-    iterations: int = 8
-    tolerance: float = 1e-3
+    iterations: int = 8  # largest number of steps
+    tolerance: float = 1e-3  # stop when a step lowers the cost by less than this share
+    # Difference steps, each used until it leads no further: the misfit is rough on a small scale,
+    # and a longer step looks over that.
     strides: tuple[float, ...] = (STEP,)
     renewal: Renewal = Renewal.WHEN_SLOW
 
@@ -84,29 +80,20 @@ class Objective[R, D](Protocol):
 
 @dataclass(frozen=True)
 class Minimum[R, D]:
-    """Where a fit ended.
+    """Where a fit ended."""
 
-    Shapes: `theta` (n,).
-    `derivative`: at `theta`; near it where it is never renewed.
-    `steps`: that were tried.
-    """
-
-    theta: Array
+    theta: Array  # (n,)
     residuals: R
-    derivative: D
+    derivative: D  # at `theta`; near it where it is never renewed
     cost: float
-    steps: int
+    steps: int  # that were tried
     ended: Ended
 
 
 def minimise[R, D](
     objective: Objective[R, D], start: Array, effort: Effort, known: D | None = None
 ) -> Minimum[R, D]:
-    """Go down from `start`.
-
-    Shapes: `start` (n,).
-    `known`: a derivative near `start`, used for the first step.
-    """
+    """Go down from `start` (n,), by a derivative that is known near it for the first step."""
     low, high = objective.bounds()
     theta = np.clip(start, low, high)
     residuals, cost = objective.evaluate(theta)

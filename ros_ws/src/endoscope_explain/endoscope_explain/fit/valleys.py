@@ -26,11 +26,7 @@ STRIDES = (2, 1)
 
 
 def out_of_valleys(found: Fit, weight: Array) -> Fit:
-    """Look whether an onset at another time, or another whole number, leads to a better fit.
-
-    `weight` (size,): factors on the residuals.
-    Returns: the one given where nothing does.
-    """
+    """A fit at another onset or whole number if that leads to a better one, else the one given."""
     for place, item in enumerate(found.model.free):
         if item.name == ONSET:
             end = found.model.observation.duration
@@ -79,11 +75,9 @@ def _begun_elsewhere(found: Fit, place: int, times: Array, weight: Array) -> Fit
 
 
 def _begun_at_once(found: Fit, place: int, weight: Array) -> Fit:
-    """Look whether what a fit has rise slowly rose at once.
-
-    The true instant and a slow rise around a later one are two valleys: in between, a joint held by
-    friction moves at the wrong time.
-    """
+    """Look whether what a fit has rise slowly rose at once."""
+    # The true instant and a slow rise around a later one are two valleys: in between, a joint held
+    # by friction moves at the wrong time.
     free = found.model.free
     names = [item.name for item in free]
     if RISE not in names:

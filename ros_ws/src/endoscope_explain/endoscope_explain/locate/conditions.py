@@ -18,10 +18,8 @@ STANDING_RAD_PER_S = 0.02
 
 
 def conditions(recording: Recording, j: int) -> dict[str, Mask]:
-    """When joint `j` was in each state (N,), by the state's words as they stand after "shows".
-
-    On a grid of `GRID_S`, those states that hold for some, not all of the time.
-    """
+    """When joint `j` was in each state (N,), by the state's words as they stand after "shows"."""
+    # On a grid of `GRID_S`, those states that hold for some, not all of the time.
     grid = np.arange(0.0, recording.duration, GRID_S)
     motor = _motor(recording, j, grid)
     speed = _speed(motor)

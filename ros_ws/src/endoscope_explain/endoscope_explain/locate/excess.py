@@ -96,11 +96,9 @@ def intervals(
 
 
 def onset(excesses: Sequence[SignalExcess], driven: Array, end: float) -> float | None:
-    """When, in s, a mismatch began that was not there from the start.
-
-    A change point of the windowed excess (Page, Biometrika 41, 1954, for one upward change), where
-    `driven` (W, K) are K measures of how much the rig was driven in each window.
-    """
+    """When, in s, a mismatch began that was not there from the start."""
+    # A change point of the windowed excess (Page, Biometrika 41, 1954, for one upward change),
+    # where `driven` (W, K) are K measures of how much the rig was driven in each window.
     sums, spread = windowed(excesses, end)
     strong = _strong(sums, spread)
     if not len(strong) or strong[0] * WINDOW_S < 0.1 * end:

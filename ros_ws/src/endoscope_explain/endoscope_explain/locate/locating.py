@@ -67,10 +67,8 @@ def _misfit(observation: JointObservation, outputs: Array, lead: float) -> float
 
 
 def band_hz(excess: SignalExcess) -> tuple[float, float]:
-    """Find the band in Hz that holds 90 % of what the prediction lacks.
-
-    The lower end is 0 where a constant is part of it.
-    """
+    """Find the band in Hz that holds 90 % of what the prediction lacks."""
+    # The lower end is 0 where a constant is part of it.
     time, missing = excess.view.time, excess.missing
     if len(time) < 8:
         return 0.0, 0.0
@@ -89,11 +87,9 @@ def band_hz(excess: SignalExcess) -> tuple[float, float]:
 def locate_effects(
     recording: Recording, plant: PlantDescription, effects: Sequence[NamedEffect]
 ) -> list[Place]:
-    """Say where each effect of an explained recording shows, but for those that the plant lacks.
-
-    The plant with all effects is compared with the same plant without the one in question: what
-    the measurement then has in excess is that effect's trace.
-    """
+    """Say where each effect of an explained recording shows, but for those that the plant lacks."""
+    # The plant with all effects is compared with the same plant without the one in question: what
+    # the measurement then has in excess is that effect's trace.
     located = []
     for effect in effects:
         rest = _without(plant, effect)
@@ -161,12 +157,7 @@ def place(
     joint: str,
     began: float | None = None,
 ) -> Place:
-    """Describe one trace in signals, time, state and frequency.
-
-    `found`: largest first; those of both joints.
-    `stage`, `joint`: known already.
-    `began`: when it began, in s, where that is known.
-    """
+    """Describe one trace in signals, time, state and frequency; `found` is of both joints."""
     by_signal = shares(found)
     j = recording.joints.index(joint)
     telling = [e for e in found if e.view.signal in by_signal] or list(found[:1])

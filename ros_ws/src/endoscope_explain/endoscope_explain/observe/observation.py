@@ -105,15 +105,9 @@ _SAME_READING = 1e-6
 
 
 def fast_scatter(values: Array, white: float) -> Array:
-    """Scatter of raw readings beyond their white noise, sample by sample.
-
-    Third differences take out what is smooth over four samples; their variance is 20 times that
-    of the samples (von Neumann et al., Ann. Math. Stat. 12, 1941, for first differences).
-
-    `values` (R,): equally spaced raw readings.
-    `white`: known noise (rms), not zero.
-    Returns (R,): in the readings' unit; zero where they show no more than their noise.
-    """
+    """Scatter (R,) of equally spaced raw readings beyond their white noise (rms), one by one."""
+    # Third differences take out what is smooth over four samples; their variance is 20 times that
+    # of the samples (von Neumann et al., Ann. Math. Stat. 12, 1941, for first differences).
     if len(values) < WINDOW:
         return np.zeros(len(values))
     squares = np.concatenate([np.zeros(3), np.diff(values, 3) ** 2 / 20.0])
@@ -127,53 +121,42 @@ def fast_scatter(values: Array, white: float) -> Array:
 
 @dataclass(frozen=True)
 class Channel:
-    """Readings of one sensor on the analysis grid.
+    """Readings of one sensor on the analysis grid."""
 
-    `signal`, `quantity`, `unit`: name as the report writes it, series of the recording, SI unit.
-    `output`: column of the compiled physics' output that this sensor reads.
-    `time`, `value`, `noise` (M,): stamp in s from the first command, reading, and its known noise
-        (rms).
-    `lasting`: part (rms) of the noise that a mean over readings does not lessen: of rounding, and
-        of what a plant never explained of the healthy rig.
-    """
-
+    # Name as the report writes it, series of the recording, SI unit.
     signal: str
     quantity: str
     unit: str
-    output: int
+    output: int  # column of the compiled physics' output that this sensor reads
     stamps: StampsOnTicks
+    # (M,), stamp in s from the first command, reading, and its known noise (rms).
     time: Array
     value: Array
     noise: Array
+    # Part (rms) of the noise that a mean over readings does not lessen: of rounding, and of what a
+    # plant never explained of the healthy rig.
     lasting: float = 0.0
 
     def predicted(self, outputs: Array, lead: float = 0.0, skew: float = 0.0) -> Array:
-        """Return the analysis samples (M,) that simulated outputs (N, OUTPUTS) predict.
-
-        `lead` in [0, 1] is by how many ticks a reading is younger than its stamp says: a loop
-        that stamps, commands and then reads has a lead of up to one tick. `skew` is by how much
-        the device's clock runs fast.
-        """
+        """The analysis samples (M,) that simulated outputs (N, OUTPUTS) predict."""
+        # `lead` in [0, 1] is by how many ticks a reading is younger than its stamp says: a loop
+        # that stamps, commands and then reads has a lead of up to one tick. `skew` is by how much
+        # the device's clock runs fast.
         return self.stamps.read(outputs[:, self.output], lead, skew)
 
 
 @dataclass(frozen=True)
 class JointObservation:
-    """One joint's input and channels.
-
-    `inputs` (1, N, INPUTS): input of the compiled physics on ticks.
-    `start` (K,): shaft angles in rad to which the motor has gone one after the other; the last is
-        its own.
-    `start_speed`: of the motor at first, rad/s.
-    `tick`: in s.
-    """
+    """One joint's input and channels."""
 
     joint: str
-    inputs: Array
+    inputs: Array  # (1, N, INPUTS), input of the compiled physics on ticks
+    # (K,), shaft angles in rad to which the motor has gone one after the other; the last is its
+    # own.
     start: Array
     channels: tuple[Channel, ...]
-    tick: float = TICK
-    start_speed: float = 0.0
+    tick: float = TICK  # in s
+    start_speed: float = 0.0  # of the motor at first, rad/s
 
     @property
     def size(self) -> int:
@@ -209,12 +192,7 @@ class JointObservation:
 
 
 def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObservation, ...]:
-    """The analysis view of a cleaned recording, joint by joint.
-
-    `recording`: stamps increasing; samples that must not be judged are marked invalid.
-    `plant`: gives the noise of the sensors; joints that it does not have are left out.
-    Returns: in the recording's order.
-    """
+    """The analysis view of an audited recording, joint by joint, of those that the plant has."""
     begin = float(recording.command.time[0])
     ticks = int(np.ceil((recording.duration - begin) / TICK)) + 2
     held = hold_on_ticks(recording.command.time - begin, recording.command.values, ticks)
@@ -276,11 +254,9 @@ def _channels(
 
 
 def rounding_error(step: float, white: float) -> float:
-    """Part (rms) of the error of rounding to steps that a mean over readings does not lessen.
-
-    White noise spreads readings over several steps; what it leaves of the error is a function of
-    the reading's true value (Widrow, Kollar, Quantization Noise, 2008, ch. 19).
-    """
+    """Part (rms) of the error of rounding to steps that a mean over readings does not lessen."""
+    # White noise spreads readings over several steps; what it leaves of the error is a function of
+    # the reading's true value (Widrow, Kollar, Quantization Noise, 2008, ch. 19).
     if step == 0.0:
         return 0.0
     k = np.arange(1.0, 100.0)
@@ -290,10 +266,8 @@ def rounding_error(step: float, white: float) -> float:
 
 
 def step_read(values: Array) -> float:
-    """Step in which readings (M,) come, one after the other; 0 where it is not seen.
-
-    A sensor may be coarser than its description says.
-    """
+    """Step in which readings (M,) come, one after the other; 0 where it is not seen."""
+    # A sensor may be coarser than its description says.
     change = np.abs(np.diff(values))
     change = change[change > _SAME_READING * np.max(np.abs(values), initial=0.0)]
     if len(change) < STEPS_SEEN:

@@ -49,10 +49,7 @@ class State:
 def state_of(
     recorded: RecordedView, joint: str, command: tuple[Array, Array], argument: Argument | None
 ) -> State:
-    """The state that what is missing depends on, or the command where it is none of a joint's own.
-
-    The command has stamps (N,) in s and angles (N,) in rad, joint-equivalent.
-    """
+    """What the missing physics depends on, or the command (rad) if it is not the joint's."""
     shown = None if argument is None else STATES.get((argument.symbol, argument.unit))
     if shown is None:
         return State('command', 'deg', command[0], np.asarray(np.degrees(command[1]), np.float64))
@@ -166,11 +163,7 @@ LEAST = 0.5
 def timeline_figure(
     recorded: RecordedView, command: tuple[Array, Array], joint: str, places: Sequence[Place]
 ) -> str:
-    """Plot a joint's motion and, window by window, how far each prediction is off.
-
-    The command has stamps (N,) in s and angles (N,) in rad, joint-equivalent; the intervals of the
-    places are shaded.
-    """
+    """Plot a joint's motion and, window by window, how far each prediction is off."""
     views = recorded.of_joint(joint)
     bending = next(v for v in views if v.quantity == 'bending')
     edges, levels = _misfit(views)

@@ -126,10 +126,7 @@ def before_and_after(case: ExplainedCase) -> str:
 
 
 def reservations(case: ExplainedCase) -> list[str]:
-    """Say what else has to be known: what is said of a corrected recording, and what is left over.
-
-    What the names leave over, and which numbers differ besides; empty where none do.
-    """
+    """Say what else has to be known: of a corrected recording, and of what is left over."""
     mistakes = case.audit.mistakes()
     said: list[str] = []
     if len(mistakes) > 1:

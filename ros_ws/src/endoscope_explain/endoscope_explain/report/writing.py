@@ -27,10 +27,7 @@ SCHEMA = 1
 
 
 def report_mapping(case: ExplainedCase) -> dict[str, Any]:
-    """Return the content of report.json: plain, with finite numbers only.
-
-    ValueError if a number that has no bound to fall back on is not finite.
-    """
+    """The content of report.json; ValueError if a number without a bound is not finite."""
     term, experiment = case.explanation.unknown, case.next_experiment
     content = {
         'schema': SCHEMA,

@@ -38,18 +38,13 @@ _WIDTHS = (0.03, 0.05, 0.08, 0.12, 0.2, 0.35, 0.6)
 
 @dataclass(frozen=True)
 class FittedFunction:
-    """A function as a fit has it.
-
-    Shapes: `coefficients` (K,).
-    `covariance` (K, K): of the coefficients, the other numbers free.
-    `samples`: that the fit has seen.
-    """
+    """A function as a fit has it."""
 
     joint: str
     family: Family
-    coefficients: Array
-    covariance: Array
-    samples: int
+    coefficients: Array  # (K,)
+    covariance: Array  # (K, K), of the coefficients, the other numbers free
+    samples: int  # that the fit has seen
 
     @property
     def values(self) -> Array:
@@ -81,18 +76,12 @@ def fitted_function(found: Fit, place_id: str) -> FittedFunction:
 
 @dataclass(frozen=True)
 class Formula:
-    """A formula for a function.
+    """A formula for a function."""
 
-    `expression`: of the place's symbol.
-    `values` (NODES,): at the family's nodes.
-    `share`: of what the function does, so much does the formula.
-    `as_good`: whether the data do not tell it from the function, and a plant takes it.
-    """
-
-    expression: str
-    values: Array
-    share: float
-    as_good: bool
+    expression: str  # of the place's symbol
+    values: Array  # (NODES,), at the family's nodes
+    share: float  # of what the function does, so much does the formula
+    as_good: bool  # whether the data do not tell it from the function, and a plant takes it
 
 
 def nearest_formula(found: FittedFunction) -> Formula:

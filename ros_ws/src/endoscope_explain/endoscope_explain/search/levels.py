@@ -68,17 +68,12 @@ PARENTS = 2
 
 @dataclass(frozen=True)
 class Level:
-    """Candidates with one term more.
+    """Candidates with one term more."""
 
-    `parent`: the best of those that were added to.
-    `found`: best first.
-    `null`: what is shown where nothing is missing.
-    `predicts`: whether the best one predicts blocks that it has not seen better than its parent.
-    """
-
-    parent: Candidate
-    found: tuple[Candidate, ...]
-    null: Null
+    parent: Candidate  # the best of those that were added to
+    found: tuple[Candidate, ...]  # best first
+    null: Null  # what is shown where nothing is missing
+    # Whether the best one predicts blocks that it has not seen better than its parent.
     predicts: bool = True
 
     def gain(self, one: Candidate) -> float:
@@ -87,11 +82,9 @@ class Level:
 
     @property
     def best(self) -> Candidate:
-        """The candidate to go on with.
-
-        Other numbers, then what every rig has, and then a formula stand where they lose no more
-        than form is worth.
-        """
+        """The candidate to go on with."""
+        # Other numbers, then what every rig has, and then a formula stand where they lose no more
+        # than form is worth.
         top, worth = self.found[0], self.form_is_worth()
 
         def first(candidates: Iterable[Candidate]) -> Candidate | None:
@@ -129,11 +122,9 @@ class Level:
 
     @property
     def is_found(self) -> bool:
-        """Whether something is missing, and found.
-
-        Nominal physics needs no more than to be worth its numbers: that a rig has none is no
-        hypothesis.
-        """
+        """Whether something is missing, and found."""
+        # Nominal physics needs no more than to be worth its numbers: that a rig has none is no
+        # hypothesis.
         if self.found and self.best.adds_nominal:
             return self.gain(self.best) > 0.0 and self.predicts
         return self.p_value <= FALSE_ALARMS and self.predicts
@@ -153,13 +144,10 @@ class Level:
 
 @dataclass(frozen=True)
 class JointSearch:
-    """What was tried on one joint.
+    """What was tried on one joint."""
 
-    `nominal`: no term added.
-    `levels`: with one, two, ... terms; the last one may have found nothing.
-    """
-
-    nominal: Candidate
+    nominal: Candidate  # no term added
+    # With one, two, ... terms; the last one may have found nothing.
     levels: tuple[Level, ...]
 
     def tried(self) -> list[Candidate]:
@@ -173,12 +161,8 @@ def search(
     depth: int = MOST_EFFECTS,
     left_out: tuple[str, ...] = (),
 ) -> JointSearch:
-    """Search what is missing from one joint.
-
-    `references`: nominal plant refitted, and as described if given.
-    `depth`: largest number of terms, beside the nominal physics that the plant lacks.
-    `left_out`: effects whose formulas are not tried.
-    """
+    """Search what is missing from a joint: `depth` terms at most beside nominal physics."""
+    # References are the nominal plant refitted, and as described if given.
     nominal = candidate((), references[0])
     depth += len(lacking(references[0].model.base))
     if not is_noise(nominal.fit):
@@ -254,11 +238,9 @@ def _level(
 def _that_predict(
     ranked: tuple[Candidate, ...], first: Candidate, before: float
 ) -> tuple[Candidate, ...]:
-    """Candidates, best first, from the first one on that predicts blocks better than its parent.
-
-    A function of time can be anything: what it gains where it was fitted it loses where it was not.
-    `before`: what the parent leaves there.
-    """
+    """Candidates, best first, from the first one on that predicts blocks better than its parent."""
+    # A function of time can be anything: what it gains where it was fitted it loses where it was
+    # not.
     for k, each in enumerate(ranked):
         if each.evidence > first.evidence and held_out_misfit(each.fit) < before:
             return ranked[k:]
@@ -322,11 +304,9 @@ def _with_their_formulas(
     terms: list[Term],
     jobs: int,
 ) -> list[Candidate]:
-    """Candidates, best first, with formulas fitted from the numbers that functions leave.
-
-    What is missing bends the other numbers, and a formula far from linear, begun beside bent ones,
-    ends anywhere. The function at its place has set them straight.
-    """
+    """Candidates, best first, with formulas fitted from the numbers that functions leave."""
+    # What is missing bends the other numbers, and a formula far from linear, begun beside bent
+    # ones, ends anywhere. The function at its place has set them straight.
     tasks: list[tuple[Candidate, list[Term]]] = []
     for function in (c for c in _near_the_best(grown, behind) if c.terms[-1].is_function):
         starts: dict[str, list[Term]] = {}
@@ -347,12 +327,10 @@ def _with_their_formulas(
 
 
 def _best_screened(ranked: list[Screened]) -> list[Term]:
-    """The best terms, starts of each, and the formulas at the places of the best functions.
-
-    The linearised gain of a formula that is far from linear is little at a start that is far from
-    the truth; the function at its place is not misled by that. Nominal physics is fitted in any
-    case.
-    """
+    """The best terms, starts of each, and the formulas at the places of the best functions."""
+    # The linearised gain of a formula that is far from linear is little at a start that is far from
+    # the truth; the function at its place is not misled by that. Nominal physics is fitted in any
+    # case.
     starts: dict[Variant, list[Term]] = {}
     for each in ranked:
         starts.setdefault(each.term.variant, []).append(each.term)

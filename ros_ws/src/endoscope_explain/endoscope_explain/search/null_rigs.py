@@ -45,13 +45,11 @@ _TINY = 1e-12
 
 @dataclass(frozen=True)
 class Null:
-    """Gains of the best term on rigs in which nothing is missing.
+    """Gains of the best term on rigs in which nothing is missing."""
 
-    `drawn` (B,): on rigs in which nothing is missing, off by as much as the recording is.
-    `doubt` (B,): the same where they are off by as much as the best candidate leaves.
-    """
-
+    # (B,), on rigs in which nothing is missing, off by as much as the recording is.
     drawn: Array = field(repr=False)
+    # (B,), the same where they are off by as much as the best candidate leaves.
     doubt: Array = field(repr=False)
 
     def p_value(self, gain: float) -> float:
@@ -65,25 +63,16 @@ NO_DETECTABLE_GAIN = Null(np.zeros(1), np.zeros(1))
 
 @dataclass(frozen=True)
 class Shown:
-    """Gains of all terms by the screen, as in `Null`.
+    """Gains of all terms by the screen, as in `Null`."""
 
-    Shapes: `observed` (terms,), `drawn`, `doubt` (terms, B).
-    `rigs` (size, B): what the drawn rigs are off by, in noise units.
-    """
-
-    observed: Array
-    drawn: Array
-    doubt: Array
-    rigs: Array
+    observed: Array  # (terms,)
+    drawn: Array  # (terms, B)
+    doubt: Array  # (terms, B)
+    rigs: Array  # (size, B), what the drawn rigs are off by, in noise units
 
 
 def shown(behind: Background, ways: tuple[Directions, ...], best: Fit | None, jobs: int) -> Shown:
-    """Run the screen over the recording and over rigs in which nothing is missing.
-
-    `behind`: the fit without the term.
-    `ways`: of all terms, one at least.
-    `best`: with the term that explains most; without one, there is no doubt about what is left.
-    """
+    """Run the screen over the recording and over rigs in which nothing is missing."""
     found, observation = behind.fit, behind.fit.model.observation
     generator = np.random.default_rng(_SEED)
     own = behind.left(found.residuals * behind.weight)
@@ -130,10 +119,7 @@ def shown(behind: Background, ways: tuple[Directions, ...], best: Fit | None, jo
 
 @dataclass(frozen=True)
 class NullRigs:
-    """Rigs in which nothing is missing, screened, and the most promising ones fitted where asked.
-
-    `behind`, `ways`: as for `shown`.
-    """
+    """Rigs in which nothing is missing, screened; the most promising are fitted where asked."""
 
     behind: Background
     ways: tuple[Directions, ...]
@@ -144,12 +130,10 @@ class NullRigs:
         return Null(np.max(self.screened.drawn, axis=0), np.max(self.screened.doubt, axis=0))
 
     def beside(self, gain: float, level: float, jobs: int) -> Null:
-        """What they show, by fits of the most promising rigs until it is clear beside a gain.
-
-        It is where the screen shows far less, once more of them show as much than the `level` of
-        false alarms allows, or once the most promising ones stay far below (sequential Monte Carlo
-        tests: Besag, Clifford, Biometrika 78, 1991).
-        """
+        """What they show, by fits of the most promising rigs until it is clear beside a gain."""
+        # It is where the screen shows far less, once more of them show as much than the `level` of
+        # false alarms allows, or once the most promising ones stay far below (sequential Monte
+        # Carlo tests: Besag, Clifford, Biometrika 78, 1991).
         null = self.as_screened()
         if np.max(null.drawn) < BY_SCREEN * gain:
             return null
@@ -212,11 +196,9 @@ def _gain(behind: Background, way: Directions, slopes: Array, off: Array) -> flo
 
 
 def wandering(observation: JointObservation, count: int, generator: np.random.Generator) -> Array:
-    """Draw slow noise (size, count) of unit variance for each sensor whose noise is random.
-
-    It is an Ornstein-Uhlenbeck process whose correlation time lies anywhere between that of white
-    noise and `SLOWEST`, evenly in its logarithm.
-    """
+    """Draw slow noise (size, count) of unit variance for each sensor whose noise is random."""
+    # It is an Ornstein-Uhlenbeck process whose correlation time lies anywhere between that of white
+    # noise and `SLOWEST`, evenly in its logarithm.
     drawn = np.zeros((observation.size, count))
     for channel, part in zip(observation.channels, observation.slices(), strict=True):
         if channel.quantity not in WHITE:

@@ -32,15 +32,11 @@ stands."""
 
 @dataclass(frozen=True)
 class Candidate:
-    """A fitted joint with some terms.
+    """A fitted joint with some terms."""
 
-    `terms`: in the order in which they were added.
-    `evidence`: see `log_evidence`.
-    """
-
-    terms: tuple[Term, ...]
+    terms: tuple[Term, ...]  # in the order in which they were added
     fit: Fit
-    evidence: float
+    evidence: float  # see `log_evidence`
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -60,28 +56,19 @@ def candidate(terms: tuple[Term, ...], found: Fit) -> Candidate:
 
 @dataclass(frozen=True)
 class TrialFit:
-    """A term after a first fit of few simulations on coarse ticks.
-
-    Shapes: `theta` (n,).
-    `model`: on fine ticks.
-    `coarse`: the same on coarse ones.
-    `cost`: half the squares, weighted by what the fit without it is off by.
-    """
+    """A term after a first fit of few simulations on coarse ticks."""
 
     term: Term
-    model: JointModel
-    coarse: JointModel
-    theta: Array
-    cost: float
+    model: JointModel  # on fine ticks
+    coarse: JointModel  # the same on coarse ones
+    theta: Array  # (n,)
+    cost: float  # half the squares, weighted by what the fit without it is off by
 
 
 def trial_fit(references: tuple[Fit, ...], term: Term, offset: Array) -> TrialFit:
-    """First fit of one term more.
-
-    `references`: fits of the same model without the term, to start from: what was missing has bent
-        the numbers of the first one, and the description may be nearer. The better one is taken.
-    `offset` (size,): what coarse ticks do to the residuals of the first of them.
-    """
+    """First fit of one term more, from the better one of several fits without it."""
+    # What was missing has bent the numbers of the first one, and the description may be nearer. The
+    # offset (size,) is what coarse ticks do to the residuals of the first of them.
     model = term.added_to(references[0].model)
     coarse = model.on_coarse_ticks(offset)
     weight = weights(model.observation, references[0].residuals)
@@ -98,13 +85,7 @@ def trial_fit(references: tuple[Fit, ...], term: Term, offset: Array) -> TrialFi
 
 
 def begun_beside(function: Fit, without: Fit, starts: Sequence[Term], offset: Array) -> TrialFit:
-    """The start of a formula that leaves least beside the numbers of a fit with a function.
-
-    `function`: with the function at the formula's place.
-    `without`: the fit to which either is added.
-    `starts`: one effect at its starting points.
-    `offset` (size,): as for `trial_fit`.
-    """
+    """The start of a formula that leaves least beside the numbers of a fit with its function."""
     weight = weights(function.model.observation, without.residuals)
     best: TrialFit | None = None
     for term in starts:
@@ -119,11 +100,8 @@ def begun_beside(function: Fit, without: Fit, starts: Sequence[Term], offset: Ar
 
 
 def refit(seen: TrialFit, without: Candidate) -> Candidate:
-    """Fit of a term from where its trial fit ended, as far as tells which term is the best.
-
-    `without`: by what this is off, channels are weighted at first; then by what is left.
-    Returns: fitted on coarse ticks; see `until_it_stands`.
-    """
+    """Fit of a term on coarse ticks from its trial fit, as far as tells which term is the best."""
+    # By what the fit without it is off, channels are weighted at first; then by what is left.
     weight = weights(seen.model.observation, without.fit.residuals)
     found = _twice(seen.model, seen.coarse.offset, seen.theta, weight)
     found = out_of_valleys(found, weights(seen.model.observation, found.residuals))
@@ -131,13 +109,7 @@ def refit(seen: TrialFit, without: Candidate) -> Candidate:
 
 
 def refined(one: Candidate, without: Fit, offset: Array) -> Candidate:
-    """A candidate whose last function is as fine as the evidence is for.
-
-    `one`: its last term is a function.
-    `without`: the fit without that function.
-    `offset` (size,): as for `trial_fit`.
-    Returns: fitted on coarse ticks.
-    """
+    """A candidate whose last term, a function, is as fine as the evidence allows."""
     best, term = one, one.terms[-1]
     for count in FINER:
         assert term.family is not None
@@ -171,10 +143,8 @@ def _visited(found: Fit, family: Family) -> tuple[float, float]:
 
 
 def _twice(model: JointModel, offset: Array | None, theta: Array, weight: Array) -> Fit:
-    """Fit on coarse ticks with channels weighted as given, then by what that leaves on fine ones.
-
-    What coarse ticks do to the residuals is known for `theta` at first, then for the first fit.
-    """
+    """Fit on coarse ticks with weights as given, then by what that leaves on fine ones."""
+    # What coarse ticks do to the residuals is known for `theta` at first, then for the first fit.
     found = fit(model.on_coarse_ticks(offset), theta, weight, ITERATIONS, ROUGH)
     fine = model.residuals(found.theta)
     again = model.on_coarse_ticks(fine - model.on_coarse_ticks().residuals(found.theta))

@@ -23,22 +23,17 @@ LEAST_SHARE = 0.10
 
 
 def motion_repeats(observation: JointObservation) -> bool:
-    """Whether enough of a joint's commanded motion has been commanded before.
-
-    A smooth force that depends on time explains any single pass through the workspace, and nothing
-    of the next one.
-    """
+    """Whether enough of a joint's commanded motion has been commanded before."""
+    # A smooth force that depends on time explains any single pass through the workspace, and
+    # nothing of the next one.
     command = observation.inputs[0, :, IN_COMMAND]
     return share_seen_before(command, observation.tick) >= LEAST_SHARE
 
 
 def share_seen_before(command: Array, tick: float = TICK) -> float:
-    """Share of the moments at which angle and speed were near what they had been before.
-
-    `command` (N,): in rad. Near is within `NEAR_ANGLE` of its range and `NEAR_SPEED` of its largest
-        speed; before is at least `APART_S` and `APART_SHARE` of the recording earlier.
-    `tick`: time between two of its values in s.
-    """
+    """Share of the moments at which angle and speed of a command (N,) were near earlier ones."""
+    # Near is within `NEAR_ANGLE` of its range and `NEAR_SPEED` of its largest speed; before is at
+    # least `APART_S` and `APART_SHARE` of the recording earlier.
     every = max(1, round(EVERY_S / tick))
     angle = command[::every]
     speed = np.gradient(angle) if len(angle) > 1 else np.zeros_like(angle)
@@ -74,11 +69,7 @@ _PER_CYCLE = 8.0
 
 
 def period_bounds(observation: JointObservation, state: Array) -> tuple[float, float]:
-    """Shortest and longest period that a recording tells of a state.
-
-    `state` (N,): on its ticks.
-    Returns: the shortest is no less than the longest where there is none.
-    """
+    """Shortest and longest period that a recording tells of a state (N,); none where they cross."""
     slowest = min(observation.channels, key=lambda channel: len(channel.time))
     steps = np.abs(np.diff(_at(observation, state, slowest.time)))
     moving = steps[steps > 1e-3 * steps.max()] if len(steps) and steps.max() > 0.0 else steps
@@ -87,12 +78,7 @@ def period_bounds(observation: JointObservation, state: Array) -> tuple[float, f
 
 
 def likely_periods(observation: JointObservation, residuals: Array, state: Array) -> list[float]:
-    """Periods of a state with which residuals repeat themselves, the most telling first.
-
-    `residuals` (size,): weighted, without what the fitted numbers could take away.
-    `state` (N,): on ticks.
-    Returns: `PERIODS` at most.
-    """
+    """Periods of a state (N,) with which weighted residuals (size,) repeat, best first."""
     shortest, longest = period_bounds(observation, state)
     if shortest >= longest:
         return []
@@ -115,14 +101,9 @@ def likely_periods(observation: JointObservation, residuals: Array, state: Array
 
 
 def periodogram(at: Array, values: Array, shortest: float, longest: float) -> tuple[Array, Array]:
-    """Shares (F,) of the squares that a sinusoid takes away, at frequencies (F,) of a state.
-
-    Sums over samples anywhere become Fourier transforms once each sample is spread over its
-    neighbours on a grid (Press, Rybicki, Astrophys. J. 338, 1989).
-
-    `at`, `values` (M,): state of each sample, and its value.
-    `shortest`, `longest`: periods.
-    """
+    """Shares (F,) of the squares that a sinusoid takes away, at frequencies (F,) of a state."""
+    # Sums over samples anywhere become Fourier transforms once each sample is spread over its
+    # neighbours on a grid (Press, Rybicki, Astrophys. J. 338, 1989).
     span = max(float(np.ptp(at)), longest)
     # Twice the highest frequency is in it, for the sums of products.
     size = next_fast_len(int(_PER_RESOLVED * span * _PER_CYCLE / shortest) + 1, real=True)

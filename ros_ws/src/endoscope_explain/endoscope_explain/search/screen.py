@@ -30,32 +30,23 @@ _NOTHING = 1e-6
 
 @dataclass(frozen=True)
 class Screened:
-    """A term and its linearised gain.
-
-    `candidate`: a function has the size of its prior.
-    `gain`: logarithm of the evidence with it over that without it.
-    """
+    """A term and its linearised gain."""
 
     term: Term
-    gain: float
+    gain: float  # logarithm of the evidence with it over that without it
 
 
 @dataclass(frozen=True)
 class Background:
-    """A fit, and what its own numbers cannot take away.
-
-    Shapes: `weight` (size,).
-    `span` (size + n, n): orthonormal directions in which its numbers move weighted residuals and
-        priors' deviations.
-    `coarse`: the same model on coarser ticks.
-    `at` (size,): residuals of `coarse`.
-    """
+    """A fit, and what its own numbers cannot take away."""
 
     fit: Fit
-    weight: Array = field(repr=False)
+    weight: Array = field(repr=False)  # (size,)
+    # (size + n, n), orthonormal directions in which its numbers move weighted residuals and priors'
+    # deviations.
     span: Array = field(repr=False)
-    coarse: JointModel = field(repr=False)
-    at: Array = field(repr=False)
+    coarse: JointModel = field(repr=False)  # the same model on coarser ticks
+    at: Array = field(repr=False)  # (size,), residuals of `coarse`
 
     @property
     def offset(self) -> Array:
@@ -83,13 +74,10 @@ def background(found: Fit) -> Background:
 
 @dataclass(frozen=True)
 class Directions:
-    """Where a term moves weighted residuals once the model's own numbers are refitted.
-
-    Shapes: `columns` (size, k).
-    """
+    """Where a term moves weighted residuals once the model's own numbers are refitted."""
 
     term: Term
-    columns: Array = field(repr=False)
+    columns: Array = field(repr=False)  # (size, k)
 
 
 def directions(behind: Background, terms: tuple[Term, ...], jobs: int) -> tuple[Directions, ...]:
@@ -136,21 +124,15 @@ def _relative_size(behind: Background, answers: Array) -> float:
 
 @dataclass(frozen=True)
 class Gains:
-    """Gains of all terms on several residuals, from inner products alone.
+    """Gains of all terms on several residuals, from inner products alone."""
 
-    Shapes: `values` (terms, B).
-    `left` (terms, B, C): mean squares of each channel, weighted, that the best of each term leaves.
-    """
-
-    values: Array
+    values: Array  # (terms, B)
+    # (terms, B, C), mean squares of each channel, weighted, that the best of each term leaves.
     left: Array
 
 
 def gains(behind: Background, found: tuple[Directions, ...], residuals: Array) -> Gains:
-    """What each term gains on each of several residuals.
-
-    `residuals` (size, B): weighted, with what the model's own numbers can take away taken away.
-    """
+    """What each term gains on several weighted residuals (size, B) that no refit takes away."""
     observation = behind.fit.model.observation
     number = counts(observation)
     parts = observation.slices()

@@ -35,16 +35,12 @@ LAGS = 3
 
 @dataclass(frozen=True)
 class Term:
-    """One term more.
+    """One term more."""
 
-    `effect`: of the catalogue, or the place of a function.
-    `start`: parameters of an effect at which its fit begins.
-    `family`: of the function.
-    """
-
-    effect: Effect
+    effect: Effect  # of the catalogue, or the place of a function
+    # Parameters of an effect at which its fit begins.
     start: Mapping[str, float] = field(default_factory=dict)
-    family: Family | None = None
+    family: Family | None = None  # of the function
 
     @property
     def id(self) -> str:
@@ -131,20 +127,7 @@ def _require_absent(model: JointModel, term: Effect) -> None:
 
 
 def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Term, ...]:
-    """Effects, and nominal physics that is lacking, that may be added to a fit, at their starts.
-
-    Parameters
-    ----------
-    found : Fit
-        What they are added to.
-    left_out : tuple of str
-        Those that are not tried.
-
-    Returns
-    -------
-    tuple of Term
-        Without those that depend on time where the joint makes no motion twice.
-    """
+    """Effects, and nominal physics that is lacking, that may be added to a fit, at their starts."""
     return tuple(
         Term(effect, start)
         for effect in _absent(found, KNOWN.values())
@@ -154,13 +137,10 @@ def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Term, ...]:
 
 
 def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Term, ...]:
-    """Functions that may be added to a fit, as tall as their place allows at most.
-
-    `residuals` (size,): weighted, without what the fitted numbers could take away.
-    Returns: one for each place whose argument has moved; one for each likely period where functions
-        repeat themselves, and for some lags where their argument lags; one more that multiplies
-        those that are there. Without those of time where the joint makes no motion twice.
-    """
+    """Functions that may be added to a fit, as tall as their place allows at most."""
+    # One for each place whose argument has moved; one for each likely period where functions repeat
+    # themselves, and for some lags where their argument lags; one more that multiplies those that
+    # are there. Without those of time where the joint makes no motion twice.
     states, observation = states_of(found), found.model.observation
     there = {family.place.point for family in found.model.families}
     candidates = []
@@ -183,11 +163,9 @@ def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Term, ...]:
 
 
 def _lags(observation: JointObservation) -> NDArray[np.float64]:
-    """Time constants to begin at, evenly in their logarithm.
-
-    They are longer than ten ticks of the slowest sensor, and shorter than a third of the recording:
-    what is quicker is the state itself, and what is slower a function of time.
-    """
+    """Time constants to begin at, evenly in their logarithm."""
+    # They are longer than ten ticks of the slowest sensor, and shorter than a third of the
+    # recording: what is quicker is the state itself, and what is slower a function of time.
     slowest = min(len(channel.time) for channel in observation.channels)
     low = max(LAGS_S[0], 10.0 * observation.duration / slowest)
     return np.geomspace(low, max(low, observation.duration / 3.0), LAGS + 2)[1:-1]
