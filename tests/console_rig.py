@@ -16,8 +16,8 @@ from sensor_msgs.msg import JointState, Joy
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.joined_graph import joined_graph
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
-from endoscope_nodes.runtime.joint_stream import JointReader
 from endoscope_nodes.runtime.qos import EVENT, profile
+from endoscope_nodes.runtime.streams import JointReader
 from endoscope_nodes.topics import Qos
 
 CONSOLE = [sys.executable, '-m', 'endoscope_bringup.cli', 'console']

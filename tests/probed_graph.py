@@ -8,7 +8,7 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Header, String
 
 from endoscope_nodes.names import MOTION_SESSION, OPERATING_STATE, STATE_COMMAND
-from endoscope_nodes.runtime.matching import all_matched
+from endoscope_nodes.runtime.node_context import all_matched
 from endoscope_nodes.runtime.qos import EVENT, RESULT
 from endoscope_nodes.runtime.runtime import Runtime
 

@@ -15,7 +15,7 @@ from std_msgs.msg import Header, String
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_poses
 from endoscope_bags.message_types import TF_MESSAGE
 from endoscope_core.rig import shipped_rig
-from endoscope_nodes.nodes.joint_transforms import JointTransforms, section_of
+from endoscope_nodes.nodes.instrument_model import JointTransforms, section_of
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime.recorded_topics import message_class

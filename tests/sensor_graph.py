@@ -30,9 +30,9 @@ from endoscope_nodes.nodes.load_cells import LoadCellsNode
 from endoscope_nodes.nodes.motor_driver import MotorDriverNode
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.supervisor import SupervisorNode
-from endoscope_nodes.runtime.joint_stream import JointSubscription
 from endoscope_nodes.runtime.qos import LOCK_STEP
 from endoscope_nodes.runtime.runtime import Runtime
+from endoscope_nodes.runtime.streams import JointSubscription
 
 PATIENCE_S = 120.0
 NODES = (

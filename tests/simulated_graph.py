@@ -12,9 +12,9 @@ from std_srvs.srv import Trigger
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.names import CALIBRATION_RESULT, CALIBRATION_RUN, JOINTS
 from endoscope_nodes.nodes.conductor import ConductorNode
-from endoscope_nodes.runtime.joint_stream import JointSample, JointSubscription
 from endoscope_nodes.runtime.qos import LOCK_STEP, RESULT
 from endoscope_nodes.runtime.runtime import Runtime
+from endoscope_nodes.runtime.streams import JointSample, JointSubscription
 
 PATIENCE_S = 120.0
 TICK_RATE = 500

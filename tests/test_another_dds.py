@@ -25,7 +25,7 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.nodes.joint_transforms import section_of
+from endoscope_nodes.nodes.instrument_model import section_of
 
 PAGE = WORKSPACE / 'doc/other_programs.md'
 STREAMS = {MOTOR_MEASURED: MOTORS, WIRES_MEASURED: WIRES, SLAVE_MEASURED: JOINTS}

@@ -227,7 +227,8 @@ def test_words_that_nobody_would_hear_are_one_line_and_exit_code_2(tmp_path, arg
 def test_every_program_leads_to_a_module_that_runs(name):
     named = getattr(program, name)
     assert named.name == name
-    assert callable(importlib.import_module(f'endoscope_nodes.{named.module}').main)
+    module, _, what = named.runs.partition(':')
+    assert callable(getattr(importlib.import_module(f'endoscope_nodes.{module}'), what))
 
 
 def test_a_node_is_healthy_while_it_speaks(tmp_path):

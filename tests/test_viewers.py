@@ -17,7 +17,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.kinematics import robot_description
 from endoscope_core.rig import shipped_rig
 from endoscope_nodes.graph import SHOWING_NODES
-from endoscope_nodes.nodes.joint_transforms import section_of
+from endoscope_nodes.nodes.instrument_model import section_of
 from endoscope_nodes.topics import RECORDED
 
 PROTOCOL = 'foxglove.sdk.v1'

@@ -12,7 +12,7 @@ from endoscope_console.teleop.joy_mapping import JoyMapping
 from endoscope_console.teleop.operator import Reason
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.runtime.qos import profile
-from endoscope_nodes.runtime.raw_subscription import RawSubscription
+from endoscope_nodes.runtime.streams import RawSubscription
 from endoscope_nodes.topics import Qos
 
 TOPIC = 'joy'

@@ -22,9 +22,8 @@ from endoscope_nodes.names import (
     WIRES,
     WIRES_MEASURED,
 )
-from endoscope_nodes.runtime.joint_stream import JointReader, JointSample
 from endoscope_nodes.runtime.qos import profile
-from endoscope_nodes.runtime.raw_subscription import RawSubscription
+from endoscope_nodes.runtime.streams import JointReader, JointSample, RawSubscription
 from endoscope_nodes.topics import Qos
 
 RATE_HZ = 30

@@ -19,8 +19,8 @@ from endoscope_bags.message_types import JOINT_STATE, message_type
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.client.joined_graph import joined_node
 from endoscope_nodes.runtime.qos import profile
-from endoscope_nodes.runtime.raw_subscription import RawSubscription
 from endoscope_nodes.runtime.recorded_topics import message_class
+from endoscope_nodes.runtime.streams import RawSubscription
 from endoscope_nodes.topics import TOPICS, Qos, Topic
 
 NODE = 'console_viewers'

@@ -24,7 +24,7 @@ def is_heard(node: str, namespace: str, longest_s: float) -> bool:
     from rclpy.node import Node
 
     from endoscope_nodes.names import DIAGNOSTICS
-    from endoscope_nodes.runtime.discovery import stay_on_this_machine
+    from endoscope_nodes.runtime.environment import stay_on_this_machine
     from endoscope_nodes.runtime.qos import EVENT
 
     stay_on_this_machine()

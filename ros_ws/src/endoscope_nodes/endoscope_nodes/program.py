@@ -20,7 +20,7 @@ class Program:
     """One command of the package."""
 
     name: str  # also of the node, if it runs a single one
-    module: str  # of this package, whose ``main()`` runs it
+    runs: str  # ``module:Node`` of this package, or ``module:function`` for several nodes
     purpose: str  # a sentence or two
     composed: tuple[str, ...] = ()  # nodes that it runs; empty for the one of its name
     options: tuple[tuple[str, str], ...] = ()  # words of its own, and what each does
@@ -50,8 +50,17 @@ class Program:
                 file=sys.stderr,
             )
             return 2
-        module = importlib.import_module(f'endoscope_nodes.{self.module}')
-        return int(module.main())
+        return self.start()
+
+    def start(self) -> int:
+        """Run its nodes with `sys.argv` until they are stopped; the exit status."""
+        module, _, name = self.runs.partition(':')
+        found = getattr(importlib.import_module(f'endoscope_nodes.{module}'), name)
+        if self.composed:
+            return int(found())
+        from endoscope_nodes.runtime.runtime import run_nodes
+
+        return run_nodes([found])
 
 
 def words_for_nobody(argv: Sequence[str]) -> list[str]:
@@ -72,68 +81,68 @@ def words_for_nobody(argv: Sequence[str]) -> list[str]:
 
 console = Program(
     'console',
-    'nodes.console',
+    'nodes.console:ConsoleNode',
     'Turns the motion of the handle into commands while the clutch is held, or plays a motion or '
     'a file.',
 )
 motor_driver = Program(
     'motor_driver',
-    'nodes.motor_driver',
+    'nodes.motor_driver:MotorDriverNode',
     'Drives the motors of the slave as far as it is safe, simulated or on a bus of servos, and '
     'publishes what the shafts do.',
 )
 load_cells = Program(
     'load_cells',
-    'nodes.load_cells',
+    'nodes.load_cells:LoadCellsNode',
     'Measures the tensions of the wires, simulated or behind a Modbus transmitter.',
 )
 em_tracker = Program(
     'em_tracker',
-    'nodes.em_tracker',
+    'nodes.em_tracker:EmTrackerNode',
     'Measures the pose of the tip and from it the bending, simulated or by an electromagnetic '
     'tracker.',
 )
 supervisor = Program(
     'supervisor',
-    'nodes.supervisor',
+    'nodes.supervisor:SupervisorNode',
     'Decides whether the slave may move: opens motion sessions, and ends them where anything '
     'vital fails.',
 )
 compensator = Program(
     'compensator',
-    'nodes.compensator',
+    'nodes.compensator:CompensatorNode',
     'Turns desired bending into commands for the motors that make up for the hysteresis.',
 )
 controller = Program(
     'controller',
-    'nodes.controller',
+    'nodes.controller:ControllerNode',
     'Learns from the tracker what the compensation leaves over, and corrects it.',
 )
 calibration = Program(
     'calibration',
-    'nodes.calibration',
+    'nodes.calibration:CalibrationNode',
     'Moves the slave as a calibration asks, finds the hysteresis class of its tube from the '
     'tensions, and takes the slave home.',
 )
 instrument_model = Program(
     'instrument_model',
-    'nodes.instrument_model',
+    'nodes.instrument_model:InstrumentModelNode',
     'Shows other programs the instrument and its bending: a description as URDF, the angles of its '
     'joints, and where its links are.',
 )
 recorder = Program(
     'recorder',
-    'nodes.recorder',
+    'nodes.recorder:RecorderNode',
     'Records every message of the interface into a bag, counted, with what was lost.',
 )
 replay = Program(
     'replay',
-    'nodes.replay',
+    'nodes.replay:ReplayNode',
     'Publishes the topics of a bag again, at their pace or another, and ends.',
 )
 conductor = Program(
     'conductor',
-    'nodes.conductor',
+    'nodes.conductor:SelfStartingConductor',
     'Makes simulated time, a millisecond at a time, as fast as the graph can follow.',
 )
 
@@ -146,7 +155,7 @@ NODES = tuple(program.name for program in (*_COMPOSED, replay, conductor))
 
 graph = Program(
     'graph',
-    'graph',
+    'graph:main',
     'Runs all nodes in one process. Where all devices are simulated, it runs in lock-step with a '
     'conductor, at real time where the machine can and slower where it cannot; -p speed:=0.0 lets '
     'it go as fast as it can.',

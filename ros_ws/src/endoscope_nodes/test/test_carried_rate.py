@@ -1,13 +1,12 @@
 import re
 
-from endoscope_nodes import carried_rate
-from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
+from endoscope_nodes import graph
 
 
 def test_it_is_said_what_arrives_and_which_rate_is_carried(monkeypatch, capfd):
-    monkeypatch.setattr(carried_rate, 'RATES', (250, 100))
-    monkeypatch.setattr(carried_rate, '_COUNTED_S', 1.0)
-    status = carried_rate.check((*SLAVE_NODES, *CONTROL_NODES))
+    monkeypatch.setattr(graph, 'RATES', (250, 100))
+    monkeypatch.setattr(graph, '_COUNTED_S', 1.0)
+    status = graph.check_rates()
     *tried, verdict = capfd.readouterr().out.splitlines()
     shares = [
         float(re.match(r' *(?:250|100) Hz: (\d+\.\d) % of the commands reach', line)[1])

@@ -9,7 +9,8 @@ import pytest
 import rclpy
 from rclpy.context import Context
 
-from endoscope_nodes.runtime.discovery import DiscoveryRangeError, stay_on_this_machine
+from endoscope_nodes.runtime.environment import stay_on_this_machine
+from endoscope_nodes.runtime.parameters import ParameterError
 
 DOMAIN = 227
 # DDSI-RTPS 9.6.1.1: ports of a domain begin at 7400 + 250 * domain.
@@ -76,7 +77,7 @@ def test_nobody_is_heard_at_no_address_but_the_loopback():
 @pytest.mark.parametrize('unknown', ['localhost', 'Localhost', 'off', 'LOCAL', 'SUBNET '])
 def test_a_range_that_ros_would_take_for_the_subnet_is_refused(monkeypatch, unknown):
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', unknown)
-    with pytest.raises(DiscoveryRangeError, match='give LOCALHOST') as caught:
+    with pytest.raises(ParameterError, match='give LOCALHOST') as caught:
         stay_on_this_machine()
     assert repr(unknown) in str(caught.value)
     assert '\n' not in str(caught.value)
@@ -101,7 +102,7 @@ import sys, time
 from rclpy.context import Context
 import rclpy
 from std_msgs.msg import String
-from endoscope_nodes.runtime.discovery import stay_on_this_machine
+from endoscope_nodes.runtime.environment import stay_on_this_machine
 stay_on_this_machine()
 context = Context()
 rclpy.init(args=[], context=context, domain_id=DOMAIN)

@@ -7,9 +7,9 @@ from std_msgs.msg import UInt64
 from endoscope_nodes.names import MOTOR_MEASURED, MOTORS
 from endoscope_nodes.nodes.conductor import ConductorNode
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_stream import JointPublisher
 from endoscope_nodes.runtime.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.runtime.runtime import Runtime
+from endoscope_nodes.runtime.streams import JointPublisher
 
 HOPS = 5
 TICKS = 100

@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 
 from endoscope_bags.cdr_encoding import encode_joint_state
 from endoscope_bags.errors import MalformedMessageError
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointReader
+from endoscope_nodes.runtime.streams import JointPublisher, JointReader
 
 NAMES = ('bend_x', 'bend_y')
 # The first message of a type loads its library.

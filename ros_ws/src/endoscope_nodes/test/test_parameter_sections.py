@@ -1,6 +1,6 @@
 import pytest
 
-from endoscope_nodes.runtime.parameter_sections import check_sections
+from endoscope_nodes.runtime.declared_parameters import check_sections
 from endoscope_nodes.runtime.parameters import ParameterError
 
 HERE = '/endoscope'

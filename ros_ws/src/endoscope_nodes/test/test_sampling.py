@@ -1,6 +1,6 @@
 from itertools import pairwise
 
-from endoscope_nodes.runtime.sampling import SampleClock
+from endoscope_nodes.runtime.ticker import SampleClock
 
 MS = 1_000_000
 

@@ -5,9 +5,9 @@ from rclpy.context import Context
 
 from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, save_plant
 from endoscope_nodes.nodes.motor_driver import MotorDriverNode
+from endoscope_nodes.runtime.node_context import load_slave
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.runtime import Runtime
-from endoscope_nodes.runtime.simulated_plant import load_slave
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,7 @@ class _Sender:
         from sensor_msgs.msg import JointState
 
         from endoscope_bags.cdr_encoding import encode_joint_state
-        from endoscope_nodes.runtime.discovery import stay_on_this_machine
+        from endoscope_nodes.runtime.environment import stay_on_this_machine
         from endoscope_nodes.runtime.qos import SENSOR_OFFERED
 
         self._context = Context()

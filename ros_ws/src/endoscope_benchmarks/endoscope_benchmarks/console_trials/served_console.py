@@ -26,8 +26,8 @@ from endoscope_nodes.names import (
     MOTOR_COMMAND,
     MOTORS,
 )
-from endoscope_nodes.runtime.joint_stream import JointReader
 from endoscope_nodes.runtime.qos import EVENT, profile
+from endoscope_nodes.runtime.streams import JointReader
 from endoscope_nodes.topics import Qos
 
 PATIENCE_S = 150.0

@@ -33,9 +33,9 @@ from endoscope_nodes.nodes.console import ConsoleNode
 from endoscope_nodes.nodes.motor_driver import MotorDriverNode
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.supervisor import SupervisorNode
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.qos import EVENT, RESULT, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime.runtime import Runtime
+from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
 
 PATIENCE_S = 240.0
 RATE_HZ = 250

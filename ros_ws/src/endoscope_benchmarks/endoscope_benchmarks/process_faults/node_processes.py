@@ -1,6 +1,5 @@
-"""The nodes as processes, each of which can be killed, stalled and started anew."""
+"""The nodes as processes, each of which can be killed, stalled and restarted."""
 
-import importlib
 import json
 import multiprocessing
 import os
@@ -10,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_nodes import program
 
 NODES = (
     'motor_driver',
@@ -39,7 +39,7 @@ class NodeProcesses(ClosedOnExit):
         self._domain = domain
         self._folder = folder
         self._processes: dict[str, multiprocessing.process.BaseProcess] = {}
-        _FORK.set_forkserver_preload([_module(name) for name in (GRAPH, *NODES)])
+        _FORK.set_forkserver_preload(['endoscope_nodes.graph'])
 
     @property
     def running(self) -> tuple[str, ...]:
@@ -102,14 +102,10 @@ class NodeProcesses(ClosedOnExit):
             self.end(name)
 
 
-def _module(name: str) -> str:
-    return f'endoscope_nodes.{name}' if name == GRAPH else f'endoscope_nodes.nodes.{name}'
-
-
 def _run(name: str, words: list[str], domain: int, log: str) -> None:
     with Path(log).open('ab', buffering=0) as sink:
         os.dup2(sink.fileno(), 1)
         os.dup2(sink.fileno(), 2)
     os.environ['ROS_DOMAIN_ID'] = str(domain)
     sys.argv = [name, '--ros-args', *words]
-    sys.exit(importlib.import_module(_module(name)).main())
+    sys.exit(getattr(program, name).start())

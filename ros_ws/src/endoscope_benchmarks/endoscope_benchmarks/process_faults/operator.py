@@ -22,9 +22,9 @@ from endoscope_nodes.names import (
     SLAVE_COMMAND,
     SLAVE_MEASURED,
 )
-from endoscope_nodes.runtime.discovery import stay_on_this_machine
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointReader, JointSample
+from endoscope_nodes.runtime.environment import stay_on_this_machine
 from endoscope_nodes.runtime.qos import COMMAND, EVENT, SENSOR_OFFERED, profile
+from endoscope_nodes.runtime.streams import JointPublisher, JointReader, JointSample
 from endoscope_nodes.topics import Qos
 
 _DEEP = profile(Qos(5000))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.rig import MotorFacts
-from endoscope_nodes.runtime.joint_stream import JointSample
+from endoscope_nodes.runtime.streams import JointSample
 
 STILL = 2.0 * 2.0 * np.pi / 4096
 """Two counts of the encoder, in rad: what readings of a shaft at rest may differ by."""

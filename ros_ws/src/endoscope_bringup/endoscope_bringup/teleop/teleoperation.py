@@ -35,8 +35,8 @@ from endoscope_nodes.names import (
     SLAVE_COMMAND,
     SLAVE_MEASURED,
 )
-from endoscope_nodes.runtime.joint_stream import JointReader
 from endoscope_nodes.runtime.qos import COMMAND
+from endoscope_nodes.runtime.streams import JointReader
 
 _TURN_NS = 10_000_000
 _SHOWN_NS = 100_000_000

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
 from endoscope_core.calibration import words_of
@@ -16,7 +15,7 @@ from endoscope_core.control import PhysicalParameters, Reach, reach
 from endoscope_core.control.physical_parameters import PROFILE
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_nodes.names import JOINTS, WIRES
-from endoscope_nodes.runtime.diagnostics import ERROR, OK, status
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, diagnostic_array, status
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,12 +63,12 @@ def successful_result(
             tube = reach(plant.joint)
             values |= {f'{REACH}{joint}.low': tube.low, f'{REACH}{joint}.high': tube.high}
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
-    return _array(stamp_ns, OK, with_zeros(message, zeros), values)
+    return _message(stamp_ns, OK, with_zeros(message, zeros), values)
 
 
 def aborted_result(stamp_ns: int, reason: str, step: str, duration: float) -> DiagnosticArray:
     """Say that a calibration was aborted, where and why; ``duration`` in s."""
-    return _array(
+    return _message(
         stamp_ns,
         ERROR,
         f'aborted: {reason}',
@@ -88,7 +87,7 @@ def refused_result(
         'duration': duration,
         **_zero_values(zeros),
     }
-    return _array(stamp_ns, ERROR, with_zeros(reason, zeros), values)
+    return _message(stamp_ns, ERROR, with_zeros(reason, zeros), values)
 
 
 def with_zeros(message: str, zeros: 'NDArray[np.float64] | None') -> str:
@@ -126,18 +125,6 @@ def is_of_no_class(message: DiagnosticArray) -> bool:
         and any(v.key == 'class_deg' and v.value == NONE_OF_THEM for v in item.values)
         for item in message.status
     )
-
-
-def class_of(message: DiagnosticArray) -> int | None:
-    """Read the class in degrees out of a result; None where it tells of no success."""
-    for item in message.status:
-        if item.name == NAME and item.level == OK:
-            values = {v.key: v.value for v in item.values}
-            try:
-                return int(values['class_deg'])
-            except (KeyError, ValueError):
-                return None
-    return None
 
 
 def findings_of(message: DiagnosticArray) -> CalibrationFindings | None:
@@ -188,8 +175,5 @@ def _reaches_of(values: Mapping[str, str]) -> tuple[Reach, ...]:
     )
 
 
-def _array(stamp_ns: int, level: bytes, text: str, values: dict[str, object]) -> DiagnosticArray:
-    message = DiagnosticArray()
-    message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-    message.status = [status(NAME, level, text, values)]
-    return message
+def _message(stamp_ns: int, level: bytes, text: str, values: dict[str, object]) -> DiagnosticArray:
+    return diagnostic_array(stamp_ns, status(NAME, level, text, values))

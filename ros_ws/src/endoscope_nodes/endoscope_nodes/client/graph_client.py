@@ -205,7 +205,7 @@ class GraphClient(GraphListener):
                 raise GraphRefusedError(f'calibration has been silent for {patience_s:g} s')
             heard = self.order_since(known, name)
             if heard is None:
-                raise GraphRefusedError(f'calibration has begun anew and knows no {name} any more')
+                raise GraphRefusedError(f'calibration has restarted and no longer knows {name}')
             if heard.state == EXECUTING:
                 progress(heard.words, heard.progress)
         return heard

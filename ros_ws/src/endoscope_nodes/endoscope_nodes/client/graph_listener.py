@@ -26,7 +26,7 @@ from endoscope_nodes.names import (
     OPERATING_STATE,
 )
 from endoscope_nodes.runtime.qos import profile
-from endoscope_nodes.runtime.raw_subscription import RawSubscription
+from endoscope_nodes.runtime.streams import RawSubscription
 from endoscope_nodes.topics import Qos
 
 PATIENCE_S = 20.0

@@ -16,9 +16,10 @@ from rcl_interfaces.srv import (
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.task import Future
 
-from endoscope_core.errors import EndoscopeError, nearest
+from endoscope_core.errors import nearest
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import PATIENCE_S, GraphRefusedError, NoGraphError
+from endoscope_nodes.runtime.parameters import ParameterError
 
 _ROS_OWN = ('qos_overrides.', 'start_type_description_service')
 _WANTED = {
@@ -31,10 +32,6 @@ _WANTED = {
     Kind.PARAMETER_DOUBLE_ARRAY: (float, 'a list of numbers'),
     Kind.PARAMETER_STRING_ARRAY: (str, 'a list of texts'),
 }
-
-
-class UnknownParameterError(EndoscopeError, ValueError):
-    """A node or parameter that there is not, or a value that is none of its type."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +57,7 @@ class GraphParameter:
             value = _one(kind, text)
             wrong = value is None
         if wrong:
-            raise UnknownParameterError(f'{self.node}.{self.name} is {wanted}, not {text!r}')
+            raise ParameterError(f'{self.node}.{self.name} is {wanted}, not {text!r}')
         return value
 
 
@@ -84,18 +81,18 @@ def node_and_parameter(name: str) -> tuple[str, str]:
     """Split ``NODE.PARAMETER``."""
     node, _, parameter = name.strip('/').partition('.')
     if not node or not parameter:
-        raise UnknownParameterError(f'{name!r}: give NODE.PARAMETER, for example compensator.mode')
+        raise ParameterError(f'{name!r}: give NODE.PARAMETER, for example compensator.mode')
     return node, parameter
 
 
 def read_parameter(
     client: GraphClient, name: str, patience_s: float = PATIENCE_S
 ) -> GraphParameter:
-    """Ask for ``NODE.PARAMETER``; UnknownParameterError names the nearest that there is."""
+    """Ask for ``NODE.PARAMETER``; ParameterError names the nearest that there is."""
     node, parameter = node_and_parameter(name)
     own = _names(client, node, patience_s)
     if parameter not in own:
-        raise UnknownParameterError(f'no parameter {name}; {nearest(parameter, sorted(own))}')
+        raise ParameterError(f'no parameter {name}; {nearest(parameter, sorted(own))}')
     return _read(client, node, [parameter], patience_s)[0]
 
 
@@ -118,9 +115,7 @@ def _names(client: GraphClient, node: str, patience_s: float) -> list[str]:
             raise NoGraphError(f'no graph answers in {client.where}: start one with `graph`')
         if node in others:
             raise NoGraphError(f'{node} does not answer in {client.where}')
-        raise UnknownParameterError(
-            f'no node {node} in {client.where}; {nearest(node, sorted(others))}'
-        )
+        raise ParameterError(f'no node {node} in {client.where}; {nearest(node, sorted(others))}')
     known = client.call(
         ListParameters, f'{node}/list_parameters', ListParameters.Request(), patience_s
     ).result.names

@@ -8,8 +8,8 @@ from rclpy.node import Node
 from sensor_msgs.msg import Joy
 
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MASTER_MEASURED
-from endoscope_nodes.runtime.joint_stream import JointPublisher
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_OFFERED
+from endoscope_nodes.runtime.streams import JointPublisher
 
 CLUTCH_PERIOD_NS = 100_000_000
 _RECEIVED = Duration(seconds=0.5)
@@ -22,6 +22,13 @@ def handle_senders(node: Node) -> list[str]:
     places = [node.resolve_topic_name(name) for name in (MASTER_MEASURED, MASTER_CLUTCH)]
     found = [info for place in places for info in node.get_publishers_info_by_topic(place)]
     return sorted({info.node_name for info in found})
+
+
+def clutch_message(held: bool, stamp_ns: int) -> Joy:
+    """Say whether the clutch is held."""
+    message = Joy(buttons=[int(held)])
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
+    return message
 
 
 class HandleSender:
@@ -40,9 +47,7 @@ class HandleSender:
         """Say at once whether the clutch is held; stamped in ns."""
         self.clutch = held
         self._said_ns = stamp_ns
-        message = Joy(buttons=[int(held)])
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
-        self._clutch.publish(message)
+        self._clutch.publish(clutch_message(held, stamp_ns))
 
     def send(self, stamp_ns: int, position: Sequence[float]) -> None:
         """Say where the handle is, in rad, and ten times a second whether the clutch is held."""

@@ -14,8 +14,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.runtime.discovery import stay_on_this_machine
-from endoscope_nodes.runtime.log_level import log_as_asked
+from endoscope_nodes.runtime.environment import log_as_asked, stay_on_this_machine
 
 LAST_DOMAIN = 232
 """The ports of higher ones do not exist (DDSI-RTPS 2.5, 9.6.2)."""

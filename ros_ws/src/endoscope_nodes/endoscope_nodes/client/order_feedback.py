@@ -3,9 +3,8 @@
 from dataclasses import asdict, dataclass
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.time import Time
 
-from endoscope_nodes.runtime.diagnostics import ERROR, OK, status
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, diagnostic_array, status
 
 CALIBRATE, HOME = 'calibrate', 'home'
 # States, as those of a ROS action's goal are called; no order was given yet in the first.
@@ -33,10 +32,9 @@ class OrderFeedback:
         """Write it, at a time in ns."""
         values = asdict(self)
         level = ERROR if self.state in (ABORTED, REJECTED) else OK
-        message = DiagnosticArray()
-        message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        message.status = [status('calibration: order', level, values.pop('words'), values)]
-        return message
+        return diagnostic_array(
+            stamp_ns, status('calibration: order', level, values.pop('words'), values)
+        )
 
     @classmethod
     def of_message(cls, message: DiagnosticArray) -> 'OrderFeedback':

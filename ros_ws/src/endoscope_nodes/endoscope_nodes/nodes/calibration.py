@@ -9,7 +9,6 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.calibration import (
@@ -72,12 +71,11 @@ from endoscope_nodes.names import (
 )
 from endoscope_nodes.runtime.diagnostics import OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import CalibrationParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
-from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.ticker import TICK_NS
 from endoscope_nodes.safety.sessions import SessionWatch
 from endoscope_nodes.safety.streams import StreamWatch
@@ -130,7 +128,7 @@ class CalibrationNode(EndoscopeNode):
         JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
         JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_bending, SENSOR_ASKED)
         self.create_subscription(String, STATE_COMMAND, self._on_state_command, EVENT)
-        self.create_service(Trigger, CALIBRATION_RUN, self._on_run)
+        self.serve(CALIBRATION_RUN, self._calibrate)
         self.diagnostics.add('procedure', self._report)
         self.ticker.add(self._on_tick)
 
@@ -152,11 +150,9 @@ class CalibrationNode(EndoscopeNode):
             classifier.classify(np.zeros((self._motion.samples, len(WIRES))))
         return classifier
 
-    def _on_run(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.message = self._start(homing=False)
-        response.success = not response.message
-        response.message = response.message or f'begun; {CALIBRATION_FEEDBACK} says how it fares'
-        return response
+    def _calibrate(self) -> tuple[bool, str]:
+        refusal = self._start(homing=False)
+        return not refusal, refusal or f'begun; {CALIBRATION_FEEDBACK} says how it fares'
 
     def _on_state_command(self, message: String) -> None:
         if message.data == StateCommand.HOME:
@@ -379,8 +375,3 @@ class CalibrationNode(EndoscopeNode):
     def close(self) -> None:
         """Let the classifier's thread end."""
         self._thread.shutdown()
-
-
-def main() -> int:
-    """Run the calibration in a process of its own."""
-    return run_nodes([CalibrationNode])

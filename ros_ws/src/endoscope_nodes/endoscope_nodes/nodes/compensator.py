@@ -1,10 +1,9 @@
 """Turns desired bending into motor commands that make up for the hysteresis."""
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.time import Time
 
 from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_CLASS, MODES
 from endoscope_core.control import (
@@ -37,18 +36,15 @@ from endoscope_nodes.names import (
     MOTORS,
     SLAVE_COMMAND,
 )
-from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report, status
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report, diagnostic_array, status
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import CompensatorParameters
 from endoscope_nodes.runtime.qos import COMMAND, RESULT
-from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.runtime.streams import JointPublisher, JointSample
 from endoscope_nodes.runtime.ticker import TICK_S
-from endoscope_nodes.safety.clutch import ClutchWatch
-from endoscope_nodes.safety.command_report import CommandReport
-from endoscope_nodes.safety.senders import SenderWatch
-from endoscope_nodes.safety.sessions import TURN_S, SessionWatch
+from endoscope_nodes.safety.sessions import TURN_S, ClutchWatch, CommandInput, SessionWatch
+from endoscope_nodes.safety.streams import CommandReport
 
 CONSOLE = 'console'
 CALIBRATION = 'calibration'
@@ -57,6 +53,13 @@ NOBODY = 'nobody'
 _AT_ZERO = (0.0,) * len(JOINTS)
 _NOTHING = np.zeros(len(JOINTS))
 _ANY_CLASS = CalibrationFindings(class_deg=70)
+
+
+class _Step(NamedTuple):
+    """A command that is obeyed."""
+
+    seconds: float  # since the command before; a tick for the first of a stream
+    begins: bool = False  # whether it is the first of a stream
 
 
 class CompensatorNode(EndoscopeNode):
@@ -113,14 +116,17 @@ class CompensatorNode(EndoscopeNode):
         self._state_is_news = True
         self._motors = JointPublisher(self, MOTOR_COMMAND, MOTORS, ('position',), COMMAND)
         self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
-        self._session = SessionWatch(self, self._start_anew, self._start_anew)
+        self._session = SessionWatch(self, self._restart, self._restart)
         self._clutch = ClutchWatch(self, self._session, self._end_stream)
         self._pose = context.pose_of(self)
-        self._calibration_in = self._listen(
-            CALIBRATION_COMMAND, self._on_calibration, self.calibration_gate
-        )
-        self._console_in = self._listen(SLAVE_COMMAND, self._on_console, self.gate)
-        self._correction_in = self._listen(CORRECTION, self._on_correction, self.correction_gate)
+        for topic, gate, take in (
+            (CALIBRATION_COMMAND, self.calibration_gate, self._on_calibration),
+            (SLAVE_COMMAND, self.gate, self._on_console),
+            (CORRECTION, self.correction_gate, self._on_correction),
+        ):
+            CommandInput(self, self._session, topic, gate, take)
+            if gate is not self.correction_gate:
+                self._session.obeys(topic, gate)
         results = self.create_subscription(
             DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
         )
@@ -133,20 +139,6 @@ class CompensatorNode(EndoscopeNode):
         self.diagnostics.add('output', self._report)
         self.ticker.every(TURN_S, self._watch_motion)
         self.ticker.every(0.1, self._publish_state)
-
-    def _listen(self, topic: str, callback: Any, gate: CommandGate) -> SenderWatch:
-        stream = JointSubscription(
-            self,
-            topic,
-            JOINTS,
-            callback,
-            COMMAND,
-            exact=True,
-            on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
-        )
-        if gate is not self.correction_gate:
-            self._session.obeys(topic, gate)
-        return self._session.senders_of(stream.subscription)
 
     def _on_parameters(self, parameters: CompensatorParameters) -> None:
         self._settings = parameters
@@ -205,7 +197,7 @@ class CompensatorNode(EndoscopeNode):
             self._feedforward.select(law)
         self._state_is_news = True
 
-    def _start_anew(self) -> None:
+    def _restart(self) -> None:
         for gate in (self.gate, self.calibration_gate, self.correction_gate):
             gate.reset()
         self._corrections = (None, None)
@@ -236,17 +228,6 @@ class CompensatorNode(EndoscopeNode):
         if trouble:
             self._session.leave(trouble)
 
-    def _may_pass(self, sample: JointSample, senders: SenderWatch, gate: CommandGate) -> bool:
-        """Whether a message is of the open session and of the one sender of its topic."""
-        if not self._session.belongs(sample.session):
-            gate.refuse(Refusal.SESSION, sample.session or 'none named')
-            return False
-        crowd = senders.rivals()
-        if crowd:
-            gate.refuse(Refusal.SENDER, crowd)
-            self._session.leave(crowd)
-        return not crowd
-
     def _learn(self, stamp_ns: int) -> None:
         """Give a measurement from before this command to the law, once."""
         sample = self._pose.tracked
@@ -256,41 +237,35 @@ class CompensatorNode(EndoscopeNode):
         self._feedforward.measure((stamp_ns - sample.stamp_ns) * 1e-9, sample.position)
 
     def _on_correction(self, sample: JointSample) -> None:
-        if not self._may_pass(sample, self._correction_in, self.correction_gate):
-            return
         now = self.ticker.monotonic_ns()
         if self.correction_gate.check(sample.stamp_ns, sample.position, now, _AT_ZERO) is None:
             self._corrections = (self._corrections[1], sample)
 
     def _on_console(self, sample: JointSample) -> None:
-        now = self.ticker.monotonic_ns()
-        if not self._may_pass(sample, self._console_in, self.gate):
-            return
-        if self.calibration_gate.is_fresh(now):
+        if self.calibration_gate.is_fresh(self.ticker.monotonic_ns()):
             return
         if not self._clutch.held:
             self.gate.refuse(Refusal.CLUTCH)
             return
-        bending = self._pose.bending()
-        dt = self._obey(CONSOLE, self.gate, sample, bending)
-        if dt is None:
+        step = self._obey(CONSOLE, self.gate, sample, self._pose.bending())
+        if step is None:
             return
         correction = self._correction(sample.stamp_ns)
-        if dt == 0.0:
+        if step.begins:
             self._desired.restart()
         added = _NOTHING if correction is None else correction
-        if dt == 0.0 or self._corrected != (correction is not None):
+        if step.begins or self._corrected != (correction is not None):
             self._corrected = correction is not None
             self._feedforward.rebase(
-                self._drive_before() - added, sample.position if dt == 0.0 else None
+                self._drive_before() - added, sample.position if step.begins else None
             )
         within = self._within_reach(sample)
-        angle, velocity = self._desired.follow(*within, dt or TICK_S)
+        angle, velocity = self._desired.follow(*within, step.seconds)
         if self._news and not any(velocity):
             self._take_news()
         self._learn(sample.stamp_ns)
-        drive = self._feedforward.step(angle, velocity, dt or TICK_S) + added
-        self._put_out(sample.stamp_ns, drive, dt or TICK_S)
+        drive = self._feedforward.step(angle, velocity, step.seconds) + added
+        self._put_out(sample.stamp_ns, drive, step.seconds)
 
     def _within_reach(self, sample: JointSample) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Desired angles and velocities, cut where the tube at hand lets the tip bend no more."""
@@ -302,19 +277,17 @@ class CompensatorNode(EndoscopeNode):
         return angle, velocity
 
     def _on_calibration(self, sample: JointSample) -> None:
-        if not self._may_pass(sample, self._calibration_in, self.calibration_gate):
-            return
         shafts = self._pose.shafts()
         start = None if shafts is None else tuple(x / self.rig.joints.gear for x in shafts)
-        dt = self._obey(CALIBRATION, self.calibration_gate, sample, start)
-        if dt is None:
+        step = self._obey(CALIBRATION, self.calibration_gate, sample, start)
+        if step is None:
             return
         self._calibrated_in = self._session.name
-        if dt == 0.0:
+        if step.begins:
             self._passing.rebase(self._drive_before(), sample.position)
-        velocity = sample.velocity or (0.0,) * len(JOINTS)
-        drive = self._passing.step(sample.position, velocity, dt or TICK_S)
-        self._put_out(sample.stamp_ns, drive, dt or TICK_S)
+        velocity = sample.velocity or _AT_ZERO
+        drive = self._passing.step(sample.position, velocity, step.seconds)
+        self._put_out(sample.stamp_ns, drive, step.seconds)
 
     def _obey(
         self,
@@ -322,8 +295,8 @@ class CompensatorNode(EndoscopeNode):
         gate: CommandGate,
         sample: JointSample,
         measured: tuple[float, ...] | None,
-    ) -> float | None:
-        """Seconds since the command before; 0 for the first of a stream, None if it is refused."""
+    ) -> _Step | None:
+        """The step that a command asks for; None if it is refused."""
         now = self.ticker.monotonic_ns()
         shafts = self._pose.shafts()
         if measured is None or shafts is None:
@@ -336,11 +309,11 @@ class CompensatorNode(EndoscopeNode):
         self._last_stamp_ns = sample.stamp_ns
         self._source = source
         if goes_on:
-            return dt
+            return _Step(dt)
         self._sent = shafts
         self.shaper.restart(shafts)
         self._answer.restart()
-        return 0.0
+        return _Step(TICK_S, begins=True)
 
     def _correction(self, stamp_ns: int) -> np.ndarray | None:
         """Newest correction from before this command: which one must not depend on chance."""
@@ -379,10 +352,8 @@ class CompensatorNode(EndoscopeNode):
             values['class_deg'] = self.findings.class_deg
         for joint, parameters in zip(JOINTS, law.parameters, strict=False):
             values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
-        message = DiagnosticArray()
-        message.header.stamp = Time(nanoseconds=now).to_msg()
-        message.status = [status('compensator: model', OK, self._model_in_words(), values)]
-        self._states.publish(message)
+        said = status('compensator: model', OK, self._model_in_words(), values)
+        self._states.publish(diagnostic_array(now, said))
 
     def _model_in_words(self) -> str:
         if self._settings.mode == 'none':
@@ -426,8 +397,3 @@ def _in_words(findings: CalibrationFindings) -> str:
     if findings.size is not None:
         parts.append(f'size {np.degrees(findings.size):.1f} deg')
     return ', '.join([*parts, *(['plant identified'] if findings.plants else [])])
-
-
-def main() -> int:
-    """Run the compensator in a process of its own."""
-    return run_nodes([CompensatorNode])

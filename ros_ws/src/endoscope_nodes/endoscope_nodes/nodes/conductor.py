@@ -19,8 +19,7 @@ from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import FOLLOWED, ConductorParameters
 from endoscope_nodes.runtime.qos import LOCK_STEP
-from endoscope_nodes.runtime.runtime import run_nodes
-from endoscope_nodes.runtime.sampling import SampleClock
+from endoscope_nodes.runtime.ticker import SampleClock
 
 _STAMP = struct.Struct('<iI')
 # What a late beat may be made up for: more would be seen as a leap.
@@ -216,8 +215,3 @@ class SelfStartingConductor(ConductorNode):
     def _on_end(self, future: Future) -> None:
         if future.exception() is None:
             self._process.stop()
-
-
-def main() -> int:
-    """Run the conductor in a process of its own."""
-    return run_nodes([SelfStartingConductor])

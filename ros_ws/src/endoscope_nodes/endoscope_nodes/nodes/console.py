@@ -6,7 +6,7 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.publisher import Publisher
-from sensor_msgs.msg import JointState, Joy
+from sensor_msgs.msg import Joy
 
 from endoscope_core.choices import FOLLOW_THE_HANDLE
 from endoscope_core.control import (
@@ -21,7 +21,7 @@ from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.safety.motion_session import STALL_NS
 from endoscope_core.signals.command_file import CommandFileError
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
-from endoscope_nodes.client.handle_sender import CLUTCH_PERIOD_NS
+from endoscope_nodes.client.handle_sender import CLUTCH_PERIOD_NS, clutch_message
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
     CALIBRATION_RESULT,
@@ -39,15 +39,13 @@ from endoscope_nodes.nodes.console_motion import (
 )
 from endoscope_nodes.runtime.diagnostics import OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import ConsoleParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
-from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.ticker import TICK_S
-from endoscope_nodes.safety.clutch import ClutchWatch
-from endoscope_nodes.safety.sessions import SessionWatch
+from endoscope_nodes.safety.sessions import ClutchWatch, SessionWatch
 from endoscope_nodes.safety.streams import StreamWatch
 
 # A hand that rests on a handle moves it by less than half a degree.
@@ -105,10 +103,7 @@ class ConsoleNode(EndoscopeNode):
         self._clutch_out: Publisher | None = None
         self._session = SessionWatch(self, self._rest, self._rest)
         self._pose = context.pose_of(self)
-        self._calibration = StreamWatch(self.ticker, CALIBRATION_COMMAND)
-        self.create_subscription(
-            JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True
-        )
+        self._calibration = StreamWatch.of(self, CALIBRATION_COMMAND, COMMAND)
         handle = JointSubscription(
             self,
             MASTER_MEASURED,
@@ -227,9 +222,7 @@ class ConsoleNode(EndoscopeNode):
         if self._clutch_out is None:
             return
         self._clutch_said, self._clutch_said_ns = self._moving, self.ticker.hand_ns()
-        message = Joy(buttons=[int(self._clutch_said)])
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
-        self._clutch_out.publish(message)
+        self._clutch_out.publish(clutch_message(self._clutch_said, stamp_ns))
 
     @property
     def _may_move(self) -> bool:
@@ -373,8 +366,3 @@ class ConsoleNode(EndoscopeNode):
         if source == FOLLOW_THE_HANDLE and not handle.alive(self.ticker.monotonic_ns()):
             return WARN, f'{MASTER_MEASURED} is silent', values
         return OK, source, values
-
-
-def main() -> int:
-    """Run the console in a process of its own."""
-    return run_nodes([ConsoleNode])

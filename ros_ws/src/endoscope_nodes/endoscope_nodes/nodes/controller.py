@@ -2,7 +2,6 @@
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from sensor_msgs.msg import JointState
 
 from endoscope_core.choices import ADAPTIVE, RECURSIVE_LEAST_SQUARES
 from endoscope_core.control import (
@@ -12,7 +11,7 @@ from endoscope_core.control import (
     TrackerMeasurement,
 )
 from endoscope_core.safety import CommandGate, CommandLimits, Refusal
-from endoscope_nodes.client.calibration_result import class_of
+from endoscope_nodes.client.calibration_result import findings_of
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
     CALIBRATION_RESULT,
@@ -23,15 +22,13 @@ from endoscope_nodes.names import (
 )
 from endoscope_nodes.runtime.diagnostics import OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import ControllerParameters
 from endoscope_nodes.runtime.qos import COMMAND, RESULT
-from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.runtime.streams import JointPublisher, JointSample
 from endoscope_nodes.runtime.ticker import TICK_S
-from endoscope_nodes.safety.command_report import CommandReport
-from endoscope_nodes.safety.sessions import SessionWatch
-from endoscope_nodes.safety.streams import StreamWatch
+from endoscope_nodes.safety.sessions import CommandInput, SessionWatch
+from endoscope_nodes.safety.streams import CommandReport, StreamWatch
 
 Controller = AdaptiveBacklashController | RecursiveHysteresisController
 LAWS: dict[str, type[Controller]] = {
@@ -69,22 +66,10 @@ class ControllerNode(EndoscopeNode):
         self._forget = False
         self._told = 0
         self._corrections = JointPublisher(self, CORRECTION, JOINTS, ('position',), COMMAND)
-        self._session = SessionWatch(self, self._start_anew, self._start_anew)
+        self._session = SessionWatch(self, self._restart, self._restart)
         self._pose = context.pose_of(self)
-        self._calibration = StreamWatch(self.ticker, CALIBRATION_COMMAND)
-        self.create_subscription(
-            JointState, CALIBRATION_COMMAND, self._calibration.note, COMMAND, raw=True
-        )
-        commands = JointSubscription(
-            self,
-            SLAVE_COMMAND,
-            JOINTS,
-            self._on_command,
-            COMMAND,
-            exact=True,
-            on_malformed=lambda reason: self._gate.refuse(Refusal.MALFORMED, reason),
-        )
-        self._senders = self._session.senders_of(commands.subscription)
+        self._calibration = StreamWatch.of(self, CALIBRATION_COMMAND, COMMAND)
+        CommandInput(self, self._session, SLAVE_COMMAND, self._gate, self._on_command)
         self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
         self.diagnostics.add('commands', CommandReport(self._gate, self.ticker))
         self.diagnostics.add('feedback', self._report)
@@ -99,25 +84,17 @@ class ControllerNode(EndoscopeNode):
     def _on_parameters(self, parameters: ControllerParameters) -> None:
         self._settings = parameters
 
-    def _start_anew(self) -> None:
+    def _restart(self) -> None:
         self._gate.reset()
         self.controller.restart()
         self._last_stamp_ns = 0
         self._corrections.session = self._session.name
 
     def _on_result(self, message: DiagnosticArray) -> None:
-        self._forget = self._forget or class_of(message) is not None
+        self._forget = self._forget or findings_of(message) is not None
 
     def _on_command(self, sample: JointSample) -> None:
         now = self.ticker.monotonic_ns()
-        if not self._session.belongs(sample.session):
-            self._gate.refuse(Refusal.SESSION, sample.session or 'none named')
-            return
-        crowd = self._senders.rivals()
-        if crowd:
-            self._gate.refuse(Refusal.SENDER, crowd)
-            self._session.leave(crowd)
-            return
         bending = self._pose.bending()
         if bending is None:
             self._gate.refuse(Refusal.STEP, 'no measured position')
@@ -184,8 +161,3 @@ class ControllerNode(EndoscopeNode):
         if not controller.tracker_fresh(self._last_stamp_ns * 1e-9):
             return WARN, f'{SLAVE_MEASURED} is not believed: feed-forward alone', values
         return OK, 'in the loop', values
-
-
-def main() -> int:
-    """Run the controller in a process of its own."""
-    return run_nodes([ControllerNode])

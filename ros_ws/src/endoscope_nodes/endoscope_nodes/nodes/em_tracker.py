@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
-from std_srvs.srv import Trigger
 
 from endoscope_core.errors import FileError
 from endoscope_core.kinematics import (
@@ -32,13 +31,12 @@ from endoscope_nodes.names import (
 )
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, STALE, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import EmTrackerParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import LOCK_STEP, SENSOR_OFFERED
-from endoscope_nodes.runtime.runtime import run_nodes
-from endoscope_nodes.runtime.sampling import SampleClock
+from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
+from endoscope_nodes.runtime.ticker import SampleClock
 
 
 class EmTrackerNode(EndoscopeNode):
@@ -72,7 +70,7 @@ class EmTrackerNode(EndoscopeNode):
         else:
             self._tracker = self._connect(device, p)
             self.ticker.add(self._on_tick)
-        self.create_service(Trigger, '~/register_straight', self._on_register)
+        self.serve('~/register_straight', self._register)
         self.diagnostics.add('tracker', self._report, device)
 
     def _on_parameters(self, parameters: EmTrackerParameters) -> None:
@@ -140,27 +138,20 @@ class EmTrackerNode(EndoscopeNode):
         self._measured.publish(stamp_ns, *bending.tolist())
         self._last_ns = self.ticker.monotonic_ns()
 
-    def _on_register(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = False
+    def _register(self) -> tuple[bool, str]:
         if self._tracker is None:
-            response.message = 'the simulated tracker knows the straight instrument'
-            return response
+            return False, 'the simulated tracker knows the straight instrument'
         try:
             registration = self._window.register(self.ticker.monotonic_ns())
             if self._settings.registration_file:
                 save_registration(self._settings.registration_file, registration)
         except (RegistrationError, OSError) as error:
-            response.message = f'not registered: {error}'
-            self.get_logger().warning(response.message)
-            return response
+            self.get_logger().warning(f'not registered: {error}')
+            return False, f'not registered: {error}'
         self._registration = registration
-        response.success = True
-        response.message = 'straight instrument registered at ' + ', '.join(
-            f'{1e3 * v:.1f}' for v in registration.position
-        )
-        response.message += ' mm'
-        self.get_logger().info(response.message)
-        return response
+        place = ', '.join(f'{1e3 * v:.1f}' for v in registration.position)
+        self.get_logger().info(f'straight instrument registered at {place} mm')
+        return True, f'straight instrument registered at {place} mm'
 
     def _publish_pose(self, stamp_ns: int, position: np.ndarray, orientation: np.ndarray) -> None:
         pose = self._pose.pose
@@ -192,8 +183,3 @@ class EmTrackerNode(EndoscopeNode):
         """Let go of the tracker."""
         if self._tracker is not None:
             self._tracker.close()
-
-
-def main() -> int:
-    """Run the EM tracker in a process of its own."""
-    return run_nodes([EmTrackerNode])

@@ -1,9 +1,13 @@
 """Shows programs that draw robots what the instrument looks like and how it is bent."""
 
+from collections.abc import Sequence
+
 from std_msgs.msg import String
 
+from endoscope_bags.cdr_encoding import TransformEncoder
 from endoscope_bags.message_types import TF_MESSAGE
-from endoscope_core.kinematics import robot_description
+from endoscope_core.kinematics import Vertebrae, robot_description
+from endoscope_core.rig import InstrumentFacts
 from endoscope_nodes.names import (
     JOINT_STATES,
     JOINTS,
@@ -12,17 +16,33 @@ from endoscope_nodes.names import (
     SLAVE_MEASURED,
     TRANSFORMS,
 )
-from endoscope_nodes.nodes.joint_transforms import JointTransforms, section_of
 from endoscope_nodes.runtime.diagnostics import OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.qos import RESULT, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime.recorded_topics import message_class
-from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
 
 # Every other sample of a tracker of 40 Hz, whatever its clock does.
 _PERIOD_NS = 45_000_000
+
+
+def section_of(instrument: InstrumentFacts) -> Vertebrae:
+    """Return the bending section of the instrument that stands on the table."""
+    return Vertebrae(instrument.section_length, instrument.base_frame)
+
+
+class JointTransforms:
+    """Writes `/tf`, which few have the message class of, for a section's joints."""
+
+    def __init__(self, section: Vertebrae) -> None:
+        self._section = section
+        self._encoder = TransformEncoder([(h.parent, h.child) for h in section.hinges])
+
+    def encode(self, stamp_ns: int, angles: Sequence[float]) -> bytes:
+        """Encode the transforms at these angles of all joints, in rad."""
+        poses = self._section.transforms(angles)
+        return self._encoder.encode(stamp_ns, [(p.translation, p.rotation) for p in poses])
 
 
 class InstrumentModelNode(EndoscopeNode):
@@ -61,8 +81,3 @@ class InstrumentModelNode(EndoscopeNode):
     def _report(self) -> Report:
         values = {'published': self._joints.count, 'out of reach': self._out_of_reach}
         return OK, 'showing the measured bending', values
-
-
-def main() -> int:
-    """Run the model of the instrument in a process of its own."""
-    return run_nodes([InstrumentModelNode])

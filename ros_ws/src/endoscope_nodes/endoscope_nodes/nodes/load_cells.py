@@ -1,7 +1,5 @@
 """Reads the tension of the wires."""
 
-from std_srvs.srv import Trigger
-
 from endoscope_core.errors import FileError
 from endoscope_core.physics import SensorModel
 from endoscope_devices.load_cells import (
@@ -23,13 +21,12 @@ from endoscope_nodes.names import (
 )
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, STALE, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import LoadCellsParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import LOCK_STEP, SENSOR_ASKED, SENSOR_OFFERED
-from endoscope_nodes.runtime.runtime import run_nodes
-from endoscope_nodes.runtime.sampling import SampleClock
+from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
+from endoscope_nodes.runtime.ticker import SampleClock
 
 
 class LoadCellsNode(EndoscopeNode):
@@ -58,7 +55,7 @@ class LoadCellsNode(EndoscopeNode):
             self._cells = self._connect(device, p)
             JointSubscription(self, MOTOR_MEASURED, MOTORS, self._on_shafts, SENSOR_ASKED)
             self.ticker.add(self._on_tick)
-        self.create_service(Trigger, '~/tare', self._on_tare)
+        self.serve('~/tare', self._tare)
         self.diagnostics.add('cells', self._report, device)
 
     def _on_parameters(self, parameters: LoadCellsParameters) -> None:
@@ -110,25 +107,19 @@ class LoadCellsNode(EndoscopeNode):
         if self._cells is not None:
             self._cells.note_shafts(sample.velocity)
 
-    def _on_tare(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = False
+    def _tare(self) -> tuple[bool, str]:
         if self._cells is None:
-            response.message = 'simulated cells have no zero to find'
-            return response
+            return False, 'simulated cells have no zero to find'
         try:
             tared = self._cells.tared()
             save_tare(tare_path(self._settings.calibration_file), tared)
         except (TareError, OSError) as error:
-            response.message = f'not tared: {error}'
-            self.get_logger().warning(response.message)
-            return response
+            self.get_logger().warning(f'not tared: {error}')
+            return False, f'not tared: {error}'
         self._cells.use(tared)
-        response.success = True
-        response.message = 'zero: ' + ', '.join(
-            f'{name} {cell.zero:.6g} counts' for name, cell in tared.wires.items()
-        )
-        self.get_logger().info(response.message)
-        return response
+        zeros = ', '.join(f'{name} {cell.zero:.6g} counts' for name, cell in tared.wires.items())
+        self.get_logger().info(f'zero: {zeros}')
+        return True, f'zero: {zeros}'
 
     def _report(self) -> Report:
         values: dict[str, object] = {'published': self._measured.count}
@@ -146,8 +137,3 @@ class LoadCellsNode(EndoscopeNode):
         """Let go of the transmitter."""
         if self._cells is not None:
             self._cells.close()
-
-
-def main() -> int:
-    """Run the load cells in a process of their own."""
-    return run_nodes([LoadCellsNode])

@@ -1,18 +1,14 @@
 """Drives the motor shafts: the simulated slave or a bus of servos, the same node for both."""
 
 from collections import deque
+from collections.abc import Sequence
 
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
-from endoscope_core.safety import (
-    CommandLimits,
-    MotionLimits,
-    OperatingState,
-    Refusal,
-    ShaftMotion,
-)
+from endoscope_core.safety import CommandLimits, MotionLimits, OperatingState, Refusal, ShaftMotion
+from endoscope_devices.dynamixel.control_table import BAUD_CODES
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
+from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_devices.motor_device import DeviceError, MotorDevice
 from endoscope_devices.simulated_slave import SimulatedSlave
 from endoscope_nodes.names import (
@@ -27,18 +23,16 @@ from endoscope_nodes.names import (
     SIMULATED_WIRES,
     WIRES,
 )
-from endoscope_nodes.nodes.dynamixel_bus import build_motors
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_stream import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import DynamixelParameters, MotorDriverParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
-from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.ticker import TICK_NS, TICK_S
-from endoscope_nodes.safety.command_report import CommandReport
 from endoscope_nodes.safety.sessions import SessionWatch
+from endoscope_nodes.safety.streams import CommandReport
 
 _REPEATED_NS = 50_000_000
 
@@ -118,16 +112,14 @@ class MotorDriverNode(EndoscopeNode):
     def _dynamixel(self, parameters: DynamixelParameters) -> MotorDevice:
         self.require_real_time(self._device_name)
         motors = build_motors(parameters, MOTORS, self.rig.timeouts.command)
-        self.create_service(Trigger, MOTOR_REBOOT, lambda _, answer: self._reboot(motors, answer))
+        self.serve(MOTOR_REBOOT, lambda: self._reboot(motors))
         return motors
 
-    def _reboot(self, motors: DynamixelMotors, answer: Trigger.Response) -> Trigger.Response:
-        answer.success = not self._session.name
-        answer.message = 'not while the slave is enabled'
-        if answer.success:
-            motors.reboot()
-            answer.message = 'the servos restart without torque and are set up anew'
-        return answer
+    def _reboot(self, motors: DynamixelMotors) -> tuple[bool, str]:
+        if self._session.name:
+            return False, 'not while the slave is enabled'
+        motors.reboot()
+        return True, 'the servos restart without torque and are set up again'
 
     def _on_state(self, message: String) -> None:
         self._state = message.data
@@ -224,6 +216,39 @@ class MotorDriverNode(EndoscopeNode):
         self._device.close()
 
 
-def main() -> int:
-    """Run the motor driver in a process of its own."""
-    return run_nodes([MotorDriverNode])
+def build_motors(
+    parameters: DynamixelParameters, names: Sequence[str], goal_timeout: float
+) -> DynamixelMotors:
+    """Make the bus; a goal not renewed for `goal_timeout` s is given up."""
+    p = parameters
+    for name in ('servo_ids', 'servo_directions', 'servo_zeros'):
+        if len(getattr(p, name)) != len(names):
+            raise ParameterError(
+                f"motor_driver: parameter '{name}' has {len(getattr(p, name))} values; give one "
+                f'for each of {", ".join(names)}'
+            )
+    if len(set(p.servo_ids)) != len(names):
+        raise ParameterError("motor_driver: parameter 'servo_ids' names a servo twice")
+    if 0 in p.servo_directions:
+        raise ParameterError("motor_driver: parameter 'servo_directions' is 0; give 1 or -1")
+    if p.baud not in BAUD_CODES.values():
+        known = ', '.join(str(baud) for baud in BAUD_CODES.values())
+        raise ParameterError(f"motor_driver: parameter 'baud' is {p.baud}; give one of {known}")
+    mounts = [
+        ServoMount(*mount)
+        for mount in zip(names, p.servo_ids, p.servo_directions, p.servo_zeros, strict=True)
+    ]
+    try:
+        settings = BusSettings(
+            p.port,
+            p.baud,
+            p.current_limit,
+            p.bus_watchdog,
+            rate=p.bus_rate,
+            goal_timeout=goal_timeout,
+            fault_after=p.fault_after,
+            fast=p.fast_sync_read,
+        )
+    except DeviceError as error:
+        raise ParameterError(f'motor_driver: {error}') from error
+    return DynamixelMotors(settings, mounts)

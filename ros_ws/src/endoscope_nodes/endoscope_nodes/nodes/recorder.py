@@ -11,7 +11,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from endoscope_bags.errors import BagError, UnknownTypeError
 from endoscope_bags.message_types import begins_with_header, message_type
@@ -30,13 +29,12 @@ from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import RecorderParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import RESULT
-from endoscope_nodes.runtime.raw_subscription import RawSubscription
 from endoscope_nodes.runtime.recorded_topics import (
     message_class,
     offered_profiles,
     suitable_qos,
 )
-from endoscope_nodes.runtime.runtime import run_nodes
+from endoscope_nodes.runtime.streams import RawSubscription
 from endoscope_nodes.topics import BY_NAME
 
 _STAMP = struct.Struct('<iI')
@@ -93,8 +91,8 @@ class RecorderNode(EndoscopeNode):
         self._warning = ''
         self._active_ns = 0
         self.last_report: SessionReport | None = None  # none before the first has ended
-        self.create_service(Trigger, RECORDER_START, self._on_start)
-        self.create_service(Trigger, RECORDER_STOP, self._on_stop)
+        self.serve(RECORDER_START, self._start_when_asked)
+        self.serve(RECORDER_STOP, self._stop_when_asked)
         if self.ticker.simulated:
             self.ticker.add(self._on_tick)
         else:
@@ -164,23 +162,20 @@ class RecorderNode(EndoscopeNode):
         if self._session is not None:
             self.stop()
 
-    def _on_start(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _start_when_asked(self) -> tuple[bool, str]:
         self._unasked, self._warning = False, ''
         try:
-            response.message = with_final_names(str(self.start()))
-            response.success = True
+            return True, with_final_names(str(self.start()))
         except BagError as error:
-            response.message = str(error)
-        return response
+            return False, str(error)
 
-    def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _stop_when_asked(self) -> tuple[bool, str]:
         self._unasked = False
         try:
             report = self.stop()
-            response.message, response.success = str(report), report.complete
         except BagError as error:
-            response.message = str(error)
-        return response
+            return False, str(error)
+        return report.complete, str(report)
 
     def _on_state(self, message: String) -> None:
         enabled = message.data == 'ENABLED'
@@ -367,8 +362,3 @@ def checked_names(topics: tuple[str, ...]) -> tuple[str, ...]:
 def _stamp_ns(data: bytes) -> int:
     seconds, nanoseconds = _STAMP.unpack_from(data, 4)
     return int(seconds) * _SECOND + int(nanoseconds)
-
-
-def main() -> int:
-    """Run the recorder in a process of its own."""
-    return run_nodes([RecorderNode])

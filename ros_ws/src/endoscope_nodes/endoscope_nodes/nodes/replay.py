@@ -18,7 +18,6 @@ from endoscope_nodes.runtime.node_parameters import ReplayParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.runtime.recorded_topics import message_class
-from endoscope_nodes.runtime.runtime import run_nodes
 from endoscope_nodes.runtime.ticker import TICK_NS
 
 # A reader that asks for what is not offered never connects.
@@ -182,8 +181,3 @@ def _offered(topic: Topic) -> QoSProfile:
         reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
-
-
-def main() -> int:
-    """Run the replay in a process of its own."""
-    return run_nodes([ReplayNode])

@@ -4,7 +4,6 @@ import math
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
 from endoscope_core.safety import Answer, OperatingState, OperatingStateMachine, TensionGuard
@@ -25,12 +24,10 @@ from endoscope_nodes.names import (
 )
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_stream import JointSample, JointSubscription
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.qos import EVENT, RESULT, SENSOR_ASKED
-from endoscope_nodes.runtime.runtime import run_nodes
-from endoscope_nodes.safety.senders import senders_in_words
-from endoscope_nodes.safety.sessions import SESSION_REPORT
+from endoscope_nodes.runtime.streams import JointSample, JointSubscription
+from endoscope_nodes.safety.sessions import SESSION_REPORT, senders_in_words
 from endoscope_nodes.safety.streams import StreamWatch
 from endoscope_nodes.topics import TOPICS
 
@@ -56,12 +53,9 @@ class SupervisorNode(EndoscopeNode):
         self._watched = [self.resolve_topic_name(t.name) for t in TOPICS if t.one_sender]
         self._states = self.create_publisher(String, OPERATING_STATE, RESULT)
         self._sessions = self.create_publisher(Header, MOTION_SESSION, EVENT)
-        self._motor = StreamWatch(self.ticker, MOTOR_MEASURED)
+        self._motor = StreamWatch.of(self, MOTOR_MEASURED, SENSOR_ASKED)
         self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
         self._streams = self._motor, self._wires
-        self.create_subscription(
-            JointState, MOTOR_MEASURED, self._motor.note, SENSOR_ASKED, raw=True
-        )
         JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
         self.create_subscription(String, STATE_COMMAND, self._on_command, EVENT)
         self.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, EVENT)
@@ -161,8 +155,3 @@ class SupervisorNode(EndoscopeNode):
         """Say that the slave is no longer supervised."""
         self.machine.command('disable', self.ticker.now_ns())
         self._publish()
-
-
-def main() -> int:
-    """Run the supervisor in a process of its own."""
-    return run_nodes([SupervisorNode])

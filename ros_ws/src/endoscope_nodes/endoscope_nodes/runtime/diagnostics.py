@@ -35,6 +35,13 @@ def status(
     )
 
 
+def diagnostic_array(stamp_ns: int, *statuses: DiagnosticStatus) -> DiagnosticArray:
+    """Put statuses into a message."""
+    message = DiagnosticArray(status=list(statuses))
+    message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+    return message
+
+
 def _text(value: object) -> str:
     return f'{value:.9g}' if isinstance(value, float) else str(value)
 
@@ -62,9 +69,5 @@ class Diagnostics:
         now = self._ticker.now_ns()
         if now == 0 or not self._reports:
             return
-        message = DiagnosticArray()
-        message.header.stamp = Time(nanoseconds=now).to_msg()
-        message.status = [
-            status(name, *report(), hardware_id) for name, hardware_id, report in self._reports
-        ]
-        self._publisher.publish(message)
+        told = [status(name, *report(), hardware) for name, hardware, report in self._reports]
+        self._publisher.publish(diagnostic_array(now, *told))

@@ -10,6 +10,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 from rclpy.time import Time
+from std_srvs.srv import Trigger
 
 from endoscope_nodes.runtime.declared_parameters import declare_parameters
 from endoscope_nodes.runtime.diagnostics import Diagnostics
@@ -71,6 +72,15 @@ class EndoscopeNode(Node):
     def _is_in_lock_step(self) -> bool:
         ticker = getattr(self, 'ticker', None)
         return ticker is not None and ticker.simulated
+
+    def serve(self, service: str, answer: Callable[[], tuple[bool, str]]) -> None:
+        """Serve a `Trigger`: `answer` says whether it was done, and what came of it, or why not."""
+
+        def respond(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.success, response.message = answer()
+            return response
+
+        self.create_service(Trigger, service, respond)
 
     def matched_event(self, subscription: Subscription) -> rclpy_implementation.EventHandle:
         """Return what counts the senders of a subscription, to be asked; it ends with the node."""

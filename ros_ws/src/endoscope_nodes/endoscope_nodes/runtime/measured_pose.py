@@ -9,8 +9,8 @@ from sensor_msgs.msg import JointState
 from endoscope_bags.errors import MalformedMessageError
 from endoscope_core.rig import Rig
 from endoscope_nodes.names import JOINTS, MOTOR_MEASURED, MOTORS, SLAVE_MEASURED
-from endoscope_nodes.runtime.joint_stream import JointReader, JointSample
 from endoscope_nodes.runtime.qos import SENSOR_ASKED
+from endoscope_nodes.runtime.streams import JointReader, JointSample
 from endoscope_nodes.runtime.ticker import Ticker
 
 # At 40 Hz, three missed frames mean that the tracker has lost its sensor.

@@ -9,19 +9,64 @@ from rclpy.parameter import Parameter
 from rclpy.task import Future
 
 from endoscope_core.errors import FileError
-from endoscope_core.physics import PlantDescription
+from endoscope_core.physics import PlantDescription, load_plant
+from endoscope_core.physics.effect import Stage
+from endoscope_core.physics.effects import describe
 from endoscope_core.rig import Rig, load_rig
-from endoscope_nodes.names import CLOCK
-from endoscope_nodes.runtime.declared_parameters import declare_parameters
-from endoscope_nodes.runtime.matching import all_matched
+from endoscope_nodes.names import CLOCK, JOINTS
+from endoscope_nodes.runtime.declared_parameters import check_sections, declare_parameters
 from endoscope_nodes.runtime.measured_pose import MeasuredPose
 from endoscope_nodes.runtime.node_parameters import BeatParameters, RealTimeParameters
-from endoscope_nodes.runtime.parameter_sections import check_sections
 from endoscope_nodes.runtime.parameters import ParameterError, changed
-from endoscope_nodes.runtime.simulated_plant import load_slave
 from endoscope_nodes.runtime.ticker import Ticker
 
 NAMESPACE = 'endoscope'
+
+
+def load_slave(source: str, path: str) -> PlantDescription:
+    """Load a plant file of both joints that `source` names; an empty path is the nominal plant."""
+    if not path:
+        return PlantDescription()
+    try:
+        plant = load_plant(path)
+    except (FileError, OSError) as error:
+        raise ParameterError(f'{source}: {error}') from error
+    if plant.joint_names() != JOINTS:
+        raise ParameterError(
+            f'{source}: {path} describes {", ".join(plant.joints)}; '
+            f'the nodes need {", ".join(JOINTS)} in this order'
+        )
+    for spec in plant.effects:
+        if describe(spec.id).stage is Stage.RECORDING:
+            raise ParameterError(
+                f'{source}: {path} has the effect {spec.id}, which acts '
+                'on recordings: leave it out here, and let `endoscope simulate` apply it'
+            )
+    return plant
+
+
+def all_matched(nodes: Sequence[Node]) -> bool:
+    """Say whether no message between these nodes would be lost from now on.
+
+    Both sides have to know of each other, and each finds the other at its own time. Endpoints of
+    other nodes do not count. A node of this process that reads topics by other means than
+    subscriptions of its own lists them in ``extra_readers() -> [(topic, publishers found)]``.
+    """
+    here = {(node.get_name(), node.get_namespace()) for node in nodes}
+    for node in nodes:
+        for publisher in node.publishers:
+            known = node.get_subscriptions_info_by_topic(publisher.topic_name)
+            wanted = sum((info.node_name, info.node_namespace) in here for info in known)
+            if publisher.get_subscription_count() < wanted:
+                return False
+        readers = [(s.topic_name, s.get_publisher_count()) for s in node.subscriptions]
+        if hasattr(node, 'extra_readers'):
+            readers += node.extra_readers()
+        for topic, found in readers:
+            known = node.get_publishers_info_by_topic(topic)
+            if found < sum((info.node_name, info.node_namespace) in here for info in known):
+                return False
+    return True
 
 
 class NodeContext:

@@ -10,9 +10,11 @@ import typing
 from collections.abc import Iterable
 from typing import Any
 
+from endoscope_core.errors import EndoscopeError
 
-class ParameterError(ValueError):
-    """A parameter that a node refuses to start with."""
+
+class ParameterError(EndoscopeError, ValueError):
+    """A parameter that there is not, or a value that it cannot have."""
 
 
 def parameter(

@@ -17,19 +17,21 @@ from rclpy.exceptions import (
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.logging import LoggingSeverity, set_logger_level
+from rclpy.logging import LoggingSeverity, get_logger, set_logger_level
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from endoscope_core.atomic_output import with_final_names
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.rig import Rig
-from endoscope_nodes.runtime.announcement import Announcement
 from endoscope_nodes.runtime.declared_parameters import check_overrides
-from endoscope_nodes.runtime.discovery import DiscoveryRangeError, stay_on_this_machine
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.log_level import LogLevelError, log_as_asked
-from endoscope_nodes.runtime.node_context import NodeContext
-from endoscope_nodes.runtime.parameters import ParameterError
+from endoscope_nodes.runtime.environment import (
+    log_as_asked,
+    stay_on_this_machine,
+)
+from endoscope_nodes.runtime.node_context import NodeContext, all_matched
+from endoscope_nodes.runtime.parameters import ParameterError, as_typed
 from endoscope_nodes.runtime.real_time import (
     enter_real_time,
     granted_priority,
@@ -48,6 +50,8 @@ _CARRY_ON_S = 0.1
 GC_THRESHOLDS = (7000, 10, 10)
 
 N = TypeVar('N', bound=EndoscopeNode)
+_LOOK_S = 0.2
+_PATIENCE_LOOKS = 25
 
 
 class Runtime(NodeContext, ClosedOnExit):
@@ -230,8 +234,6 @@ def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -
             runtime.spin()
     except (
         ParameterError,
-        DiscoveryRangeError,
-        LogLevelError,
         InvalidNodeNameException,
         InvalidNamespaceException,
         InvalidParameterTypeException,
@@ -239,3 +241,50 @@ def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -
         print(error, file=sys.stderr)
         return 2
     return runtime.exit_code
+
+
+class Announcement:
+    """Says once that the nodes of a process can be operated, and what to do next.
+
+    That is when they have found each other and none of them waits for anything.
+    """
+
+    def __init__(
+        self, nodes: Sequence[EndoscopeNode], process_parameters: Mapping[str, object]
+    ) -> None:
+        self._nodes = nodes
+        self._looks = 0
+        self._logger = nodes[0].get_logger() if len(nodes) == 1 else get_logger('graph')
+        for node in nodes:
+            given = {**process_parameters, **node.given} if node is nodes[0] else node.given
+            told = [f'{name}:={as_typed(value)}' for name, value in given.items()]
+            if told:
+                node.get_logger().info(with_final_names(f'with {", ".join(told)}'))
+        self._timer = nodes[0].create_timer(
+            _LOOK_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+
+    def _look(self) -> None:
+        waiting = self._waiting()
+        if not waiting:
+            self._timer.cancel()
+            self._logger.info(self._ready())
+            return
+        self._looks += 1
+        if self._looks == _PATIENCE_LOOKS:
+            self._logger.warning(f'not ready yet: {waiting}')
+
+    def _waiting(self) -> str:
+        waiting = [node.waiting for node in self._nodes if node.waiting]
+        if not self._nodes[0].ticker.now_ns():
+            waiting.append('simulated time has not begun')
+        if not waiting and not all_matched(self._nodes):
+            return 'the nodes have not found each other'
+        return '; '.join(waiting)
+
+    def _ready(self) -> str:
+        nodes, ticker = self._nodes, self._nodes[0].ticker
+        pace = 'in simulated time' if ticker.simulated else f'at {ticker.rate} Hz'
+        pace += ', no faster than real time' * ticker.paced
+        said = '; '.join(filter(None, (node.announcement for node in nodes)))
+        return f'ready in {nodes[0].get_namespace()} {pace}' + (f': {said}' if said else '')

@@ -1,7 +1,11 @@
-"""The 1 kHz beat that all nodes of a process share, in real or in simulated time."""
+"""The 1 kHz beat that all nodes of a process share, in real or in simulated time.
+
+In simulated time no tick begins before what the nodes sent each other in the last one was heard.
+"""
 
 import struct
 import time
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 
 from rclpy.clock import Clock, ClockType
@@ -10,18 +14,77 @@ from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from endoscope_nodes.names import CLOCK
-from endoscope_nodes.runtime.in_flight import InFlight
 from endoscope_nodes.runtime.qos import SENSOR_ASKED
 
 TICK_NS = 1_000_000
 TICK_S = TICK_NS * 1e-9
 TickCallback = Callable[[int, int], None]
-
 _STAMP = struct.Struct('<iI')
 _SLOW_NS = 20_000_000
 _USUAL_DELAY_NS = 5_000_000
 # What a hand says meanwhile waits to be heard, and is no silence of it.
 _LONGEST_WAIT_NS = 50_000_000
+
+
+class InFlight:
+    """Counts messages on their way, so that no tick begins before all of the last one was heard.
+
+    The middleware hands a message to its readers one after the other. On a busy machine one of them
+    may be told of it later than the next tick, which would then depend on the machine.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0  # once for each reader
+        # Called when the last one has been dealt with.
+        self.landed: Callable[[], object] = lambda: None
+        self._sent: Counter[str] = Counter()
+        self._readers: defaultdict[str, list[Node]] = defaultdict(list)
+        self._senders: set[str] = set()
+
+    def sent_by_us(self, topic: str) -> bool:
+        """Whether a node of this process sends on a topic, given by its full name."""
+        return topic in self._senders
+
+    def sent[M](self, topic: str, publish: Callable[[M], None]) -> Callable[[M], None]:
+        """Count what is published by a function on a topic."""
+        self._senders.add(topic)
+
+        def counted(message: M) -> None:
+            readers = len(self._readers[topic])
+            self._sent[topic] += readers
+            self.count += readers
+            publish(message)
+
+        return counted
+
+    def taken[M](
+        self, node: Node, topic: str, callback: Callable[[M], object]
+    ) -> Callable[[M], None]:
+        """Count what a node's callback has dealt with."""
+        self._readers[topic].append(node)
+
+        def counted(message: M) -> None:
+            try:
+                callback(message)
+            finally:
+                # What comes from another process was not counted.
+                if self._sent[topic]:
+                    self._sent[topic] -= 1
+                    self.count -= 1
+                    if not self.count:
+                        self.landed()
+
+        return counted
+
+    def forget(self, owners: Sequence[object]) -> None:
+        """Expect nothing more of these nodes."""
+        for topic, nodes in self._readers.items():
+            self._readers[topic] = [node for node in nodes if node not in owners]
+
+    def give_up(self) -> None:
+        """Take what has not come for lost."""
+        self.count = 0
+        self._sent.clear()
 
 
 class Ticker:
@@ -147,7 +210,7 @@ class Ticker:
         if backwards or self._sim_ns == 0:
             periods = 1
         if backwards:
-            self._node.get_logger().warning('simulated time went back: watches start anew')
+            self._node.get_logger().warning('simulated time went back: watches restart')
             for item in self._periodic:
                 item.due_ns = None
         self._sim_ns = stamp
@@ -191,3 +254,20 @@ class _Periodic:
         self.callback = callback
         self.due_ns: int | None = None
         self.timer: Timer | None = None
+
+
+class SampleClock:
+    """Samples at the first tick in each sampling period of a rate in Hz, counted from the epoch."""
+
+    def __init__(self, rate: float) -> None:
+        self._period_ns = round(1e9 / rate)
+        self._last = -1
+
+    def due(self, stamp_ns: int) -> bool:
+        """Whether the tick stamped so is one to sample at; call it for each tick in turn."""
+        # By the stamp alone: whoever knows the rate knows which stamps to expect.
+        number = stamp_ns // self._period_ns
+        if number == self._last:
+            return False
+        self._last = number
+        return True

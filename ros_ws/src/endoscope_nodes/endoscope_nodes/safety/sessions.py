@@ -1,19 +1,60 @@
-"""A node's part in the motion sessions of the supervisor."""
+"""Who may move the slave: a node's part in the motion sessions, the one sender, the clutch."""
 
 from collections.abc import Callable
 
 from rclpy.subscription import Subscription
+from sensor_msgs.msg import Joy
 from std_msgs.msg import Header
 
-from endoscope_core.safety import CommandGate, MotionSession
-from endoscope_nodes.names import MOTION_SESSION
+from endoscope_core.safety import CommandGate, MotionSession, Refusal
+from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTION_SESSION
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.qos import EVENT
-from endoscope_nodes.safety.senders import SenderWatch
+from endoscope_nodes.runtime.qos import COMMAND, EVENT
+from endoscope_nodes.runtime.streams import JointSample, JointSubscription
 
 SESSION_REPORT = 'motion session'
 TURN_S = 0.04
+# The clutch is repeated at 10 Hz; three missed repetitions mean that the console is gone.
+CLUTCH_TIMEOUT_NS = 350_000_000
+
+
+class SenderWatch:
+    """Whether a topic has had but one sender since this was last asked.
+
+    A message may wait for a node that is not run and outlive its sender, which is not among those
+    who are there when it is taken.  A node killed without a last word counts until the middleware
+    has given it up.
+    """
+
+    def __init__(self, node: EndoscopeNode, subscription: Subscription) -> None:
+        self._node = node
+        self._topic = subscription.topic_name
+        self._event = node.matched_event(subscription)
+        self._there = self._ever = 0
+
+    def rivals(self) -> str:
+        """Say who else has been there; empty while there was but one."""
+        matched = self._event.take_event()
+        been = self._there + matched.total_count - self._ever
+        self._there, self._ever = matched.current_count, matched.total_count
+        if been <= 1:
+            return ''
+        relative = self._topic.removeprefix(f'{self._node.get_namespace()}/')
+        known = senders_in_words(self._node, self._topic)
+        return known or f'{relative} had {been} senders, of which not all are there any more'
+
+
+def senders_in_words(node: EndoscopeNode, topic: str) -> str:
+    """Name all senders of a topic in one line; empty where there are fewer than two."""
+    known = [
+        f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+        for info in node.get_publishers_info_by_topic(topic)
+    ]
+    if len(known) < 2:
+        return ''
+    relative = topic.removeprefix(f'{node.get_namespace()}/')
+    return f'{relative} has {len(known)} senders: {" and ".join(sorted(known))}'
 
 
 class SessionWatch:
@@ -106,3 +147,86 @@ class SessionWatch:
     def _report(self) -> Report:
         session = self._session
         return (ERROR, session.trouble, {}) if session.trouble else (OK, session.name or 'none', {})
+
+
+class CommandInput:
+    """Commands of joints on a topic; `take` gets those of the open session from its one sender."""
+
+    def __init__(
+        self,
+        node: EndoscopeNode,
+        session: SessionWatch,
+        topic: str,
+        gate: CommandGate,
+        take: Callable[[JointSample], None],
+    ) -> None:
+        self._session = session
+        self._gate = gate
+        self._take = take
+        stream = JointSubscription(
+            node,
+            topic,
+            JOINTS,
+            self._receive,
+            COMMAND,
+            exact=True,
+            on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
+        )
+        self._senders = session.senders_of(stream.subscription)
+
+    def _receive(self, sample: JointSample) -> None:
+        if not self._session.belongs(sample.session):
+            self._gate.refuse(Refusal.SESSION, sample.session or 'none named')
+            return
+        crowd = self._senders.rivals()
+        if crowd:
+            self._gate.refuse(Refusal.SENDER, crowd)
+            self._session.leave(crowd)
+            return
+        self._take(sample)
+
+
+class ClutchWatch:
+    """The clutch as last heard; silence counts as released.
+
+    A second sender ends the node's part in the session, and the clutch counts as released until it
+    is let go of: who held it is not known. `on_release` also comes when it is heard again.
+    """
+
+    def __init__(
+        self,
+        node: EndoscopeNode,
+        session: SessionWatch,
+        on_release: Callable[[], None] | None = None,
+    ) -> None:
+        self._ticker = node.ticker
+        self._session = session
+        self._on_release = on_release
+        self._pressed = self._doubted = False
+        self._heard_ns = 0
+        subscription = node.create_subscription(Joy, MASTER_CLUTCH, self._receive, EVENT)
+        self._senders = session.senders_of(subscription, self._doubt)
+
+    def _doubt(self, crowd: str) -> None:
+        self._doubted = True
+        self._pressed = False
+        self._session.leave(crowd)
+
+    def _receive(self, message: Joy) -> None:
+        crowd = self._senders.rivals()
+        if crowd:
+            self._doubt(crowd)
+            return
+        before = self._pressed
+        pressed = bool(message.buttons) and message.buttons[0] == 1
+        self._doubted = self._doubted and pressed
+        pressed = pressed and not self._doubted
+        if before and not (pressed and self.held) and self._on_release is not None:
+            self._on_release()
+        self._pressed = pressed
+        self._heard_ns = self._ticker.hand_ns()
+
+    @property
+    def held(self) -> bool:
+        """Whether the clutch is held now, and was heard of lately."""
+        return self._pressed and self._ticker.hand_ns() - self._heard_ns <= CLUTCH_TIMEOUT_NS

@@ -1,11 +1,14 @@
-"""Keeps DDS on this machine unless the operator says otherwise."""
+"""What a process takes from its environment before ROS starts: who reaches it, its log level."""
 
 import os
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from endoscope_core.errors import EndoscopeError
+from rclpy.logging import LoggingSeverity, set_logger_level
+
+from endoscope_core.choices import LOG_LEVEL_VARIABLE, LOG_LEVELS
+from endoscope_nodes.runtime.parameters import ParameterError
 
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 PEERS = 'ROS_STATIC_PEERS'
@@ -20,10 +23,6 @@ _ON_THIS_MACHINE = ('LOCALHOST', 'OFF')
 _WIDER = ('SUBNET', 'SYSTEM_DEFAULT')
 
 
-class DiscoveryRangeError(EndoscopeError, ValueError):
-    """A discovery range that ROS 2 does not know, and would take for `SUBNET`."""
-
-
 def stay_on_this_machine() -> None:
     """Let this machine alone reach the nodes; call it before a context is initialised.
 
@@ -34,7 +33,7 @@ def stay_on_this_machine() -> None:
     # ROS 2 takes an empty range for SUBNET.
     chosen = os.environ.get(RANGE) or 'LOCALHOST'
     if chosen not in _ON_THIS_MACHINE + _WIDER:
-        raise DiscoveryRangeError(
+        raise ParameterError(
             f'{RANGE} is {chosen!r}; give LOCALHOST for this machine alone, OFF for this process '
             'alone, SUBNET for other machines too, or SYSTEM_DEFAULT for what Fast DDS does by '
             'itself'
@@ -59,3 +58,15 @@ def _heeded() -> tuple[str, ...]:
             major = int(version(distribution).split('.')[0])
             return (PROFILES,) if major <= _RCLPY_OF_JAZZY else (PROFILES_OF_FAST_DDS_3, PROFILES)
     return (PROFILES,)
+
+
+def log_as_asked() -> None:
+    """Set the log level of the environment, if any; before ROS starts, whose `--log-level` wins."""
+    asked = os.environ.get(LOG_LEVEL_VARIABLE)
+    if not asked:
+        return
+    if asked not in LOG_LEVELS:
+        raise ParameterError(
+            f'{LOG_LEVEL_VARIABLE} is {asked!r}; give one of {", ".join(LOG_LEVELS)}'
+        )
+    set_logger_level('', LoggingSeverity[asked.upper()])
