@@ -16,7 +16,7 @@ import yaml
 from doc_pages import LANGUAGES, NOT_RUN, PAGES, ROOT, WORKSPACE, blocks, prose, run_page
 
 from endoscope_bringup.commands import COMMANDS
-from endoscope_bringup.other_packages import commands_of_other_packages
+from endoscope_bringup.subcommands import commands_of_other_packages
 from endoscope_core.physics import JointParameters, SensorParameters
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS

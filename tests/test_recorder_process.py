@@ -19,9 +19,9 @@ from sensor_msgs.msg import JointState
 
 from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.copying import recover
 from endoscope_bags.errors import TruncatedBagError
 from endoscope_bags.information import bag_information
-from endoscope_bags.recovery import recover
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_OFFERED
 
 TOPIC = '/endoscope/motor/measured_js'
@@ -247,7 +247,7 @@ def test_a_topic_that_cannot_be_is_one_line(tmp_path, capsys):
         check=False,
     )
     assert done.returncode == 2
-    assert done.stderr == "recorder: parameter 'topics': '3 x' is no name of a topic\n"
+    assert done.stderr == "recorder: parameter 'topics': '3 x' is not a topic name\n"
     assert not (tmp_path / 'bag').exists()
 
 

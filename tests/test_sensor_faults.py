@@ -306,7 +306,7 @@ def test_moving_wires_are_not_tared_and_a_bent_tip_is_not_registered(rig):
         ({'device': 'modbus_rtu', 'port': '/dev/null'}, "'calibration_file' is empty"),
         (
             {'device': 'modbus_tcp', 'port': 'h:x', 'calibration_file': 'CELLS'},
-            "'h:x' is no address",
+            "'h:x' is not an address",
         ),
         ({'device': 'modbus_rtu', 'port': 'p', 'calibration_file': 'nowhere'}, 'nowhere'),
         ({'device': 'modbus'}, 'did you mean modbus_'),

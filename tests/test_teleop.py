@@ -244,7 +244,7 @@ def test_a_motion_that_the_console_played_does_not_begin_anew_with_nobody_lookin
         assert typist.end() == 0
         assert source(graph) == 'motion'
         assert graph.state == 'PAUSED'
-        assert 'begins anew when you resume' in typist.text
+        assert 'starts again when you resume' in typist.text
         assert typist.stands()
 
 

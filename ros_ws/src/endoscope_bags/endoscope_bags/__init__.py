@@ -4,10 +4,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from endoscope_bags.bag_writer import BagWriter
+    from endoscope_bags.bag_writer import BagWriter, MessageStream
     from endoscope_bags.errors import BagError
     from endoscope_bags.joint_state_series import JointStateSeries, PoseSeries
-    from endoscope_bags.message_stream import MessageStream
     from endoscope_bags.recording import Recording, open_bag
     from endoscope_bags.topic import RawMessage, Topic
 
@@ -15,7 +14,7 @@ _HOME = {
     'BagError': 'errors',
     'BagWriter': 'bag_writer',
     'JointStateSeries': 'joint_state_series',
-    'MessageStream': 'message_stream',
+    'MessageStream': 'bag_writer',
     'PoseSeries': 'joint_state_series',
     'RawMessage': 'topic',
     'Recording': 'recording',

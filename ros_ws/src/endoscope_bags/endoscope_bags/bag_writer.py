@@ -2,20 +2,17 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
-from endoscope_bags.chunk_sink import ChunkSink, TopicRecord
-from endoscope_bags.errors import (
-    BagExistsError,
-    BagWriteError,
-    MalformedMessageError,
-)
-from endoscope_bags.mcap_chunk import MESSAGE_OVERHEAD, ChunkMessage, chunk_message
-from endoscope_bags.message_stream import MessageStream
+from endoscope_bags.chunk_sink import ChunkSink, TopicRecord, write_error
+from endoscope_bags.errors import BagExistsError, BagWriteError, MalformedMessageError
+from endoscope_bags.mcap_file import MESSAGE_OVERHEAD, ChunkMessage, chunk_message
 from endoscope_bags.message_types import MessageType, message_type
 from endoscope_bags.metadata import (
     METADATA,
@@ -24,13 +21,48 @@ from endoscope_bags.metadata import (
     metadata_text,
     write_metadata,
 )
-from endoscope_bags.qos_profile import QosProfile
-from endoscope_bags.room_on_disk import write_error
+from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import make_parent
 
 CHUNK_SECONDS = 0.25
 CHUNK_BYTES = 1 << 20
 METADATA_RECORD = 'endoscope_bags'
+
+
+@dataclass(frozen=True)
+class MessageStream:
+    """N encoded messages of one topic, for `BagWriter.write_streams`.
+
+    Attributes
+    ----------
+    topic, type
+        Full topic name and message type.
+    payloads
+        The encoded messages.
+    log_ns
+        Receipt in ns since the epoch, int64, shape (N,).
+    publish_ns
+        Publication, the same; None where it equals receipt.
+    """
+
+    topic: str
+    type: str
+    payloads: Sequence[bytes]
+    log_ns: npt.NDArray[np.int64]
+    publish_ns: npt.NDArray[np.int64] | None = None
+
+    def __post_init__(self) -> None:
+        for times in (self.log_ns, self.published_ns):
+            if times.shape != (len(self.payloads),) or times.dtype != np.int64:
+                raise ValueError(
+                    f'{self.topic}: times {times.dtype} {times.shape} for '
+                    f'{len(self.payloads)} messages; int64 of shape (N,) is due'
+                )
+
+    @property
+    def published_ns(self) -> npt.NDArray[np.int64]:
+        """Publication in ns since the epoch, shape (N,)."""
+        return self.log_ns if self.publish_ns is None else self.publish_ns
 
 
 class BagWriter:
@@ -104,7 +136,7 @@ class BagWriter:
             raise
         except OSError as error:
             self._remove_home()
-            raise BagWriteError(f'{file_path}: cannot be made: {error.strerror}') from error
+            raise BagWriteError(f'{file_path}: cannot be created: {error.strerror}') from error
 
     def _make_home(self, atomic: bool) -> Path:
         hidden = self.path.with_name(f'.partial-{os.getpid()}-{self.path.name}')
@@ -114,7 +146,7 @@ class BagWriter:
             if not self._bare:
                 home.mkdir()
         except OSError as error:
-            raise BagWriteError(f'{self.path}: cannot be made: {error.strerror}') from error
+            raise BagWriteError(f'{self.path}: cannot be created: {error.strerror}') from error
         return home
 
     @property

@@ -1,5 +1,6 @@
 """Takes chunks of messages and puts them into the file of a recording, in a thread if asked."""
 
+import errno
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -10,19 +11,40 @@ from pathlib import Path
 
 from mcap.records import Channel, Schema
 
-from endoscope_bags.errors import BagWriteError
-from endoscope_bags.mcap_chunk import ChunkMessage, encode_chunk
-from endoscope_bags.mcap_file import McapFile
+from endoscope_bags.errors import BagFullError, BagWriteError
+from endoscope_bags.mcap_file import ChunkMessage, McapFile, encode_chunk
 from endoscope_bags.message_types import MessageType
-from endoscope_bags.qos_profile import QosProfile, qos_as_yaml
-from endoscope_bags.room_on_disk import require_room, write_error
+from endoscope_bags.topic import QosProfile, qos_as_yaml
 
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+_NOT_OFFERED = {errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
 LIBRARY = 'endoscope_bags'
 # What the index of a chunk, and the two descriptions of a topic, take at the end of the file.
 _CHUNK_OVERHEAD = 512
 _TOPIC_OVERHEAD = 8192
 # A disk that cannot keep up is waited for rather than buffered for without bound.
 _CHUNKS_IN_FLIGHT = 16
+
+
+def require_room(descriptor: int, name: str, n_bytes: int) -> None:
+    """Raise BagFullError unless a file, positioned at its end, can grow by `n_bytes`."""
+    end = os.lseek(descriptor, 0, os.SEEK_CUR)
+    try:
+        # Given back at once: this alone asks the disk, the quota and the limit of file sizes
+        # together.
+        os.posix_fallocate(descriptor, end, n_bytes)
+    except OSError as error:
+        if error.errno in _NOT_OFFERED:
+            return
+        raise write_error(error, name) from error
+    finally:
+        os.ftruncate(descriptor, end)
+
+
+def write_error(error: OSError, name: str) -> BagWriteError:
+    """Return what to raise for an error of the file `name`; a full disk has its own class."""
+    kind = BagFullError if error.errno in _FULL else BagWriteError
+    return kind(f'{name}: {error.strerror}; recording ended there')
 
 
 @dataclass(frozen=True)

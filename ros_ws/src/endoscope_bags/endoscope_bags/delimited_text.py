@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags.errors import BagError
-from endoscope_bags.table_mapping import WHITESPACE
-from endoscope_bags.units import known_unit
+from endoscope_bags.table_mapping import WHITESPACE, known_unit
 from endoscope_core.errors import nearest
 
 SEPARATORS = (';', '\t', ',', WHITESPACE)
@@ -118,7 +117,7 @@ class DelimitedText:
                 if not is_number(cell, self.decimal_comma) and cell
             )
             raise TableError(
-                f'{self.path}: line {line}, {self.label(index)}: {_shown(cell)} is no number'
+                f'{self.path}: line {line}, {self.label(index)}: {_shown(cell)} is not a number'
             ) from None
 
     def _number(self, cell: str) -> float:
@@ -137,7 +136,7 @@ class DelimitedText:
                 float(text)
                 scaled = Decimal(text) * unit_ns
             except (InvalidOperation, ValueError) as error:
-                raise TableError(f'{where}: {_shown(cell)} is no number') from error
+                raise TableError(f'{where}: {_shown(cell)} is not a number') from error
             if not scaled.is_finite():
                 raise TableError(f'{where}: the time {_shown(cell)} is not finite')
             if abs(scaled) >= 1 << 62:
@@ -153,8 +152,8 @@ class DelimitedText:
                 times.append(date_ns(cell))
             except ValueError as error:
                 raise TableError(
-                    f'{self.path}: line {line}, {self.label(index)}: {_shown(cell)} is no date and '
-                    'time such as 2026-01-31 13:45:00.250'
+                    f'{self.path}: line {line}, {self.label(index)}: {_shown(cell)} is not a date '
+                    'and time such as 2026-01-31 13:45:00.250'
                 ) from error
         return np.array(times, dtype=np.int64)
 

@@ -6,8 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from endoscope_bags.cdr_decoding import LayoutGroup, Payloads, grouped_by_layout
-from endoscope_bags.cdr_layout import QUANTITIES, Layout, joint_state_layout, pose_layout
+from endoscope_bags.cdr_decoding import (
+    QUANTITIES,
+    Layout,
+    LayoutGroup,
+    Payloads,
+    grouped_by_layout,
+    joint_state_layout,
+    pose_layout,
+)
 from endoscope_bags.errors import MalformedMessageError, MissingJointError, NonFiniteError
 
 MOST_JOINTS = 1024

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags.delimited_text import DelimitedText, is_date
-from endoscope_bags.table_mapping import WHITESPACE
-from endoscope_bags.units import DATE, TIME_UNITS, UNITS
+from endoscope_bags.table_mapping import DATE, TIME_UNITS, UNITS, WHITESPACE
 from endoscope_core.errors import printable
 
 DESIRED, SHAFT = 'slave/servo_jp', 'motor/servo_jp'

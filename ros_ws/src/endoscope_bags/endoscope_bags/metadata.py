@@ -13,7 +13,7 @@ import yaml
 
 from endoscope_bags.errors import BagNotFoundError, NotABagError, UnsupportedBagError
 from endoscope_bags.message_types import MessageType
-from endoscope_bags.qos_profile import QosProfile
+from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import FileError
 from endoscope_core.strict_yaml import load_yaml

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from rosbags.serde import SerdeError
 
-from endoscope_bags.cdr_decoding import HEAD_WITH_STAMP, Payloads, stamps_of_heads
-from endoscope_bags.cdr_layout import QUANTITIES
+from endoscope_bags.cdr_decoding import HEAD_WITH_STAMP, QUANTITIES, Payloads, stamps_of_heads
 from endoscope_bags.errors import (
     AmbiguousTopicError,
     BagError,
@@ -30,14 +29,16 @@ from endoscope_bags.joint_state_series import (
 from endoscope_bags.mcap_scan import McapScan, scan_mcap
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, typestore
 from endoscope_bags.metadata import bag_files
-from endoscope_bags.qos_profile import QosProfile, qos_from_yaml
 from endoscope_bags.sqlite3_scan import Sqlite3Scan, is_sqlite3, scan_sqlite3
-from endoscope_bags.topic import MessageTimes, RawMessage, Topic
+from endoscope_bags.topic import MessageTimes, QosProfile, RawMessage, Topic, qos_from_yaml
 from endoscope_core.errors import FileError
+from endoscope_core.rig import Rig, rig_as_text, rig_from_text, shipped_rig
 from endoscope_core.strict_yaml import LARGEST
 
 IntArray = npt.NDArray[np.int64]
 Scan = McapScan | Sqlite3Scan
+_NAME, _KEY = 'endoscope_rig', 'rig.yaml'
+"""Of the metadata record, which stands before all messages."""
 
 
 @contextmanager
@@ -428,3 +429,19 @@ def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
     if not recording.message_count:
         raise EmptyBagError(f'{path}: holds no message')
     return recording
+
+
+def rig_record(rig: Rig) -> dict[str, dict[str, str]]:
+    """The metadata record of a rig, for a `BagWriter`."""
+    return {_NAME: {_KEY: rig_as_text(rig)}}
+
+
+def copied_rig_record(recording: Recording) -> dict[str, dict[str, str]]:
+    """The record that a recording has, for another one that is made of it."""
+    return {name: content for name, content in recording.metadata.items() if name == _NAME}
+
+
+def rig_of_bag(recording: Recording) -> Rig:
+    """Return the rig that a recording carries; as shipped where it carries none."""
+    text = recording.metadata.get(_NAME, {}).get(_KEY)
+    return shipped_rig() if text is None else rig_from_text(text, f'the rig of {recording.path}')

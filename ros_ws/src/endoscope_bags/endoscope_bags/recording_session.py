@@ -8,9 +8,9 @@ from typing import NamedTuple
 from endoscope_bags.bag_writer import CHUNK_SECONDS, BagWriter
 from endoscope_bags.errors import BagWriteError
 from endoscope_bags.information import LOST_PREFIX
-from endoscope_bags.qos_profile import QosProfile
-from endoscope_bags.rig_record import rig_record
+from endoscope_bags.recording import rig_record
 from endoscope_bags.sequence_gaps import SequenceGaps
+from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import with_final_names
 from endoscope_core.rig import Rig
 

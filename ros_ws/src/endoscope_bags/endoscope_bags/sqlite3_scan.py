@@ -146,7 +146,7 @@ def _read_topics(file: sqlite3.Connection, scan: Sqlite3Scan) -> dict[int, int]:
         if str(sql).upper().startswith('CREATE TABLE')
     }
     if not {'topics', 'messages'} <= tables:
-        raise NotABagError(f'{scan.path}: a database that is no rosbag2 recording')
+        raise NotABagError(f'{scan.path}: a database that is not a rosbag2 recording')
     has = {str(column[1]) for column in file.execute('PRAGMA table_info(topics)')}
     chosen = [
         name if name in has else "''" for name in ('offered_qos_profiles', 'type_description_hash')

@@ -4,6 +4,7 @@
 """
 
 import difflib
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +12,67 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from endoscope_bags.units import TIME_UNITS, UNITS, known_unit
 from endoscope_core.schema import Before, load, one_of, within
 
+DATE = 'date'
+"""In place of a unit: the column holds dates and times, or times of day (ISO 8601)."""
+UNITS = {
+    's': 1.0,
+    'ms': 1e-3,
+    'us': 1e-6,
+    'ns': 1e-9,
+    DATE: 1.0,
+    'rad': 1.0,
+    'mrad': 1e-3,
+    'deg': math.pi / 180.0,
+    'turn': 2.0 * math.pi,
+    'rad/s': 1.0,
+    'deg/s': math.pi / 180.0,
+    'rpm': math.pi / 30.0,
+    'm': 1.0,
+    'mm': 1e-3,
+    'N': 1.0,
+    'mN': 1e-3,
+    'kN': 1e3,
+    'N m': 1.0,
+    'mN m': 1e-3,
+    '-': 1.0,
+}
+"""SI value of one of each unit."""
+TIME_UNITS = ('s', 'ms', 'us', 'ns', DATE)
+UNIT_SPELLINGS = {
+    **{unit: unit for unit in UNITS if unit not in ('-', DATE)},
+    'sec': 's',
+    'second': 's',
+    'seconds': 's',
+    'msec': 'ms',
+    'millis': 'ms',
+    'milliseconds': 'ms',
+    'µs': 'us',
+    'usec': 'us',
+    'micros': 'us',
+    'microseconds': 'us',
+    'nsec': 'ns',
+    'nanos': 'ns',
+    'nanoseconds': 'ns',
+    'radian': 'rad',
+    'radians': 'rad',
+    '°': 'deg',
+    'degree': 'deg',
+    'degrees': 'deg',
+    'turns': 'turn',
+    'rev': 'turn',
+    '1/min': 'rpm',
+    '°/s': 'deg/s',
+    'dps': 'deg/s',
+    'newton': 'N',
+    'newtons': 'N',
+    'Nm': 'N m',
+    'N·m': 'N m',
+    'N*m': 'N m',
+    'mNm': 'mN m',
+}
+"""By spelling; what is not found as it is written is looked for in lower case."""
 QUANTITIES = ('position', 'velocity', 'effort')
 ANGLES = ('bend_x', 'bend_y', 'motor_x', 'motor_y')
 NAMES = {
@@ -50,7 +109,6 @@ incomplete_rows: refuse # or drop: where a topic lacks a part of its numbers, or
 """A mapping with every key but `sample_and_hold`, which excludes `drop_repeats`."""
 WHITESPACE = 'whitespace'
 """As a delimiter: one or more blanks or tabs."""
-
 HELP = f"""\
 A mapping file says what the columns are:
 
@@ -63,6 +121,16 @@ Topics hold position, velocity or effort. Units of time are {', '.join(TIME_UNIT
 {', '.join(unit for unit in UNITS if unit not in TIME_UNITS)}.
 The value is (number * scale + offset) in the unit. An empty cell is no sample.
 """
+_DELIMITER = Meta(
+    pattern=rf'(?s)^(?:.|{WHITESPACE})\Z', description=f'one character, or {WHITESPACE}'
+)
+_VALUE_UNIT = one_of(unit for unit in UNITS if unit not in TIME_UNITS)
+
+
+def known_unit(text: str) -> str | None:
+    """Return a unit as `UNITS` has it, however it is spelled; None for what is none."""
+    text = text.strip().replace('μ', 'µ')
+    return UNIT_SPELLINGS.get(text) or UNIT_SPELLINGS.get(text.casefold())
 
 
 def _as_unit(value: Any) -> Any:
@@ -72,12 +140,6 @@ def _as_unit(value: Any) -> Any:
 
 def _without_slash(value: Any) -> Any:
     return value.rstrip('/') if isinstance(value, str) else value
-
-
-_DELIMITER = Meta(
-    pattern=rf'(?s)^(?:.|{WHITESPACE})\Z', description=f'one character, or {WHITESPACE}'
-)
-_VALUE_UNIT = one_of(unit for unit in UNITS if unit not in TIME_UNITS)
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_bags.bag_writer import BagWriter
+from endoscope_bags.bag_writer import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.delimited_text import DelimitedText, TableError, is_date, is_number, read_table
 from endoscope_bags.errors import NonFiniteError
-from endoscope_bags.message_stream import MessageStream
 from endoscope_bags.message_types import JOINT_STATE
-from endoscope_bags.table_mapping import Column, TableMapping
-from endoscope_bags.units import DATE, TIME_UNITS, UNITS
+from endoscope_bags.table_mapping import DATE, TIME_UNITS, UNITS, Column, TableMapping
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -121,7 +119,9 @@ def _times(text: DelimitedText, column: Column, start_s: float) -> Stamps:
     if unit is None:
         unit = DATE if is_date(cells[0]) and not is_number(cells[0], text.decimal_comma) else 's'
     if unit not in TIME_UNITS:
-        raise TableError(f'{text.path}: {text.label(index)} is in {unit}: that is no time')
+        raise TableError(
+            f'{text.path}: {text.label(index)} is in {unit}: which is not a unit of time'
+        )
     start = round(start_s * 1e9)
     if unit == DATE:
         return text.dates(index) + start

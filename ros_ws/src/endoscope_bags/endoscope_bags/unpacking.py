@@ -28,10 +28,6 @@ class ChunkError(ValueError):
     """A chunk that does not hold what it says."""
 
 
-class ChunkTooLargeError(ChunkError):
-    """A chunk that holds more than any recorder writes."""
-
-
 class ChunkHead(NamedTuple):
     """What stands before the data of a chunk: sizes in bytes."""
 
@@ -72,19 +68,19 @@ class Allowance:
         )
 
     def take(self, n_bytes: int, n_records: int) -> None:
-        """Take from it; ChunkTooLargeError if there is not so much left."""
+        """Take from it; ChunkError if there is not so much left."""
         self.n_bytes -= n_bytes
         self.n_records -= n_records
         if self.n_bytes < 0 or self.n_records < 0:
-            raise ChunkTooLargeError('the chunks hold more than any recorder puts in such a file')
+            raise ChunkError('the chunks hold more than any recorder puts in such a file')
 
 
 def unpacked(body: bytes, allowance: Allowance | None = None) -> bytes:
     """Return the records in a chunk; what is decompressed for it is taken from the allowance."""
     head = chunk_head(body, 0, len(body))
     if head.size > LARGEST_CHUNK:
-        raise ChunkTooLargeError(
-            f'it claims {head.size} bytes, at most {LARGEST_CHUNK} are read; write it anew with '
+        raise ChunkError(
+            f'it claims {head.size} bytes, at most {LARGEST_CHUNK} are read; rewrite it with '
             'smaller chunks'
         )
     if allowance is not None:

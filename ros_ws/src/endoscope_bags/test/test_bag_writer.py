@@ -17,7 +17,7 @@ from endoscope_bags.errors import (
     UnknownTypeError,
 )
 from endoscope_bags.message_types import JOINT_STATE, STRING, message_type
-from endoscope_bags.qos_profile import LATCHED_QOS, SENSOR_QOS, qos_from_yaml
+from endoscope_bags.topic import LATCHED_QOS, SENSOR_QOS, qos_from_yaml
 
 START = 1_790_000_000 * 10**9
 SERVO = '/endoscope/motor/servo_jp'

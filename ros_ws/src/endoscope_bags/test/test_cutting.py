@@ -4,11 +4,11 @@ import pytest
 
 from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_string
-from endoscope_bags.cutting import NoSuchStretchError, cut
-from endoscope_bags.errors import BagExistsError
+from endoscope_bags.copying import cut
+from endoscope_bags.errors import BagError, BagExistsError
 from endoscope_bags.information import bag_information
 from endoscope_bags.message_types import STRING
-from endoscope_bags.qos_profile import COMMAND_QOS, LATCHED_QOS
+from endoscope_bags.topic import COMMAND_QOS, LATCHED_QOS
 
 MS = 10**6
 
@@ -56,7 +56,7 @@ def test_what_was_lost_in_the_stretch_is_told(bag, tmp_path, begin, end, lost):
 
 @pytest.mark.parametrize(('begin', 'end'), [(-1.0, 1.0), (1.0, 1.0), (1.2, 0.3), (2.5, None)])
 def test_a_stretch_that_there_is_not_is_refused_and_leaves_nothing(bag, tmp_path, begin, end):
-    with pytest.raises(NoSuchStretchError, match=r'has no stretch from .* it is 2\.000 s long'):
+    with pytest.raises(BagError, match=r'has no stretch from .* it is 2\.000 s long'):
         cut(bag, tmp_path / 'out', begin, end)
     assert [p.name for p in tmp_path.iterdir()] == ['bag']
 

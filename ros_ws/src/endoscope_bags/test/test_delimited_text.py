@@ -150,9 +150,9 @@ topics: {a/q: {position: {q: {column: q}}}, a/f: {effort: {f: {column: f}}}}
 @pytest.mark.parametrize(
     ('text', 'error', 'message'),
     [
-        ('t,q\n0,1\n1,x\n', TableError, "line 3, column 2 (q): 'x' is no number"),
+        ('t,q\n0,1\n1,x\n', TableError, "line 3, column 2 (q): 'x' is not a number"),
         ('# a\nt,q\n0,1\n\n1\n', TableError, 'line 5 has 1 columns, 2 are needed'),
-        ('t,q\n0,1\nsoon,2\n', TableError, "line 3, column 1 (t): 'soon' is no number"),
+        ('t,q\n0,1\nsoon,2\n', TableError, "line 3, column 1 (t): 'soon' is not a number"),
         ('t,q\n0,1\nnan,2\n', TableError, "line 3, column 1 (t): the time 'nan' is not finite"),
         ('t,q\n0,1\n1e30,2\n', TableError, 'no stamp reaches it'),
         ('t,q\n0,1\n1,inf\n', NonFiniteError, 'line 3: position of a/b is not finite'),
@@ -173,7 +173,9 @@ def test_what_cannot_be_read_is_one_line_with_its_place(tmp_path, text, error, m
 
 def test_a_date_that_is_none_is_named(tmp_path):
     mapping = 'time: {column: t, unit: date}\ntopics: {a/b: {position: {q: {column: q}}}}'
-    with pytest.raises(TableError, match=re.escape("line 3, column 1 (t): '31.1.2026' is no date")):
+    with pytest.raises(
+        TableError, match=re.escape("line 3, column 1 (t): '31.1.2026' is not a date")
+    ):
         mapped(tmp_path, 't,q\n2026-01-31 10:00:00,1\n31.1.2026,2\n', mapping)
 
 

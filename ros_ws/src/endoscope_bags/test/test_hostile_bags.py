@@ -11,11 +11,11 @@ from mcap.writer import CompressionType, Writer
 
 from endoscope_bags import BagError, BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
+from endoscope_bags.copying import recover
 from endoscope_bags.errors import MalformedMessageError, NotABagError
 from endoscope_bags.information import bag_information
 from endoscope_bags.mcap_records import MAGIC
 from endoscope_bags.message_types import JOINT_STATE, STRING
-from endoscope_bags.recovery import recover
 from endoscope_bags.unpacking import LARGEST_CHUNK
 
 MS = 10**6

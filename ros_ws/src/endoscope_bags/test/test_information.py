@@ -6,7 +6,7 @@ from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
 from endoscope_bags.information import bag_information
 from endoscope_bags.message_types import JOINT_STATE, STRING
-from endoscope_bags.qos_profile import LATCHED_QOS
+from endoscope_bags.topic import LATCHED_QOS
 
 MS = 10**6
 START = 1_790_000_000 * 10**9

@@ -35,7 +35,7 @@ from endoscope_bags.message_types import (
     STRING,
     typestore,
 )
-from endoscope_bags.qos_profile import SENSOR_QOS
+from endoscope_bags.topic import SENSOR_QOS
 
 MS = 10**6
 

@@ -13,8 +13,8 @@ from endoscope_bags.cdr_encoding import encode_joint_states, encode_string
 from endoscope_bags.errors import BagExistsError
 from endoscope_bags.information import bag_information
 from endoscope_bags.message_types import JOINT_STATE, STRING
-from endoscope_bags.qos_profile import SENSOR_QOS
 from endoscope_bags.recording_session import Arrival, RecordingSession, simulated_receipt_ns
+from endoscope_bags.topic import SENSOR_QOS
 
 MS = 10**6
 

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.copying import recover
 from endoscope_bags.errors import BagExistsError, BagNotFoundError, EmptyBagError, NotABagError
 from endoscope_bags.message_types import STRING, MessageType
-from endoscope_bags.qos_profile import LATCHED_QOS
-from endoscope_bags.recovery import recover
+from endoscope_bags.topic import LATCHED_QOS
 
 MS = 10**6
 N = 2000

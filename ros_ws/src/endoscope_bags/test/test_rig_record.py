@@ -6,10 +6,9 @@ import pytest
 
 from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_string
-from endoscope_bags.cutting import cut
+from endoscope_bags.copying import cut, recover
 from endoscope_bags.message_types import STRING
-from endoscope_bags.recovery import recover
-from endoscope_bags.rig_record import rig_of_bag, rig_record
+from endoscope_bags.recording import rig_of_bag, rig_record
 from endoscope_core.errors import FileError
 from endoscope_core.rig import shipped_rig
 

@@ -4,8 +4,8 @@ import errno
 
 import pytest
 
+from endoscope_bags.chunk_sink import require_room, write_error
 from endoscope_bags.errors import BagFullError, BagWriteError
-from endoscope_bags.room_on_disk import require_room, write_error
 
 
 def test_asking_leaves_the_file_as_it_was(tmp_path):

@@ -9,10 +9,10 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from endoscope_bags import BagError, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
+from endoscope_bags.copying import recover
 from endoscope_bags.errors import CorruptBagError, EmptyBagError, NotABagError, TruncatedBagError
 from endoscope_bags.information import bag_information
 from endoscope_bags.message_types import JOINT_STATE, STRING, typestore
-from endoscope_bags.recovery import recover
 
 MS = 10**6
 N = 5000
@@ -86,7 +86,7 @@ def test_it_becomes_an_mcap(tmp_path):
 @pytest.mark.parametrize(
     ('statement', 'error', 'what'),
     [
-        ('DROP TABLE messages', NotABagError, 'a database that is no rosbag2 recording'),
+        ('DROP TABLE messages', NotABagError, 'a database that is not a rosbag2 recording'),
         (
             (
                 'ALTER TABLE messages RENAME TO m; CREATE VIEW messages AS WITH RECURSIVE n(x) AS '
@@ -94,7 +94,7 @@ def test_it_becomes_an_mcap(tmp_path):
                 "timestamp, x'00' AS data FROM n"
             ),
             NotABagError,
-            'a database that is no rosbag2 recording',
+            'a database that is not a rosbag2 recording',
         ),
         ('DELETE FROM messages', EmptyBagError, 'holds no message'),
         ('UPDATE messages SET timestamp = -1 WHERE id = 9', CorruptBagError, 'timed -1 ns'),

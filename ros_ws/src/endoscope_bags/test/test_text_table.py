@@ -135,7 +135,7 @@ def test_a_wrong_mapping_is_refused_by_its_key(tmp_path, old, new, message):
     ('text', 'error', 'message'),
     [
         ('0,1,1,5,5\n1,1,1,5\n', TableError, 'line 2 has 4 columns, 5 are needed'),
-        ('0,1,1,5,5\n1,one,1,5,5\n', TableError, "line 2, column 2: 'one' is no number"),
+        ('0,1,1,5,5\n1,one,1,5,5\n', TableError, "line 2, column 2: 'one' is not a number"),
         ('0,1,1,5,5\n', TableError, 'fewer than two rows'),
         ('1,1,1,5,5\n0,1,1,5,5\n', TableError, 'line 2: time runs backwards, from 101 to 100 s'),
         (

@@ -5,8 +5,7 @@ import secrets
 from pathlib import Path
 
 from endoscope_benchmarks.proof import OWN, SIMULATORS, SLAVE
-from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT
+from endoscope_bringup.subcommands import COUNT, seed
 
 PAGE = 'index.html'
 _SEEDS = 1_000_000

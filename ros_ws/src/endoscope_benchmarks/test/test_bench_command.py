@@ -6,7 +6,7 @@ import pytest
 
 from endoscope_benchmarks.benches import BENCHES
 from endoscope_bringup.cli import main
-from endoscope_bringup.other_packages import GROUP
+from endoscope_bringup.subcommands import GROUP
 
 
 def test_the_package_brings_its_commands():

@@ -11,8 +11,13 @@ from types import FrameType
 from typing import Any
 
 from endoscope_bringup.commands import COMMANDS
-from endoscope_bringup.other_packages import COMES_WITH, commands_of_other_packages
-from endoscope_bringup.subcommands import OneLineParser, add_subcommands, run_chosen
+from endoscope_bringup.subcommands import (
+    COMES_WITH,
+    OneLineParser,
+    add_subcommands,
+    commands_of_other_packages,
+    run_chosen,
+)
 from endoscope_core.choices import LOG_LEVEL_VARIABLE, LOG_LEVELS
 from endoscope_core.exit_status import exit_status
 

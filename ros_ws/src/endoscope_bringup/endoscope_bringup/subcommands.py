@@ -1,15 +1,28 @@
-"""Turns a package of subcommand modules into argparse subparsers."""
+"""Turns modules of subcommands, those of other packages too, into argparse subparsers."""
 
 import argparse
 import importlib
 import itertools
 import json
 import math
+import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NoReturn
 
 from endoscope_core.errors import nearest, printable
+
+GROUP = 'endoscope.commands'
+"""An entry point of it names a module of the same form as those of `endoscope_bringup.commands`."""
+COMES_WITH = {
+    'bench': 'endoscope_benchmarks',
+    'console': 'endoscope_console',
+    'prove': 'endoscope_benchmarks',
+}
+"""Packages of this workspace that may be left out, by the command that is missing then."""
+_SECTION = re.compile(rf'^\[{re.escape(GROUP)}\]\n((?:[^\[\n].*\n?|\n)*)', re.MULTILINE)
+_ENTRY = re.compile(r'^(\S+) *= *([\w.]+) *$', re.MULTILINE)
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -106,3 +119,40 @@ def _plain(value: object) -> object:
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     return str(value)
+
+
+def seed(text: str) -> int:
+    """Read a seed: a whole number below 2^32, as numpy's and torch's generators need it."""
+    if not text.isdecimal() or int(text) >= 2**32:
+        raise argparse.ArgumentTypeError(f'{text!r} is not a seed: give 0 to {2**32 - 1}')
+    return int(text)
+
+
+def commands_of_other_packages() -> dict[str, str]:
+    """Find module names by command in `entry_points.txt` of all installed packages, sorted."""
+    found: dict[str, str] = {}
+    # `importlib.metadata` finds the same, but takes ten times as long, at every start.
+    for folder in sys.path:
+        try:
+            with os.scandir(folder or os.curdir) as entries:
+                installed = [
+                    e.path for e in entries if e.name.endswith(('.dist-info', '.egg-info'))
+                ]
+        except OSError:  # an archive, or a folder that is not there
+            continue
+        for package in installed:
+            for command, module in _entries(f'{package}/entry_points.txt'):
+                # Of two packages with the same command the one that stands first in `sys.path`
+                # counts.
+                found.setdefault(command, module)
+    return dict(sorted(found.items()))
+
+
+def _entries(path: str) -> list[tuple[str, str]]:
+    try:
+        with open(path, encoding='utf-8') as file:  # noqa: PTH123 - of hundreds of files
+            text = file.read()
+    except OSError:  # a package without entry points
+        return []
+    section = _SECTION.search(text)
+    return _ENTRY.findall(section[1]) if section else []

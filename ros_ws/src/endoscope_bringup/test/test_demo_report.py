@@ -27,11 +27,14 @@ from endoscope_bringup.demo.procedure import (
     Method,
     Segment,
 )
-from endoscope_bringup.demo.results import CalibrationOutcome, Crossing, DemoResults, TrackingRun
-from endoscope_bringup.demo.table import (
+from endoscope_bringup.demo.results import (
     BACKLASH,
     LARGEST,
     RMSE,
+    CalibrationOutcome,
+    Crossing,
+    DemoResults,
+    TrackingRun,
     figures_table,
     of_figure,
     ranking,

@@ -12,7 +12,7 @@ from endoscope_bringup.teleop.keyboard_handle import (
     KeyboardHandle,
     Request,
 )
-from endoscope_bringup.teleop.terminal_keys import KeyEvent, KeyEventKind
+from endoscope_bringup.teleop.terminal import KeyEvent, KeyEventKind
 
 PRESS, REPEAT, RELEASE = KeyEventKind
 MS = 1_000_000

@@ -10,7 +10,7 @@ import pytest
 
 from endoscope_bringup import cli
 from endoscope_bringup.commands import COMMANDS
-from endoscope_bringup.other_packages import GROUP, commands_of_other_packages
+from endoscope_bringup.subcommands import GROUP, commands_of_other_packages
 
 HEAVY = ('numpy', 'scipy', 'numba', 'rclpy', 'matplotlib', 'mcap', 'sklearn')
 CODE = """

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from endoscope_bringup.teleop.terminal_keys import FOCUS_LOST, KeyEvent, KeyEventKind, TerminalKeys
+from endoscope_bringup.teleop.terminal import FOCUS_LOST, KeyEvent, KeyEventKind, TerminalKeys
 
 PRESS, REPEAT, RELEASE = KeyEventKind
 

@@ -7,10 +7,6 @@ from enum import StrEnum
 from endoscope_core.errors import EndoscopeError
 
 
-class AlarmStandsError(EndoscopeError):
-    """An alarm cannot be acknowledged; the message says why."""
-
-
 class Level(StrEnum):
     """How urgent an alarm is, by the priorities of IEC 60601-1-8; conformity is not claimed."""
 
@@ -52,7 +48,7 @@ class Alarms:
     def acknowledge(self, name: str) -> None:
         """Take note that an alarm was seen, which ends it unless its cause is still present."""
         if name not in self._kept:
-            raise AlarmStandsError('there is nothing to acknowledge')
+            raise EndoscopeError('there is nothing to acknowledge')
         if name in self._present:
-            raise AlarmStandsError(f'still present: {self._present[name].text}')
+            raise EndoscopeError(f'still present: {self._present[name].text}')
         del self._kept[name]

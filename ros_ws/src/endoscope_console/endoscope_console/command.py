@@ -59,7 +59,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--allow-no-origin',
         action='store_true',
-        help='let programs that are no browsers open the sockets; they need the token too',
+        help='let programs that are not browsers open the sockets; they need the token too',
     )
     parser.add_argument(
         '--no-graph', action='store_true', help='start no graph, wait for one to answer'

@@ -36,10 +36,6 @@ _ENDED_S = 5.0
 _METADATA = 'metadata.yaml'
 
 
-class ExplanationRefusedError(EndoscopeError):
-    """What cannot be explained, played or ended; the message says why."""
-
-
 @dataclass
 class Explanation:
     """One recording being explained, or explained."""
@@ -65,7 +61,9 @@ class Explanation:
             self.sentence = sentence or _in_short(result)
             planned = result['next_experiment'] is not None
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            self.error = f'{self.folder / _RESULT_FILE} is no result of an explanation: {error}'
+            self.error = (
+                f'{self.folder / _RESULT_FILE} is not the result of an explanation: {error}'
+            )
             return
         self.experiment = planned and (self.folder / EXPERIMENT_FILE).is_file()
         if (self.folder / REPORT_FILE).is_file():
@@ -137,10 +135,10 @@ class Explanations:
         return None
 
     def experiment_of(self, name: str) -> Path:
-        """File with the motion that would tell more; ExplanationRefusedError if there is none."""
+        """File with the motion that would tell more; EndoscopeError if there is none."""
         one = self._all.get(name)
         if one is None or not one.experiment:
-            raise ExplanationRefusedError(f'there is no experiment of an explanation {name}')
+            raise EndoscopeError(f'there is no experiment of an explanation {name}')
         return (one.folder / EXPERIMENT_FILE).resolve()
 
     async def begin(
@@ -158,10 +156,10 @@ class Explanations:
             ('plant', plant, plants),
         ):
             if name is not None and name not in known:
-                raise ExplanationRefusedError(f'there is no {kind} {name} in {self._folder}')
+                raise EndoscopeError(f'there is no {kind} {name} in {self._folder}')
         file = plants[plant] if plant is not None else self._own_plant(own)
         if self._task is not None and not self._task.done():
-            raise ExplanationRefusedError('another recording is being explained')
+            raise EndoscopeError('another recording is being explained')
         name = f'why-{bag.removesuffix(".mcap")}-{time.strftime("%Y%m%d-%H%M%S")}'
         one = self._new(bag, self._folder / name)
         one.plant = plant or own
@@ -180,7 +178,7 @@ class Explanations:
             save_plant(PlantDescription(), file)
         if not file.is_file():
             why = f'{own} is not there' if own else 'the graph does not say which it simulates'
-            raise ExplanationRefusedError(f'name a plant: {why}')
+            raise EndoscopeError(f'name a plant: {why}')
         return file
 
     def _new(self, bag: str, folder: Path) -> Explanation:
@@ -234,7 +232,7 @@ class Explanations:
         """End one that is under way."""
         one = self._all.get(name)
         if one is None or not one.running:
-            raise ExplanationRefusedError(f'no explanation {name} is under way')
+            raise EndoscopeError(f'no explanation {name} is under way')
         one.error = 'cancelled'
         await self.close()
         return ''

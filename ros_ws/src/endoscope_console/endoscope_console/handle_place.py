@@ -8,8 +8,8 @@ from typing import Any, Protocol
 
 from endoscope_console.beat import Beat
 from endoscope_console.graph_side import PATIENCE_S, GraphSide, Settings
-from endoscope_console.orders import OrderRefusedError
 from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
+from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.client.graph_listener import GraphRefusedError
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 
@@ -42,14 +42,14 @@ class HandlePlace:
         graph = self._graph
         settings = graph.settings = await self._ask(self._read_settings)
         if graph.plays and not take:
-            raise OrderRefusedError(
+            raise EndoscopeError(
                 f'the console plays (its source is {settings.source}): taking the controls would '
                 'end that'
             )
         own = ('console',) if settings.source in PLAYS else ()
         others = [name for name in graph.others_at_the_handle() if name not in own]
         if others:
-            raise OrderRefusedError(
+            raise EndoscopeError(
                 f'{" and ".join(others)} speaks for the handle already; two of them would be a '
                 'fault: end it first'
             )
@@ -61,7 +61,7 @@ class HandlePlace:
             others = graph.others_at_the_handle()
             if others:
                 await self._set_source_back(settings.source)
-                raise OrderRefusedError(f'{" and ".join(others)} goes on speaking for the handle')
+                raise EndoscopeError(f'{" and ".join(others)} goes on speaking for the handle')
             # A session that begins while a node still knows of the old sender ends as a fault.
             await asyncio.sleep(_SETTLED_S)
         self._found = settings.source

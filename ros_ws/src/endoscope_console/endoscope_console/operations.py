@@ -25,7 +25,6 @@ from endoscope_console.orders import (
     Claim,
     Explain,
     Order,
-    OrderRefusedError,
     Play,
     Record,
     Release,
@@ -175,14 +174,14 @@ class Operations:
 
     def _check(self, client: Client, order: Order) -> None:
         if client.role != OPERATOR:
-            raise OrderRefusedError('a viewer only looks on')
+            raise EndoscopeError('a viewer only looks on')
         if isinstance(order, _NO_LEASE) or client.id == self.lease.holder:
             return
         holder = self.holder
         if isinstance(order, Record) and not self.lease.holder:
             return
         who = 'nobody operates: take the controls first'
-        raise OrderRefusedError(f'{holder.label} operates' if holder else who)
+        raise EndoscopeError(f'{holder.label} operates' if holder else who)
 
     async def _carry_out(self, client: Client, order: Order) -> str | Mapping[str, Any]:
         match order:
@@ -224,10 +223,10 @@ class Operations:
     async def claim(self, client: Client, take: bool) -> str:
         """Make a client the operator; what became of it."""
         if self._closing:
-            raise OrderRefusedError('the server of the page ends')
+            raise EndoscopeError('the server of the page ends')
         claim = self.lease.claim(client.id, take, time.monotonic_ns())
         if not claim.granted:
-            raise OrderRefusedError(claim.why)
+            raise EndoscopeError(claim.why)
         if claim.lost_by:
             self._lost(claim.lost_by, client)
         if self._holder.client is not client:
@@ -245,7 +244,7 @@ class Operations:
                 raise
             if self.lease.holder != client.id:
                 self.soon(self._give_back())
-                raise OrderRefusedError('the controls were lost meanwhile')
+                raise EndoscopeError('the controls were lost meanwhile')
             self._tell_beat()
         return ''
 
@@ -317,9 +316,9 @@ class Operations:
         """Have the slave moved, for as long as the client operates."""
         holder = self._holder
         if holder.moves:
-            raise OrderRefusedError(f'{holder.moves} is under way')
+            raise EndoscopeError(f'{holder.moves} is under way')
         if self.beat.said.state is DeadManState.ENGAGED:
-            raise OrderRefusedError('let go first: it moves the slave by itself')
+            raise EndoscopeError('let go first: it moves the slave by itself')
         holder.moves, holder.waits = what, True
         try:
             told = await self._ask(move)
@@ -331,7 +330,7 @@ class Operations:
 
     def _calibrate(self, withdrawn: Callable[[], bool]) -> str:
         if withdrawn():
-            raise OrderRefusedError('calibration was withdrawn before it began')
+            raise EndoscopeError('calibration was withdrawn before it began')
         client = self.graph.client
         first = client.calibration is None or client.calibration.level != 0
         found = client.calibrate(patience_s=PATIENCE_S)
@@ -347,15 +346,15 @@ class Operations:
         """Have the console play an experiment for as long as the operator holds on."""
         file = self.explanations.experiment_of(explanation)
         if self._holder.moves:
-            raise OrderRefusedError(f'{self._holder.moves} is under way')
+            raise EndoscopeError(f'{self._holder.moves} is under way')
         if self.graph.client.state != 'ENABLED':
-            raise OrderRefusedError(f'the slave is {self.graph.client.state}: enable it first')
+            raise EndoscopeError(f'the slave is {self.graph.client.state}: enable it first')
         values = {'command_file': str(file), 'hold_to_play': True, 'source': 'file'}
         async with self._place.lock:
             changed = 'command_file', 'hold_to_play'
             before = await self._ask(partial(self._place.read_console, *changed))
             if self.lease.holder != client.id or self._holder.moves:
-                raise OrderRefusedError('the controls were lost or taken to something else')
+                raise EndoscopeError('the controls were lost or taken to something else')
             # Said before it is so: whoever loses the controls meanwhile leaves nothing behind.
             holder = self._holder
             holder.moves, holder.waits = _EXPERIMENT, True
@@ -388,7 +387,7 @@ class Operations:
     async def _set(self, order: Set) -> str:
         if order.scale is not None:
             if self.beat.said.state is DeadManState.ENGAGED:
-                raise OrderRefusedError('the scale changes only while nothing is held')
+                raise EndoscopeError('the scale changes only while nothing is held')
             await self._ask(partial(self._place.set_console, scale=order.scale))
             self.graph.settings = Settings(self.graph.settings.source, order.scale)
         elif order.compensator is not None:

@@ -20,10 +20,6 @@ class MalformedOrderError(EndoscopeError, ValueError):
     """Text that is no order; the message says what is wrong with it."""
 
 
-class OrderRefusedError(EndoscopeError):
-    """What was asked for is not done; the message says why."""
-
-
 class Hello(msgspec.Struct, frozen=True, tag='hello', tag_field='op', forbid_unknown_fields=True):
     """The first words on a socket."""
 

@@ -4,12 +4,11 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from endoscope_bags.errors import MalformedMessageError
-from endoscope_console.teleop.envelope import Envelope
 from endoscope_console.teleop.frames import POINTS, encode_telemetry
 from endoscope_core.kinematics import centre_line
 from endoscope_nodes.names import (
@@ -40,13 +39,37 @@ SIGNALS = tuple(
     for name in names
 )
 """What the ranges of a picture are of, in their order."""
-
 # At 1 kHz the queue holds what comes while this process is not run for six pictures.
 _QUEUE = profile(Qos(200, reliable=False))
 _FRESH_NS = 150_000_000
 _TRACKED_NS = 500_000_000
 _REMEMBERED = 16
 _NOTHING = np.full((POINTS, 3), np.nan)
+
+
+class Envelope:
+    """Smallest, largest and last value of N signals, so that no peak between pictures is lost."""
+
+    def __init__(self, count: int) -> None:
+        self._ranges = np.full((count, 3), np.nan)
+
+    def take(self, k: int, values: ArrayLike) -> None:
+        """Take samples (M,) of signal `k` in its own unit, in their order, without those NaN."""
+        samples = np.asarray(values, dtype=float)
+        samples = samples[~np.isnan(samples)]
+        if not samples.size:
+            return
+        low, high, _ = self._ranges[k]
+        self._ranges[k] = (
+            np.fmin(low, samples.min()),
+            np.fmax(high, samples.max()),
+            samples[-1],
+        )
+
+    def close(self) -> NDArray[np.float64]:
+        """End the interval and begin the next: (N, 3), NaN where no sample came."""
+        ranges, self._ranges = self._ranges, np.full_like(self._ranges, np.nan)
+        return ranges
 
 
 class Stream:

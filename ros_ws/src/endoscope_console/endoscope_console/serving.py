@@ -32,7 +32,7 @@ from endoscope_console.joy import JoyHand
 from endoscope_console.operations import Operations
 from endoscope_console.orders import LARGEST_BYTES
 from endoscope_console.server import Console
-from endoscope_console.teleop.joy_mapping import JoyMapping, JoyMappingError
+from endoscope_console.teleop.joy_mapping import JoyMapping
 from endoscope_console.teleop.pad import PadHandle
 from endoscope_console.view import View
 from endoscope_core.errors import EndoscopeError
@@ -57,10 +57,6 @@ _ENDS_S = 20.0
 _DROPPED_S = 2
 _NOT_UNASKED = "--graph '-p autostart:=false' leaves it to you"
 _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-
-class ServingError(EndoscopeError):
-    """The page cannot be served like that; the message says why."""
 
 
 class _Server(uvicorn.Server):
@@ -164,7 +160,9 @@ async def _serve(
         operations = Operations(graph, beat, clients, explanations, Alarms(), counts)
         view = View(operations, rig, counts)
         joy = JoyHand(graph, operations, mapping)
-        console = Console(graph, operations, clients, view, joy, tokens, rig, counts)
+        console = Console(
+            graph, operations, clients, view=view, joy=joy, tokens=tokens, rig=rig, counts=counts
+        )
         address = _address(args, listening)
         admission = Admission(frozenset((address, *args.origin)), args.allow_no_origin)
         server = _Server(_configuration(args, console, admission, counts))
@@ -216,7 +214,9 @@ async def _announce(
         await started.start_unless_one_answers(graph)
     while not graph.client.state:
         if started.ended is not None:
-            raise ServingError(f'the graph has ended with status {started.ended}, as it says above')
+            raise EndoscopeError(
+                f'the graph has ended with status {started.ended}, as it says above'
+            )
         await asyncio.sleep(_LOOK_S)
     await _until_whole(graph, started)
     recorder = graph.client.health.get(RECORDER)
@@ -274,12 +274,14 @@ def _check_privacy(args: argparse.Namespace) -> None:
     for origin in args.origin:
         parts = urlsplit(origin)
         if parts.scheme not in ('http', 'https') or origin != f'{parts.scheme}://{parts.netloc}':
-            raise ServingError(f'--origin {origin}: give SCHEME://HOST:PORT, and nothing after it')
+            raise EndoscopeError(
+                f'--origin {origin}: give SCHEME://HOST:PORT, and nothing after it'
+            )
     if (args.certificate is None) != (args.key is None):
-        raise ServingError('--certificate and --key belong together')
+        raise EndoscopeError('--certificate and --key belong together')
     for file in (args.certificate, args.key):
         if file is not None and not file.is_file():
-            raise ServingError(f'{file}: no such file')
+            raise EndoscopeError(f'{file}: no such file')
     if args.certificate is not None:
         try:
             # A key that asks for a password would wait for one at the terminal.
@@ -287,8 +289,8 @@ def _check_privacy(args: argparse.Namespace) -> None:
                 args.certificate, args.key, password=''
             )
         except (ssl.SSLError, OSError) as error:
-            raise ServingError(
-                f'{args.certificate} and {args.key} are no certificate in PEM and its key without '
+            raise EndoscopeError(
+                f'{args.certificate} and {args.key} are not a PEM certificate and its key without '
                 f'a password: {error}'
             ) from error
     try:
@@ -296,19 +298,19 @@ def _check_privacy(args: argparse.Namespace) -> None:
     except ValueError:
         address = None
     if address is not None and address.is_unspecified:
-        raise ServingError(
+        raise EndoscopeError(
             f'--host {args.host}: give the one address of this machine that browsers call'
         )
     here = args.host == 'localhost' or (address is not None and address.is_loopback)
     if not here and args.certificate is None:
-        raise ServingError(
+        raise EndoscopeError(
             f'--host {args.host}: other machines would send the token for all to read; give '
             '--certificate and --key'
         )
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    """Listen at one address; ServingError where somebody else does, or there is no such address."""
+    """Listen at one address; EndoscopeError where that is taken or not of this machine."""
     family = socket.AF_INET6 if ':' in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -317,7 +319,7 @@ def _listen(host: str, port: int) -> socket.socket:
         listening.listen(128)
     except OSError as error:
         listening.close()
-        raise ServingError(
+        raise EndoscopeError(
             f'cannot listen at {host}:{port}: {error.strerror}; give another --host or --port'
         ) from error
     return listening
@@ -335,9 +337,9 @@ def _joy_parameters(given: Iterable[str]) -> dict[str, Any]:
     for text in given:
         name, found, value = text.partition('=')
         if not found:
-            raise JoyMappingError(f'--joy {text}: give NAME=VALUE')
+            raise EndoscopeError(f'--joy {text}: give NAME=VALUE')
         try:
             parameters[name] = yaml.safe_load(value)
         except yaml.YAMLError as error:
-            raise JoyMappingError(f'--joy {text}: {value!r} is no value') from error
+            raise EndoscopeError(f'--joy {text}: {value!r} is not a value') from error
     return parameters

@@ -2,7 +2,8 @@
 
 import pytest
 
-from endoscope_console.alarms import Alarm, Alarms, AlarmStandsError, Level
+from endoscope_console.alarms import Alarm, Alarms, Level
+from endoscope_core.errors import EndoscopeError
 
 FAULT = Alarm('fault', Level.HIGH, 'a wire is over its ceiling', latched=True)
 TRACKER = Alarm('tracker', Level.MEDIUM, 'the tracker is silent')
@@ -28,12 +29,12 @@ def test_a_fault_stays_until_it_was_seen_others_go_with_their_cause():
 def test_to_have_seen_it_does_not_mend_it():
     alarms = Alarms()
     alarms.update(of(FAULT))
-    with pytest.raises(AlarmStandsError, match=f'still present: {FAULT.text}'):
+    with pytest.raises(EndoscopeError, match=f'still present: {FAULT.text}'):
         alarms.acknowledge('fault')
     assert alarms.update(of(FAULT)) == (FAULT,)
     assert alarms.update({}) == (FAULT,)
 
 
 def test_there_may_be_nothing_to_acknowledge():
-    with pytest.raises(AlarmStandsError, match='nothing'):
+    with pytest.raises(EndoscopeError, match='nothing'):
         Alarms().acknowledge('fault')

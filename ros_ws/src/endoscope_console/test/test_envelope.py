@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endoscope_console.teleop.envelope import Envelope
+from endoscope_console.pictures import Envelope
 
 SAMPLES = st.lists(st.floats(-1e6, 1e6) | st.just(math.nan), max_size=5)
 

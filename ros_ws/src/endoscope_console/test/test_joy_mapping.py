@@ -4,8 +4,9 @@ import pytest
 from page_in_virtual_time import MS, Page
 
 from endoscope_console.teleop.frames import MalformedFrameError, Source
-from endoscope_console.teleop.joy_mapping import JoyMapping, JoyMappingError
+from endoscope_console.teleop.joy_mapping import JoyMapping
 from endoscope_console.teleop.operator import DeadManState, Reason
+from endoscope_core.errors import EndoscopeError
 
 AXES = [0.0] * 6
 NOTHING = [0] * 11
@@ -88,7 +89,7 @@ def test_a_message_of_another_device_is_refused(axes, buttons, said):
     ],
 )
 def test_parameters_that_cannot_be_used_are_named(parameters, said):
-    with pytest.raises(JoyMappingError, match=said):
+    with pytest.raises(EndoscopeError, match=said):
         JoyMapping(parameters)
 
 

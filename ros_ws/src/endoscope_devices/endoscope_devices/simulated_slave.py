@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from endoscope_core.physics import PlantDescription, PlantSample, PlantSimulator, SensorModel
-from endoscope_devices.motor_device import MotorReading
+from endoscope_devices.device import MotorReading
 
 Numbers = tuple[float, ...]
 

@@ -3,8 +3,8 @@
 import random
 import struct
 
-from endoscope_devices.dynamixel.answers import AnswerCollector
 from endoscope_devices.dynamixel.packet import STATUS, encode
+from endoscope_devices.dynamixel.packet_handler import AnswerCollector
 from endoscope_devices.dynamixel.servo_block import BLOCK_SIZE, BlockJudge, decode_block
 
 MS = 1_000_000

@@ -2,7 +2,7 @@
 
 import random
 
-from endoscope_devices.dynamixel.tick_clock import Freshness, TickClock
+from endoscope_devices.dynamixel.servo_block import Freshness, TickClock
 
 MS = 1_000_000
 

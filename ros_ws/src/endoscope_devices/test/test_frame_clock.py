@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from endoscope_devices.em_tracker.frame_clock import FrameClock
+from endoscope_devices.em_tracker.aurora_tracker import FrameClock
 
 MS = 1_000_000
 

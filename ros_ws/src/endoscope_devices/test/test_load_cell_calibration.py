@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from endoscope_core.errors import FileError
 from endoscope_devices.load_cells import load_calibration
-from endoscope_devices.load_cells.registers import REGISTER_TYPES, decode_number
+from endoscope_devices.load_cells.calibration_file import REGISTER_TYPES, decode_number
 
 WIRES = ('left', 'right')
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
-from endoscope_devices.em_tracker.ndi_crc import crc16
+from endoscope_devices.em_tracker.aurora_port import crc16
 from endoscope_devices.em_tracker.tx_reply import PortStatus
 
 BAUD_RATES = (9600, 14400, 19200, 38400, 57600, 115200, 921600, 1228739)

@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from endoscope_devices.em_tracker.ndi_crc import crc16
+from endoscope_devices.em_tracker.aurora_port import crc16
 from endoscope_devices.em_tracker.tx_reply import PortStatus, parse_tx
 from endoscope_emulators.aurora_unit import AuroraUnit, SensorView, sealed
 

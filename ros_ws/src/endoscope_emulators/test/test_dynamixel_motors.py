@@ -8,7 +8,7 @@ import tty
 import pytest
 from patient_clients import PATIENCE_S, opened
 
-from endoscope_devices.dynamixel.bring_up import SetUpError
+from endoscope_devices.device import DeviceError
 from endoscope_devices.dynamixel.control_table import (
     ALERT,
     BAUD_RATE,
@@ -22,14 +22,13 @@ from endoscope_devices.dynamixel.control_table import (
 from endoscope_devices.dynamixel.doctor import examine
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
 from endoscope_devices.dynamixel.packet_handler import (
+    BusError,
     NoReplyError,
     PacketHandler,
-    RefusedError,
     sync_write_request,
 )
 from endoscope_devices.dynamixel.serial_port import BusPort
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
-from endoscope_devices.motor_device import DeviceError
 from endoscope_emulators.dynamixel.bus import EmulatedBus
 from endoscope_emulators.dynamixel.process import EmulatorProcess
 from endoscope_emulators.dynamixel.servo import EmulatedServo
@@ -120,7 +119,7 @@ def test_without_torque_no_goal_is_sent(emulator, motors):
 
 def test_a_setting_that_is_not_kept_is_refused_by_name(emulator):
     emulator.do('stick', 2, 38)
-    with pytest.raises(SetUpError, match=r'servo 2 .*Current Limit\(38\) reads 1193'):
+    with pytest.raises(BusError, match=r'servo 2 .*Current Limit\(38\) reads 1193'):
         DynamixelMotors(BusSettings(emulator.port), MOUNTS).open()
 
 
@@ -138,7 +137,7 @@ def test_torque_that_does_not_come_on_is_refused(emulator, motors):
 def test_another_model_is_refused():
     with EmulatedBus([EmulatedServo(1, model=1060)]) as bus:
         motors = DynamixelMotors(BusSettings(bus.port), MOUNTS[:1])
-        with pytest.raises(SetUpError, match='model number 1060'):
+        with pytest.raises(BusError, match='model number 1060'):
             motors.open()
 
 
@@ -244,15 +243,15 @@ def test_the_time_out_is_the_time_on_the_wire_and_a_margin(handler):
 
 
 def test_a_refusal_is_an_error_with_its_reason(handler):
-    with pytest.raises(RefusedError, match=r'servo 1 .*refuses write .*cannot be accessed'):
+    with pytest.raises(BusError, match=r'servo 1 .*refuses write .*cannot be accessed'):
         handler.write(1, 132, bytes(4))
-    with pytest.raises(RefusedError, match='out of range'):
+    with pytest.raises(BusError, match='out of range'):
         handler.write(1, 8, b'\x09')
     assert handler.read(1, 132, 4).data == (2048).to_bytes(4, 'little')
 
 
 def test_data_that_look_like_a_header_arrive(handler):
-    with pytest.raises(RefusedError, match='out of range'):
+    with pytest.raises(BusError, match='out of range'):
         handler.write(1, 116, (0x00FDFFFF).to_bytes(4, 'little'))
     data = GOAL_CURRENT.encode(-1) + GOAL_VELOCITY.encode(253)
     handler.port.send(sync_write_request(GOAL_CURRENT.address, 6, {1: data}))

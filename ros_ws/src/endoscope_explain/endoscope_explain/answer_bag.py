@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from endoscope_bags import BagWriter, JointStateSeries, MessageStream, PoseSeries, Recording
 from endoscope_bags.cdr_encoding import encode_joint_states, encode_poses
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED
-from endoscope_bags.rig_record import rig_of_bag, rig_record
+from endoscope_bags.recording import rig_of_bag, rig_record
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.kinematics import tip_pose
 from endoscope_core.physics import PlantDescription, SensorModel

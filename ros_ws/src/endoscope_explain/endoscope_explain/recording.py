@@ -12,8 +12,7 @@ from endoscope_bags.errors import BagError, MissingJointError, MissingTopicError
 from endoscope_bags.information import losses_told
 from endoscope_bags.joint_state_series import JointStateSeries
 from endoscope_bags.recording import Recording as Bag
-from endoscope_bags.recording import open_bag
-from endoscope_bags.rig_record import rig_of_bag
+from endoscope_bags.recording import open_bag, rig_of_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_core.choices import WAIVABLE
 from endoscope_core.physics.description import PlantDescription

@@ -2,8 +2,7 @@
 
 import argparse
 
-from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT
+from endoscope_bringup.subcommands import COUNT, seed
 
 RATES = (100, 125, 200, 250, 450, 500, 990, 1000)
 GAPS_MS = (20, 30, 40, 50, 60)

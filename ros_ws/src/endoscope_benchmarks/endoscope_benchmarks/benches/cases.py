@@ -9,8 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT
+from endoscope_bringup.subcommands import COUNT, seed
 from endoscope_core.errors import EndoscopeError
 
 

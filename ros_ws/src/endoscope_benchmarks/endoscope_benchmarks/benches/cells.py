@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT
+from endoscope_bringup.subcommands import COUNT, seed
 
 if TYPE_CHECKING:
     from endoscope_benchmarks.trials.disturbed_cells import Outcome

@@ -11,8 +11,7 @@ from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING
 
-from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT
+from endoscope_bringup.subcommands import COUNT, seed
 
 if TYPE_CHECKING:
     from endoscope_benchmarks.process_faults.process_faults import Outcome

@@ -4,8 +4,7 @@ import argparse
 import sys
 
 from endoscope_benchmarks.benches.cases import add_jobs
-from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT
+from endoscope_bringup.subcommands import COUNT, seed
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:

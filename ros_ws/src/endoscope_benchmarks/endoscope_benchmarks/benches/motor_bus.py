@@ -69,8 +69,8 @@ def run_motor_bus_bench(baud: int, seconds: float, fast: bool = False) -> MotorB
     RuntimeError if the servos cannot be enabled.
     """
     from endoscope_devices.dynamixel.bus_thread import BusThread
+    from endoscope_devices.dynamixel.doctor import bytes_of_cycle, cycles_per_second
     from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
-    from endoscope_devices.dynamixel.wire_time import bytes_of_cycle, cycles_per_second
     from endoscope_emulators.dynamixel.process import EmulatorProcess
 
     mounts = [ServoMount('motor_x', 1), ServoMount('motor_y', 2)]

@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 
 from endoscope_benchmarks.benches.papers_tables import TABLES
-from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT
+from endoscope_bringup.subcommands import COUNT, seed
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:

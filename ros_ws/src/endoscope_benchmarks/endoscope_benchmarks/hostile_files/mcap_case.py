@@ -15,11 +15,11 @@ from numpy.random import Generator
 
 from endoscope_bags import BagError, BagWriter, Recording, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_states, encode_string
+from endoscope_bags.copying import recover
 from endoscope_bags.information import bag_information
 from endoscope_bags.mcap_records import MAGIC
 from endoscope_bags.mcap_scan import UNSURE_NAMES
 from endoscope_bags.message_types import JOINT_STATE, STRING
-from endoscope_bags.recovery import recover
 from endoscope_benchmarks.hostile_files.spoiling import (
     EVIL_NAMES,
     EVIL_SCALARS,

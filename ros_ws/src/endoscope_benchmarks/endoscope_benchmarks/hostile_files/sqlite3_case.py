@@ -10,9 +10,9 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from endoscope_bags import BagError, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.copying import recover
 from endoscope_bags.information import bag_information
 from endoscope_bags.message_types import JOINT_STATE, typestore
-from endoscope_bags.recovery import recover
 from endoscope_benchmarks.hostile_files.spoiling import BOUNDARIES, EVIL_NAMES, spoiled_bytes
 from endoscope_core.errors import printable
 

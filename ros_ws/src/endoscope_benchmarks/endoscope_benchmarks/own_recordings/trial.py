@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from endoscope_bags import open_bag
-from endoscope_bags.cutting import cut
+from endoscope_bags.copying import cut
 from endoscope_benchmarks.own_recordings.drawing import LEAST_S, act, drawn
 from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
 from endoscope_core.errors import EndoscopeError

@@ -7,7 +7,7 @@ import numpy as np
 from endoscope_bags import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
-from endoscope_bags.rig_record import rig_record
+from endoscope_bags.recording import rig_record
 from endoscope_explain.recording import (
     BENDING,
     COMMAND,

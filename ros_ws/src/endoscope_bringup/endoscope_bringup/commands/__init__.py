@@ -2,7 +2,7 @@
 
 A module offers ``add_parser(subparsers)``, which adds one parser, and ``run(args) -> int``, which
 gives the exit status. It imports nothing heavy at module level: every start of `endoscope` imports
-all of them. Commands of other packages come after these, see `endoscope_bringup.other_packages`.
+all of them. Commands of other packages come after these, see `endoscope_bringup.subcommands`.
 """
 
 COMMANDS: tuple[str, ...] = (

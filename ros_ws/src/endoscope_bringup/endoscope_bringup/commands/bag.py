@@ -65,11 +65,11 @@ def run(args: argparse.Namespace) -> int:
         else:
             print(information)
     elif args.action == 'cut':
-        from endoscope_bags.cutting import cut
+        from endoscope_bags.copying import cut
 
         print(cut(args.bag, args.out, args.begin, args.end))
     else:
-        from endoscope_bags.recovery import recover
+        from endoscope_bags.copying import recover
 
         print(recover(args.bag, args.out))
     return 0

@@ -7,10 +7,6 @@ from endoscope_bringup.subcommands import add_json_option, print_json
 from endoscope_core.errors import EndoscopeError
 
 
-class NoMappingError(EndoscopeError, ValueError):
-    """A bag was asked for, and nobody said what the columns are."""
-
-
 class _MappingHelp(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from endoscope_bags.table_mapping import HELP
@@ -65,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     if args.mapping is None:
         return _propose(args)
     if args.out is None or args.propose is not None:
-        raise NoMappingError('--mapping takes --out BAG, and no --propose')
+        raise EndoscopeError('--mapping takes --out BAG, and no --propose')
     bar = ShareBar()
     try:
         done = convert_table(args.table, load_table_mapping(args.mapping), args.out, bar)
@@ -91,7 +87,7 @@ def _propose(args: argparse.Namespace) -> int:
     from endoscope_core.atomic_output import write_text
 
     if args.out is not None:
-        raise NoMappingError(
+        raise EndoscopeError(
             f'{args.out} is not written: say what the columns of {args.table} are with --mapping; '
             '--propose M.yaml writes one to begin with'
         )

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from endoscope_bringup.seed_argument import seed
+from endoscope_bringup.subcommands import seed
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:

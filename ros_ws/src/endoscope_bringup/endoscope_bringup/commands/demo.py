@@ -5,7 +5,7 @@ import time
 from functools import partial
 from pathlib import Path
 
-from endoscope_bringup.seed_argument import seed
+from endoscope_bringup.subcommands import seed
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -46,8 +46,8 @@ def run(args: argparse.Namespace) -> int:
     progress(f'calibrating and moving a simulated endoscope in {shapes} of the colon')
     from endoscope_bringup.demo import sentences
     from endoscope_bringup.demo.procedure import TUBES
+    from endoscope_bringup.demo.results import figures_table, table_rows
     from endoscope_bringup.demo.run_demo import REPORT, run_demo
-    from endoscope_bringup.demo.table import figures_table, table_rows
     from endoscope_core.atomic_output import atomic_directory
 
     out = args.out or Path(time.strftime('bags/demo-%Y%m%d-%H%M%S'))

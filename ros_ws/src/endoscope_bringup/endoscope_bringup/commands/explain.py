@@ -14,10 +14,6 @@ STEPS = 6
 """Of every explanation, beside one for each joint: read, refit, judge, locate, answer, compare."""
 
 
-class SecondsError(EndoscopeError, ValueError):
-    """Second recordings that cannot be told to belong to which bag."""
-
-
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `explain`."""
     parser = subparsers.add_parser(
@@ -118,12 +114,12 @@ def run(args: argparse.Namespace) -> int:
         Sources(
             bag,
             plant,
-            args.baseline,
-            second,
-            tuple(args.without),
-            args.quick,
-            args.band,
-            args.effects,
+            baseline=args.baseline,
+            validate=second,
+            without=tuple(args.without),
+            quick=args.quick,
+            band=args.band,
+            most_effects=args.effects,
             namespace=args.namespace,
             rig=rig,
             plant_file=args.plant,
@@ -153,7 +149,7 @@ def _seconds(args: argparse.Namespace) -> list[Path | None]:
     if len(given) == 1:
         return given * len(args.bags)
     if len(given) != len(args.bags):
-        raise SecondsError(
+        raise EndoscopeError(
             f'--validate was given {len(given)} times for {len(args.bags)} bags: '
             'give it once, or once for each'
         )

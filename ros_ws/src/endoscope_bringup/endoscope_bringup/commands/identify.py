@@ -8,8 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT, within
+from endoscope_bringup.subcommands import COUNT, seed, within
 
 if TYPE_CHECKING:
     from endoscope_bags import Recording as Bag
@@ -145,7 +144,7 @@ def _of_dataset(args: argparse.Namespace) -> dict[str, object]:
 
 
 def _of_bag(args: argparse.Namespace) -> dict[str, object]:
-    from endoscope_bringup.learning.hysteresis_of_bag import hysteresis_of_bag
+    from endoscope_bringup.learning.joints_of_bag import hysteresis_of_bag
     from endoscope_core.control import FeedforwardSettings
     from endoscope_core.identification import Servo, fit_feedforward, fit_model
 
@@ -169,14 +168,14 @@ def _of_bag(args: argparse.Namespace) -> dict[str, object]:
 
 def _bag_and_gear(args: argparse.Namespace) -> tuple['Bag', float]:
     from endoscope_bags import open_bag
-    from endoscope_bags.rig_record import rig_of_bag
+    from endoscope_bags.recording import rig_of_bag
 
     bag = open_bag(args.source)
     return bag, rig_of_bag(bag).joints.gear if args.gear is None else args.gear
 
 
 def _plant_of_bag(args: argparse.Namespace) -> dict[str, object]:
-    from endoscope_bringup.learning.plant_of_bag import plant_recordings_of_bag
+    from endoscope_bringup.learning.joints_of_bag import plant_recordings_of_bag
     from endoscope_core.identification import fit_plant
 
     joints: dict[str, object] = {}
@@ -206,7 +205,7 @@ def _extend(
 
     import numpy as np
 
-    from endoscope_bringup.learning.hysteresis_of_bag import GRID_STEP
+    from endoscope_bringup.learning.joints_of_bag import GRID_STEP
     from endoscope_core.identification import Servo, TableEntry, UpdatedTable, UpdatedTableError
     from endoscope_core.metrics import width_at_mid_height
 

@@ -78,8 +78,7 @@ def run(args: argparse.Namespace) -> int:
     import sys
     from functools import partial
 
-    from endoscope_bringup.operating.actions import act
-    from endoscope_bringup.operating.interruption import paused_when_interrupted
+    from endoscope_bringup.operating.actions import act, paused_when_interrupted
     from endoscope_core.errors import printable
     from endoscope_nodes.client.graph_listener import GraphRefusedError
     from endoscope_nodes.client.joined_graph import joined_graph

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from endoscope_bringup.seed_argument import seed
+from endoscope_bringup.subcommands import seed
 
 WORTH_SAYING = 0.02
 """What a table may be off from its formula without a word, as a share of what that spans."""

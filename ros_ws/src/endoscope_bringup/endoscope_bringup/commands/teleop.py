@@ -23,7 +23,7 @@ the last one; a keyboard that repeats before 0.18 or after 0.7 s moves nothing. 
 speaks the keyboard protocol of kitty (kitty, foot, WezTerm, Ghostty, Alacritty, ...) tells press
 and release: then the slave moves from one to the other, two keys move both joints, and silence
 still stops it, 0.15 s after a repeat and 0.7 s after a press. After a stop that was no release the
-key has to be let go of and pressed anew.
+key has to be let go of and pressed again.
 
 The slave follows while the graph is ENABLED and `console.source` is `master`, which is set with
 your consent and set back at the end. Whatever ends this program, the clutch is released first: Q,

@@ -1,10 +1,10 @@
 """`endoscope train`: the classifier of wire tensions, from simulated rigs."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
-from endoscope_bringup.seed_argument import seed
-from endoscope_bringup.subcommands import COUNT
+from endoscope_bringup.subcommands import COUNT, seed
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -43,7 +43,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Train and write; return 0."""
-    from endoscope_core.atomic_output import require_free_directory
+    from endoscope_core.atomic_output import atomic_directory, require_free_directory
     from endoscope_core.classifier.weights_file import save_weights, weights_path
     from endoscope_core.signals import calibration_motion
 
@@ -64,9 +64,8 @@ def run(args: argparse.Namespace) -> int:
     save_weights(out, trained.classifier.weights, described)
     kept.unlink(missing_ok=True)
     if args.plots is not None:
-        from endoscope_bringup.learning.classifier_figures import save_figures, training_figure
-
-        save_figures(args.plots, {'training': training_figure(trained.curve)})
+        with atomic_directory(args.plots) as folder:
+            (folder / 'training.svg').write_text(_training_figure(trained.curve), encoding='utf-8')
     for rate, told in trained.held_out.items():
         print(
             f'{out}: rigs held out, read at {rate}: nearest class right in '
@@ -75,6 +74,24 @@ def run(args: argparse.Namespace) -> int:
             f'{100.0 * told["refused"]:.1f} % refused'
         )
     return 0
+
+
+def _training_figure(curve: Sequence[tuple[int, float]]) -> str:
+    """SVG of the mean loss over the steps of a training."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    from endoscope_core.pages.still_pictures import STYLE, svg
+
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(5.2, 3.2), layout='constrained')
+        axis = figure.subplots()
+        steps, losses = zip(*curve, strict=True)
+        axis.plot(steps, losses, color='#2f6fb7', marker='o', markersize=2.5, linewidth=1.4)
+        axis.set_xlabel('step')
+        axis.set_ylabel('mean loss of a recording')
+        axis.set_title('training of the 1D-CNN')
+        return svg(figure)
 
 
 def _print_line(line: str) -> None:

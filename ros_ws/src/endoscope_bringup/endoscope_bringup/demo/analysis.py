@@ -121,11 +121,13 @@ def run_of(angles: Angles, shafts: tuple[Array, Array], segment: Segment) -> Tra
         segment.tube,
         segment.motion,
         segment.method,
-        time[inside],
-        np.degrees(own.desired[inside]),
-        np.degrees(own.actual[inside]),
-        tuple(reversals(own.asked_time - began, np.degrees(asked)) for asked in own.asked.T),
-        longest_crossing(*shafts, segment.start + began + signal.steady[0], segment.end),
+        time=time[inside],
+        desired_deg=np.degrees(own.desired[inside]),
+        actual_deg=np.degrees(own.actual[inside]),
+        reversals=tuple(
+            reversals(own.asked_time - began, np.degrees(asked)) for asked in own.asked.T
+        ),
+        crossing=longest_crossing(*shafts, segment.start + began + signal.steady[0], segment.end),
     )
 
 

@@ -14,8 +14,7 @@ from typing import Any
 from endoscope_bringup.demo.analysis import analyse
 from endoscope_bringup.demo.page import report_page
 from endoscope_bringup.demo.procedure import TUBES, Tube, TubeRecording
-from endoscope_bringup.demo.results import DemoResults
-from endoscope_bringup.demo.table import table_rows
+from endoscope_bringup.demo.results import DemoResults, table_rows
 from endoscope_core.atomic_output import write_text
 from endoscope_core.worker_pool import worker_pool
 

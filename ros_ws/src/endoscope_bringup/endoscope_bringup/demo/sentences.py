@@ -6,8 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bringup.demo.procedure import MOTION_TITLE, MOTIONS, CalibrationFacts, Method
-from endoscope_bringup.demo.results import DemoResults, TrackingRun
-from endoscope_bringup.demo.table import BACKLASH, LARGEST, RMSE, TableRow, of_figure, ranking
+from endoscope_bringup.demo.results import (
+    BACKLASH,
+    LARGEST,
+    RMSE,
+    DemoResults,
+    TableRow,
+    TrackingRun,
+    of_figure,
+    ranking,
+)
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.signals import motion_by_name
 from endoscope_nodes.names import JOINTS

@@ -3,7 +3,12 @@
 import argparse
 import json
 import math
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from types import FrameType
 from typing import Any
 
 from endoscope_bringup.operating.status import calibration_in_words, status_of
@@ -26,6 +31,8 @@ _OF_A_DEVICE = {
 }
 
 _NEXT_WORD_S = 1.5
+_HUNG_UP = 128 + signal.SIGHUP
+_ANSWERED_S = 2.0
 
 
 @dataclass(frozen=True)
@@ -146,3 +153,25 @@ def _of_json(value: Any) -> Any:
 
 def _in_words(value: Any) -> str:
     return value or "''" if isinstance(value, str) else json.dumps(_of_json(value))
+
+
+@contextmanager
+def paused_when_interrupted(client: GraphClient, moving: bool) -> Iterator[None]:
+    """Pause the graph if the block is ended by SIGINT, SIGTERM or SIGHUP while it has it move."""
+
+    def unwind(number: int, frame: FrameType | None) -> None:
+        raise SystemExit(_HUNG_UP)
+
+    # Whoever starts a program by `nohup` wants it to outlive the terminal.
+    ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    previous = signal.SIG_IGN if ignored else signal.signal(signal.SIGHUP, unwind)
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit):
+        if moving:
+            client.order('pause')
+            client.wait_until(lambda: client.state != 'ENABLED', _ANSWERED_S)
+            print(f'interrupted: the graph is {client.state or "silent"}', file=sys.stderr)
+        raise
+    finally:
+        signal.signal(signal.SIGHUP, previous)

@@ -5,16 +5,19 @@ import math
 import statistics
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass
 from itertools import pairwise
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
 
 from endoscope_bags.message_types import TF_MESSAGE, typestore
-from endoscope_bringup.operating.message_text import fields_of, lines_of
 from endoscope_core.errors import nearest, printable
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import NoGraphError
+from endoscope_nodes.names import WIRES
 from endoscope_nodes.runtime.recorded_topics import message_class, suitable_qos
 from endoscope_nodes.topics import BY_NAME, TOPICS, Topic
 
@@ -22,6 +25,8 @@ _HEADINGS = ('topic', 'type', 'senders', 'readers', '')
 _ROS_OWN = ('/parameter_events', '/rosout')
 _FOUND_S = 1.0
 _PROMPT_S = 0.01
+_LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')
+_UNITS = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
 
 
 def listing(client: GraphClient, patience_s: float, as_json: bool) -> None:
@@ -163,7 +168,7 @@ def rate(
         pass
     gaps = [(b - a) * 1e-6 for a, b in pairwise(times)]
     if not gaps:
-        raise NoGraphError(f'{name}: {len(times)} message came, which is no rate')
+        raise NoGraphError(f'{name}: {len(times)} message came: too few for a rate')
     mean, spread = statistics.fmean(gaps), statistics.pstdev(gaps)
     figures = {
         'messages': len(times),
@@ -208,3 +213,65 @@ def _print_json(message: Any) -> None:
 def _print_lines(message: Any) -> None:
     for line in lines_of(message):
         print(printable(line), flush=True)
+
+
+def lines_of(message: Any) -> list[str]:
+    """Put a message into lines, which may hold whatever a stranger wrote."""
+    if isinstance(message, JointState):
+        return [_joints(message)]
+    if isinstance(message, DiagnosticArray):
+        return list(_statuses(message))
+    rows = list(_leaves('', fields_of(message)))
+    return [f'{name}: {value}' if name else str(value) for name, value in rows]
+
+
+def fields_of(value: Any) -> Any:
+    """Turn a message into dicts, lists, numbers and texts that JSON can hold."""
+    if hasattr(value, 'get_fields_and_field_types'):
+        return {
+            name: fields_of(getattr(value, name)) for name in value.get_fields_and_field_types()
+        }
+    if is_dataclass(value):
+        return {field.name: fields_of(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, bytes):
+        return list(value) if len(value) != 1 else value[0]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if isinstance(value, str | int | float | bool):
+        return value
+    return [fields_of(item) for item in value]
+
+
+def _stamp(message: Any) -> str:
+    stamp = message.header.stamp
+    return f'{stamp.sec}.{stamp.nanosec:09d}'
+
+
+def _joints(message: JointState) -> str:
+    """One row: ``bend_x=+0.1234 rad +0.0010 rad/s``."""
+    columns = {quantity: getattr(message, quantity) for quantity in _UNITS}
+    cells = []
+    for k, name in enumerate(message.name):
+        values = [
+            f'{column[k]:+.4f} {"N" if name in WIRES and quantity == "effort" else unit}'
+            for (quantity, column), unit in zip(columns.items(), _UNITS.values(), strict=True)
+            if k < len(column)
+        ]
+        cells.append(f'{name}={" ".join(values)}')
+    of = f'  ({message.header.frame_id})' if message.header.frame_id else ''
+    return f'{_stamp(message)}  {"  ".join(cells)}{of}'
+
+
+def _statuses(message: DiagnosticArray) -> Iterator[str]:
+    for status in message.status:
+        yield f'{_stamp(message)}  {_LEVELS[status.level[0] % 4]} {status.name}: {status.message}'
+        for item in status.values:
+            yield f'    {item.key}: {item.value}'
+
+
+def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _leaves(f'{name}.{key}' if name else key, inner)
+    else:
+        yield name, value

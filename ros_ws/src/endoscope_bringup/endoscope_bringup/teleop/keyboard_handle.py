@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from endoscope_bringup.teleop.terminal_keys import FOCUS_LOST, KeyEvent, KeyEventKind
+from endoscope_bringup.teleop.terminal import FOCUS_LOST, KeyEvent, KeyEventKind
 from endoscope_core.teleop.dead_man import DeadMan
 from endoscope_core.teleop.running_angles import RunningAngles
 
@@ -62,27 +62,13 @@ _SPEEDS = {'[': 1.0 / _FASTER, ']': _FASTER}
 
 @dataclass(frozen=True)
 class Turn:
-    """What the keyboard says at one turn.
+    """What the keyboard says at one turn."""
 
-    Attributes
-    ----------
-    position
-        Angles of the handle in rad, shape (J,).
-    clutch
-        Whether it is held.
-    homing
-        Whether the way home is held.
-    requests
-        What else was asked for.
-    at_limit
-        Joints that do not follow any further, shape (J,).
-    """
-
-    position: tuple[float, ...]
-    clutch: bool
-    homing: bool
-    requests: tuple[Request, ...]
-    at_limit: tuple[bool, ...]
+    position: tuple[float, ...]  # angles of the handle, rad, (J,)
+    clutch: bool  # whether it is held
+    homing: bool  # whether the way home is held
+    requests: tuple[Request, ...]  # what else was asked for
+    at_limit: tuple[bool, ...]  # joints that do not follow any further, (J,)
 
 
 class _HeldKeys:
@@ -159,28 +145,14 @@ class KeyboardHandle:
     press to release, with two keys at once for both joints. One that does not has it run from the
     first repeat of a key to `STOPS_AFTER_S` after the last one. In both, silence ends it: after
     that time where a key was repeating, after 0.7 s where the first repeat was still to come; then
-    the key has to be pressed anew. Any key that is not held for motion ends it too.
+    the key has to be pressed again. Any key that is not held for motion ends it too.
 
-    Parameters
-    ----------
-    joints
-        How many there are.
-    speed
-        Of the handle in rad/s, within `SPEEDS`.
-    told_apart
-        Whether the terminal tells presses and releases apart.
-
-    Attributes
-    ----------
-    dead_man
-        Holds the clutch, and says why it does not.
-    speed
-        Of the handle in rad/s.
+    `told_apart`: the terminal tells presses and releases apart.
     """
 
     def __init__(self, joints: int, speed: float, told_apart: bool = False) -> None:
-        self.dead_man = DeadMan()
-        self.speed = speed
+        self.dead_man = DeadMan()  # holds the clutch, and says why it does not
+        self.speed = speed  # of the handle in rad/s, within `SPEEDS`
         self._keys = _HeldKeys(told_apart)
         self._angles = RunningAngles(joints)
         self._turned_ns: int | None = None
@@ -202,19 +174,9 @@ class KeyboardHandle:
     ) -> Turn:
         """Take what was typed since the last turn, and say what the handle does now.
 
-        Parameters
-        ----------
-        now_ns
-            Steady time in ns.
-        events
-            Of the keys.
-        hindrance
-            What forbids motion; empty for nothing.
-        wanted
-            Angles in rad that the console asks of the slave now, shape (J,); None while it follows
-            nobody. The handle does not move before it does, nor away from what it has reached.
-        scale
-            Slave motion for one radian of the handle.
+        `hindrance` is what forbids motion, empty for nothing; `wanted` (J,) what the console asks
+        of the slave now, in rad, None while it follows nobody: the handle does not move before it
+        does, nor away from what it has reached; `scale` the slave's motion for one radian.
         """
         requests = [r for event in events if (r := self._take(now_ns, event)) is not None]
         held = self.dead_man.turn(now_ns, hindrance)

@@ -25,7 +25,7 @@ from endoscope_nodes.client.graph_parameters import (
     set_parameters,
 )
 from endoscope_nodes.client.handle_sender import HandleSender, handle_senders
-from endoscope_nodes.client.order_feedback import HOME, SUCCEEDED
+from endoscope_nodes.client.order_feedback import HOME, OrderState
 from endoscope_nodes.names import (
     JOINTS,
     MASTER_CLUTCH,
@@ -103,7 +103,7 @@ def _wait_for_the_handles_place(client: GraphClient) -> None:
 def _give_back(
     client: GraphClient, terminal: Terminal, before: dict[str, str | float], patience_s: float
 ) -> None:
-    """Set the console's parameters back; a motion does not begin anew with nobody looking."""
+    """Set the console's parameters back; a motion does not restart with nobody looking."""
     if not before:
         return
     # The supervisor has to know that this handle is gone.
@@ -111,7 +111,7 @@ def _give_back(
     source = before.get('source')
     if source in PLAYS and client.state == 'ENABLED':
         client.ask('pause', patience_s)
-        terminal.say(f'paused: console.source {source} begins anew when you resume')
+        terminal.say(f'paused: console.source {source} starts again when you resume')
     set_parameters(client, 'console', before, patience_s)
 
 
@@ -287,7 +287,7 @@ class _Teleoperation:
 
     def _is_home(self, known: frozenset[int]) -> bool:
         order = self._client.order_since(known, HOME)
-        return order is not None and order.state == SUCCEEDED
+        return order is not None and order.state == OrderState.SUCCEEDED
 
     def _obey(self, request: Request) -> None:
         if request is Request.QUIT:

@@ -3,7 +3,7 @@
  *
  * One device holds at a time. A grip begins where a device is taken hold of while none is held, and has
  * a number above all before it; it ends when that device is let go of, or when anything makes `letGo`
- * necessary. What is still pressed then has to be let go of and pressed anew.
+ * necessary. What is still pressed then has to be let go of and pressed again.
  */
 
 import { SOURCE } from './frames.js';

@@ -40,73 +40,35 @@ class Source(IntEnum):
 
 @dataclass(frozen=True)
 class InputFrame:
-    """What the operator's hand does now.
+    """What the operator's hand does now."""
 
-    Attributes
-    ----------
-    pressed
-        Whether the dead-man is held.
-    turbo
-        Whether by its fast button.
-    visible, focused
-        Whether the page is shown, and the keyboard's.
-    position_mode
-        Whether `x` and `y` are angles and not speeds.
-    source
-        One of :class:`Source`.  The frame that ends a grip names the source of the grip; where it
-        names another, the device of the grip is gone.
-    seq
-        Number of the frame, counting up.
-    grip
-        Number of the grip, larger for every new one; what it is while nothing is pressed means
-        nothing.
-    seen
-        Number of the newest picture that was drawn.
-    t
-        Steady time of the page in s.
-    x, y
-        Deflection of either joint, -1 to 1; in position mode rad since the grip began.
-    """
-
-    pressed: bool
-    turbo: bool
-    visible: bool
-    focused: bool
-    position_mode: bool
+    pressed: bool  # whether the dead-man is held
+    turbo: bool  # whether by its fast button
+    visible: bool  # whether the page is shown
+    focused: bool  # whether the page has the keyboard
+    position_mode: bool  # whether `x` and `y` are angles and not speeds
+    # One of `Source`. The frame that ends a grip names the source of the grip; where it names
+    # another, the device of the grip is gone.
     source: int
-    seq: int
-    grip: int
-    seen: int
-    t: float
-    x: float
+    seq: int  # number of the frame, counting up
+    grip: int  # larger for every new one; without meaning while nothing is pressed
+    seen: int  # number of the newest picture that was drawn
+    t: float  # steady time of the page in s
+    x: float  # deflection, like `y`, -1 to 1; in position mode rad since the grip began
     y: float
 
 
 @dataclass(frozen=True)
 class TelemetryFrame:
-    """One picture of the slave.
-
-    Attributes
-    ----------
-    seq
-        Its number.
-    stamp_s
-        Time in s of the graph.
-    age_s
-        Age in s of the newest sample in it.
-    ranges
-        Smallest, largest and last value of each signal since the frame before, shape (N, 3); NaN
-        where nothing came.
-    wanted, actual
-        Bending section in m, shape (`POINTS`, 3), as commanded and as measured; NaN where unknown.
-    """
+    """One picture of the slave; NaN where nothing came or is known."""
 
     seq: int
-    stamp_s: float
-    age_s: float
+    stamp_s: float  # time of the graph
+    age_s: float  # of the newest sample in it
+    # (N, 3): smallest, largest and last value of each signal since the frame before.
     ranges: NDArray[np.float32]
-    wanted: NDArray[np.float32]
-    actual: NDArray[np.float32]
+    wanted: NDArray[np.float32]  # (`POINTS`, 3), commanded bending section, m
+    actual: NDArray[np.float32]  # (`POINTS`, 3), as measured, m
 
 
 def encode_input(frame: InputFrame) -> bytes:
@@ -123,14 +85,7 @@ def encode_input(frame: InputFrame) -> bytes:
 
 
 def decode_input(data: bytes) -> InputFrame:
-    """Read an input frame that came from a page.
-
-    Raises
-    ------
-    MalformedFrameError
-        If the length, the kind, a flag or the source is unknown, or a number is not finite.  The
-        source `Source.JOY` is unknown too: nobody speaks for the topic but the topic.
-    """
+    """Read an input frame that came from a page; MalformedFrameError where anything is unknown."""
     if len(data) != _INPUT.size:
         raise MalformedFrameError(f'an input frame has {_INPUT.size} bytes, not {len(data)}')
     kind, flags, source, seq, grip, seen, t, x, y = _INPUT.unpack(data)
@@ -138,6 +93,7 @@ def decode_input(data: bytes) -> InputFrame:
         raise MalformedFrameError(f'an input frame is of kind {INPUT}, not {kind}')
     if flags & ~_KNOWN_FLAGS:
         raise MalformedFrameError(f'an input frame has no flags {flags & ~_KNOWN_FLAGS:#x}')
+    # Nobody speaks for the topic but the topic.
     if source >= Source.JOY:
         raise MalformedFrameError(f'a page has no source {source}')
     if not (abs(t) <= _LAST_S and math.isfinite(x) and math.isfinite(y)):
@@ -166,31 +122,7 @@ def encode_telemetry(
     wanted: ArrayLike,
     actual: ArrayLike,
 ) -> bytes:
-    """Write a telemetry frame: kind, version, N, seq, stamp, age, N ranges and two polylines.
-
-    Parameters
-    ----------
-    seq
-        Number of the frame.
-    stamp_s
-        Time in s of the graph.
-    age_s
-        Age in s of the newest sample in it.
-    ranges
-        Smallest, largest and last value of each signal, shape (N, 3).
-    wanted, actual
-        Polylines in m, shape (`POINTS`, 3).
-
-    Returns
-    -------
-    bytes
-        24 + 12 N + 24 `POINTS` of them.
-
-    Raises
-    ------
-    ValueError
-        If an array has another shape.
-    """
+    """Write a `TelemetryFrame`: kind, version, N, seq, stamp, age, N ranges and two polylines."""
     of_signals, *lines = (np.asarray(array, dtype=_F32) for array in (ranges, wanted, actual))
     if of_signals.ndim != 2 or of_signals.shape[1] != 3:
         raise ValueError(f'ranges have shape (N, 3), not {of_signals.shape}')
@@ -202,13 +134,7 @@ def encode_telemetry(
 
 
 def decode_telemetry(data: bytes) -> TelemetryFrame:
-    """Read a telemetry frame.
-
-    Raises
-    ------
-    MalformedFrameError
-        If the kind or the version is another one, or the length does not fit.
-    """
+    """Read a telemetry frame; MalformedFrameError where kind, version or length is another."""
     if len(data) < _HEAD.size:
         raise MalformedFrameError(f'a telemetry frame has at least {_HEAD.size} bytes')
     kind, version, count, seq, stamp_s, age_s = _HEAD.unpack_from(data)

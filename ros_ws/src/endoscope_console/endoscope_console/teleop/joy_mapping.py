@@ -25,32 +25,12 @@ _JOINTS = ('bend_x', 'bend_y')
 _MAY_BE_NONE = ('enable_turbo_button', 'pause_button')
 
 
-class JoyMappingError(EndoscopeError, ValueError):
-    """A parameter of the mapping that cannot be used; the message names it."""
-
-
 class JoyMapping:
     """Turns axes and buttons into the frames of an operator.
 
     The enable button is the dead-man, as it is in teleop_twist_joy
     (https://github.com/ros2/teleop_twist_joy); the turbo button is another one, not a modifier.
-
-    Parameters
-    ----------
-    parameters
-        What differs from `DEFAULTS`.
-
-    Attributes
-    ----------
-    speeds
-        In rad/s at full deflection, usual and turbo, shape (2, 2), one row a joint.
-    pause
-        Whether the last message pressed the pause button anew.
-
-    Raises
-    ------
-    JoyMappingError
-        If there is no parameter of that name, it is of another type, or a dead-man is missing.
+    `parameters` are what differs from `DEFAULTS`; EndoscopeError where one cannot be used.
     """
 
     def __init__(self, parameters: Mapping[str, bool | int | float] | None = None) -> None:
@@ -58,40 +38,26 @@ class JoyMapping:
         for name, value in (parameters or {}).items():
             of[name] = _checked(name, value)
         if not of['require_enable_button']:
-            raise JoyMappingError(
+            raise EndoscopeError(
                 'require_enable_button: false is refused: nothing moves without a held dead-man'
             )
         if of['enable_button'] in (of['enable_turbo_button'], of['pause_button']):
-            raise JoyMappingError(f'enable_button {of["enable_button"]} has another meaning too')
+            raise EndoscopeError(f'enable_button {of["enable_button"]} has another meaning too')
         self._enable = int(of['enable_button'])
         self._turbo = int(of['enable_turbo_button'])
         self._pause = int(of['pause_button'])
         self._axes = [int(of[f'axis_angular.{joint}']) for joint in _JOINTS]
+        # In rad/s at full deflection, usual and turbo, shape (2, 2), one row a joint.
         self.speeds = tuple(
             (float(of[f'scale_angular.{joint}']), float(of[f'scale_angular_turbo.{joint}']))
             for joint in _JOINTS
         )
-        self.pause = False
+        self.pause = False  # whether the last message pressed the pause button
         self._pausing = self._pressed = False
         self._seq = self._grip = 0
 
     def frame(self, axes: Sequence[float], buttons: Sequence[int], stamp_s: float) -> InputFrame:
-        """Take a message.
-
-        Parameters
-        ----------
-        axes
-            Deflections, -1 to 1.
-        buttons
-            1 where pressed.
-        stamp_s
-            Of its header, in s.
-
-        Raises
-        ------
-        MalformedFrameError
-            If a button or axis of the mapping is missing, or a deflection is not finite.
-        """
+        """Take a message: deflections from -1 to 1, and 1 for each button that is pressed."""
         needed = max(self._enable, self._turbo, self._pause)
         if len(buttons) <= needed or len(axes) <= max(self._axes):
             raise MalformedFrameError(
@@ -127,7 +93,7 @@ class JoyMapping:
 def _checked(name: str, value: Any) -> Any:
     """Check one parameter."""
     if name not in DEFAULTS:
-        raise JoyMappingError(f"there is no parameter '{name}' of joy: {nearest(name, DEFAULTS)}")
+        raise EndoscopeError(f"there is no parameter '{name}' of joy: {nearest(name, DEFAULTS)}")
     default = DEFAULTS[name]
     if isinstance(default, bool) or isinstance(value, bool):
         fits = isinstance(default, bool) and isinstance(value, bool)
@@ -139,5 +105,5 @@ def _checked(name: str, value: Any) -> Any:
         fits = isinstance(value, int | float) and math.isfinite(value) and value != 0.0
         wanted = 'a finite speed in rad/s, not 0'
     if not fits:
-        raise JoyMappingError(f'{name} = {value} must be {wanted}')
+        raise EndoscopeError(f'{name} = {value} must be {wanted}')
     return value

@@ -8,53 +8,23 @@ SILENCE_NS = 2_000_000_000
 
 @dataclass(frozen=True)
 class Claim:
-    """What became of a claim.
+    """What became of a claim."""
 
-    Attributes
-    ----------
-    granted
-        Whether the client holds the lease now.
-    why
-        Why not; empty when granted.
-    lost_by
-        Client from which it was taken; empty where nobody held it.
-    """
-
-    granted: bool
-    why: str = ''
-    lost_by: str = ''
+    granted: bool  # whether the client holds the lease now
+    why: str = ''  # why not
+    lost_by: str = ''  # client from which it was taken; empty where nobody held it
 
 
 class Lease:
-    """The lease of the one operator; whoever only looks on never comes here.
-
-    Every time is steady and in ns.
-
-    Attributes
-    ----------
-    holder
-        Client that holds it; empty for nobody.
-    since_ns
-        Since when; 0 for nobody.
-    """
+    """The lease of the one operator; every time is steady and in ns."""
 
     def __init__(self) -> None:
-        self.holder = ''
-        self.since_ns = 0
+        self.holder = ''  # client; empty for nobody
+        self.since_ns = 0  # 0 for nobody
         self._heard_ns = 0
 
     def claim(self, client: str, take: bool, now_ns: int) -> Claim:
-        """Ask for the lease.
-
-        Parameters
-        ----------
-        client
-            Who asks.
-        take
-            Whether to take it from whoever holds it.
-        now_ns
-            Now.
-        """
+        """Ask for the lease, or `take` it from whoever holds it."""
         if not client:
             raise ValueError('a client without a name cannot hold the lease')
         holder = self.holder

@@ -63,37 +63,18 @@ _OF_THE_RULE = {
 
 @dataclass(frozen=True)
 class Conditions:
-    """What motion depends on besides the hand; times are steady.
+    """What motion depends on besides the hand; times are steady."""
 
-    Attributes
-    ----------
-    holder
-        Client that holds the lease; empty for nobody.
-    state_enabled
-        Whether the operating state last heard is ``ENABLED``.
-    state_ns
-        When it was heard.
-    calibrating
-        Whether a calibration or a way home has the slave.
-    source
-        Of the commands of the console.
-    pictures
-        Number of each of the last pictures and when it was made, newest last, shape (N, 2); a
-        picture stands here before it is sent.
-    playing
-        Whether the console plays a motion that goes on only while the clutch is held.
-    session
-        Motion session; another one may have begun unseen between two words on the state.
-    """
-
-    holder: str = ''
-    state_enabled: bool = False
-    state_ns: int = 0
-    calibrating: bool = False
-    source: str = ''
+    holder: str = ''  # client that holds the lease; empty for nobody
+    state_enabled: bool = False  # whether the operating state last heard is ``ENABLED``
+    state_ns: int = 0  # when it was heard
+    calibrating: bool = False  # whether a calibration or a way home has the slave
+    source: str = ''  # of the commands of the console
+    # Number of each of the last pictures and when it was made, newest last; a picture stands here
+    # before it is sent.
     pictures: tuple[tuple[int, int], ...] = ()
-    playing: bool = False
-    session: str = ''
+    playing: bool = False  # whether the console plays a motion that needs the clutch held
+    session: str = ''  # another one may have begun unseen between two words on the state
 
 
 class _Sender:
@@ -143,30 +124,17 @@ class OperatorDeadMan:
 
     Every time is steady and in ns.  Call :meth:`hear` for each frame with the time of its arrival,
     and :meth:`turn` at each turn of the loop, which alone leads to READY and ENGAGED.
-
-    Attributes
-    ----------
-    state
-        Where it is.
-    reason
-        Why the last grip, or the operator's readiness, has ended; None while it is engaged.
-    missing
-        What an operator who is not ready lacks first; None outside OPEN.
-    frame
-        Newest frame of the operator; None before the first.
-    grips
-        Greatest number of a grip so far, from which another page counts on.
-    counts
-        How often each reason has ended a grip that was engaged.
     """
 
     def __init__(self) -> None:
         self.state = DeadManState.OPEN
+        # Why the last grip, or the operator's readiness, has ended; None while it is engaged.
         self.reason: Reason | None = None
+        # What an operator who is not ready lacks first; None outside OPEN.
         self.missing: Reason | None = Reason.LOST
-        self.frame: InputFrame | None = None
-        self.grips = 0
-        self.counts: Counter[Reason] = Counter()
+        self.frame: InputFrame | None = None  # newest of the operator; None before the first
+        self.grips = 0  # greatest number of a grip so far, from which another page counts on
+        self.counts: Counter[Reason] = Counter()  # what ended grips that were engaged
         self._dead_man = DeadMan()
         self._holder = ''
         self._senders: dict[str, _Sender] = {}
@@ -182,17 +150,7 @@ class OperatorDeadMan:
         return self.state is DeadManState.ENGAGED
 
     def hear(self, frame: InputFrame, now_ns: int, client: str) -> None:
-        """Take a frame; one of anybody but the operator means nothing.
-
-        Parameters
-        ----------
-        frame
-            What the hand does.
-        now_ns
-            When it arrived.
-        client
-            Who sent it.
-        """
+        """Take a frame that arrived at `now_ns`; one of anybody but the operator means nothing."""
         if not client or client != self._holder:
             return
         sender = self._senders.setdefault(client, _Sender())
@@ -211,15 +169,7 @@ class OperatorDeadMan:
             self._hands_off = not frame.pressed and (self._hands_off or rests)
 
     def refuse(self, reason: Reason, client: str) -> None:
-        """Take note of what a client sent instead of frames.
-
-        Parameters
-        ----------
-        reason
-            `Reason.MALFORMED`, `Reason.FLOOD` for too many of them, or `Reason.LOST` for a lease.
-        client
-            Who sent it.
-        """
+        """Take note of what a client sent instead of frames, or that it has lost the lease."""
         if client and client == self._holder:
             self._open(reason)
 
@@ -229,15 +179,7 @@ class OperatorDeadMan:
         self._senders.pop(client, None)
 
     def turn(self, now_ns: int, conditions: Conditions) -> None:
-        """Judge.
-
-        Parameters
-        ----------
-        now_ns
-            Now.
-        conditions
-            As they are after the last frame was heard.
-        """
+        """Judge by the conditions as they are after the last frame was heard."""
         if conditions.holder != self._holder:
             self._open(Reason.LOST)
             self._holder, self.frame = conditions.holder, None

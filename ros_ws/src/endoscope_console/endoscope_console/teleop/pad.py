@@ -19,14 +19,8 @@ class PadHandle:
     each frame over the 20 ms to the next one: the 50 steps a second of a page would be spikes of
     speed at 1 kHz.  At release they stay, and the next grip begins there.
 
-    Parameters
-    ----------
-    joints
-        How many there are, J.
-    speeds
-        In rad/s at full deflection, with the usual and with the fast dead-man, shape (J, 2).
-    limits
-        Greatest speed in rad/s at which the angles follow a drag, shape (J,).
+    `speeds` (J, 2) are in rad/s at full deflection, with the usual and with the fast dead-man;
+    `limits` (J,) the greatest in rad/s at which the angles follow a drag.
     """
 
     def __init__(
@@ -50,24 +44,10 @@ class PadHandle:
         wanted: Sequence[float] | None = None,
         scale: float = 1.0,
     ) -> tuple[float, ...]:
-        """Where the handle is; to be called at each beat.
+        """Angles (J,) of the handle in rad; to be called at each beat.
 
-        Parameters
-        ----------
-        now_ns
-            Steady time in ns.
-        frame
-            The newest one of the grip that is engaged; None while none is.
-        wanted
-            Angles in rad that the console asks of the slave now, shape (J,); None while it follows
-            nobody.
-        scale
-            Slave motion for one radian of the handle.
-
-        Returns
-        -------
-        tuple of float, shape (J,)
-            Angles in rad.
+        `frame` is the newest one of the grip that is engaged; `wanted` (J,) what the console asks
+        of the slave now, in rad; `scale` the slave's motion for one radian of the handle.
         """
         elapsed_ns = 0 if self._followed_ns is None else now_ns - self._followed_ns
         elapsed_ns = min(max(0, elapsed_ns), _LONGEST_NS)

@@ -32,10 +32,6 @@ _SHUTDOWN = 0b110100
 _EVERY_STATUS = 2
 
 
-class SetUpError(BusError):
-    """A servo is not as it was set; motion is refused."""
-
-
 def wanted_registers(settings: BusSettings) -> dict[Register, int]:
     """What every servo's registers shall hold before it may be enabled, in counts."""
     return {
@@ -62,7 +58,7 @@ def bring_up(bus: PacketHandler, device: int, settings: BusSettings) -> ServoMod
     number, _ = bus.ping(device)
     if number not in MODELS:
         known = ', '.join(model.name for model in MODELS.values())
-        raise SetUpError(f'servo {device} has model number {number}; this driver is for {known}')
+        raise BusError(f'servo {device} has model number {number}; this driver is for {known}')
     _refuse_hardware_errors(bus, device)
     bus.write_register(device, TORQUE_ENABLE, 0)
     bus.write_register(device, BUS_WATCHDOG, 0)
@@ -88,12 +84,12 @@ def verify(
         found = _read_area(bus, device, area)
         for register in area:
             if found[register] != wanted[register] and register is not but:
-                raise SetUpError(
+                raise BusError(
                     f'servo {device} is not enabled: {register.name}({register.address}) reads '
                     f'{found[register]} instead of {wanted[register]}'
                 )
     if bus.read(device, MAP_ADDRESS, len(MAP_BYTES)).data != MAP_BYTES:
-        raise SetUpError(f'servo {device} is not enabled: it does not keep its indirect addresses')
+        raise BusError(f'servo {device} is not enabled: it does not keep its indirect addresses')
     _refuse_hardware_errors(bus, device)
 
 
@@ -114,7 +110,7 @@ def _read_area(
 def _refuse_hardware_errors(bus: PacketHandler, device: int) -> None:
     status = bus.read_register(device, HARDWARE_ERROR_STATUS)
     if status:
-        raise SetUpError(
+        raise BusError(
             f'servo {device} reports {hardware_errors_in_words(status)}; once its cause is gone, '
             'restart it (power, service motor/reboot, or `endoscope doctor --reboot`)'
         )
@@ -135,7 +131,7 @@ def enable(bus: PacketHandler, goals: Mapping[int, int], settings: BusSettings) 
         kept = bus.read_register(device, GOAL_POSITION)
         # The shaft may give way meanwhile, and firmware that follows it is no fault.
         if abs(kept - goal) * COUNT > JITTER:
-            raise SetUpError(
+            raise BusError(
                 f'servo {device} is not enabled: Goal Position(116) reads {kept} instead of {goal}'
             )
     for device in goals:
@@ -143,7 +139,7 @@ def enable(bus: PacketHandler, goals: Mapping[int, int], settings: BusSettings) 
         bus.write_register(device, TORQUE_ENABLE, 1)
         found = _read_area(bus, device, (TORQUE_ENABLE, BUS_WATCHDOG))
         if found != {TORQUE_ENABLE: 1, BUS_WATCHDOG: settings.watchdog_counts}:
-            raise SetUpError(
+            raise BusError(
                 f'servo {device} does not switch its torque on: Torque Enable(64) reads '
                 f'{found[TORQUE_ENABLE]}, Bus Watchdog(98) {found[BUS_WATCHDOG]}'
             )

@@ -8,11 +8,12 @@ as far as the servos still obey.
 import queue
 import threading
 import time
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
-from endoscope_devices.dynamixel.answers import Reply
+from endoscope_devices.device import DeviceError, MotorReading
 from endoscope_devices.dynamixel.bring_up import bring_up, enable
-from endoscope_devices.dynamixel.bus_records import BusFigures, ServoHealth, TimedReading
 from endoscope_devices.dynamixel.control_table import (
     ALERT,
     COUNT,
@@ -27,6 +28,7 @@ from endoscope_devices.dynamixel.control_table import (
 from endoscope_devices.dynamixel.packet_handler import (
     BusError,
     PacketHandler,
+    Reply,
     sync_read_request,
     sync_write_request,
 )
@@ -35,12 +37,11 @@ from endoscope_devices.dynamixel.servo_block import (
     BLOCK_ADDRESS,
     BLOCK_SIZE,
     BlockJudge,
+    Freshness,
     ServoBlock,
     decode_block,
 )
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
-from endoscope_devices.dynamixel.tick_clock import Freshness
-from endoscope_devices.motor_device import DeviceError, MotorReading
 
 _RETRY_S = 0.5
 _HEALTH_PERIOD_S = 0.5
@@ -49,6 +50,36 @@ _DRAIN_S = 4e-3
 # A shaft that is driven by its wires may be faster than the motor without load.
 _SPEED_MARGIN = 1.5
 _LARGEST_CURRENT_A = 1193 * CURRENT_UNIT
+
+
+@dataclass(frozen=True)
+class TimedReading:
+    """A reading of all shafts."""
+
+    reading: MotorReading
+    taken_ns: int  # our monotonic time in ns at which the oldest of it was taken
+
+
+@dataclass
+class ServoHealth:
+    """What is known of a servo beside its motion."""
+
+    model: str = ''
+    error: int = 0  # error byte of its last answer
+    hardware: str = ''  # errors in words
+    voltage: float = 0.0  # V, as last read
+    temperature: int = 0  # °C, as last read
+
+
+@dataclass
+class BusFigures:
+    """What the thread counts."""
+
+    cycles: int = 0
+    readings: int = 0  # cycles that gave a new reading of all servos
+    failures: Counter[str] = field(default_factory=Counter)  # failed cycles by reason
+    last_failure: str = ''  # in words
+    last_ns: int = 0  # monotonic time in ns of the last valid reading
 
 
 class BusThread:
@@ -112,7 +143,7 @@ class BusThread:
     def trouble(self) -> str:
         """What is wrong; a trouble that has passed is still told for a while."""
         if self._thread.ident is not None and not self._thread.is_alive():
-            return 'the thread of the bus has ended; start the motor driver anew'
+            return 'the thread of the bus has ended; restart the motor driver'
         recent = time.monotonic_ns() - self._trouble_ns < _TROUBLE_SHOWN_S * 1e9
         return self._trouble if recent else ''
 
@@ -238,7 +269,7 @@ class BusThread:
         if silence_s > self.settings.fault_after:
             self._fail(f'no valid reading for {silence_s * 1e3:.0f} ms: {failure}')
         if reason == 'restarted' or silence_s > _RETRY_S:
-            raise BusError(f'{failure}; it is set up anew')
+            raise BusError(f'{failure}; it is set up again')
 
     def _goal_now(self) -> tuple[float, ...] | None:
         """Goal to send: the newest, or what is held; None while torque is off."""

@@ -8,9 +8,11 @@ from pathlib import Path
 
 from serial.tools import list_ports
 
+from endoscope_devices.device import DeviceError
 from endoscope_devices.dynamixel.control_table import (
     BAUD_CODES,
     CURRENT_LIMIT,
+    GOAL_POSITION,
     HARDWARE_ERROR_STATUS,
     MODELS,
     OPERATING_MODE,
@@ -22,10 +24,16 @@ from endoscope_devices.dynamixel.control_table import (
     Register,
     hardware_errors_in_words,
 )
-from endoscope_devices.dynamixel.packet_handler import BusError, NoReplyError, PacketHandler
-from endoscope_devices.dynamixel.serial_port import BusPort, latency_timer
-from endoscope_devices.dynamixel.wire_time import bytes_of_cycle, cycles_per_second
-from endoscope_devices.motor_device import DeviceError
+from endoscope_devices.dynamixel.packet import STATUS_OVERHEAD
+from endoscope_devices.dynamixel.packet_handler import (
+    BusError,
+    NoReplyError,
+    PacketHandler,
+    sync_read_request,
+    sync_write_request,
+)
+from endoscope_devices.dynamixel.serial_port import BusPort, byte_time, latency_timer
+from endoscope_devices.dynamixel.servo_block import BLOCK_ADDRESS, BLOCK_SIZE
 
 # 'Specifications': 10.0 to 14.8 V; firmware: notes at Bus Watchdog(98) and 'Fast Sync Read'.
 _VOLTAGE = (10.0, 14.8)
@@ -205,3 +213,17 @@ def _told(port: str, error: DeviceError) -> str:
     if isinstance(cause, OSError) and cause.errno == errno.EACCES:
         return f'{port}: no permission: sudo usermod -a -G dialout $USER, and log in again'
     return str(error)
+
+
+def bytes_of_cycle(servos: int) -> int:
+    """Bytes of one sync write of goals and one sync read with its answers, unstuffed."""
+    devices = range(1, servos + 1)
+    goals = {device: bytes(GOAL_POSITION.size) for device in devices}
+    requests = sync_write_request(GOAL_POSITION.address, GOAL_POSITION.size, goals)
+    requests += sync_read_request(BLOCK_ADDRESS, BLOCK_SIZE, list(devices))
+    return len(requests) + servos * (STATUS_OVERHEAD + BLOCK_SIZE)
+
+
+def cycles_per_second(baud: int, servos: int, return_delay: float = 0.0) -> float:
+    """Largest rate that the line carries at `baud` bit/s, with `return_delay` s of each servo."""
+    return 1.0 / (bytes_of_cycle(servos) * byte_time(baud) + servos * return_delay)

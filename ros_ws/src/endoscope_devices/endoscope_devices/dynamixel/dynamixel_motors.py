@@ -4,11 +4,10 @@ import dataclasses
 import time
 from collections.abc import Sequence
 
-from endoscope_devices.dynamixel.bus_records import TimedReading
-from endoscope_devices.dynamixel.bus_thread import BusThread
+from endoscope_devices.device import MotorReading
+from endoscope_devices.dynamixel.bus_thread import BusThread, TimedReading
 from endoscope_devices.dynamixel.control_table import error_in_words
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
-from endoscope_devices.motor_device import MotorReading
 
 
 class DynamixelMotors:

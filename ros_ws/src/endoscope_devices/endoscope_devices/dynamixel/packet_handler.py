@@ -10,8 +10,9 @@ repeats of the first is then no answer to the second.
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from endoscope_devices.dynamixel.answers import AnswerCollector, Reply
+from endoscope_devices.device import DeviceError
 from endoscope_devices.dynamixel.control_table import (
     ALERT,
     RETURN_DELAY_UNIT,
@@ -24,11 +25,12 @@ from endoscope_devices.dynamixel.packet import (
     STATUS,
     STATUS_OVERHEAD,
     Instruction,
+    Packet,
     PacketReader,
     encode,
+    split_fast_answer,
 )
 from endoscope_devices.dynamixel.serial_port import BusPort, byte_time, latency_timer
-from endoscope_devices.motor_device import DeviceError
 
 REPLY_MARGIN_S = 3e-3
 QUIET_S = 0.03
@@ -40,16 +42,63 @@ _PING_PAUSE_S = 3e-3
 _LONGEST_RETURN_DELAY_S = 254 * RETURN_DELAY_UNIT
 
 
+class Reply(NamedTuple):
+    """What a servo answered."""
+
+    error: int  # error byte; the alert bit alone is no refusal
+    data: bytes  # parameters after the error byte
+
+
+class AnswerCollector:
+    """Matches packets with the open request by kind, id, order and length; `fast`: all in one."""
+
+    def __init__(self, devices: Sequence[int], size: int, fast: bool = False) -> None:
+        self.replies: dict[int, Reply] = {}
+        # Valid packets that answer no open question: late, repeated, or of another servo.
+        self.stray = 0
+        self.reader = PacketReader()
+        self._devices = tuple(devices)
+        self._size = size  # data bytes of each answer
+        self._fast = fast
+
+    @property
+    def complete(self) -> bool:
+        """Whether all have answered."""
+        return len(self.replies) == len(self._devices)
+
+    def feed(self, data: bytes) -> None:
+        """Take bytes from the line."""
+        for packet in self.reader.feed(data):
+            reply = self._reply(packet)
+            if reply is None:
+                self.stray += 1
+            else:
+                self.replies |= reply
+
+    def _reply(self, packet: Packet) -> dict[int, Reply] | None:
+        if packet.instruction != STATUS or self.complete:
+            return None
+        if self._fast and packet.device == BROADCAST_ID:
+            parts = split_fast_answer(packet, self._size)
+            if tuple(parts) == self._devices:
+                return {device: Reply(*part) for device, part in parts.items()}
+            return None
+        expected = packet.device == self._devices[len(self.replies)]
+        if not expected or not packet.parameters:
+            return None
+        error, data = packet.parameters[0], packet.parameters[1:]
+        # A refusal carries no data, whatever was asked for.
+        if len(data) == self._size or (not data and error & ~ALERT):
+            return {packet.device: Reply(error, data)}
+        return None
+
+
 class BusError(DeviceError):
     """A servo did not do what it was asked; the message names it."""
 
 
 class NoReplyError(BusError):
     """No valid answer came in time."""
-
-
-class RefusedError(BusError):
-    """The servo answered with an error number."""
 
 
 @dataclass
@@ -101,13 +150,13 @@ class PacketHandler:
         return reply.data[0] | reply.data[1] << 8, reply.data[2]
 
     def read(self, device: int, address: int, size: int) -> Reply:
-        """`size` bytes of a servo's control table; NoReplyError, or RefusedError on its error."""
+        """Read `size` bytes of a control table; BusError on its error, NoReplyError on silence."""
         asked = size + 1 if size == self._size_before else size
         reply = self._ask(device, Instruction.READ, _words(address, asked), asked)
         return Reply(reply.error, reply.data[:size])
 
     def write(self, device: int, address: int, data: bytes) -> None:
-        """Write to a servo's control table; NoReplyError, or RefusedError on its error."""
+        """Write to a servo's control table; BusError on its error, NoReplyError on silence."""
         self._ask(device, Instruction.WRITE, _words(address) + data, 0)
 
     def reboot(self, device: int) -> None:
@@ -139,7 +188,7 @@ class PacketHandler:
                 self.drain(QUIET_S)
                 continue
             if reply.error & ~ALERT:
-                raise RefusedError(
+                raise BusError(
                     f'{what} refuses {instruction.name.lower()} of {parameters.hex(" ")}: '
                     f'{error_in_words(reply.error)}'
                 )

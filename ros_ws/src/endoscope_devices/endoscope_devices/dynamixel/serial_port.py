@@ -8,8 +8,8 @@ from pathlib import Path
 import serial
 from dynamixel_sdk import PortHandler
 
+from endoscope_devices.device import DeviceError
 from endoscope_devices.dynamixel.control_table import BAUD_CODES
-from endoscope_devices.motor_device import DeviceError
 
 BITS_PER_BYTE = 10
 _TTY = Path('/sys/class/tty')

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from endoscope_devices.device import DeviceError
 from endoscope_devices.dynamixel.control_table import (
     BUS_WATCHDOG,
     CURRENT_LIMIT,
@@ -10,7 +11,6 @@ from endoscope_devices.dynamixel.control_table import (
     RETURN_DELAY_UNIT,
     WATCHDOG_UNIT,
 )
-from endoscope_devices.motor_device import DeviceError
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class BusSettings:
     rate: float = 1000.0  # cycles per second at most; 0 for as many as the bus carries
     # Time in s after which a goal that nobody renewed is given up and the measured position held.
     goal_timeout: float = 0.1
-    # Silence of a servo in s after which motion is refused until it is enabled anew.
+    # Silence of a servo in s after which motion is refused until it is enabled again.
     fault_after: float = 0.05
     fast: bool = False  # whether to use fast sync read (firmware 45 and newer)
 

@@ -9,8 +9,7 @@ import time
 
 import serial
 
-from endoscope_devices.em_tracker.ndi_crc import crc16
-from endoscope_devices.motor_device import DeviceError
+from endoscope_devices.device import DeviceError
 
 _FIRST_BAUD = 9600
 _FRAME_BAUD = 115200
@@ -39,6 +38,19 @@ _WORDS = {
     '15': 'Unable to initialize the Measurement System',
 }
 _Gone = (serial.SerialException, OSError, termios.error)
+
+
+def crc16(data: bytes) -> int:
+    """CRC-16/ARC: x^16 + x^15 + x^2 + 1, reflected, starting from 0.
+
+    Aurora Application Program Interface Guide, appendix on calculating CRC; ``INIT:`` gives E3A5.
+    """
+    crc = 0
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ 0xA001 if crc & 1 else crc >> 1
+    return crc
 
 
 class TrackerReplyError(DeviceError):

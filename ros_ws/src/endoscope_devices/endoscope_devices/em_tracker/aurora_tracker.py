@@ -1,10 +1,10 @@
-"""Frames of one sensor of an Aurora, read by a thread of their own."""
+"""Frames of one sensor of an Aurora, read by a thread of their own, and when each was measured."""
 
 import time
 from dataclasses import dataclass
 
+from endoscope_devices.device import DeviceError, ReadingThread
 from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
-from endoscope_devices.em_tracker.frame_clock import FrameClock
 from endoscope_devices.em_tracker.pose_check import PoseCheck
 from endoscope_devices.em_tracker.tx_reply import (
     MalformedReplyError,
@@ -12,9 +12,8 @@ from endoscope_devices.em_tracker.tx_reply import (
     ToolReading,
     parse_tx,
 )
-from endoscope_devices.motor_device import DeviceError
-from endoscope_devices.reading_thread import ReadingThread
 
+_DRIFT = 1e-4
 _REOPEN_S = 0.3
 _KEPT = 200
 _PAUSE_S = 0.002
@@ -24,6 +23,43 @@ _GIVE_UP = 5
 _FOR_GOOD = 40
 # So far before its time a frame may seem to come: the replies before it may have waited as long.
 _AHEAD_NS = 100_000_000
+
+
+class FrameClock:
+    """Lays frame numbers on the host's clock, at `rate` frames a second.
+
+    Frames are equally spaced; a reply comes after its frame by a time that varies. The earliest
+    reply, relative to its number, shows where the frames lie (NDI advises to use the frame number,
+    not the host's clock, to tell when data was collected). The line follows clocks that drift apart
+    by up to ``1e-4``.
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._period_ns = 1e9 / rate
+        self._offset_ns: float | None = None
+        self._frame = 0
+
+    def stamp(self, frame: int, asked_ns: int) -> int:
+        """Time of a frame seen for the first time, in ns, never later than `asked_ns`.
+
+        The frame's number is larger than the last; `asked_ns` is when the reply that brought it was
+        asked for, in ns of the same clock.
+        """
+        seen = asked_ns - frame * self._period_ns
+        self._offset_ns = seen if self._offset_ns is None else min(seen, self._latest_ns(frame))
+        self._frame = frame
+        return round(self._offset_ns + frame * self._period_ns)
+
+    def ahead_ns(self, frame: int, asked_ns: int) -> int:
+        """How much earlier than it can have been measured a frame was seen; 0 if it was not."""
+        if self._offset_ns is None:
+            return 0
+        return max(0, round(self._latest_ns(frame) + frame * self._period_ns - asked_ns))
+
+    def _latest_ns(self, frame: int) -> float:
+        """Latest time of frame 0, after what the clocks may have drifted until a frame."""
+        passed = (frame - self._frame) * self._period_ns
+        return (self._offset_ns or 0.0) + _DRIFT * passed
 
 
 @dataclass(frozen=True)
@@ -231,7 +267,9 @@ class AuroraTracker(ReadingThread[TrackerReading]):
             return True
         self._misnumbered += 1
         if self._misnumbered >= _FOR_GOOD:
-            raise DeviceError(f'tracker at {self._path} counts its frames anew: it is opened again')
+            raise DeviceError(
+                f'tracker at {self._path} has restarted its frame count: it is reopened'
+            )
         return False
 
 

@@ -7,8 +7,8 @@ from abc import ABC, abstractmethod
 
 import serial
 
+from endoscope_devices.device import DeviceError
 from endoscope_devices.load_cells.calibration_file import SerialSettings
-from endoscope_devices.motor_device import DeviceError
 
 # A Modbus frame has at most 260 bytes (Modbus Messaging on TCP/IP V1.0b, section 3.1.3).
 LONGEST = 260
@@ -130,7 +130,7 @@ class TcpLine(Line):
     def __init__(self, address: str, timeout: float = 1.0) -> None:
         host, _, port = address.partition(':')
         if not host or (port and not port.isdecimal()) or int(port or 1) not in range(1, 65536):
-            raise DeviceError(f"'{address}' is no address: give HOST or HOST:PORT")
+            raise DeviceError(f"'{address}' is not an address: give HOST or HOST:PORT")
         self._address = (host, int(port) if port else MODBUS_TCP_PORT)
         super().__init__(f'{self._address[0]}:{self._address[1]}')
         self._timeout = timeout

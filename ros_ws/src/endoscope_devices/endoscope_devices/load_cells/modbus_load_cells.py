@@ -5,7 +5,12 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from endoscope_devices.load_cells.calibration_file import LoadCellCalibration
+from endoscope_devices.device import ReadingThread
+from endoscope_devices.load_cells.calibration_file import (
+    REGISTER_TYPES,
+    LoadCellCalibration,
+    decode_number,
+)
 from endoscope_devices.load_cells.channel_check import ChannelCheck
 from endoscope_devices.load_cells.modbus_framing import (
     Framing,
@@ -16,12 +21,10 @@ from endoscope_devices.load_cells.modbus_framing import (
 )
 from endoscope_devices.load_cells.modbus_line import Line, LineLostError, SerialLine, TcpLine
 from endoscope_devices.load_cells.register_reader import RegisterReader
-from endoscope_devices.load_cells.registers import REGISTER_TYPES, decode_number
 from endoscope_devices.load_cells.tare import TareWindow, with_zero, zero_after_tare
-from endoscope_devices.reading_thread import ReadingThread
 
 _REOPEN_S = 0.2
-# So many readings in a row that cannot be believed are a fault; a single spike is none.
+# So many readings in a row that cannot be believed are a fault; a single spike is not.
 _FAULTY_READINGS = 10
 _KEPT = 2000
 

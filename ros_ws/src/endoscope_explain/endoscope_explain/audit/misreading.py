@@ -7,7 +7,7 @@ from math import log, pi
 
 import numpy as np
 
-from endoscope_bags.units import UNITS
+from endoscope_bags.table_mapping import UNITS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.recording import (

@@ -19,14 +19,7 @@ from endoscope_nodes.client.graph_listener import (
     Health,
     NoGraphError,
 )
-from endoscope_nodes.client.order_feedback import (
-    CALIBRATE,
-    EXECUTING,
-    HOME,
-    REJECTED,
-    SUCCEEDED,
-    OrderFeedback,
-)
+from endoscope_nodes.client.order_feedback import CALIBRATE, HOME, OrderFeedback, OrderState
 from endoscope_nodes.names import (
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
@@ -172,8 +165,8 @@ class GraphClient(GraphListener):
             HOME, lambda: self.order_since(known, HOME) is not None, what, patience_s, withdrawn
         )
         ended = self._followed(known, HOME, patience_s)
-        if ended.state != SUCCEEDED:
-            prefix = f'{HOME}: ' if ended.state == REJECTED else ''
+        if ended.state != OrderState.SUCCEEDED:
+            prefix = f'{HOME}: ' if ended.state == OrderState.REJECTED else ''
             raise GraphRefusedError(f'{prefix}{ended.words}')
         return ended.words
 
@@ -185,7 +178,7 @@ class GraphClient(GraphListener):
     def order_since(self, known: frozenset[int], name: str) -> OrderFeedback | None:
         """The first order of a name that is none of those known, rejected ones last."""
         new = [o for o in list(self.orders.values()) if o.order == name and o.id not in known]
-        return max(new, key=lambda order: order.state != REJECTED, default=None)
+        return max(new, key=lambda order: order.state != OrderState.REJECTED, default=None)
 
     def _followed(
         self,
@@ -200,13 +193,13 @@ class GraphClient(GraphListener):
         def says_more() -> bool:
             return self.order_since(known, name) != heard
 
-        while heard is None or heard.state == EXECUTING:
+        while heard is None or heard.state == OrderState.EXECUTING:
             if not self.wait_until(says_more, patience_s):
                 raise GraphRefusedError(f'calibration has been silent for {patience_s:g} s')
             heard = self.order_since(known, name)
             if heard is None:
                 raise GraphRefusedError(f'calibration has restarted and no longer knows {name}')
-            if heard.state == EXECUTING:
+            if heard.state == OrderState.EXECUTING:
                 progress(heard.words, heard.progress)
         return heard
 
@@ -224,7 +217,7 @@ class GraphClient(GraphListener):
                 raise
             self.trigger(CALIBRATION_RUN, patience_s)
         ended = self._followed(known, CALIBRATE, patience_s, progress)
-        if ended.state != SUCCEEDED:
+        if ended.state != OrderState.SUCCEEDED:
             raise GraphRefusedError(ended.words)
 
         def is_told() -> bool:

@@ -14,7 +14,7 @@ from std_msgs.msg import Header, String
 
 from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.client.order_feedback import EXECUTING, WAITING, OrderFeedback
+from endoscope_nodes.client.order_feedback import OrderFeedback, OrderState
 from endoscope_nodes.names import (
     AWAITED,
     CALIBRATION_FEEDBACK,
@@ -138,8 +138,8 @@ class GraphListener(ClosedOnExit):
 
     def _on_feedback(self, data: bytes, received_ns: int) -> None:
         order = OrderFeedback.of_message(deserialize_message(data, DiagnosticArray))
-        if order.state == WAITING:
-            # Calibration begins anew, and its time may.
+        if order.state == OrderState.WAITING:
+            # Calibration restarts, and its time may too.
             self.orders.clear()
         self.orders[order.id] = order
 
@@ -153,7 +153,7 @@ class GraphListener(ClosedOnExit):
     def underway(self) -> OrderFeedback | None:
         """The order for which calibration moves the slave now; None for none."""
         orders = list(self.orders.values())
-        return next((order for order in orders if order.state == EXECUTING), None)
+        return next((order for order in orders if order.state == OrderState.EXECUTING), None)
 
     @property
     def why(self) -> str:

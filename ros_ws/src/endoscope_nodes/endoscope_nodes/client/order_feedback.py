@@ -1,19 +1,38 @@
 """The message ``calibration/feedback``: how an order to calibrate or to go home fares."""
 
 from dataclasses import asdict, dataclass
+from enum import StrEnum
 
 from diagnostic_msgs.msg import DiagnosticArray
 
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, diagnostic_array, status
 
 CALIBRATE, HOME = 'calibrate', 'home'
-# States, as those of a ROS action's goal are called; no order was given yet in the first.
-WAITING, EXECUTING, SUCCEEDED = 'waiting', 'executing', 'succeeded'
-ABORTED, REJECTED = 'aborted', 'rejected'
-# Why an order was rejected or aborted.
-BUSY, NO_SESSION, SESSION_ENDED = 'busy', 'no_session', 'session_ended'
-TENSION_CEILING, STREAM_SILENT, TENSION_GAP = 'tension_ceiling', 'stream_silent', 'tension_gap'
-UNKNOWN_TUBE, NOT_JUDGED, NOT_REACHED = 'unknown_tube', 'not_judged', 'not_reached'
+
+
+class OrderState(StrEnum):
+    """As the states of a ROS action's goal are called, and `WAITING` before the first order."""
+
+    WAITING = 'waiting'
+    EXECUTING = 'executing'
+    SUCCEEDED = 'succeeded'
+    ABORTED = 'aborted'
+    REJECTED = 'rejected'
+
+
+class OrderCode(StrEnum):
+    """Why an order was rejected or aborted."""
+
+    NONE = ''
+    BUSY = 'busy'
+    NO_SESSION = 'no_session'
+    SESSION_ENDED = 'session_ended'
+    TENSION_CEILING = 'tension_ceiling'
+    STREAM_SILENT = 'stream_silent'
+    TENSION_GAP = 'tension_gap'
+    UNKNOWN_TUBE = 'unknown_tube'
+    NOT_JUDGED = 'not_judged'
+    NOT_REACHED = 'not_reached'
 
 
 @dataclass(frozen=True)
@@ -22,16 +41,17 @@ class OrderFeedback:
 
     order: str = ''  # `CALIBRATE` or `HOME`; empty before the first
     id: int = 0  # unique: the time in ns at which it was given, or just after it
-    state: str = WAITING
+    state: OrderState = OrderState.WAITING
     phase: str = ''  # what is done for it now
     progress: float = 0.0  # from 0 to 1
-    code: str = ''  # why it was rejected or aborted
+    code: OrderCode = OrderCode.NONE  # why it was rejected or aborted
     words: str = ''  # the same for a person
 
     def message(self, stamp_ns: int) -> DiagnosticArray:
         """Write it, at a time in ns."""
         values = asdict(self)
-        level = ERROR if self.state in (ABORTED, REJECTED) else OK
+        failed = self.state in (OrderState.ABORTED, OrderState.REJECTED)
+        level = ERROR if failed else OK
         return diagnostic_array(
             stamp_ns, status('calibration: order', level, values.pop('words'), values)
         )
@@ -44,9 +64,9 @@ class OrderFeedback:
         return cls(
             texts['order'],
             int(texts['id']),
-            texts['state'],
+            OrderState(texts['state']),
             texts['phase'],
             float(texts['progress']),
-            texts['code'],
+            OrderCode(texts['code']),
             said.message,
         )

@@ -38,22 +38,11 @@ from endoscope_nodes.client.calibration_result import (
     with_zeros,
 )
 from endoscope_nodes.client.order_feedback import (
-    ABORTED,
-    BUSY,
     CALIBRATE,
-    EXECUTING,
     HOME,
-    NO_SESSION,
-    NOT_JUDGED,
-    NOT_REACHED,
-    REJECTED,
-    SESSION_ENDED,
-    STREAM_SILENT,
-    SUCCEEDED,
-    TENSION_CEILING,
-    TENSION_GAP,
-    UNKNOWN_TUBE,
+    OrderCode,
     OrderFeedback,
+    OrderState,
 )
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
@@ -158,10 +147,15 @@ class CalibrationNode(EndoscopeNode):
         if message.data == StateCommand.HOME:
             self._start(homing=True)
 
-    def _tell(self, last: str, code: str = '') -> None:
+    def _tell(self, last: str, code: OrderCode = OrderCode.NONE) -> None:
         """Say at once what has come of a procedure, and why it was aborted, if it was."""
         self._last = last
-        self._feed(state=ABORTED if code else SUCCEEDED, code=code, progress=1.0, words=last)
+        self._feed(
+            state=OrderState.ABORTED if code else OrderState.SUCCEEDED,
+            code=code,
+            progress=1.0,
+            words=last,
+        )
         self.diagnostics.publish()
 
     def _feed(self, **changes: Any) -> None:
@@ -186,7 +180,9 @@ class CalibrationNode(EndoscopeNode):
         self._newest = max(self._newest + 1, now)
         order = OrderFeedback(HOME if homing else CALIBRATE, self._newest)
         if trouble or shafts is None:
-            rejected = dataclasses.replace(order, state=REJECTED, code=code, words=trouble)
+            rejected = dataclasses.replace(
+                order, state=OrderState.REJECTED, code=code, words=trouble
+            )
             self._feedback.publish(rejected.message(now))
             self._last = f'{order.order}: {trouble}'
             self.get_logger().warning(self._last)
@@ -205,20 +201,20 @@ class CalibrationNode(EndoscopeNode):
         self._homing = homing
         self._bending = BendingRecord(len(JOINTS))
         self._judging = None
-        self._feed(state=EXECUTING, words=str(self._run.step))
+        self._feed(state=OrderState.EXECUTING, words=str(self._run.step))
         self.diagnostics.publish()
         return ''
 
-    def _obstacle(self) -> tuple[str, str]:
-        """Why nothing can begin, in words and as a code; empty where it can."""
+    def _obstacle(self) -> tuple[str, OrderCode]:
+        """Why nothing can begin, in words (empty where it can) and as a code."""
         if self._run is not None:
-            return f'busy: {self._run.step}', BUSY
+            return f'busy: {self._run.step}', OrderCode.BUSY
         if not self._session.name:
-            return 'no motion session is open: the slave has to be ENABLED', NO_SESSION
+            return 'no motion session is open: the slave has to be ENABLED', OrderCode.NO_SESSION
         return self._trouble(), self._code_of_trouble()
 
-    def _code_of_trouble(self) -> str:
-        return TENSION_CEILING if self._guard.trouble else STREAM_SILENT
+    def _code_of_trouble(self) -> OrderCode:
+        return OrderCode.TENSION_CEILING if self._guard.trouble else OrderCode.STREAM_SILENT
 
     def _trouble(self) -> str:
         if self._guard.trouble:
@@ -228,7 +224,7 @@ class CalibrationNode(EndoscopeNode):
         return self._wires.trouble(self._timeout_ns)
 
     def _on_leave(self) -> None:
-        self._abort('the motion session has ended', SESSION_ENDED)
+        self._abort('the motion session has ended', OrderCode.SESSION_ENDED)
 
     def _on_wires(self, sample: JointSample) -> None:
         if len(sample.effort) != len(WIRES):
@@ -268,7 +264,7 @@ class CalibrationNode(EndoscopeNode):
         try:
             tension = run.record.resampled()
         except TensionGapError as error:
-            self._abort(str(error), TENSION_GAP)
+            self._abort(str(error), OrderCode.TENSION_GAP)
             return
         self._zeros = zero_errors(tension)
         if self.ticker.paced or not self.ticker.simulated:
@@ -295,7 +291,7 @@ class CalibrationNode(EndoscopeNode):
             return
         if self._judging is None:
             if run.record is None or not run.record.complete:
-                self._abort('the tensions of the last samples did not come', TENSION_GAP)
+                self._abort('the tensions of the last samples did not come', OrderCode.TENSION_GAP)
             return
         if not self._judging.done():
             return
@@ -304,7 +300,7 @@ class CalibrationNode(EndoscopeNode):
             self._refuse(str(trouble))
             return
         if isinstance(trouble, ClassifierError | PlantFitError):
-            self._abort(str(trouble), NOT_JUDGED)
+            self._abort(str(trouble), OrderCode.NOT_JUDGED)
             return
         verdict, plants = self._judging.result()
         backlash = None
@@ -329,13 +325,16 @@ class CalibrationNode(EndoscopeNode):
             return
         self._aborts += 1
         where = ' and '.join(f'{name} at {x:.3f} rad' for name, x in away.items())
-        self._tell(f'home is not reached: {where or "nothing measured"} instead of 0', NOT_REACHED)
+        self._tell(
+            f'home is not reached: {where or "nothing measured"} instead of 0',
+            OrderCode.NOT_REACHED,
+        )
         self.get_logger().error(self._last)
 
     def _refuse(self, reason: str) -> None:
         self._run = None
         self._refused += 1
-        self._tell(with_zeros(reason, self._zeros), UNKNOWN_TUBE)
+        self._tell(with_zeros(reason, self._zeros), OrderCode.UNKNOWN_TUBE)
         self.get_logger().error(f'{self._last}; the motion is not compensated')
         now = self.ticker.now_ns()
         duration = (now - self._began_ns) * 1e-9
@@ -346,7 +345,7 @@ class CalibrationNode(EndoscopeNode):
         self._results.publish(result)
         self._numbers.publish(numbers_of(result))
 
-    def _abort(self, reason: str, code: str) -> None:
+    def _abort(self, reason: str, code: OrderCode) -> None:
         run, self._run = self._run, None
         if run is None:
             return

@@ -2,6 +2,7 @@
 
 from endoscope_core.errors import FileError
 from endoscope_core.physics import SensorModel
+from endoscope_devices.device import DeviceError
 from endoscope_devices.load_cells import (
     CONNECTIONS,
     ModbusLoadCells,
@@ -11,7 +12,6 @@ from endoscope_devices.load_cells import (
     save_tare,
     tare_path,
 )
-from endoscope_devices.motor_device import DeviceError
 from endoscope_nodes.names import (
     MOTOR_MEASURED,
     MOTORS,

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from std_msgs.msg import String
 
 from endoscope_core.safety import CommandLimits, MotionLimits, OperatingState, Refusal, ShaftMotion
+from endoscope_devices.device import DeviceError, MotorDevice
 from endoscope_devices.dynamixel.control_table import BAUD_CODES
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
-from endoscope_devices.motor_device import DeviceError, MotorDevice
 from endoscope_devices.simulated_slave import SimulatedSlave
 from endoscope_nodes.names import (
     JOINTS,

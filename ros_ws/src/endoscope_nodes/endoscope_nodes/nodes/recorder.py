@@ -354,7 +354,7 @@ def checked_names(topics: tuple[str, ...]) -> tuple[str, ...]:
             validate_topic_name(topic)
         except InvalidTopicNameException as error:
             raise ParameterError(
-                f"recorder: parameter 'topics': {topic!r} is no name of a topic"
+                f"recorder: parameter 'topics': {topic!r} is not a topic name"
             ) from error
     return topics
 

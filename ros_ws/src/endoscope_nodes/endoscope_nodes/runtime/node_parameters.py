@@ -126,7 +126,7 @@ class DynamixelParameters:
     )
     fault_after: float = parameter(
         0.05,
-        'time without a valid reading after which motion must be enabled anew',
+        'time without a valid reading after which motion must be enabled again',
         unit='s',
         low=0.005,
         high=1.0,
@@ -283,7 +283,7 @@ class ConsoleParameters:
 
     source: str = parameter(
         'none',
-        'where commands come from; setting it starts a motion or file anew',
+        'where commands come from; setting it restarts a motion or file',
         choices=SOURCES,
         dynamic=True,
     )

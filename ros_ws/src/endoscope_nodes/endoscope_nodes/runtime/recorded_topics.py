@@ -15,7 +15,7 @@ from visualization_msgs.msg import MarkerArray
 
 from endoscope_bags.errors import UnknownTypeError
 from endoscope_bags.message_types import TF_MESSAGE, message_type
-from endoscope_bags.qos_profile import QosProfile
+from endoscope_bags.topic import QosProfile
 from endoscope_nodes import topics
 from endoscope_nodes.runtime.qos import profile
 

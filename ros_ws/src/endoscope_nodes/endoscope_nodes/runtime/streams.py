@@ -2,7 +2,7 @@
 
 Converting a JointState between C and Python costs more than sending it (22 us a hop against 8).
 The layout of a stream never changes, so each publisher fills numbers into a prepared message and
-each subscription reads them from known places; a message of another layout is parsed anew.
+each subscription reads them from known places; a message of another layout is parsed again.
 """
 
 import struct
@@ -17,8 +17,8 @@ from rclpy.qos import QoSProfile
 from rclpy.type_support import check_for_type_support
 from sensor_msgs.msg import JointState
 
+from endoscope_bags.cdr_decoding import QUANTITIES, joint_state_layout
 from endoscope_bags.cdr_encoding import encode_joint_state
-from endoscope_bags.cdr_layout import QUANTITIES, joint_state_layout
 from endoscope_bags.errors import MalformedMessageError
 
 _SECOND = 1_000_000_000

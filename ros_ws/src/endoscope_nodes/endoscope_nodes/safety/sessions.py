@@ -42,7 +42,7 @@ class SenderWatch:
             return ''
         relative = self._topic.removeprefix(f'{self._node.get_namespace()}/')
         known = senders_in_words(self._node, self._topic)
-        return known or f'{relative} had {been} senders, of which not all are there any more'
+        return known or f'{relative} had {been} senders, not all of which are still there'
 
 
 def senders_in_words(node: EndoscopeNode, topic: str) -> str:

@@ -1,4 +1,4 @@
-"""Writes a stretch of a recording to a new one, with what was in force when it began."""
+"""New recordings out of old ones: a stretch with what was in force then, or what is sound."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,15 +7,10 @@ from endoscope_bags.bag_writer import BagWriter
 from endoscope_bags.errors import BagError
 from endoscope_bags.information import LOST_PREFIX, losses_told
 from endoscope_bags.message_types import MessageType
-from endoscope_bags.recording import open_bag
-from endoscope_bags.rig_record import copied_rig_record
+from endoscope_bags.recording import Recording, copied_rig_record, open_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_bags.topic import RawMessage
 from endoscope_core.errors import printable
-
-
-class NoSuchStretchError(BagError, ValueError):
-    """A stretch that a recording does not have."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +35,7 @@ def cut(source: str | Path, target: str | Path, begin: float, end: float | None)
     length = (recording.end_ns - recording.start_ns) * 1e-9
     last = length if end is None else end
     if not 0.0 <= begin < last or begin > length:
-        raise NoSuchStretchError(
+        raise BagError(
             f'{source}: has no stretch from {begin:g} to {last:g} s; it is {length:.3f} s long'
         )
     first_ns = recording.start_ns + round(begin * 1e9)
@@ -76,10 +71,58 @@ def cut(source: str | Path, target: str | Path, begin: float, end: float | None)
                     numbers[message.topic].add(message.sequence)
         count = writer.message_count - len(in_force)
         if not count:
-            raise NoSuchStretchError(
-                f'{source}: no message was received from {begin:g} to {last:g} s'
-            )
+            raise BagError(f'{source}: no message was received from {begin:g} to {last:g} s')
         lost = {f'{LOST_PREFIX}{topic}': str(gaps.lost) for topic, gaps in numbers.items()}
         writer.close({'cut_from': Path(source).name, **lost})
         seconds = (min(last_ns, recording.end_ns) - first_ns) * 1e-9
     return CutReport(count, tuple(sorted(in_force)), seconds)
+
+
+@dataclass(frozen=True)
+class RecoveryReport:
+    """What `recover` saved."""
+
+    message_count: int
+    counts: dict[str, int]  # messages by topic
+    start_ns: int  # first receipt, since the epoch
+    end_ns: int  # last receipt
+    damage: tuple[str, ...]  # one line each; empty if the recording was sound
+
+    def __str__(self) -> str:
+        lines = [f'damage: {what}' for what in self.damage] or ['no damage found']
+        seconds = (self.end_ns - self.start_ns) * 1e-9
+        lines.append(f'saved {self.message_count} messages over {seconds:.3f} s')
+        lines += [f'  {topic}: {count}' for topic, count in sorted(self.counts.items())]
+        return '\n'.join(map(printable, lines))
+
+
+def recover(source: str | Path, target: str | Path) -> RecoveryReport:
+    """Write all messages of the sound chunks of a recording to a new one; on an error to none."""
+    recording = open_bag(source, salvage=True)
+    with BagWriter(target, records=copied_rig_record(recording)) as writer:
+        _copy(recording, writer)
+        writer.close({'recovered_from': Path(source).name, **_numbered(recording.damage)})
+        counts = writer.counts
+    return RecoveryReport(
+        recording.message_count, counts, recording.start_ns, recording.end_ns, recording.damage
+    )
+
+
+def _copy(recording: Recording, writer: BagWriter) -> None:
+    for topic in recording.topics.values():
+        kind = MessageType(topic.type, topic.definition, topic.type_hash)
+        writer.add_topic(topic.name, kind, topic.qos)
+    for message in recording.stored_messages():
+        kind_name = recording.topics[message.topic].type
+        writer.write_raw(
+            message.topic,
+            kind_name,
+            message.data,
+            message.log_ns,
+            message.publish_ns,
+            message.sequence,
+        )
+
+
+def _numbered(damage: tuple[str, ...]) -> dict[str, str]:
+    return {f'damage_{number}': what for number, what in enumerate(damage, start=1)}

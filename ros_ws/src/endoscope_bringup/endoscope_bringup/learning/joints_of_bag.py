@@ -1,4 +1,6 @@
-"""Motor and bending angle of each joint of a bag, laid on one even grid."""
+"""What identification takes from a bag: the signals of each joint, on one even grid."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +19,8 @@ GRID_STEP = 0.005
 _COMMAND_STEP = 0.001
 
 Array = NDArray[np.float64]
-
-
-class NoHysteresisError(EndoscopeError, ValueError):
-    """A bag that does not show both what a motor did and what the joint made of it."""
+WIRES = 'wires/measured_js'
+_STEP = 0.001
 
 
 def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecording]:
@@ -30,7 +30,7 @@ def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecord
     angle passed through the nominal servo.
     """
     if not gear > 0.0:
-        raise NoHysteresisError(f'gear = {gear} must be positive')
+        raise EndoscopeError(f'gear = {gear} must be positive')
     bending = bag.joint_state(BENDING, finite=('position',))
     motor, scale, measured = _motor(bag, gear)
     origin = int(bending.stamp_ns[0])
@@ -52,7 +52,7 @@ def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecord
             rested=False,
         )
     if not found:
-        raise NoHysteresisError(
+        raise EndoscopeError(
             f'{bag.path}: {motor.topic} ({", ".join(motor.names)}) and {bending.topic} '
             f'({", ".join(bending.names)}) have no joint in common for a second'
         )
@@ -68,7 +68,7 @@ def _motor(bag: Recording, gear: float) -> tuple[JointStateSeries, float, bool]:
     ):
         if bag.has(topic):
             return bag.joint_state(topic, finite=('position',)), scale, measured
-    raise NoHysteresisError(
+    raise EndoscopeError(
         f'{bag.path}: lacks {MOTOR}, {MOTOR_COMMAND} and {DESIRED}: it does not say what the '
         'motors did'
     )
@@ -77,7 +77,7 @@ def _motor(bag: Recording, gear: float) -> tuple[JointStateSeries, float, bool]:
 def _angle_over_time(series: JointStateSeries, joint: str, origin_ns: int) -> tuple[Array, Array]:
     """Seconds since `origin_ns` and angles of one joint, one for each stamp."""
     if series.position is None:
-        raise NoHysteresisError(f'topic {series.topic} holds no positions')
+        raise EndoscopeError(f'topic {series.topic} holds no positions')
     seconds = series.seconds(origin_ns)
     keep = np.concatenate(([True], np.diff(seconds) > 0.0))
     return seconds[keep], series.position[keep, series.names.index(joint)]
@@ -88,3 +88,59 @@ def _servo(stamps: Array, command: Array, grid: Array) -> Array:
     time = np.arange(stamps[0], grid[-1] + _COMMAND_STEP, _COMMAND_STEP)
     held = command[np.clip(np.searchsorted(stamps, time, side='right') - 1, 0, None)]
     return np.interp(grid, time, Servo().answer(held, _COMMAND_STEP))
+
+
+@dataclass(frozen=True)
+class PlantRecording:
+    """One joint, N samples at 1 kHz."""
+
+    command: Array  # (N,), joint-equivalent, rad
+    tension: Array  # (N, 2), N
+    bending: Array | None  # (N,), rad, NaN where the tracker says nothing
+
+
+def plant_recordings_of_bag(bag: Recording, gear: float) -> dict[str, PlantRecording]:
+    """Every joint with motor command and two tensions; `gear` is shaft rad for one of bending.
+
+    The recording should begin at rest at zero, as a calibration does.
+    """
+    if not gear > 0.0:
+        raise EndoscopeError(f'gear = {gear} must be positive')
+    for topic in (MOTOR_COMMAND, WIRES):
+        if not bag.has(topic):
+            raise EndoscopeError(f'{bag.path}: lacks {topic}, which shows the plant')
+    motors = bag.joint_state(MOTOR_COMMAND, finite=('position',))
+    wires = bag.joint_state(WIRES, finite=('effort',))
+    if motors.position is None or wires.effort is None:
+        raise EndoscopeError(f'{bag.path}: motor commands or tensions hold no values')
+    origin = int(motors.stamp_ns[0])
+    times, tension_times = motors.seconds(origin), wires.seconds(origin)
+    grid = np.arange(max(0.0, tension_times[0]), min(times[-1], tension_times[-1]), _STEP)
+    found = {}
+    for name in ('x', 'y'):
+        motor, pair = f'motor_{name}', (f'wire_{name}_pos', f'wire_{name}_neg')
+        if motor not in motors.names or not set(pair) <= set(wires.names):
+            continue
+        held = np.clip(np.searchsorted(times, grid, side='right') - 1, 0, None)
+        tension = [
+            np.interp(grid, tension_times, wires.effort[:, wires.names.index(wire)])
+            for wire in pair
+        ]
+        found[f'bend_{name}'] = PlantRecording(
+            motors.position[held, motors.names.index(motor)] / gear,
+            np.stack(tension, axis=1),
+            _bending(bag, f'bend_{name}', origin, grid),
+        )
+    if not found:
+        raise EndoscopeError(f'{bag.path}: no joint has a motor command and two wire tensions')
+    return found
+
+
+def _bending(bag: Recording, joint: str, origin: int, grid: Array) -> Array | None:
+    if not bag.has(BENDING):
+        return None
+    angles = bag.joint_state(BENDING, finite=('position',))
+    if angles.position is None or joint not in angles.names:
+        return None
+    measured = angles.position[:, angles.names.index(joint)]
+    return np.interp(grid, angles.seconds(origin), measured, left=np.nan, right=np.nan)
