@@ -57,7 +57,8 @@ def _declared(package: Path, *more: str) -> set[str]:
 def _locked_modules() -> set[str]:
     settings = tomllib.loads((WORKSPACE / 'pyproject.toml').read_text())
     groups = settings['dependency-groups']
-    lines = settings['project']['dependencies'] + groups['train'] + groups['peers']
+    optional = [line for group in ('viewers', 'train', 'peers') for line in groups[group]]
+    lines = settings['project']['dependencies'] + optional
     names = [re.split(r'[^\w-]', line, maxsplit=1)[0] for line in lines]
     return {IMPORT_NAMES.get(name, name) for name in names}
 

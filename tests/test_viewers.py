@@ -1,8 +1,10 @@
 """What Foxglove and Lichtblick see of a graph, by a client that speaks their protocol."""
 
+import importlib
 import json
 import socket
 import struct
+import sys
 import time
 from contextlib import contextmanager
 
@@ -170,3 +172,10 @@ def test_a_port_that_is_taken_is_said(address):
         viewers('endoscope', port),
     ):
         pass
+
+
+def test_without_the_sdk_one_line_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, 'foxglove', None)
+    monkeypatch.delitem(sys.modules, 'endoscope_console.viewers')
+    with pytest.raises(EndoscopeError, match='`make -C ros_ws viewers` installs it'):
+        importlib.import_module('endoscope_console.viewers')

@@ -10,9 +10,6 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import foxglove
-from foxglove import Channel, Context, Schema
-from foxglove.websocket import ChannelView, Client, ServerListener
 from rclpy.node import Node
 
 from endoscope_bags.message_types import JOINT_STATE, message_type
@@ -22,6 +19,15 @@ from endoscope_nodes.runtime.qos import profile
 from endoscope_nodes.runtime.recorded_topics import message_class
 from endoscope_nodes.runtime.streams import RawSubscription
 from endoscope_nodes.topics import TOPICS, Qos, Topic
+
+try:
+    import foxglove
+    from foxglove import Channel, Context, Schema
+    from foxglove.websocket import ChannelView, Client, ServerListener
+except ModuleNotFoundError as error:
+    raise EndoscopeError(
+        '--viewers needs the Foxglove SDK: `make -C ros_ws viewers` installs it'
+    ) from error
 
 NODE = 'console_viewers'
 HOST = '127.0.0.1'
