@@ -4,4 +4,4 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'tests'))
-pytest_plugins = ['not_tried']
+pytest_plugins = ['run_report']

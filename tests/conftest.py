@@ -11,4 +11,4 @@ os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 # Tests talk to nobody outside this machine.
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-pytest_plugins = ['not_tried']
+pytest_plugins = ['run_report']

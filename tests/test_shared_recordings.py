@@ -1,17 +1,14 @@
 """Recordings made elsewhere, where there are any: ours and rosbags' reading agree."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
+from outside_data import CASES, needs
 from rosbags.highlevel import AnyReader
 
 from endoscope_bags import open_bag
 from endoscope_bags.information import bag_information
 
-SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[2] / 'shared'))
-RECORDINGS = sorted(SHARED.glob('cases/*.second.mcap'))
+RECORDINGS = sorted(CASES.glob('*.second.mcap'))
 TOPICS = (
     'slave/servo_jp',
     'motor/servo_jp',
@@ -20,10 +17,7 @@ TOPICS = (
     'slave/measured_js',
 )
 
-pytestmark = pytest.mark.skipif(
-    not RECORDINGS,
-    reason='no reference cases on this machine: set ENDOSCOPE_SHARED to the folder that has them',
-)
+pytestmark = needs(CASES)
 
 
 @pytest.mark.parametrize('path', RECORDINGS[:3], ids=lambda path: path.stem)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from outside_data import REAL, needs
 
 from endoscope_benchmarks.real.rig import PLANT, Plant, Told, as_described, wide
 from endoscope_benchmarks.real.tables import markdown, rmse_rows
@@ -12,10 +13,7 @@ from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig
 
 FOLDER = recordings_folder()
-recorded = pytest.mark.skipif(
-    FOLDER is None,
-    reason='no real recordings on this machine: set ENDOSCOPE_SHARED to the folder that has them',
-)
+recorded = needs(REAL)
 
 
 @pytest.fixture(scope='module')

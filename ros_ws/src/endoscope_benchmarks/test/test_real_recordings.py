@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from outside_data import REAL, needs
 
 from endoscope_benchmarks.trials.real_recordings import (
     closed_cycle,
@@ -12,10 +13,7 @@ from endoscope_core.hysteresis.inverse import MODELS
 from endoscope_core.identification import fit_model
 
 RECORDINGS = real_recordings()
-where_they_are_at_hand = pytest.mark.skipif(
-    not RECORDINGS,
-    reason='no real recordings on this machine: set ENDOSCOPE_SHARED to the folder that has them',
-)
+where_they_are_at_hand = needs(REAL)
 
 
 @where_they_are_at_hand

@@ -1,10 +1,9 @@
 import math
-import os
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+from outside_data import CASES, needs
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
@@ -16,8 +15,7 @@ from endoscope_benchmarks.proof.sliding_nodes import (
     simulate,
 )
 
-SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))
-REFERENCE = SHARED / 'cases' / 'sheath' / 'reference'
+REFERENCE = CASES / 'sheath' / 'reference'
 
 CELLS = 100
 PLACE = np.linspace(0.0, 1.0, CELLS + 1)
@@ -212,10 +210,7 @@ def test_the_two_wires_are_each_other_s_mirror():
         np.testing.assert_allclose(own, other, atol=1e-7)
 
 
-@pytest.mark.skipif(
-    not REFERENCE.is_dir(),
-    reason='no reference cases on this machine: set ENDOSCOPE_SHARED to the folder that has them',
-)
+@needs(REFERENCE)
 @pytest.mark.parametrize(
     'name',
     [

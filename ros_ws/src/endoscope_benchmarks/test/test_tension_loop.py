@@ -1,8 +1,6 @@
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
+from outside_data import REAL, needs
 
 from endoscope_benchmarks.trials.tension_loop import leave_one_out_errors, tension_loop_width
 from endoscope_core.dataset import random_instrument
@@ -10,9 +8,6 @@ from endoscope_core.dataset.rig_variation import backlash_sizes, calibration_com
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics import simulate
 from endoscope_core.signals import calibration_motion
-
-SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))
-REAL = SHARED / 'data' / 'kaist'
 
 
 def test_a_loop_of_known_width():
@@ -45,10 +40,7 @@ def test_leaving_a_point_out_predicts_it_from_the_others():
     assert leave_one_out_errors([0.0, 1.0, 2.0], [0.0, 1.0, 5.0])[2] == pytest.approx(-3.0)
 
 
-@pytest.mark.skipif(
-    not REAL.is_dir(),
-    reason='no real recordings on this machine: set ENDOSCOPE_SHARED to the folder that has them',
-)
+@needs(REAL)
 def test_real_backlash_sizes_from_tension_alone():
     sizes, widths = [], []
     for path in sorted(REAL.glob('[0-9]*.txt')):

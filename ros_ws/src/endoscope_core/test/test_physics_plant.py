@@ -1,20 +1,18 @@
 """What an endoscope does and never does, and answers that were made elsewhere."""
 
-import os
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from outside_data import CASES, needs
 from scipy.interpolate import CubicSpline
 from wrong_way import wrong_way_motion
 
 from endoscope_core.physics import JointParameters, PlantDescription, simulate
 
-SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))
-REFERENCE = SHARED / 'cases' / 'sheath' / 'reference'
+REFERENCE = CASES / 'sheath' / 'reference'
 TICK = 1e-3
 TIME = np.arange(0.0, 3.0, TICK)
 TUBES = {
@@ -73,10 +71,7 @@ def test_a_held_shaft_holds_everything():
     assert np.ptp(made.tension[-2000:], axis=0).max() < 2e-3
 
 
-@pytest.mark.skipif(
-    not REFERENCE.is_dir(),
-    reason='no reference cases on this machine: set ENDOSCOPE_SHARED to the folder that has them',
-)
+@needs(REFERENCE)
 def test_answers_made_elsewhere():
     for path in sorted(REFERENCE.glob('*.csv')):
         differs = re.findall(r'(\w+)=([-\d.e]+)', path.read_text().split(';', 1)[0])

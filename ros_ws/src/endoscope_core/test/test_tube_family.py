@@ -1,11 +1,10 @@
 """The family of tubes: over the bend, in a file, identified, and never bending the wrong way."""
 
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from outside_data import REAL, needs
 from wrong_way import wrong_way_motion
 
 from endoscope_core.errors import FileError
@@ -29,8 +28,6 @@ from endoscope_core.physics.family import (
     shipped_family,
 )
 
-SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))
-FOLDER = SHARED / 'data' / 'kaist'
 BENDS = np.deg2rad([0.0, 60.0, 120.0, 180.0, 240.0])
 TICK = 5e-3
 MADE_UP = TubeFamily(
@@ -137,12 +134,9 @@ def test_recordings_that_tell_nothing_are_refused():
         fit_family([recording])
 
 
-@pytest.mark.skipif(
-    not FOLDER.is_dir(),
-    reason='no real recordings on this machine: set ENDOSCOPE_SHARED to the folder that has them',
-)
+@needs(REAL)
 def test_the_shipped_family_reads_as_the_real_rig_does_in_the_cycle_not_fitted():
-    recordings = tube_recordings(FOLDER)
+    recordings = tube_recordings(REAL)
     assert [recording.bend for recording in recordings] == pytest.approx(list(BENDS))
     for recording in recordings:
         left = misfit(shipped_family(), recording, 2)

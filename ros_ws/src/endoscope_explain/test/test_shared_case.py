@@ -1,10 +1,8 @@
 """A recording of the nominal plant that an independent program made, where there is one."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
+from outside_data import CASES, needs
 
 from endoscope_core.physics import load_plant
 from endoscope_explain.fit.evidence import misfit
@@ -13,14 +11,10 @@ from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.recording import recording_from_bag
 
-SHARED = Path(os.environ.get('ENDOSCOPE_SHARED', Path(__file__).parents[5] / 'shared'))
-FOLDER = SHARED / 'cases' / 'sheath'
+FOLDER = CASES / 'sheath'
 CASE = FOLDER / 'nominal.mcap'
 
-pytestmark = pytest.mark.skipif(
-    not CASE.exists(),
-    reason='no reference cases on this machine: set ENDOSCOPE_SHARED to the folder that has them',
-)
+pytestmark = needs(CASE)
 
 
 def test_the_plant_as_described_leaves_the_noise_and_its_refit_stays_there():
