@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import KNOWN, describe
-from endoscope_core.physics.simulator import simulate
+from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import Rig
 from endoscope_core.signals import Signal, hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS
@@ -24,7 +24,7 @@ from endoscope_explain.decide.conclusions import spec_of
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
 from endoscope_explain.fit.model import Fit, JointModel, fit, joint_of, packed_joint
-from endoscope_explain.observe.observation import TICK, JointObservation, observe
+from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.search.screen import background, directions, screened
@@ -242,7 +242,7 @@ def rival_plant(
     if not ways:
         return None
     # Beside numbers that are bent by what was taken out, a rival may promise nothing at its starts.
-    ranked = [promised.term for promised in screened(behind, ways)] or [ways[0].term]
+    ranked = screened(behind, ways) or [ways[0].term]
     packed = ranked[0].added_to(behind.fit.model).base
     term = replace(bare, effects=(*others, spec_of(describe(rival), effect.joint, packed)))
     return with_fit(term, effect.joint, refit(term, observation, 0.2, 6))

@@ -32,15 +32,12 @@ from endoscope_explain.fit.nominal import (
     with_references,
 )
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Recording
 from endoscope_explain.search.levels import MOST_EFFECTS, JointSearch, search
 from endoscope_explain.search.refit import Candidate
 
 Progress = Callable[[str], None]
 
-LEAST_DURATION_S = 2.0
-LEAST_MOTION_RAD = 0.01
-"""Of the shaft."""
 SAME_RIG = 0.03
 """Relative tolerance of a nominal parameter from one recording of a rig to the next."""
 ROUNDS = 3
@@ -165,11 +162,7 @@ def _noise_of(observation: JointObservation) -> float:
 def _is_enough(observations: tuple[JointObservation, ...]) -> bool:
     return any(
         o.duration >= LEAST_DURATION_S
-        and np.ptp(o.inputs[0, :, 0]) >= LEAST_MOTION_RAD
-        and all(
-            np.ptp(c.value) >= LEAST_MOTION_RAD
-            for c in o.channels
-            if c.quantity == 'shaft_position'
-        )
+        and np.ptp(o.inputs[0, :, 0]) >= MOVES_RAD
+        and all(np.ptp(c.value) >= MOVES_RAD for c in o.channels if c.quantity == 'shaft_position')
         for o in observations
     )

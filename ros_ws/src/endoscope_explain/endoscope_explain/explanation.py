@@ -16,6 +16,8 @@ from endoscope_core.physics.functions.place import Place
 
 Array = NDArray[np.float64]
 
+NINETY_PERCENT = 1.645
+"""Standard deviations that hold 90 % of a normal distribution, either way."""
 LEAST_EXPLAINED = 0.05
 """A function that takes away less of the excess misfit than this is not offered as what acts."""
 

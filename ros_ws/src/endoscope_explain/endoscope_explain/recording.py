@@ -35,6 +35,12 @@ the pose that it held once they had ended.
 """
 
 
+LEAST_DURATION_S = 2.0
+"""Length of a recording, or of what is left of it, from which on it can be explained."""
+MOVES_RAD = 0.01
+"""Shaft angle that is a motion."""
+
+
 @dataclass(frozen=True)
 class Series:
     """Samples of one quantity."""

@@ -26,7 +26,7 @@ from endoscope_explain.search.levels import FALSE_ALARMS, STARTS, TRIED
 from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN, Null, shown
 from endoscope_explain.search.refit import TrialFit, candidate, refit, trial_fit
 from endoscope_explain.search.repetition import motion_repeats
-from endoscope_explain.search.screen import background, directions, screened
+from endoscope_explain.search.screen import background, by_variant, directions, screened
 from endoscope_explain.search.term import Term, Variant, effects
 
 Array = NDArray[np.float64]
@@ -37,7 +37,6 @@ Begun = tuple[list[JointModel], list[Array]]
 REFITTED_FIRST, REFITTED = 6, 3
 """Effects that are fitted to all recordings, beside no other one and beside others."""
 _SEED = 11
-_TINY = 1e-12
 
 
 @dataclass(frozen=True)
@@ -129,10 +128,8 @@ def _trial_fits(choice: SharedChoice, jobs: int) -> dict[Variant, list[TrialFit 
         behind = background(references[0])
         offset = behind.offset
         terms = tuple(t for t in _effects(references[0]) if t.id in everywhere)
-        starts: dict[Variant, list[Term]] = {}
-        for each in screened(behind, directions(behind, terms, jobs)):
-            starts.setdefault(each.term.variant, []).append(each.term)
-        tasks = [term for own in list(starts.values())[:TRIED] for term in own[:STARTS]]
+        variants = by_variant(screened(behind, directions(behind, terms, jobs)))
+        tasks = [term for own in variants[:TRIED] for term in own[:STARTS]]
 
         def tried(
             term: Term, references: ReferenceFits = references, offset: Array = offset

@@ -5,7 +5,7 @@ import pytest
 from outside_data import CASES, needs
 
 from endoscope_core.physics import load_plant
-from endoscope_explain.fit.evidence import misfit
+from endoscope_explain.fit.evidence import mean_squares
 from endoscope_explain.fit.free_parameters import BAND, FORM_INDICES
 from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
@@ -22,7 +22,7 @@ def test_the_plant_as_described_leaves_the_noise_and_its_refit_stays_there():
     recording = recording_from_bag(CASE, plant)
     _, references = with_references(recording, observe(recording, plant), plant, BAND, 1)
     for refitted, described in references:
-        assert np.sqrt(misfit(refitted).channels.max()) < 1.5
+        assert np.sqrt(mean_squares(refitted.model.observation, refitted.residuals).max()) < 1.5
         for item, coordinate, truth in zip(
             refitted.model.free, refitted.theta, described.theta, strict=True
         ):

@@ -30,7 +30,7 @@ def by_empirical_risk(problem: Problem) -> Statement | None:
     left = behind.left(problem.refitted.residuals * behind.weight)
     terms = (*effects(problem.refitted, problem.left_out), *functions(problem.refitted, left))
     ways = directions(behind, terms, 1)
-    ranked = {each.term.id: each.term for each in screened(behind, ways)[::-1]}
+    ranked = {term.id: term for term in screened(behind, ways)[::-1]}
     nominal = candidate((), problem.refitted)
     fits = {'': problem.refitted}
     for name in list(ranked)[: -MODELS - 1 : -1]:

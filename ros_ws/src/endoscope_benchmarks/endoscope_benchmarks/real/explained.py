@@ -27,9 +27,9 @@ from endoscope_benchmarks.real.takes import (
 )
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.decide.decision import decide
+from endoscope_explain.explanation import NINETY_PERCENT
 from endoscope_explain.fit.evidence import log_evidence
-from endoscope_explain.fit.free_parameters import NINETY_PERCENT
-from endoscope_explain.fit.intervals import DEGREES, with_form
+from endoscope_explain.fit.intervals import FORMS, with_form
 from endoscope_explain.fit.model import Fit, JointModel, jacobian, without_effect
 from endoscope_explain.fit.pooled import deviations, fit_together
 from endoscope_explain.observe.observation import JointObservation
@@ -112,7 +112,7 @@ def numbers(fits: Sequence[Fit], jobs: int) -> dict[str, list[Number | None]]:
         form = with_form(one, jobs).moved_by_form
         reach = NINETY_PERCENT * deviation
         if form is not None:
-            reach = np.hypot(reach, student.ppf(0.95, DEGREES) * np.sqrt(np.diag(form)))
+            reach = np.hypot(reach, student.ppf(0.95, FORMS) * np.sqrt(np.diag(form)))
         for item, theta, far in zip(one.model.free, one.theta, reach, strict=True):
             name = owners.get(item.index, '') + item.name
             middle, low, high = (item.value(float(theta + side * far)) for side in (0, -1, 1))

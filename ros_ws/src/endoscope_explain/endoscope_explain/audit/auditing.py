@@ -23,7 +23,6 @@ from endoscope_explain.audit.stamps import (
     usual_interval,
 )
 from endoscope_explain.audit.standing_still import (
-    MOVES_RAD,
     frozen_findings,
     moves,
     resting_motor_findings,
@@ -40,10 +39,15 @@ from endoscope_explain.audit.wrong_samples import (
     outlier_finding,
     saturation_finding,
 )
-from endoscope_explain.recording import WIRES, Recording, Series, signal_name
+from endoscope_explain.recording import (
+    LEAST_DURATION_S,
+    MOVES_RAD,
+    WIRES,
+    Recording,
+    Series,
+    signal_name,
+)
 
-LEAST_DURATION_S = 2.0
-"""Length of a recording from which on it can be compared with the plant."""
 SETTLING_S = 0.5
 """How long after a gap in the commands the rig's answer is not judged."""
 

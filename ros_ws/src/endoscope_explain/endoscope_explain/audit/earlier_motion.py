@@ -21,13 +21,10 @@ from endoscope_core.physics.kernel import run_joints
 from endoscope_core.physics.layout import MOTOR_BANDWIDTH, OUTPUTS
 from endoscope_core.physics.packing import rest_state
 from endoscope_explain.audit.finding import Finding, Severity
-from endoscope_explain.audit.standing_still import MOVES_RAD
 from endoscope_explain.observe.observation import ANALYSIS_PERIOD, JointObservation, observe
 from endoscope_explain.observe.predicted_signals import Flags, packed_rig
-from endoscope_explain.recording import Array, Mask, Recording
+from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Array, Mask, Recording
 
-LEAST_S = 2.0
-"""Length of what has to be left where the time until the past no longer shows is not judged."""
 MOST_REVERSALS = 5
 SHORTEST = 1e-6
 """Way back in rad, from where the motor stands, of the smallest reversals that are tried."""
@@ -267,7 +264,7 @@ def _is_more_than_noise(squares: Array) -> bool:
 def _is_enough(recording: Recording, joint: int, since: float) -> bool:
     command = recording.command
     later = command.values[command.time >= since, joint]
-    long = recording.duration - since >= LEAST_S
+    long = recording.duration - since >= LEAST_DURATION_S
     return bool(long and len(later) and np.ptp(later) >= MOVES_RAD)
 
 

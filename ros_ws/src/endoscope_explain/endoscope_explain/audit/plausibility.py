@@ -27,14 +27,12 @@ from endoscope_explain.audit.misreading import (
     scaled,
 )
 from endoscope_explain.audit.standing_still import must_move
-from endoscope_explain.recording import Array, Recording, Series
+from endoscope_explain.recording import MOVES_RAD, Array, Recording, Series
 
 TURN_RAD = 2.0 * pi
 """No section bends further, from one side to the other."""
 MOST = 1.0
 """Misfit of what has nothing in common."""
-MOVES = 0.01
-"""Shaft angle in rad that is a motion."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +156,7 @@ class Comparison:
 
     def _may_be_meant(self, drive: Misreading) -> bool:
         """Whether it moves, and either cannot be what was given or the shafts follow it."""
-        if np.ptp(self._shaft(drive)[:, list(drive.touched)], axis=0).max() < MOVES:
+        if np.ptp(self._shaft(drive)[:, list(drive.touched)], axis=0).max() < MOVES_RAD:
             return False
         if np.abs(self._held).max() > self._rig.motors.reach:
             return True
@@ -284,7 +282,7 @@ def _prices(mistakes: list[Misreading]) -> list[float]:
 def _span(recording: Recording) -> tuple[float, float]:
     """From shortly before the first motion, no longer than is needed."""
     command = recording.command
-    away = np.abs(command.values - command.values[0]).max(axis=1) >= MOVES
+    away = np.abs(command.values - command.values[0]).max(axis=1) >= MOVES_RAD
     first = float(command.time[np.argmax(away)]) if away.any() else float(command.time[0])
     every = recording.measured().values()
     begin = max(float(command.time[0]), first - 1.0)

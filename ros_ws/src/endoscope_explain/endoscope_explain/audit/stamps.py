@@ -10,7 +10,7 @@ from endoscope_core.physics.description import SensorParameters
 from endoscope_core.physics.effect import Symptom
 from endoscope_core.physics.effects import showing
 from endoscope_explain.audit.finding import Finding, Severity
-from endoscope_explain.explanation import Estimate
+from endoscope_explain.explanation import NINETY_PERCENT, Estimate
 from endoscope_explain.recording import BENDING, MOTOR, WIRES, Array, Recording, Series
 
 GAP_FACTOR = 2.5
@@ -200,7 +200,8 @@ def clock_skew_from_receipt(series: dict[str, Series]) -> dict[str, Estimate]:
         apart = slope - usual
         if abs(apart) > max(6.0 * error, 3e-5):
             skew = -apart / (1.0 + apart)
-            found[topic] = Estimate(skew, skew - 1.645 * error, skew + 1.645 * error, '-')
+            reach = NINETY_PERCENT * error
+            found[topic] = Estimate(skew, skew - reach, skew + reach, '-')
     return found
 
 
@@ -213,6 +214,7 @@ def retimed(series: Series, skew: float, start: float = 0.0) -> Series:
 def skew_finding(topic: str, joint: str, skew: Estimate, duration: float) -> Finding:
     """Describe the `clock_skew` of the device behind one topic."""
     way = 'fast' if skew.value > 0 else 'slow'
+    deviation = (skew.high - skew.low) / (2.0 * NINETY_PERCENT)
     return Finding(
         showing(Symptom.CLOCK_RATE).id,
         Severity.FAULT,
@@ -223,7 +225,7 @@ def skew_finding(topic: str, joint: str, skew: Estimate, duration: float) -> Fin
         f'the clock behind {topic} runs {way} by {abs(skew.value) * 1e3:.3f} ms in a second',
         'its stamps were put on the common clock',
         parameters={'skew': skew},
-        evidence={'z': abs(skew.value) / max((skew.high - skew.low) / 3.29, 1e-12)},
+        evidence={'z': abs(skew.value) / max(deviation, 1e-12)},
     )
 
 

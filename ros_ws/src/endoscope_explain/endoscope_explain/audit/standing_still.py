@@ -12,10 +12,8 @@ from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.audit.misreading import column_name
 from endoscope_explain.audit.stamps import find_gaps, usual_interval
-from endoscope_explain.recording import MOTOR, Array, Recording, Series
+from endoscope_explain.recording import MOTOR, MOVES_RAD, Array, Recording, Series
 
-MOVES_RAD = 0.01
-"""Shaft angle that is a motion."""
 LONG_S = 1.0
 SHARE = 0.5
 """Part of the recording from whose length on a topic is frozen, not held for a moment."""

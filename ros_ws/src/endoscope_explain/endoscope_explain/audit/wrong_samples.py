@@ -11,7 +11,7 @@ from endoscope_core.physics.effect import Symptom
 from endoscope_core.physics.effects import showing
 from endoscope_explain.audit.finding import Finding, Severity
 from endoscope_explain.audit.stamps import GAP_FACTOR, usual_interval
-from endoscope_explain.explanation import Estimate
+from endoscope_explain.explanation import NINETY_PERCENT, Estimate
 from endoscope_explain.recording import Array, Mask, Series, signal_name
 
 Indices = NDArray[np.int64]
@@ -243,7 +243,7 @@ def outlier_finding(joints: Sequence[str], series: Series, wrong: Mask) -> Findi
         sizes.append(np.abs(values[bad] - truth))
     size = np.concatenate(sizes)
     count, n = int(wrong.any(axis=1).sum()), len(wrong)
-    share, spread = count / n, 1.645 * np.sqrt(count) / n
+    share, spread = count / n, NINETY_PERCENT * np.sqrt(count) / n
     typical = float(np.sqrt(np.mean(size**2)))
     worst = int(np.argmax(wrong.sum(axis=0)))
     befallen = [name for j, name in enumerate(joints) if wrong[:, j].any()]

@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from endoscope_core.physics.layout import IN_COMMAND
-from endoscope_explain.audit.standing_still import MOVES_RAD
 from endoscope_explain.case import Ladder
 from endoscope_explain.compare.black_boxes import Exam, black_box_fits
 from endoscope_explain.explanation import ChannelFit, Explanation, NamedEffect
 from endoscope_explain.fit.evidence import BLOCK_S, fitted_at, judged_at
 from endoscope_explain.observe.predicted_signals import RecordedView, fits_by, view
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import MOVES_RAD, Recording
 from endoscope_explain.search.levels import FALSE_ALARMS
 
 

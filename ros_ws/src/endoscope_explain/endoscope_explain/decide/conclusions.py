@@ -23,7 +23,7 @@ from endoscope_explain.explanation import (
     UnknownTerm,
     Verdict,
 )
-from endoscope_explain.fit.evidence import held_out_fit, held_out_masks, misfit, on_samples
+from endoscope_explain.fit.evidence import held_out_fit
 from endoscope_explain.fit.free_parameters import (
     FITTED_NOMINAL,
     FRICTION_PROFILE_NAMES,
@@ -245,14 +245,11 @@ def ladder(
     compared: dict[str, dict[str, ChannelFit]] = {'nominal': {}, 'refitted': {}, 'augmented': {}}
     for (_, described), tried, decision in zip(references, searches, decisions, strict=True):
         observation = described.model.observation
-        judged, _ = held_out_masks(observation)
-        compared['nominal'] |= on_samples(observation, described.residuals, judged)
-        before = refitted(tried, decision).fit
-        compared['refitted'] |= held_out_fit(before)
+        compared['nominal'] |= held_out_fit(observation, described.residuals)
+        before = held_out_fit(observation, refitted(tried, decision).unseen)
+        compared['refitted'] |= before
         compared['augmented'] |= (
-            held_out_fit(decision.chosen.fit)
-            if decision.chosen.terms
-            else {s.signal: compared['refitted'][s.signal] for s in observation.channels}
+            held_out_fit(observation, decision.chosen.unseen) if decision.chosen.terms else before
         )
     return compared
 
@@ -279,7 +276,7 @@ def candidates(
                     observation.joint,
                     tuple(term.id for term in c.terms),
                     tried.nominal.evidence - c.evidence,
-                    misfit(c.fit).total / observation.size,
+                    float(np.mean(c.fit.residuals**2)),
                     not c.terms and c is not tried.nominal,
                 )
             )

@@ -10,7 +10,6 @@ from scipy.special import expit
 
 from endoscope_core.physics.effects import CATALOGUE, KNOWN
 from endoscope_explain.criteria import BEYOND_FORM, CERTAINTY
-from endoscope_explain.fit.evidence import misfit
 from endoscope_explain.fit.intervals import may_be_absent, with_form
 from endoscope_explain.search.levels import JointSearch, Level
 from endoscope_explain.search.refit import Candidate
@@ -106,7 +105,7 @@ def decide(search: JointSearch, jobs: int) -> Decision:
 
 def share_explained(nominal: Candidate, chosen: Candidate) -> float:
     """Share of the misfit above noise that a candidate removes; 1 where there was none."""
-    before, after = misfit(nominal.fit).total, misfit(chosen.fit).total
+    before, after = (float(np.sum(one.fit.residuals**2)) for one in (nominal, chosen))
     above = before - nominal.fit.model.observation.size
     return 1.0 if above <= 0.0 else float(np.clip((before - after) / above, 0.0, 1.0))
 

@@ -11,17 +11,14 @@ from endoscope_core.physics.effects import describe
 from endoscope_explain.decide.decision import Decision, MissingTerm, decide, share_explained
 from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.free_parameters import FreeParameter
-from endoscope_explain.fit.model import Fit, JointModel, fit, without_effect
+from endoscope_explain.fit.model import TO_THE_END, Fit, JointModel, fit, without_effect
 from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.levels import JointSearch, Level, search
-from endoscope_explain.search.refit import Candidate, candidate
+from endoscope_explain.search.refit import SETTLED, Candidate, candidate
 from endoscope_explain.search.term import Term
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-SETTLED = 1e-4
-SETTLING_STEPS = 20
 
 
 @dataclass(frozen=True)
@@ -45,11 +42,6 @@ def without_recording(effects: tuple[str, ...], found: Fit) -> GivenPhysics:
     return GivenPhysics(effects, model.base, model.flags, model.free, found.theta)
 
 
-def settled(model: JointModel, theta: Array) -> Fit:
-    """Fit until nothing moves any more."""
-    return fit(model, theta, iterations=SETTLING_STEPS, tolerance=SETTLED)
-
-
 def explained_by(
     references: tuple[Fit, Fit], given: GivenPhysics, jobs: int
 ) -> tuple[JointSearch, Decision]:
@@ -63,7 +55,7 @@ def explained_by(
     missing: tuple[MissingTerm, ...] = ()
     if given.effects:
         model = JointModel(references[0].model.observation, given.base, given.flags, given.free)
-        found = settled(model, given.theta)
+        found = fit(model, given.theta, iterations=TO_THE_END, tolerance=SETTLED)
         terms = tuple(Term(describe(each)) for each in given.effects)
         missing = _needed(candidate(terms, found), given.effects, jobs)
     beside = decide(JointSearch(candidate((), found), ()), jobs)

@@ -6,30 +6,15 @@ for what it could have explained and did not; no penalty is set by hand.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.fit.model import Fit, fit
-from endoscope_explain.observe.observation import JointObservation
+from endoscope_explain.observe.observation import WHITE, JointObservation
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """Misfit of one joint."""
-
-    channels: Array  # (C,), mean squared residual of each channel in noise units
-    total: float  # sum over all samples, in noise units
-
-
-def misfit(found: Fit) -> Misfit:
-    """Misfit of a fitted joint, channel by channel."""
-    squares = mean_squares(found.model.observation, found.residuals)
-    return Misfit(squares, float(np.sum(found.residuals**2)))
 
 
 def mean_squares(observation: JointObservation, residuals: Array) -> Array:
@@ -85,8 +70,6 @@ LIMIT = 5.0
 """Standard deviations of the noise's own scatter that a mean square may exceed."""
 NOTABLE = 0.1
 """Share of a wire's samples with more scatter than noise from which on it is said to slip."""
-WHITE = frozenset({'tension', 'bending', 'shaft_effort'})
-"""Quantities whose noise is white but for rounding; that of the encoder is rounding alone."""
 
 
 def excess(fit: Fit) -> dict[str, float]:
@@ -147,53 +130,32 @@ def fitted_at(time: Array) -> Mask:
     return np.asarray((phase >= GAP_S) & (phase < BLOCK_S * (EVERY - 1) - GAP_S))
 
 
-def held_out_masks(observation: JointObservation) -> tuple[Mask, Mask]:
-    """Samples to judge on and samples to fit on, over all channels in a row (size,) each."""
-    time = np.concatenate([channel.time for channel in observation.channels])
-    return judged_at(time), fitted_at(time)
+def held_out_residuals(final: Fit) -> Array:
+    """Residuals (size,) of a fit that has not seen the held-out blocks."""
+    time = final.model.observation.times
+    if judged_at(time).all():
+        return final.residuals
+    weight = fitted_at(time) * weights(final.model.observation, final.residuals)
+    return fit(
+        final.model, final.theta, weight, REFIT_STEPS, known_jacobian=final.jacobian
+    ).residuals
 
 
-def held_out_fit(final: Fit) -> dict[str, ChannelFit]:
-    """Refit without the held-out blocks and return the fit of every signal on them."""
-    judged, residuals = _held_out(final)
-    return on_samples(final.model.observation, residuals, judged)
-
-
-def held_out_misfit(final: Fit) -> float:
-    """Sum over the signals of the logarithm of what a refit leaves on blocks it has not seen."""
-    judged, residuals = _held_out(final)
+def held_out_misfit(observation: JointObservation, residuals: Array) -> float:
+    """Sum over the signals of the logarithm of their mean square on the held-out blocks."""
+    judged = judged_at(observation.times)
     return sum(
         float(np.log(np.maximum(np.mean(residuals[part][judged[part]] ** 2), 1.0)))
-        for part in final.model.observation.slices()
+        for part in observation.slices()
         if judged[part].any()
     )
 
 
-def _held_out(final: Fit) -> tuple[Mask, Array]:
-    """Held-out samples (size,), and the residuals (size,) of a fit that has not seen them."""
-    judged, used = held_out_masks(final.model.observation)
-    if judged.all():
-        return judged, final.residuals
-    again = fit(
-        final.model,
-        final.theta,
-        weight=used * weights(final.model.observation, final.residuals),
-        iterations=REFIT_STEPS,
-        known_jacobian=final.jacobian,
-    )
-    return judged, again.residuals
-
-
-def on_samples(
-    observation: JointObservation, residuals: Array, judged: Mask
-) -> dict[str, ChannelFit]:
-    """Return rmse and noise of every signal on the judged samples (size,)."""
-    result = {}
+def held_out_fit(observation: JointObservation, residuals: Array) -> dict[str, ChannelFit]:
+    """What residuals (size,) leave of every signal on the held-out blocks."""
+    judged, result = judged_at(observation.times), {}
     for channel, part in zip(observation.channels, observation.slices(), strict=True):
-        use = judged[part]
-        use = use if use.any() else np.ones_like(use)
-        error = residuals[part][use] * channel.noise[use]
-        result[channel.signal] = ChannelFit(
-            float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(channel.noise[use] ** 2)))
-        )
+        use = judged[part] if judged[part].any() else np.ones_like(judged[part])
+        noise = channel.noise[use]
+        result[channel.signal] = ChannelFit.of(residuals[part][use] * noise, noise)
     return result

@@ -12,6 +12,7 @@ from endoscope_core.physics.functions.interpolation import HIGH, LAG
 from endoscope_core.physics.functions.place import Place
 from endoscope_core.physics.layout import FRICTION_PROFILE, NOMINAL_KEYS
 from endoscope_core.physics.plant_numbers import NUMBERS, PlantNumber
+from endoscope_explain.explanation import NINETY_PERCENT
 
 LEAD = -1
 """Index that stands for the reading's lead, which is not a parameter of the plant."""
@@ -35,8 +36,6 @@ FITTED_NOMINAL = (*SCALED_NOMINAL, *FORM_INDICES)
 BAND = 0.15
 """Relative tolerance by which a healthy rig differs from its description."""
 BAND_SPREAD = 0.09
-NINETY_PERCENT = 1.645
-"""Standard deviations that hold 90 % of a normal distribution, either way."""
 
 
 def nominal_number(name: str) -> PlantNumber:

@@ -17,13 +17,12 @@ from endoscope_core.physics.functions.interpolation import NODES, VALUES
 from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
 from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_explain.criteria import REACH
-from endoscope_explain.explanation import Estimate, NominalEstimate
+from endoscope_explain.explanation import NINETY_PERCENT, Estimate, NominalEstimate
 from endoscope_explain.fit.evidence import counts, is_noise, mean_squares, weights
 from endoscope_explain.fit.free_parameters import (
     COEFFICIENT,
     FITTED_NOMINAL,
     FRICTION_PROFILE_NAMES,
-    NINETY_PERCENT,
     tolerance,
 )
 from endoscope_explain.fit.model import Fit, broyden_fit
@@ -47,16 +46,8 @@ _SEED = 7
 _TINY = 1e-12
 
 
-@dataclass(frozen=True)
-class OtherForms:
-    """What rigs of another form leave, without noise."""
-
-    residuals: Array  # (size, B), in noise units, with the model fitted to each rig
-    moved: Array  # (n, B), by how much the form moves the fit's coordinates
-
-
-def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
-    """Residuals (size, B) and coordinates (n, B) of fits to `count` rigs of another form."""
+def other_forms(found: Fit, count: int, jobs: int) -> tuple[Array, Array]:
+    """What fits to noise-free rigs of another form leave (size, B), and move coordinates (n, B)."""
     model = found.model.on_coarse_ticks()
     parameters, lead = model.packed(found.theta)
     # The fitted numbers are these rigs' own: there is nothing that would draw a fit elsewhere.
@@ -84,10 +75,8 @@ def other_forms(found: Fit, count: int, jobs: int) -> OtherForms:
         return near.residuals, near.theta - found.theta
 
     results = parallel_map(fitted, [drawn() for _ in range(count)], jobs)
-    return OtherForms(
-        np.stack([residuals for residuals, _ in results], axis=1),
-        np.stack([moved for _, moved in results], axis=1),
-    )
+    residuals, moved = zip(*results, strict=True)
+    return np.stack(residuals, axis=1), np.stack(moved, axis=1)
 
 
 def with_form(found: Fit, jobs: int) -> Fit:
@@ -96,16 +85,15 @@ def with_form(found: Fit, jobs: int) -> Fit:
         return found
     if is_noise(found):
         return replace(found, beyond_form=0.0)
-    forms = other_forms(found, FORMS, jobs)
+    of_forms, moved = other_forms(found, FORMS, jobs)
     observation = found.model.observation
     left = np.maximum(mean_squares(observation, found.residuals) - 1.0, 0.0)
-    drawn = np.stack([mean_squares(observation, r) for r in forms.residuals.T])
+    drawn = np.stack([mean_squares(observation, r) for r in of_forms.T])
     beyond = float(np.max(np.sqrt((1.0 + left) / (1.0 + drawn.max(axis=0)))))
     # An error of form moves numbers the further the more of it there is.
     size = counts(observation) / (1.0 + left)
     scale = np.sum(size * left) / max(float(np.sum(size * drawn.mean(axis=0))), _TINY)
-    moved = scale * forms.moved @ forms.moved.T / FORMS
-    return replace(found, moved_by_form=moved, beyond_form=beyond)
+    return replace(found, moved_by_form=scale * moved @ moved.T / FORMS, beyond_form=beyond)
 
 
 def reading(observation: JointObservation, residuals: Array) -> JointObservation:
@@ -117,8 +105,6 @@ def reading(observation: JointObservation, residuals: Array) -> JointObservation
     return replace(observation, channels=channels)
 
 
-DEGREES = 19
-"""Of freedom of what moves the numbers: rigs of another form that were fitted."""
 SHOWN = math.sqrt(0.5)
 """Deviation over the prior's up to which a recording says as much of a number as the prior does:
 their precisions add."""
@@ -152,7 +138,7 @@ def _with_form(spread: Array, fit: Fit) -> Array:
     """A fit's covariance (n, n) and what another form moves, as few rigs tell (Student's t)."""
     if fit.moved_by_form is None:
         return spread
-    scale = t.ppf(0.95, DEGREES) / NINETY_PERCENT
+    scale = t.ppf(0.95, FORMS) / NINETY_PERCENT
     return np.asarray(spread + scale**2 * fit.moved_by_form)
 
 

@@ -18,10 +18,11 @@ from endoscope_core.physics.layout import (
     PROFILE_TERMS,
 )
 from endoscope_core.physics.packing import pack, rest_state
+from endoscope_core.physics.simulator import TICK
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
 from endoscope_explain.fit.solver import STEP, Effort, Ended, Minimum, Renewal, minimise
-from endoscope_explain.observe.observation import TICK, JointObservation
+from endoscope_explain.observe.observation import JointObservation
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -76,6 +77,8 @@ def joint_of(parameters: Array) -> JointParameters:
 
 
 CLOCK_RATE = showing(Symptom.CLOCK_RATE)
+TO_THE_END = 20
+"""Steps of a fit, at most, that is not to stop on its way."""
 COARSE = 10
 """Ticks in one of the simulations that only tell in which direction something goes."""
 WIDE_STEP = 0.1

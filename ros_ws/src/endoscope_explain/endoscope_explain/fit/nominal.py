@@ -21,7 +21,15 @@ from endoscope_explain.fit.free_parameters import (
     FreeParameter,
     nominal_parameters,
 )
-from endoscope_explain.fit.model import Fit, JointModel, fit, jacobian, packed_joint, simulate_joint
+from endoscope_explain.fit.model import (
+    TO_THE_END,
+    Fit,
+    JointModel,
+    fit,
+    jacobian,
+    packed_joint,
+    simulate_joint,
+)
 from endoscope_explain.observe.observation import Channel, JointObservation, StampsOnTicks
 from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.parallel import parallel_map
@@ -160,10 +168,6 @@ ReferenceFits = tuple[Fit, Fit]
 """A joint's nominal plant refitted, and as described."""
 Flags = NDArray[np.bool_]
 
-FINISHED = 20
-"""Further steps of a nominal refit that may be on its way to noise."""
-ANY_NUMBER = 20
-"""Steps of a fit with numbers that may be any."""
 AT_THE_END = 1e-3
 """Relative distance from the end of a band within which a number counts as being at it."""
 
@@ -245,7 +249,7 @@ def nominal_references(
     if is_noise(refitted):
         return refitted, described
     # On to the end only where no physics is missing: it would bend the parameters ever further.
-    finished = fit(model, refitted.theta, iterations=FINISHED, known_jacobian=refitted.jacobian)
+    finished = fit(model, refitted.theta, iterations=TO_THE_END, known_jacobian=refitted.jacobian)
     return finished if is_noise(finished) else refitted, described
 
 
@@ -264,7 +268,7 @@ def with_any_numbers(fitted: Fit) -> Fit:
     # so that a number far from its description has its price.
     model = fitted.model
     model = replace(model, free=tuple(_widened(item) for item in model.free))
-    return fit(model, fitted.theta, iterations=ANY_NUMBER)
+    return fit(model, fitted.theta, iterations=TO_THE_END)
 
 
 def _widened(item: FreeParameter) -> FreeParameter:

@@ -10,6 +10,7 @@ from scipy.signal import periodogram, savgol_filter
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.layout import IN_MOTOR
+from endoscope_core.physics.simulator import TICK
 from endoscope_explain.audit import Finding
 from endoscope_explain.case import ChainCut, Place, changed_parameters
 from endoscope_explain.explanation import Explanation, NamedEffect
@@ -17,7 +18,7 @@ from endoscope_explain.fit.free_parameters import nominal_number
 from endoscope_explain.fit.model import simulate_joint
 from endoscope_explain.locate.conditions import conditions, drive, regime_in_words
 from endoscope_explain.locate.excess import SignalExcess, excess_between, intervals, onset, shares
-from endoscope_explain.observe.observation import TICK, JointObservation, observe
+from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.observe.predicted_signals import packed_rig, reading_lead, simulate_rig
 from endoscope_explain.recording import Recording
 

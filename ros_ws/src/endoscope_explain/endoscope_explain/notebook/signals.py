@@ -20,6 +20,7 @@ from endoscope_explain.report.sentences import table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 OUTSIDE = {'loc': 'upper left', 'bbox_to_anchor': (1.0, 1.0), 'fontsize': 7, 'frameon': False}
 """Where a legend hides no curve."""
@@ -40,10 +41,6 @@ def embedded(figure: 'Figure') -> str:
     picture = base64.b64encode(content.getvalue()).decode()
     return f'<img style="max-width:100%" src="data:image/png;base64,{picture}">'
 
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from pandas import DataFrame
 
 Array = NDArray[np.float64]
 

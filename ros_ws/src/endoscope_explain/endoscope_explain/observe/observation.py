@@ -32,6 +32,7 @@ from endoscope_core.physics.layout import (
     OUT_TENSION_B,
 )
 from endoscope_core.physics.on_stamps import hold_on_ticks
+from endoscope_core.physics.simulator import TICK
 from endoscope_explain.recording import QUANTITY_UNITS, Recording, Series, signal_name
 
 Array = NDArray[np.float64]
@@ -88,7 +89,6 @@ class StampsOnTicks:
         return {}
 
 
-TICK = 1.0e-3
 ANALYSIS_PERIOD = 0.01
 """Length in s over which fast channels are averaged: 100 Hz, ten times the servo's bandwidth."""
 WINDOW = 250
@@ -162,6 +162,11 @@ class JointObservation:
     def size(self) -> int:
         """Number of analysis samples of all channels."""
         return sum(len(channel.time) for channel in self.channels)
+
+    @property
+    def times(self) -> Array:
+        """Times (size,) in s of all analysis samples, from the first command."""
+        return np.concatenate([channel.time for channel in self.channels])
 
     @property
     def duration(self) -> float:
@@ -334,7 +339,8 @@ SETTLED_S = 0.4
 """Time after the command's last change from which on a joint is at rest."""
 LEAST_SAMPLES = 100
 LARGEST_FACTOR = 4.0
-WITH_NOISE = frozenset({'tension', 'bending', 'shaft_effort'})
+WHITE = frozenset({'tension', 'bending', 'shaft_effort'})
+"""Quantities whose noise is white but for rounding; that of the encoder is rounding alone."""
 
 
 def with_held_noise(observations: tuple[JointObservation, ...]) -> tuple[JointObservation, ...]:
@@ -346,7 +352,7 @@ def with_held_noise(observations: tuple[JointObservation, ...]) -> tuple[JointOb
     for observation in observations:
         still = held(observation)
         for channel in observation.channels:
-            if channel.quantity in WITH_NOISE:
+            if channel.quantity in WHITE:
                 squares.setdefault(channel.quantity, []).append(_squares(channel, still))
     factors = {}
     for quantity, found in squares.items():

@@ -11,8 +11,9 @@ from endoscope_core.physics.kernel import run_joints
 from endoscope_core.physics.layout import OUTPUTS
 from endoscope_core.physics.packing import pack, rest_state
 from endoscope_core.physics.recording import recording_faults
+from endoscope_core.physics.simulator import TICK
 from endoscope_explain.explanation import ChannelFit
-from endoscope_explain.observe.observation import TICK, JointObservation, observe
+from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]

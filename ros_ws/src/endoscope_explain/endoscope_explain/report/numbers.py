@@ -7,7 +7,7 @@ from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.plant_file import JOINT_NAMES
 from endoscope_explain.case import ExplainedCase, Ladder
 from endoscope_explain.explanation import ChannelFit, Estimate, NamedEffect
-from endoscope_explain.recording import QUANTITY_UNITS, Recording, signal_name
+from endoscope_explain.recording import MOVES_RAD, QUANTITY_UNITS, Recording, signal_name
 
 PLANTS = {'nominal': 'described', 'refitted': 'refitted', 'augmented': 'improved'}
 """The one word for each plant of report.json."""
@@ -16,8 +16,6 @@ MODELS = {
     'gaussian_process': 'Gaussian process (black box)',
     'neural_network': 'neural network (black box)',
 }
-MOVES_RAD = 0.01
-"""Shaft angle that is a motion."""
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from endoscope_core.pages.zoomable import COLUMNS, Curve, Plot, figure_html
 from endoscope_core.physics.functions.place import Argument
 from endoscope_core.physics.layout import OUT_JOINT, OUT_MOTOR_SPEED
+from endoscope_core.physics.simulator import TICK
 from endoscope_explain.case import Place
 from endoscope_explain.locate.excess import WINDOW_S
-from endoscope_explain.observe.observation import TICK
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
 from endoscope_explain.report.figures import TIME, look
 

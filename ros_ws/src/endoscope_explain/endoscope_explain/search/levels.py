@@ -5,18 +5,18 @@ simulator, and the evidence ranks them, functions and formulas alike. Rigs in wh
 missing, run through the same screen, say how much evidence there is then.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from endoscope_core.physics.effects import lacking
-from endoscope_explain.fit.evidence import held_out_misfit, is_noise, log_evidence
+from endoscope_explain.fit.evidence import is_noise, log_evidence
 from endoscope_explain.fit.intervals import with_form
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import is_at_tolerance, with_any_numbers
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN, Null, null_rigs
+from endoscope_explain.search.null_rigs import NEAR, NO_DETECTABLE_GAIN, Null, null_rigs
 from endoscope_explain.search.refit import (
     Candidate,
     TrialFit,
@@ -31,14 +31,13 @@ from endoscope_explain.search.refit import (
 from endoscope_explain.search.screen import (
     Background,
     Directions,
-    Screened,
     background,
+    by_variant,
     directions,
     screened,
 )
 from endoscope_explain.search.term import (
     Term,
-    Variant,
     effects,
     functions,
 )
@@ -56,9 +55,6 @@ REFINED = 3
 """Functions of these, the best, that are let vary faster."""
 SETTLED = 2
 """Of these the best ones and those at the place of the best are fitted until they stand."""
-NEAR = 0.5
-"""Share of the best gain from which on a term is fitted further: in the study the truth had as much
-in 46 cases of 48."""
 MOST_FITS, WORTH_A_FIT = 6, 1.0
 """Fits of what every rig has, without which all other numbers were bent, and the gain of evidence
 in nats that is worth another one."""
@@ -217,14 +213,11 @@ def _level(
         for parent, _ in parents
         if other_numbers and is_at_tolerance(parent.fit)
     ]
-    best: dict[frozenset[Variant], Candidate] = {}
-    for each in sorted(found, key=lambda c: -c.evidence):
-        best.setdefault(frozenset(term.variant for term in each.terms), each)
-    ranked = tuple(best.values())
+    found.sort(key=lambda c: -c.evidence)
+    ranked = tuple(_first_of_each(found, lambda c: frozenset(term.variant for term in c.terms)))
     if not ranked:
         return Level(first, (), NO_DETECTABLE_GAIN)
-    before = held_out_misfit(first.fit)
-    ranked = _that_predict(ranked, first, before)
+    ranked = _that_predict(ranked, first)
     if not is_noise(ranked[0].fit):
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     behind, ways, _ = grown[0]
@@ -232,17 +225,15 @@ def _level(
     level = Level(first, ranked, rigs.as_screened() if rigs else NO_DETECTABLE_GAIN)
     if rigs and not level.best.adds_nominal:
         level = replace(level, null=rigs.beside(level.gain(level.best), FALSE_ALARMS, jobs))
-    return replace(level, predicts=held_out_misfit(level.best.fit) < before)
+    return replace(level, predicts=level.best.unseen_misfit < first.unseen_misfit)
 
 
-def _that_predict(
-    ranked: tuple[Candidate, ...], first: Candidate, before: float
-) -> tuple[Candidate, ...]:
+def _that_predict(ranked: tuple[Candidate, ...], first: Candidate) -> tuple[Candidate, ...]:
     """Candidates, best first, from the first one on that predicts blocks better than its parent."""
     # A function of time can be anything: what it gains where it was fitted it loses where it was
     # not.
     for k, each in enumerate(ranked):
-        if each.evidence > first.evidence and held_out_misfit(each.fit) < before:
+        if each.evidence > first.evidence and each.unseen_misfit < first.unseen_misfit:
             return ranked[k:]
     return ranked
 
@@ -320,21 +311,16 @@ def _with_their_formulas(
         return refit(begun_beside(function.fit, parent.fit, own, behind.offset), parent)
 
     more = parallel_map(fitted, tasks, jobs)
-    best: dict[Variant, Candidate] = {}
-    for each in sorted([*grown, *more], key=lambda c: -c.evidence):
-        best.setdefault(each.terms[-1].variant, each)
-    return list(best.values())
+    every = sorted([*grown, *more], key=lambda c: -c.evidence)
+    return _first_of_each(every, lambda c: c.terms[-1].variant)
 
 
-def _best_screened(ranked: list[Screened]) -> list[Term]:
+def _best_screened(ranked: list[Term]) -> list[Term]:
     """The best terms, starts of each, and the formulas at the places of the best functions."""
     # The linearised gain of a formula that is far from linear is little at a start that is far from
     # the truth; the function at its place is not misled by that. Nominal physics is fitted in any
     # case.
-    starts: dict[Variant, list[Term]] = {}
-    for each in ranked:
-        starts.setdefault(each.term.variant, []).append(each.term)
-    variants = list(starts.values())
+    variants = by_variant(ranked)
     chosen = [term for own in variants[:TRIED] for term in own[:STARTS]]
     terms = [own[0] for own in variants[TRIED:]]
     functions = [term for term in chosen if term.is_function][:REFITTED]
@@ -343,16 +329,22 @@ def _best_screened(ranked: list[Screened]) -> list[Term]:
         for term in terms
         if not term.is_function and any(term.shares_place(each) for each in functions)
     ]
-    chosen += [t for own in starts.values() for t in own if t.is_nominal and t not in chosen]
+    chosen += [t for own in variants for t in own if t.is_nominal and t not in chosen]
     return chosen
+
+
+def _first_of_each[T](ranked: Iterable[T], kind: Callable[[T], Hashable]) -> list[T]:
+    """The first one of each kind, in their order."""
+    first: dict[Hashable, T] = {}
+    for each in ranked:
+        first.setdefault(kind(each), each)
+    return list(first.values())
 
 
 def _worth_a_fit(trials: list[TrialFit]) -> list[TrialFit]:
     """The best after a first fit, what is nominal, and all that are at the place of the best."""
-    best: dict[Variant, TrialFit] = {}
-    for seen in sorted(trials, key=lambda seen: seen.cost):
-        best.setdefault(seen.term.variant, seen)
-    ranked = list(best.values())
+    trials = sorted(trials, key=lambda seen: seen.cost)
+    ranked = _first_of_each(trials, lambda seen: seen.term.variant)
     chosen = ranked[:REFITTED]
     return chosen + [
         seen

@@ -7,12 +7,18 @@ about ten simulations instead of a hundred.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.functions.interpolation import NODES
-from endoscope_explain.fit.evidence import log_evidence, weights
+from endoscope_explain.fit.evidence import (
+    held_out_misfit,
+    held_out_residuals,
+    log_evidence,
+    weights,
+)
 from endoscope_explain.fit.family import COEFFICIENTS, Family, visited_range
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, broyden_fit, fit, jacobian
@@ -24,7 +30,6 @@ Array = NDArray[np.float64]
 FINER = (2 * COEFFICIENTS, 4 * COEFFICIENTS, NODES)
 """Coefficients of finer functions: twice as many each time, up to a value for every node."""
 TRIAL_STEPS = 6
-FINE_STEPS = 8
 ITERATIONS, ROUGH, SETTLED = 25, 1e-2, 1e-4
 """Steps of a fit, at most, and the shares of the cost below which it tells and below which it
 stands."""
@@ -37,6 +42,16 @@ class Candidate:
     terms: tuple[Term, ...]  # in the order in which they were added
     fit: Fit
     evidence: float  # see `log_evidence`
+
+    @cached_property
+    def unseen(self) -> Array:
+        """Residuals (size,) of a refit that has not seen the held-out blocks."""
+        return held_out_residuals(self.fit)
+
+    @cached_property
+    def unseen_misfit(self) -> float:
+        """What that refit leaves on these blocks; see `held_out_misfit`."""
+        return held_out_misfit(self.fit.model.observation, self.unseen)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -169,6 +184,6 @@ def by_fine_derivatives(one: Candidate) -> Candidate:
     """A candidate fitted on by derivatives on fine ticks, where coarse ones may mislead."""
     model = replace(one.fit.model, coarse=1)
     weight = weights(model.observation, one.fit.residuals)
-    found = fit(model, one.fit.theta, weight, FINE_STEPS, SETTLED)
+    found = fit(model, one.fit.theta, weight, tolerance=SETTLED)
     again = candidate(one.terms, replace(found, model=one.fit.model))
     return again if again.evidence > one.evidence else one

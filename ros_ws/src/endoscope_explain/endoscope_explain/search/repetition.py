@@ -6,7 +6,8 @@ from scipy.fft import next_fast_len, rfft
 from scipy.signal import find_peaks
 
 from endoscope_core.physics.layout import IN_COMMAND
-from endoscope_explain.observe.observation import TICK, JointObservation
+from endoscope_core.physics.simulator import TICK
+from endoscope_explain.observe.observation import JointObservation
 
 Array = NDArray[np.float64]
 

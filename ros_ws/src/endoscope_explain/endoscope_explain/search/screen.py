@@ -7,6 +7,7 @@ each direction there is, from which follows the evidence. The same directions, w
 rigs of another form would have left, say what evidence means nothing.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from endoscope_explain.fit.evidence import counts, log_likelihood, weights
 from endoscope_explain.fit.model import Fit, JointModel
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.term import Term, mirrored
+from endoscope_explain.search.term import Term, Variant, mirrored
 
 Array = NDArray[np.float64]
 
@@ -26,14 +27,6 @@ _TRIAL = 1e-3
 """Share of the largest value that a function may have, of the one that is tried."""
 _NOTHING = 1e-6
 """Squares in noise units below which a term does nothing."""
-
-
-@dataclass(frozen=True)
-class Screened:
-    """A term and its linearised gain."""
-
-    term: Term
-    gain: float  # logarithm of the evidence with it over that without it
 
 
 @dataclass(frozen=True)
@@ -161,18 +154,23 @@ def gains(behind: Background, found: tuple[Directions, ...], residuals: Array) -
     return Gains(values, left)
 
 
-def screened(behind: Background, found: tuple[Directions, ...]) -> list[Screened]:
-    """Each term's linearised gain on the recording itself, the best start of each effect first."""
+def screened(behind: Background, found: tuple[Directions, ...]) -> list[Term]:
+    """Terms that help, by their linearised gain on the recording itself, the best one first."""
     residuals = behind.left(behind.fit.residuals * behind.weight)[:, None]
-    ranked = []
-    for each, gain in zip(found, gains(behind, found, residuals).values[:, 0], strict=True):
-        term = sided(behind, each, residuals)
-        if term is not None:
-            ranked.append(Screened(term, float(gain)))
-    return sorted(ranked, key=lambda p: -p.gain)
+    gained = gains(behind, found, residuals).values[:, 0]
+    ranked = (_sided(found[k], residuals) for k in np.argsort(-gained, kind='stable'))
+    return [term for term in ranked if term is not None]
 
 
-def sided(behind: Background, each: Directions, residuals: Array) -> Term | None:
+def by_variant(ranked: Iterable[Term]) -> list[list[Term]]:
+    """Starting points of each variant, in the order in which variants come first."""
+    starts: dict[Variant, list[Term]] = {}
+    for term in ranked:
+        starts.setdefault(term.variant, []).append(term)
+    return list(starts.values())
+
+
+def _sided(each: Directions, residuals: Array) -> Term | None:
     """The effect on the side of nothing on which it helps; None where it does not on any."""
     term = each.term
     helps = float((each.columns.T @ residuals)[0, 0]) < 0.0

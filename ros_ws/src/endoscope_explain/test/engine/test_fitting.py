@@ -169,9 +169,9 @@ def test_channels_that_are_off_count_less(one_joint):
 
 def test_another_form_widens_intervals_by_what_it_moves_the_numbers(one_joint):
     refitted, _ = references(one_joint)
-    forms = other_forms(refitted, 8, 2)
-    assert forms.residuals.shape == (len(refitted.residuals), 8)
-    moved = forms.moved @ forms.moved.T / 8
+    residuals, ways = other_forms(refitted, 8, 2)
+    assert residuals.shape == (len(refitted.residuals), 8)
+    moved = ways @ ways.T / 8
     named = [item.name for item in refitted.model.free]
     exponent = named.index('capstan_exponent')
     assert moved[exponent, exponent] > 0.0

@@ -12,7 +12,7 @@ from endoscope_core.physics.functions.acting import MULTIPLIES
 from endoscope_core.physics.packing import pack
 from endoscope_explain.decide.conclusions import plant_of
 from endoscope_explain.decide.decision import decide
-from endoscope_explain.fit.evidence import is_noise, misfit
+from endoscope_explain.fit.evidence import is_noise, mean_squares
 from endoscope_explain.fit.family import family_at
 from endoscope_explain.fit.model import jacobian, packed_joint, simulate_joint
 from endoscope_explain.fit.nominal import nominal_references
@@ -63,9 +63,9 @@ def test_a_disturbance_in_the_opposite_phase_is_promised_there(references):
     hidden = effect('breathing', moment_nm=0.0006, frequency_hz=0.3, phase_rad=-2.5)
     refitted, _ = references(hidden)
     near = [
-        p.term.start['phase_rad']
+        p.start['phase_rad']
         for p in promised(refitted, 'breathing')
-        if p.term.start['frequency_hz'] == pytest.approx(0.3)
+        if p.start['frequency_hz'] == pytest.approx(0.3)
     ]
     assert np.cos(near[0] + 2.5) > 0.0
 
@@ -73,8 +73,8 @@ def test_a_disturbance_in_the_opposite_phase_is_promised_there(references):
 def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(references):
     _, described = references(effect('torque_limit', limit_nm=0.01))
     found = promised(described, 'torque_limit')
-    assert found[0].term.start['limit_nm'] == pytest.approx(0.01, rel=0.05)
-    reached = [p.term.start['limit_nm'] for p in found]
+    assert found[0].start['limit_nm'] == pytest.approx(0.01, rel=0.05)
+    reached = [p.start['limit_nm'] for p in found]
     assert max(reached) < 0.03
 
 
@@ -120,7 +120,8 @@ def test_an_effect_is_found_by_its_formula_with_nothing_left(references):
     assert [term.name for term in decision.missing] == [hidden.id]
     assert decision.missing[0].alternatives == ()
     assert decision.adequate
-    assert np.sqrt(misfit(decision.chosen.fit).channels.max()) < 1.2
+    found = decision.chosen.fit
+    assert np.sqrt(mean_squares(found.model.observation, found.residuals).max()) < 1.2
     assert decision.missing[0].p_value < 0.05
 
 
@@ -195,11 +196,14 @@ def test_what_loses_on_blocks_not_seen_gives_way_to_what_predicts_them(monkeypat
     found = _level({'function': 500.0, 'gravity': 400.0, 'tracker_delay': 300.0}, [0.0]).found
     first = _candidate(0.0)
     predicting = {'gravity', 'tracker_delay'}
-    monkeypatch.setattr(levels, 'held_out_misfit', lambda one: 1.0 if one in predicting else 3.0)
+    left = {True: 1.0, False: 3.0}
+    monkeypatch.setattr(
+        Candidate, 'unseen_misfit', property(lambda one: left.get(one.fit in predicting))
+    )
     named = tuple(replace(each, fit=each.terms[0].id) for each in found)
-    assert [c.fit for c in levels._that_predict(named, first, 2.0)] == ['gravity', 'tracker_delay']
+    assert [c.fit for c in levels._that_predict(named, first)] == ['gravity', 'tracker_delay']
     predicting.clear()
-    assert levels._that_predict(named, first, 2.0) == named
+    assert levels._that_predict(named, first) == named
 
 
 def test_a_finer_sheath_alone_is_not_named(one_joint):
