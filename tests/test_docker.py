@@ -113,7 +113,7 @@ def test_a_container_finds_what_the_image_has_compiled(tmp_path) -> None:
     program = [
         sys.executable,
         '-c',
-        'from endoscope_core.hysteresis.dahl_kernel import dahl_step as d; d(0.1, 0.1, 0.2, 1.0)',
+        'from endoscope_core.hysteresis.dahl import dahl_step as d; d(0.1, 0.1, 0.2, 1.0)',
     ]
     environment = os.environ | {'NUMBA_DEBUG_CACHE': '1'}
     environment.pop('NUMBA_CACHE_DIR', None)

@@ -16,7 +16,7 @@ from endoscope_bags.message_types import MessageType
 from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import FileError
-from endoscope_core.strict_yaml import load_yaml
+from endoscope_core.schema import load_yaml
 
 METADATA = 'metadata.yaml'
 ROS_DISTRO = 'jazzy'

@@ -33,7 +33,7 @@ from endoscope_bags.sqlite3_scan import Sqlite3Scan, is_sqlite3, scan_sqlite3
 from endoscope_bags.topic import MessageTimes, QosProfile, RawMessage, Topic, qos_from_yaml
 from endoscope_core.errors import FileError
 from endoscope_core.rig import Rig, rig_as_text, rig_from_text, shipped_rig
-from endoscope_core.strict_yaml import LARGEST
+from endoscope_core.schema import LARGEST
 
 IntArray = npt.NDArray[np.int64]
 Scan = McapScan | Sqlite3Scan

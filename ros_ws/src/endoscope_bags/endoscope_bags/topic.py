@@ -9,7 +9,7 @@ import numpy.typing as npt
 import yaml
 
 from endoscope_core.errors import FileError
-from endoscope_core.strict_yaml import parse_yaml
+from endoscope_core.schema import parse_yaml
 
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 IntArray = npt.NDArray[np.int64]

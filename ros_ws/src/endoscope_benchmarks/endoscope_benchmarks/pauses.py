@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from sensor_msgs.msg import JointState
 
 from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
-from endoscope_core.control.smoothing import COUNT
+from endoscope_core.control.limits import COUNT
 from endoscope_nodes.names import CALIBRATION_COMMAND, CALIBRATION_RUN, SLAVE_COMMAND
 from endoscope_nodes.runtime.qos import COMMAND
 

@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from endoscope_benchmarks.proof import sliding_nodes
-from endoscope_core.classifier.shipped import load_classifier
+from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import DesiredMotion, Feedforward, FeedforwardLaw, reach, shipped_limits
 from endoscope_core.dataset import configuration_of_size, random_instrument
 from endoscope_core.dataset.rig_variation import calibration_command

@@ -6,7 +6,7 @@ import pytest
 from endoscope_benchmarks.trials.never_seen_tube import never_seen_tube
 from endoscope_benchmarks.trials.unusual_recordings import UNUSUAL
 from endoscope_core.classifier.classification import UnseenTensionError
-from endoscope_core.classifier.shipped import load_classifier
+from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.dataset import record_calibration
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 

@@ -8,7 +8,7 @@ from endoscope_benchmarks.trials.never_seen_tube import (
     within_reach,
 )
 from endoscope_benchmarks.trials.tracking_trial import run_tracking_trial
-from endoscope_core.classifier.shipped import load_classifier
+from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.identification.law_choice import LawChoice
 from endoscope_core.signals import periodic_signal

@@ -52,7 +52,7 @@ def test_without_pytorch_one_line_says_how_to_get_it(command, tmp_path, monkeypa
     monkeypatch.setitem(sys.modules, 'torch', None)
     for name in (
         'endoscope_benchmarks.networks.papers_recipe',
-        'endoscope_core.classifier.pytorch',
+        'endoscope_core.classifier.network',
     ):
         monkeypatch.delitem(sys.modules, name, raising=False)
     assert main(command) == 2

@@ -17,7 +17,7 @@ from endoscope_benchmarks.networks.papers_recipe import (  # noqa: E402
     use_one_thread,
 )
 from endoscope_benchmarks.networks.recurrence_plot_cnn import PIXELS, recurrence_plots  # noqa: E402
-from endoscope_core.classifier.tension_cnn import TensionCnn  # noqa: E402
+from endoscope_core.classifier.network import TensionCnn  # noqa: E402
 
 SHORT = TrainingSettings(batch_size=14, epochs=60, learning_rate=3e-3, decay=0.97)
 

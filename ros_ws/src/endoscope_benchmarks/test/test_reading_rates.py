@@ -6,7 +6,7 @@ from endoscope_benchmarks.trials.reading_rates import (
     refused_at_rate,
     tubes_of_all_classes,
 )
-from endoscope_core.classifier.shipped import load_classifier
+from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.dataset import CLASSES_DEG
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 

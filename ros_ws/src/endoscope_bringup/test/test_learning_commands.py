@@ -11,7 +11,7 @@ from endoscope_bags import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bringup.cli import main
-from endoscope_core.classifier.shipped import load_classifier
+from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.dataset import load_dataset
 from endoscope_core.hysteresis import BoucWenParameters, forward
 from endoscope_core.identification import Servo, load_class_parameters
@@ -109,7 +109,7 @@ def test_a_data_set_without_room_on_the_disk_is_named(tmp_path):
 def test_without_pytorch_one_line_says_how_to_get_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, 'torch', None)
-    for name in ('endoscope_core.classifier.cnn_training', 'endoscope_core.classifier.pytorch'):
+    for name in ('endoscope_core.classifier.cnn_training', 'endoscope_core.classifier.network'):
         monkeypatch.delitem(sys.modules, name, raising=False)
     assert main(['train', '--out', 'weights.safetensors']) == 2
     assert capsys.readouterr().err == (

@@ -1,12 +1,15 @@
-"""How a program ends: its exit status and, where something went wrong, one line on stderr."""
+"""How a program ends: its exit status, one line on stderr, and the close of what it holds."""
 
 import contextlib
 import itertools
 import os
 import sys
 import traceback
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
 from endoscope_core.choices import LOG_LEVEL_VARIABLE
 from endoscope_core.errors import EndoscopeError, printable
@@ -94,3 +97,22 @@ def _flush_stdout() -> None:
         if isinstance(error, BrokenPipeError):
             raise
         raise OSError(error.errno, error.strerror, 'stdout') from error
+
+
+class ClosedOnExit(ABC):
+    """Is closed at the end of its `with` block, whether that ends in an exception or not."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Let go of everything it holds."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

@@ -10,7 +10,7 @@ from endoscope_core.control import (
     AdaptiveBacklashSettings,
     TrackerMeasurement,
 )
-from endoscope_core.control.adaptive_backlash_law import (
+from endoscope_core.control.adaptive_backlash import (
     AdaptationState,
     adapt,
     learnt_term,

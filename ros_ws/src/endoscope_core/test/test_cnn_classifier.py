@@ -16,7 +16,7 @@ from endoscope_core.classifier.cnn_classifier import (
     course,
 )
 from endoscope_core.classifier.held_out_calibration import calibration_of, widest
-from endoscope_core.classifier.shipped import load_classifier
+from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.dataset import CLASSES_DEG, random_instrument, record_calibration
 from endoscope_core.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
 from endoscope_core.physics import PlantDescription, simulate

@@ -8,7 +8,7 @@ from endoscope_core.classifier.cnn_classifier import INPUT, evaluated
 torch = pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
 
 from endoscope_core.classifier.cnn_training import CnnTraining, loss_of, train_cnn  # noqa: E402
-from endoscope_core.classifier.tension_cnn import TensionCnn  # noqa: E402
+from endoscope_core.classifier.network import TensionCnn  # noqa: E402
 
 
 def test_judging_without_pytorch_gives_what_pytorch_gives():

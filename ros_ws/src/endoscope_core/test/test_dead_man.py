@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endoscope_core.teleop.dead_man import STALL_NS, DeadMan
+from endoscope_core.teleop import STALL_NS, DeadMan
 
 MS = 1_000_000
 LASTS = 150 * MS

@@ -5,7 +5,7 @@ import pytest
 
 from endoscope_core.control import DesiredMotion
 from endoscope_core.control.desired_motion import AGREEMENT
-from endoscope_core.control.smoothing import COUNT
+from endoscope_core.control.limits import COUNT
 
 TICK = 1e-3
 

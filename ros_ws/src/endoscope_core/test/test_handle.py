@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from endoscope_core.control import Handle, HandleRefusal
-from endoscope_core.control.smoothing import COUNT, Play, SmoothFollower
+from endoscope_core.control.limits import COUNT, Play, SmoothFollower
 
 MS = 1_000_000
 RATES = (50, 100, 250, 500, 1000)

@@ -18,9 +18,9 @@ from endoscope_core.hysteresis import (
     prandtl_ishlinskii_forward,
     prandtl_ishlinskii_inverse,
 )
-from endoscope_core.hysteresis.dahl_kernel import dahl_step, play_step
+from endoscope_core.hysteresis.dahl import dahl_step, play_step
 from endoscope_core.hysteresis.inverse import MODELS, inverse_of
-from endoscope_core.hysteresis.inverse_safety import GREATEST_INVERSE_SLOPE
+from endoscope_core.hysteresis.memory_model import GREATEST_INVERSE_SLOPE
 
 TIME = np.arange(0.0, 9.0, 0.01)
 MOTION = 0.9 * np.sin(TIME) + 0.5 * np.sin(1.73 * TIME)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.control.iterated_inverse import iterated_inverse
-from endoscope_core.control.motor_limits import shipped_limits
+from endoscope_core.control.limits import shipped_limits
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.simulator import simulate
 from endoscope_core.signals import periodic_signal

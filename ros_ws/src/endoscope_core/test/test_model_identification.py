@@ -12,7 +12,7 @@ from endoscope_core.hysteresis import (
     prandtl_ishlinskii_forward,
 )
 from endoscope_core.hysteresis.inverse import MODELS
-from endoscope_core.hysteresis.inverse_safety import (
+from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
     GREATEST_INVERSE_SLOPE,
     SMALLEST_ALPHA,
@@ -24,7 +24,7 @@ from endoscope_core.identification import (
     fit_feedforward,
     fit_model,
 )
-from endoscope_core.identification.feedforward_candidates import candidates_for
+from endoscope_core.identification.feedforward_fit import candidates_for
 
 TIME = np.arange(0.0, 9.0, 0.02)
 DRIVER = 1.5 * np.sin(TIME)

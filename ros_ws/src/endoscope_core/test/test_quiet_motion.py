@@ -17,7 +17,7 @@ from endoscope_core.control import (
     TrackerMeasurement,
     shipped_limits,
 )
-from endoscope_core.control.smoothing import COUNT
+from endoscope_core.control.limits import COUNT
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.sensing import SensorModel

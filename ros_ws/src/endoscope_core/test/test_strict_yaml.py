@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from endoscope_core.errors import EndoscopeError, FileError, printable
-from endoscope_core.strict_yaml import DEEPEST, LARGEST, load_yaml, parse_yaml
+from endoscope_core.schema import DEEPEST, LARGEST, load_yaml, parse_yaml
 
 plain = st.recursive(
     st.none()

@@ -10,7 +10,7 @@ from endoscope_core.control import (
     RecursiveHysteresisController,
     TrackerMeasurement,
 )
-from endoscope_core.control.smoothing import SHARE_OF_TRAVEL
+from endoscope_core.control.limits import SHARE_OF_TRAVEL
 
 TICK = 1e-3
 PERIOD = 25

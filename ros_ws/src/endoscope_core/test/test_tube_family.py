@@ -15,8 +15,8 @@ from endoscope_core.identification.family_fit import (
     fit_family,
     misfit,
     read,
+    tube_recordings,
 )
-from endoscope_core.identification.tube_files import tube_recordings
 from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.physics.family import (
     CENTRE,

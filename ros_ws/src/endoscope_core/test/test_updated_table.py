@@ -14,7 +14,7 @@ from endoscope_core.hysteresis import (
     PlayParameters,
     PrandtlIshlinskiiParameters,
 )
-from endoscope_core.hysteresis.inverse_safety import GREATEST_INVERSE_SLOPE
+from endoscope_core.hysteresis.memory_model import GREATEST_INVERSE_SLOPE
 from endoscope_core.identification import (
     KINDS,
     TableEntry,

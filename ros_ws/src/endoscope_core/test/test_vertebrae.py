@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from endoscope_core.kinematics import Vertebrae, robot_description, tip_pose
-from endoscope_core.kinematics.vertebrae import VERTEBRAE
+from endoscope_core.kinematics.constant_curvature import VERTEBRAE
 
 SECTION = Vertebrae(0.02, 'endoscope_base')
 ROBOT = ElementTree.fromstring(robot_description(SECTION))

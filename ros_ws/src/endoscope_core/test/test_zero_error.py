@@ -21,6 +21,6 @@ def test_a_wire_that_goes_slack_shows_the_zero_of_its_cell(motion):
 
 def test_only_what_is_much_is_told():
     assert words_of(OFFSETS, WIRES) == (
-        'zero of a load cell is off: x_pos by +0.58 N, x_neg by -0.40 N; set it anew'
+        'zero of a load cell is off: x_pos by +0.58 N, x_neg by -0.40 N; set it again'
     )
     assert words_of(0.2 * OFFSETS, WIRES) == ''

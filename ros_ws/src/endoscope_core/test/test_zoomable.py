@@ -8,8 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endoscope_core.pages.fewer_readings import MOST_BINS, MOST_READINGS, banded, telling
-from endoscope_core.pages.zoomable import Curve, Plot, figure_html
+from endoscope_core.pages.zoomable import (
+    MOST_BINS,
+    MOST_READINGS,
+    Curve,
+    Plot,
+    banded,
+    figure_html,
+    telling,
+)
 
 RNG = np.random.default_rng(1)
 LONG = 1e-3 * np.arange(50_000)

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.kinematics import tip_pose
 from endoscope_emulators.aurora_unit import AuroraUnit, SensorSource, SensorView
 

@@ -10,7 +10,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.exit_status import ClosedOnExit
 
 # Registers from 0 on at a time in s since the start; None while the device is busy.
 RegisterSource = Callable[[float], Sequence[int] | None]

@@ -18,7 +18,7 @@ from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import Rig
 from endoscope_core.signals import Signal, hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS
-from endoscope_core.signals.commissioning import chirp, multisine, steps_with_holds, triangle
+from endoscope_core.signals.motions import chirp, multisine, steps_with_holds, triangle
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.decide.conclusions import spec_of
 from endoscope_explain.explanation import NamedEffect

@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
         tubes_of_all_classes,
     )
     from endoscope_benchmarks.trials.unusual_recordings import UNUSUAL
-    from endoscope_core.classifier.shipped import load_classifier
+    from endoscope_core.classifier.weights_file import load_classifier
     from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 
     if args.tubes < 1:

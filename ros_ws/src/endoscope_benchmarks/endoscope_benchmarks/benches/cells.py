@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
         tubes_of_sizes,
         tubes_outside,
     )
-    from endoscope_core.classifier.shipped import load_classifier
+    from endoscope_core.classifier.weights_file import load_classifier
     from endoscope_core.dataset import CLASSES_DEG
 
     classifier = load_classifier(args.weights, args.motion)

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from endoscope_benchmarks.trials.never_seen_tube import backlash_left, calibrate, never_seen_tube
 from endoscope_benchmarks.trials.tracking_trial import run_tracking_trial
-from endoscope_core.classifier.shipped import load_classifier
+from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.identification.law_choice import LawChoice
 from endoscope_core.pages.still_pictures import INK, STYLE, svg, thinned

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import Signal, calibration_sinusoid, hold, sequence
-from endoscope_core.signals.commissioning import (
+from endoscope_core.signals.motions import (
     chirp,
     multisine,
     steps_with_holds,

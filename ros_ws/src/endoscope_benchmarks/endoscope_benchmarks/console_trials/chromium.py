@@ -19,8 +19,8 @@ from typing import Any
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.exit_status import ClosedOnExit
 
 _ARGUMENTS = (
     *('--headless=new', '--no-sandbox', '--no-first-run', '--disable-extensions'),

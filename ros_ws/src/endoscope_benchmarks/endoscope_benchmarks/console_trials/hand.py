@@ -7,7 +7,7 @@ from typing import Any
 from endoscope_benchmarks.console_trials.chromium import BrowserError, Chromium, Tab
 from endoscope_benchmarks.console_trials.relay import Relay
 from endoscope_benchmarks.console_trials.served_console import PATIENCE_S, ServedConsole
-from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.exit_status import ClosedOnExit
 
 _MOVING_NS = 60_000_000
 _LOOK_S = 0.05

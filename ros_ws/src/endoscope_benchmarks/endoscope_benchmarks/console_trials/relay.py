@@ -8,7 +8,7 @@ import time
 from contextlib import suppress
 from typing import cast
 
-from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.exit_status import ClosedOnExit
 
 _LOOK_S = 0.01
 _BLOCK = 65536

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, Joy
 
-from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_nodes.client.joined_graph import joined_graph
 from endoscope_nodes.names import (
     JOINTS,

@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
 
-from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_devices.dynamixel.control_table import COUNT
 from endoscope_emulators.dynamixel.process import EmulatorProcess
 from endoscope_nodes.names import (

@@ -14,8 +14,7 @@ from numpy.random import Generator
 
 from endoscope_benchmarks.hostile_files.spoiling import boundary, spoiled_bytes, spoiled_yaml
 from endoscope_core.classifier.classification import WIRES, ClassifierError, UnseenTensionError
-from endoscope_core.classifier.shipped import load_classifier, shipped_weights
-from endoscope_core.classifier.weights_file import sealed
+from endoscope_core.classifier.weights_file import load_classifier, sealed, shipped_weights
 from endoscope_core.signals import SINUSOID, calibration_motion
 
 _HEAD = 8

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from endoscope_benchmarks.networks.grouped_folds import CrossValidation, grouped_folds
 from endoscope_benchmarks.networks.recurrence_plot_cnn import RecurrencePlotCnn
 from endoscope_benchmarks.networks.tension_mlp import TensionMlp
-from endoscope_core.classifier.pytorch import Tensor, nn, torch
-from endoscope_core.classifier.tension_cnn import TensionCnn
+from endoscope_core.classifier.network import TensionCnn, Tensor, nn, torch
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 
 Progress = Callable[[str], None]

@@ -1,7 +1,7 @@
 """The recurrence plot + CNN that the first paper compares its 1D-CNN with (Table 3)."""
 
 from endoscope_core.classifier.classification import WIRES
-from endoscope_core.classifier.pytorch import Tensor, nn, torch
+from endoscope_core.classifier.network import Tensor, nn, torch
 from endoscope_core.signals import CALIBRATION_SAMPLES
 
 PIXELS = 60

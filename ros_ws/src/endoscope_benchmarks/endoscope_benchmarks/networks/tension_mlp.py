@@ -1,8 +1,7 @@
 """The multilayer perceptron that the first paper compares its 1D-CNN with (Table 3)."""
 
 from endoscope_core.classifier.classification import WIRES
-from endoscope_core.classifier.pytorch import Tensor, nn
-from endoscope_core.classifier.standardised_tension import StandardisedTension
+from endoscope_core.classifier.network import StandardisedTension, Tensor, nn
 from endoscope_core.signals import CALIBRATION_SAMPLES
 
 DECIMATION = 10

@@ -9,8 +9,8 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.task import Future
 
-from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.rig import Rig
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_parameters import set_parameters

@@ -10,7 +10,7 @@ import rclpy
 from rclpy.context import Context
 from sensor_msgs.msg import JointState, Joy
 
-from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.names import (
     JOINTS,

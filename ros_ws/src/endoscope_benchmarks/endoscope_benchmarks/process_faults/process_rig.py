@@ -7,7 +7,7 @@ from random import Random
 
 from endoscope_benchmarks.process_faults.node_processes import GRAPH, NODES, NodeProcesses
 from endoscope_benchmarks.process_faults.operator import Operator
-from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.rig import load_rig
 
 PATIENCE_S = 60.0

@@ -13,8 +13,8 @@ from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
 from endoscope_core.control.iterated_inverse import iterated_inverse
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.simulator import TICK
-from endoscope_core.signals.catalogue import motion_by_name
 from endoscope_core.signals.command_file import write_command_file
+from endoscope_core.signals.motions import motion_by_name
 from endoscope_nodes.names import JOINTS, SLAVE_COMMAND, SLAVE_MEASURED
 
 Array = NDArray[np.float64]

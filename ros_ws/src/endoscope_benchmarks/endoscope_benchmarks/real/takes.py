@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from endoscope_benchmarks.trials.real_recordings import without_repeats
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.identification.tube_files import DESIRED, PHASE
+from endoscope_core.identification.family_fit import DESIRED, PHASE
 from endoscope_core.physics.description import JointParameters, PlantDescription, SensorParameters
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise

@@ -14,7 +14,12 @@ from endoscope_core.classifier.cnn_classifier import (
     logarithm,
     stretched,
 )
-from endoscope_core.classifier.disturbance import STRANGE, drifting, exchanged_across_joints, read
+from endoscope_core.classifier.held_out_calibration import (
+    STRANGE,
+    drifting,
+    exchanged_across_joints,
+    read,
+)
 from endoscope_core.dataset import CLASSES_DEG, configuration_of_size, random_instrument
 from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS, calibration_command
 from endoscope_core.dataset.training_rigs import training_rigs

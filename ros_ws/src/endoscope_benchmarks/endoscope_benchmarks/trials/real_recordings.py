@@ -24,7 +24,7 @@ from endoscope_core.identification import (
     UpdatedTableError,
     fit_model,
 )
-from endoscope_core.identification.tube_files import (
+from endoscope_core.identification.family_fit import (
     ACTUAL,
     CYCLE_S,
     DESIRED,

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from endoscope_core.metrics.backlash_size import width_at_mid_height
+from endoscope_core.metrics import width_at_mid_height
 
 
 def tension_loop_width(

@@ -14,7 +14,7 @@ from endoscope_core.control import (
     RecursiveHysteresisController,
     TrackerMeasurement,
 )
-from endoscope_core.control.motor_limits import shipped_limits
+from endoscope_core.control.limits import shipped_limits
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.physics import PlantDescription, PlantSimulator, SensorModel
 from endoscope_core.signals import Signal

@@ -107,7 +107,7 @@ def _of_tubes(args: argparse.Namespace) -> int:
     from endoscope_bringup.learning.family_of_recordings import drawn, identified, table
     from endoscope_core.atomic_output import atomic_file
     from endoscope_core.errors import EndoscopeError
-    from endoscope_core.identification.tube_files import tube_recordings
+    from endoscope_core.identification.family_fit import tube_recordings
 
     if args.source != Path('family') or args.model is not None or args.table is not None:
         raise EndoscopeError('a second place is taken by `identify family FOLDER` alone, no model')

@@ -69,12 +69,12 @@ def _desired(motion: str, joints: Sequence[str], tick: float) -> 'tuple[Array, A
 
     from endoscope_bags import open_bag
     from endoscope_core.errors import nearest
-    from endoscope_core.signals.catalogue import MOTIONS, motion_by_name
     from endoscope_core.signals.command_file import (
         CommandFileError,
         CommandTable,
         read_command_file,
     )
+    from endoscope_core.signals.motions import MOTIONS, motion_by_name
 
     path = Path(motion)
     if motion not in MOTIONS and not path.exists():

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from endoscope_bringup.teleop.terminal import FOCUS_LOST, KeyEvent, KeyEventKind
-from endoscope_core.teleop.dead_man import DeadMan
-from endoscope_core.teleop.running_angles import RunningAngles
+from endoscope_core.teleop import DeadMan, RunningAngles
 
 # A keyboard repeats after 0.25 to 0.66 s for the first time, then 25 to 40 times a second. What
 # repeats sooner for the first time is no new press but a stream that was held up on its way.

@@ -17,8 +17,8 @@ import time
 from dataclasses import dataclass
 from enum import StrEnum
 
-from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.exit_status import ClosedOnExit
 
 # Which keys' events to report: escapes told apart (1), presses, repeats and releases (2), all (8).
 ASK_FOR_EVENTS = b'\x1b[>11u'

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from endoscope_console.teleop.frames import InputFrame, Source
+from endoscope_core import teleop as rule
 from endoscope_core.choices import FOLLOW_THE_HANDLE
-from endoscope_core.teleop import dead_man as rule
-from endoscope_core.teleop.dead_man import DeadMan
+from endoscope_core.teleop import DeadMan
 
 SILENCE_NS = 100_000_000
 """After the last arrival of a frame a grip is over."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from endoscope_console.teleop.frames import InputFrame
-from endoscope_core.teleop.running_angles import RunningAngles
+from endoscope_core.teleop import RunningAngles
 
 _RAMP_NS = 20_000_000
 # A beat that comes later than a command lives makes up for no more than this.

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.calibration.tension_record import TensionRecord
+from endoscope_core.calibration.records import TensionRecord
 from endoscope_core.signals import CalibrationMotion, both_joints, calibration_motion, move
 
 Array = NDArray[np.float64]

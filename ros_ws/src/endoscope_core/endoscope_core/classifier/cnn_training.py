@@ -19,15 +19,16 @@ from endoscope_core.classifier.cnn_classifier import (
     logarithm,
     stretched,
 )
-from endoscope_core.classifier.disturbance import (
+from endoscope_core.classifier.held_out_calibration import (
     STRANGE,
     SUBTLE,
+    Report,
+    calibrated,
+    counted,
     read,
     read_of_all_kinds,
 )
-from endoscope_core.classifier.held_out_calibration import Report, calibrated, counted
-from endoscope_core.classifier.pytorch import Tensor, nn, torch
-from endoscope_core.classifier.tension_cnn import TensionCnn
+from endoscope_core.classifier.network import TensionCnn, Tensor, nn, torch
 from endoscope_core.dataset import CLASSES_DEG
 from endoscope_core.dataset.training_rigs import (
     TrainingRigs,

@@ -1,17 +1,23 @@
 """From a hand to a command: what is desired, feed-forward and feedback."""
 
 from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES, PHYSICAL
-from endoscope_core.control.adaptive_backlash import AdaptiveBacklashController
-from endoscope_core.control.adaptive_backlash_law import AdaptiveBacklashSettings
-from endoscope_core.control.adaptive_physical_inverse import AdaptivePhysicalInverse
+from endoscope_core.control.adaptive_backlash import (
+    AdaptiveBacklashController,
+    AdaptiveBacklashSettings,
+)
 from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
-from endoscope_core.control.motor_limits import MotorLimits, shipped_limits
-from endoscope_core.control.physical_inverse import PhysicalInverse
-from endoscope_core.control.physical_parameters import PhysicalParameters
+from endoscope_core.control.internal_model import (
+    PhysicalParameters,
+    Reach,
+    keep_within,
+    reach,
+    reach_in_words,
+)
+from endoscope_core.control.limits import MotorLimits, shipped_limits
+from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
-from endoscope_core.control.reach import Reach, keep_within, reach, reach_in_words
 from endoscope_core.control.recursive_hysteresis import (
     RecursiveHysteresisController,
     RecursiveHysteresisSettings,

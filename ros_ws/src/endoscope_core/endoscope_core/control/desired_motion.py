@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from endoscope_core.control.smoothing import COUNT, Play, SmoothFollower
+from endoscope_core.control.limits import COUNT, Play, SmoothFollower
 
 BANDWIDTH = 60.0
 """Of the velocity that is estimated from positions, in rad/s: that of a hand, see `handle`."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from statistics import median_low
 
-from endoscope_core.control.smoothing import COUNT, Play, SmoothFollower
+from endoscope_core.control.limits import COUNT, Play, SmoothFollower
 
 _NS = 1e-9
 _INTERVALS = 15

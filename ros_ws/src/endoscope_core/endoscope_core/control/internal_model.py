@@ -1,4 +1,4 @@
-"""The plant of one joint as a compensator keeps it in mind, and its inverse.
+"""One joint behind one tube as a compensator keeps it in mind, and how far it can be bent.
 
 The model is the nominal plant itself with the shaft given. Friction along the sheath, the joint's
 friction and its stiffness do not depend on speed, so a motion is known by its turning points: with
@@ -8,14 +8,17 @@ memory: Mayergoyz, Mathematical Models of Hysteresis, 1991, ch. I).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.compiled import Flags, compiled
-from endoscope_core.control.motor_limits import MotorLimits
+from endoscope_core.control.limits import MotorLimits, shipped_limits
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.kernel import advance_tick, settle, tensions
 from endoscope_core.physics.layout import (
@@ -27,6 +30,7 @@ from endoscope_core.physics.layout import (
 from endoscope_core.physics.packing import pack, rest_state
 from endoscope_core.physics.sheath import MOTOR_END
 
+PROFILE = 'friction_profile'
 Array = NDArray[np.float64]
 
 TICK = 1e-3
@@ -39,6 +43,43 @@ _JOINT_STEP = 0.1
 _TRIES = 60
 _STEPS = 1000
 _MOST_TURNS = 12
+_BEYOND = 10.0
+"""Rad to which no joint bends."""
+
+
+@dataclass(frozen=True)
+class PhysicalParameters:
+    """One joint behind one tube.
+
+    Parameters
+    ----------
+    joint : JointParameters
+        Of the nominal plant; the capstan exponent is the tube's.
+    """
+
+    joint: JointParameters = field(default_factory=JointParameters)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All numbers by name; the friction profile is a list."""
+        values = {item.name: getattr(self.joint, item.name) for item in fields(JointParameters)}
+        return values | {PROFILE: list(self.joint.friction_profile)}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> PhysicalParameters:
+        """Parameters from a mapping of exactly their names.
+
+        Raises
+        ------
+        ValueError
+            If a name is missing or unknown, or a value is out of range.
+        """
+        names = {item.name for item in fields(JointParameters)}
+        if set(values) != names:
+            odd = ', '.join(sorted(set(values) ^ names))
+            raise ValueError(f'parameters of the plant are wrong or missing: {odd}')
+        numbers = {name: float(values[name]) for name in names - {PROFILE}}
+        profile = tuple(float(value) for value in values[PROFILE])
+        return cls(JointParameters(**numbers, friction_profile=profile))
 
 
 class TurningPoints:
@@ -282,3 +323,64 @@ class InternalModel:
             self._state, *self._arrays, path, self._limits.travel, self._limits.tension
         )
         return path.tolist()
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Smallest and largest bending angle, rad."""
+
+    low: float
+    high: float
+
+    def keep(self, angle: float, velocity: float) -> tuple[float, float]:
+        """A desired angle within reach, and its velocity: zero where the angle is cut."""
+        within = min(self.high, max(self.low, angle))
+        return within, velocity if within == angle else 0.0
+
+
+def reach_in_words(reaches: Sequence[Reach], joints: Sequence[str]) -> str:
+    """How far the joints of these names can be bent, in degrees, as a sentence without its stop."""
+    ranges = ', '.join(
+        f'{joint} from {math.degrees(r.low):.0f} to {math.degrees(r.high):.0f} deg'
+        for joint, r in zip(joints, reaches, strict=True)
+    )
+    return f'this tube can be bent: {ranges}'
+
+
+def keep_within(
+    reaches: Sequence[Reach], angle: Sequence[float], velocity: Sequence[float]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Desired angles (rad) and velocities (rad/s) of J joints, cut where a tube's reach ends.
+
+    Nothing is cut where no reach is known; where no velocities are given, none are returned.
+    """
+    if not reaches:
+        return tuple(angle), tuple(velocity)
+    speeds = velocity or (0.0,) * len(angle)
+    kept = [r.keep(a, v) for r, a, v in zip(reaches, angle, speeds, strict=True)]
+    return tuple(a for a, _ in kept), tuple(v for _, v in kept) if velocity else ()
+
+
+def reach(joint: JointParameters, limits: MotorLimits | None = None) -> Reach:
+    """Find how far a joint can be bent to and fro, time and again.
+
+    The motor swings slowly as far as its travel and the wires' tension allow. A first pull from
+    rest gets elsewhere than later ones, which begin in wires that friction has left tense.
+
+    Parameters
+    ----------
+    joint : JointParameters
+        With the friction of the tube at hand.
+    limits : MotorLimits, optional
+        Those of the shipped rig if not given.
+
+    Returns
+    -------
+    Reach
+    """
+    model = InternalModel(joint, limits or shipped_limits())
+    there_and_back = [_BEYOND, -_BEYOND] * 2
+    model.go_through(there_and_back)
+    low = model.angle
+    model.go_through([*there_and_back, _BEYOND])
+    return Reach(low, model.angle)

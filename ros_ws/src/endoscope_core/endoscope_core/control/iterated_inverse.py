@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from endoscope_core.control.motor_limits import shipped_limits
+from endoscope_core.control.internal_model import PhysicalParameters
+from endoscope_core.control.limits import shipped_limits
 from endoscope_core.control.physical_inverse import PhysicalInverse
-from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.simulator import TICK, simulate
 

@@ -1,13 +1,12 @@
-"""Feed-forward by the inverse of the identified plant, one joint, causal and without delay."""
+"""Commands that move a joint as desired, by inverting the plant that a calibration identified."""
 
 from __future__ import annotations
 
 import math
 
-from endoscope_core.control.internal_model import InternalModel, TurningPoints
-from endoscope_core.control.motor_limits import MotorLimits, shipped_limits
-from endoscope_core.control.physical_parameters import PhysicalParameters
-from endoscope_core.control.smoothing import COUNT
+from endoscope_core.control.internal_model import InternalModel, PhysicalParameters, TurningPoints
+from endoscope_core.control.limits import COUNT, MotorLimits, shipped_limits
+from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
 
 SWING = 1.0
 """Rad from which a joint is taken to have come whose motion is known by its direction alone."""
@@ -108,3 +107,55 @@ class PhysicalInverse:
         self.model = InternalModel(parameters.joint, self.limits)
         self.shafts = (0.0, *self.model.go_through(self._turns.values[1:]))
         self._arrived = True
+
+
+class AdaptivePhysicalInverse(PhysicalInverse):
+    """A `PhysicalInverse` whose parameters follow the tracker.
+
+    Feedback enters through the parameters alone: a command is always the inverse of one plant, so
+    that delay and noise of the tracker cannot close a fast loop. Without a tracker it goes on with
+    what was learnt.
+
+    Parameters
+    ----------
+    parameters : PhysicalParameters
+        To begin with.
+    limits : MotorLimits, optional
+    dead_band : float
+    learning : PlantLearningSettings, optional
+    """
+
+    def __init__(
+        self,
+        parameters: PhysicalParameters,
+        limits: MotorLimits | None = None,
+        dead_band: float = 2.0 * COUNT,
+        learning: PlantLearningSettings | None = None,
+    ) -> None:
+        super().__init__(parameters, limits, dead_band)
+        self._learning_settings = learning
+        self._learning = PlantLearning(parameters, self.limits.gear, settings=learning)
+
+    def begin(self, direction: float, desired: float, velocity: float) -> float:
+        """Start anew with what was learnt; return the command wanted now (rad)."""
+        self.parameters = self._learning.parameters
+        wanted = super().begin(direction, desired, velocity)
+        self._learning = PlantLearning(
+            self.parameters, self.limits.gear, self.shafts, self._learning_settings
+        )
+        return wanted
+
+    def sent(self, command: float, dt: float) -> None:
+        """What went out in the end, in force for `dt` s."""
+        self._learning.sent(command, dt)
+
+    def measured(self, age: float, angle: float) -> None:
+        """Take a bending angle (rad) that held `age` s ago.
+
+        What was learnt enters where the model's joint is where it shall be. In the middle of a dead
+        zone the command goes on with what was known before: a wider or narrower one has no place
+        for it.
+        """
+        self._learning.measured(age, angle)
+        if self.arrived and self._learning.modelled is not self.parameters:
+            self.take(self._learning.modelled)

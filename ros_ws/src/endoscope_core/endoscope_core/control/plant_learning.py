@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from endoscope_core.control.internal_model import (
     TICK,
+    PhysicalParameters,
     TurningPoints,
     go_through_shafts,
     packed_joint,
     turn_all,
 )
-from endoscope_core.control.physical_parameters import PhysicalParameters
 from endoscope_core.physics.description import JointParameters
 from endoscope_core.physics.layout import INPUTS, JOINT, NOMINAL_KEYS
 from endoscope_core.physics.packing import rest_state

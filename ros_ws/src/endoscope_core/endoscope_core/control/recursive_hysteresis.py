@@ -7,9 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from endoscope_core.control.law_settings import check_settings
-from endoscope_core.control.smoothing import COUNT
-from endoscope_core.control.tracker_feedback import FADE_TIME, STALE_AFTER, TrackerFeedback
+from endoscope_core.control.limits import COUNT
+from endoscope_core.control.tracker_feedback import (
+    FADE_TIME,
+    STALE_AFTER,
+    TrackerFeedback,
+    check_settings,
+)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Feedback correction from a slow tracker, for all joints, that comes and goes without a jump."""
+"""Feedback of the tracker: a learning law on every joint, safe to switch at any time."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.control.smoothing import SHARE_OF_TRAVEL, Play, limited, worked_off
-from endoscope_core.hysteresis.bouc_wen_kernel import bouc_wen_normalised_step
+from endoscope_core.control.limits import SHARE_OF_TRAVEL, Play, limited, worked_off
+from endoscope_core.hysteresis.bouc_wen import bouc_wen_normalised_step
 
 Vector = Sequence[float] | NDArray[np.float64]
 
@@ -23,6 +23,16 @@ RATE = 0.5
 """Greatest speed in rad/s at which what was learnt enters the correction."""
 
 HISTORY = 0.6
+
+
+def check_settings(settings: object, positive: Sequence[str]) -> None:
+    """Refuse a setting that is not finite, or negative, or zero though among `positive`."""
+    for name, value in vars(settings).items():
+        if not (math.isfinite(value) and value >= 0.0):
+            raise ValueError(f'{name} = {value} must be finite and not negative')
+    for name in positive:
+        if getattr(settings, name) == 0.0:
+            raise ValueError(f'{name} must be positive')
 
 
 @dataclass(frozen=True)

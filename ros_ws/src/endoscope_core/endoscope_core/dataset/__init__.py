@@ -3,13 +3,14 @@
 from endoscope_core.dataset.calibration_dataset import (
     CLASSES_DEG,
     CalibrationDataset,
+    CalibrationRecording,
     DatasetError,
     is_dataset,
     load_dataset,
     make_dataset,
+    record_calibration,
     save_dataset,
 )
-from endoscope_core.dataset.calibration_recording import CalibrationRecording, record_calibration
 from endoscope_core.dataset.rig_variation import (
     TubeConfiguration,
     configuration_of_size,

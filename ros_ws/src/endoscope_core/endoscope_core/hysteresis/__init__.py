@@ -1,10 +1,8 @@
 """Hysteresis models as pure steps of state over input, and their inverses."""
 
-from endoscope_core.hysteresis.asymmetric_bouc_wen import AsymmetricBoucWenParameters
-from endoscope_core.hysteresis.bouc_wen import BoucWenParameters
-from endoscope_core.hysteresis.dahl import DahlParameters
+from endoscope_core.hysteresis.bouc_wen import AsymmetricBoucWenParameters, BoucWenParameters
+from endoscope_core.hysteresis.dahl import DahlParameters, PlayParameters
 from endoscope_core.hysteresis.memory_model import MemoryModel, direct_inverse, forward
-from endoscope_core.hysteresis.play import PlayParameters
 from endoscope_core.hysteresis.prandtl_ishlinskii import (
     PrandtlIshlinskiiParameters,
     prandtl_ishlinskii_forward,

@@ -1,4 +1,4 @@
-"""Symmetric Bouc-Wen hysteresis and its direct inverse (equations 3 to 5 of the first paper)."""
+"""Bouc-Wen hysteresis, symmetric (equations 3 to 5 of the first paper) and asymmetric."""
 
 from __future__ import annotations
 
@@ -10,21 +10,120 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.hysteresis.bouc_wen_kernel import (
-    bouc_wen_normalised_path,
-    bouc_wen_normalised_step,
-)
-from endoscope_core.hysteresis.constant_lag import ConstantLag
-from endoscope_core.hysteresis.inverse_safety import (
+from endoscope_core.compiled import njit
+from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
     GREATEST_INVERSE_SLOPE,
     GREATEST_LAG,
+    GREATEST_OFFSET,
     SMALLEST_ALPHA,
+    ConstantLag,
+    NamedNumbers,
+    check_inverse,
     check_numbers,
+    check_range,
 )
-from endoscope_core.hysteresis.named_numbers import NamedNumbers
 
+_LONGEST_SUBSTEP = 0.1
+_MOST_SUBSTEPS = 64
 GREATEST_EXPONENT = 5.0
+GREATEST_SKEW = 0.5
+GREATEST_ANGLE = 1.75
+
+
+# With ``y = h / h_max``, ``h_max = (A / (B + C))**(1/n)``, ``rho = (B - C) / (B + C)``, and ``x``
+# the distance travelled in the present direction in units of ``h_max / A``, equation 4 of the first
+# paper becomes, for ``g = y sgn(theta')``,
+#     dg/dx = 1 - g**n            for g >= 0
+#     dg/dx = 1 + rho |g|**n      for g < 0
+# an autonomous equation without time: only the travel of the angle counts, not its speed.
+
+
+@njit(cache=True)
+def _approach_rate(g: float, rho: float, n: float) -> float:
+    """kappa(g) > 0 such that dg/dx = kappa(g) (1 - g)."""
+    gap = 1.0 - g
+    if g <= 0.0:
+        return (1.0 + rho * (-g) ** n) / gap
+    if gap < 1e-9:
+        return n
+    return -math.expm1(n * math.log(g)) / gap
+
+
+@njit(cache=True)
+def _exact_linear(g: float, rho: float, distance: float) -> float:
+    """The case n = 1, in which both pieces of the equation integrate to exponentials."""
+    if g < 0.0:
+        to_zero = math.log1p(-rho * g) / rho if abs(rho) > 1e-12 else -g
+        if distance < to_zero:
+            grown = -math.expm1(-rho * distance) / rho if abs(rho) > 1e-12 else distance
+            return g + (1.0 - rho * g) * grown
+        distance -= to_zero
+        g = 0.0
+    return 1.0 - (1.0 - g) * math.exp(-distance)
+
+
+@njit(cache=True)
+def bouc_wen_normalised_step(y: float, delta: float, travel: float, rho: float, n: float) -> float:
+    """Normalised state in [-1, 1] after the driving angle has moved by `delta` rad, one way.
+
+    `travel` is ``h_max / A`` in rad, over which the state builds up; `rho` is in (-1, 1], the
+    sharpness `n` at least 1. Every substep has the form ``1 - g_new = (1 - g) exp(-kappa dx)`` with
+    ``kappa > 0`` taken at the middle of the substep, which is a convex combination of `g` and 1.
+    Hence ``g <= g_new <= 1`` for any step: the state stays in [-1, 1], whatever the sampling.
+    """
+    if delta == 0.0:
+        return y
+    side = 1.0 if delta > 0.0 else -1.0
+    g = side * y
+    distance = abs(delta) / travel
+    if n == 1.0:  # the step is exact
+        return side * min(1.0, _exact_linear(g, rho, distance))
+    substeps = min(_MOST_SUBSTEPS, max(1, math.ceil(min(distance, 1e6) / _LONGEST_SUBSTEP)))
+    dx = distance / substeps
+    for _ in range(substeps):
+        half = 1.0 - (1.0 - g) * math.exp(-0.5 * dx * _approach_rate(g, rho, n))
+        g = 1.0 - (1.0 - g) * math.exp(-dx * _approach_rate(half, rho, n))
+    return side * g
+
+
+@njit(cache=True)
+def bouc_wen_normalised_path(
+    driver: NDArray[np.float64],
+    y0: float,
+    travel: float,
+    rho: float,
+    n: float,
+) -> NDArray[np.float64]:
+    """Normalised state along a recorded driving angle (N,), `y0` at the first sample."""
+    states = np.empty(driver.size)
+    y = y0
+    previous = driver[0]
+    for k in range(driver.size):
+        y = bouc_wen_normalised_step(y, driver[k] - previous, travel, rho, n)
+        previous = driver[k]
+        states[k] = y
+    return states
+
+
+@njit(cache=True)
+def asymmetric_path(
+    driver: NDArray[np.float64],
+    y0: float,
+    up: tuple[float, float, float],
+    down: tuple[float, float, float],
+) -> NDArray[np.float64]:
+    """States along a driving angle (N,) in rad; `up` and `down` hold travel, rho and n."""
+    states = np.empty(driver.size)
+    y = y0
+    previous = driver[0]
+    for k in range(driver.size):
+        delta = driver[k] - previous
+        travel, rho, n = up if delta >= 0.0 else down
+        y = bouc_wen_normalised_step(y, delta, travel, rho, n)
+        previous = driver[k]
+        states[k] = y
+    return states
 
 
 @dataclass(frozen=True)
@@ -169,3 +268,105 @@ class BoucWenParameters(NamedNumbers, ConstantLag):
             C=0.5 * (1.0 - rho) * total,
             n=n,
         )
+
+
+@dataclass(frozen=True)
+class AsymmetricBoucWenParameters(NamedNumbers):
+    """``theta_a = alpha theta + offset - (lag + skew theta) y`` with `y` built up by direction.
+
+    The symmetric model (equations 3 and 4 of the first paper) in normalised form, `y` = h / h_max,
+    with shape parameters of its own for either direction, as in the asymmetric extensions of the
+    Bouc-Wen model (Wang and Wen 1998; Zhu and Wang 2012), a loop that may be wider at one end, and
+    an offset. The state stays in [-1, 1] for a step of any size because each direction's step does
+    (see `bouc_wen_normalised_step`).
+
+    Parameters
+    ----------
+    alpha : float
+        Ratio of actual to driving angle, in [0.2, 3].
+    lag : float
+        Half the width of a saturated loop at angle zero, along the actual angle, rad.
+    skew : float
+        Growth of that half-width with the angle, in [-0.5, 0.5]; beyond 1.75 rad it grows no more.
+    offset : float
+        rad.
+    travel_up, travel_down : float
+        rad over which the state builds up in either direction.
+    rho_up, rho_down : float
+        In (-1, 1]; how much faster the state leaves saturation than from rest.
+    n_up, n_down : float
+        Sharpness, in [1, 5].
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range or the inverse would be steeper than 40.
+    """
+
+    MODEL: ClassVar[str] = 'asymmetric Bouc-Wen'
+
+    alpha: float
+    lag: float
+    skew: float
+    offset: float
+    travel_up: float
+    rho_up: float
+    n_up: float
+    travel_down: float
+    rho_down: float
+    n_down: float
+
+    def __post_init__(self) -> None:
+        name = self.MODEL
+        check_numbers(name, asdict(self))
+        for side in ('up', 'down'):
+            check_range(name, f'travel_{side}', getattr(self, f'travel_{side}'), 1e-4, 100.0)
+            check_range(name, f'rho_{side}', getattr(self, f'rho_{side}'), -1.0 + 1e-6, 1.0)
+            check_range(name, f'n_{side}', getattr(self, f'n_{side}'), 1.0, GREATEST_EXPONENT)
+        check_range(name, 'offset', self.offset, -GREATEST_OFFSET, GREATEST_OFFSET)
+        check_range(name, 'skew', self.skew, -GREATEST_SKEW, GREATEST_SKEW)
+        if abs(self.skew) > 0.9 * self.alpha:
+            raise ValueError(
+                f'{name} skew = {self.skew:g} must stay below 0.9 alpha = {0.9 * self.alpha:g}, '
+                'or a branch turns back'
+            )
+        check_inverse(name, self.alpha, self.lag, self.inverse_slope)
+
+    @property
+    def inverse_slope(self) -> float:
+        """Bound of the slope of the direct inverse for angles up to 1.75 rad."""
+        steepest = max(
+            max(1.0, 1.0 + self.rho_up) / self.travel_up,
+            max(1.0, 1.0 + self.rho_down) / self.travel_down,
+        )
+        widest = self.lag + abs(self.skew) * GREATEST_ANGLE
+        return (1.0 + abs(self.skew) + widest * steepest) / self.alpha
+
+    def memory_step(self, y: float, delta: float, angle: float) -> float:
+        """State after a move by `delta` rad to `angle`."""
+        if delta >= 0.0:
+            shape = self.travel_up, self.rho_up, self.n_up
+        else:
+            shape = self.travel_down, self.rho_down, self.n_down
+        return float(bouc_wen_normalised_step(y, delta, *shape))
+
+    def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
+        """States (N,) along a driving angle (N,) in rad."""
+        states: NDArray[np.float64] = asymmetric_path(
+            driver,
+            y0,
+            (self.travel_up, self.rho_up, self.n_up),
+            (self.travel_down, self.rho_down, self.n_down),
+        )
+        return states
+
+    def lag_at(self, angle: float) -> float:
+        """Half-width of the loop at an angle, rad; never negative."""
+        bounded = min(GREATEST_ANGLE, max(-GREATEST_ANGLE, angle))
+        return max(0.0, self.lag + self.skew * bounded)
+
+    def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same for many angles (N,)."""
+        bounded = np.clip(angles, -GREATEST_ANGLE, GREATEST_ANGLE)
+        lags: NDArray[np.float64] = np.maximum(0.0, self.lag + self.skew * bounded)
+        return lags

@@ -1,25 +1,91 @@
-"""Modified Dahl hysteresis with a shape exponent, and its direct inverse."""
+"""Dahl hysteresis and the play operator, its limit without memory, and their direct inverses."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.hysteresis.constant_lag import ConstantLag
-from endoscope_core.hysteresis.dahl_kernel import dahl_path, dahl_step
-from endoscope_core.hysteresis.inverse_safety import (
+from endoscope_core.compiled import njit
+from endoscope_core.hysteresis.memory_model import (
     GREATEST_OFFSET,
+    ConstantLag,
+    NamedNumbers,
     check_inverse,
     check_numbers,
     check_range,
 )
-from endoscope_core.hysteresis.named_numbers import NamedNumbers
 
 LEAST_EXPONENT = 0.5
 GREATEST_EXPONENT = 4.0
+
+
+@njit(cache=True)
+def dahl_step(y: float, delta: float, travel: float, exponent: float) -> float:
+    """State in [-1, 1] after the driving angle has moved by `delta` rad, one way, exactly.
+
+    It builds up over `travel` rad: with an `exponent` in (0, 1) it saturates after a finite
+    distance, above 1 slowly.
+    """
+    # With ``g = y sgn(theta')`` and `x` the distance travelled in the present direction in units of
+    # the travel, the modified Dahl model (Dahl 1968; second paper, section 2.3, whose printed
+    # equations take the exponent to be one in the loading branch) reads ``dg/dx = (1 - g)**i``. It
+    # has, for ``w = 1 - g``, the closed solution
+    #     w0 exp(-x) for i = 1, and otherwise
+    #     (w0**(1-i) + (i-1) x)**(1/(1-i)), and 0 once the bracket is negative (i < 1).
+    if delta == 0.0:
+        return y
+    side = 1.0 if delta > 0.0 else -1.0
+    gap = 1.0 - side * y
+    if gap <= 0.0:
+        return side
+    x = abs(delta) / travel
+    power = 1.0 - exponent
+    if abs(power) < 1e-9:
+        return side * (1.0 - gap * math.exp(-x))
+    inner = gap**power - power * x
+    if inner <= 0.0:
+        return side
+    left = inner ** (1.0 / power)
+    # Rounding of the power must not turn the state back.
+    return side * (1.0 - min(left, gap))
+
+
+@njit(cache=True)
+def dahl_path(
+    driver: NDArray[np.float64], y0: float, travel: float, exponent: float
+) -> NDArray[np.float64]:
+    """States along a driving angle (N,) in rad, `y0` at the first sample."""
+    states = np.empty(driver.size)
+    y = y0
+    previous = driver[0]
+    for k in range(driver.size):
+        y = dahl_step(y, driver[k] - previous, travel, exponent)
+        previous = driver[k]
+        states[k] = y
+    return states
+
+
+@njit(cache=True)
+def play_step(y: float, delta: float, travel: float) -> float:
+    """State in [-1, 1] of a play of half-gap `travel` rad, exactly, for any step `delta` rad."""
+    return min(1.0, max(-1.0, y + delta / travel))
+
+
+@njit(cache=True)
+def play_path(driver: NDArray[np.float64], y0: float, travel: float) -> NDArray[np.float64]:
+    """States along a driving angle (N,) in rad, `y0` at the first sample."""
+    states = np.empty(driver.size)
+    y = y0
+    previous = driver[0]
+    for k in range(driver.size):
+        y = play_step(y, driver[k] - previous, travel)
+        previous = driver[k]
+        states[k] = y
+    return states
 
 
 @dataclass(frozen=True)
@@ -76,4 +142,59 @@ class DahlParameters(NamedNumbers, ConstantLag):
     def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
         """States (N,) along a driving angle (N,) in rad."""
         states: NDArray[np.float64] = dahl_path(driver, y0, self.travel, self.exponent)
+        return states
+
+
+@dataclass(frozen=True)
+class PlayParameters(NamedNumbers, ConstantLag):
+    """``theta_a = alpha theta + offset - lag y``, ``y' = theta' / travel`` within [-1, 1].
+
+    With ``travel = lag / alpha`` this is the play (backlash) model of Tao and Kokotovic, which the
+    second paper starts from: half-gap `travel`, gain `alpha`; between the sides of the gap the
+    output rests. Its exact inverse jumps by ``2 lag / alpha`` at each reversal. A shorter `travel`
+    in the inverse crosses the gap within that much motion of the desired angle instead, which
+    bounds its slope.
+
+    Parameters
+    ----------
+    alpha : float
+        Gain, in [0.2, 3].
+    lag : float
+        Half the width of the loop along the actual angle, rad.
+    travel : float
+        rad of the driving angle from the middle of the gap to its side.
+    offset : float
+        rad.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range or the inverse would be steeper than 40.
+    """
+
+    MODEL: ClassVar[str] = 'play'
+
+    alpha: float
+    lag: float
+    travel: float
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self.MODEL, asdict(self))
+        check_range(self.MODEL, 'offset', self.offset, -GREATEST_OFFSET, GREATEST_OFFSET)
+        check_range(self.MODEL, 'travel', self.travel, 1e-6, 100.0)
+        check_inverse(self.MODEL, self.alpha, self.lag, self.inverse_slope)
+
+    @property
+    def inverse_slope(self) -> float:
+        """Greatest slope of the inverse."""
+        return (1.0 + self.lag / self.travel) / self.alpha
+
+    def memory_step(self, y: float, delta: float, angle: float) -> float:
+        """State after a move by `delta` rad to `angle`."""
+        return float(play_step(y, delta, self.travel))
+
+    def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
+        """States (N,) along a driving angle (N,) in rad."""
+        states: NDArray[np.float64] = play_path(driver, y0, self.travel)
         return states

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from endoscope_core.hysteresis.asymmetric_bouc_wen import AsymmetricBoucWenParameters
-from endoscope_core.hysteresis.bouc_wen import BoucWenParameters
-from endoscope_core.hysteresis.dahl import DahlParameters
+from endoscope_core.hysteresis.bouc_wen import AsymmetricBoucWenParameters, BoucWenParameters
+from endoscope_core.hysteresis.dahl import DahlParameters, PlayParameters
 from endoscope_core.hysteresis.memory_model import MemoryModel
-from endoscope_core.hysteresis.play import PlayParameters
 from endoscope_core.hysteresis.prandtl_ishlinskii import (
     PrandtlIshlinskiiParameters,
     advance_plays,

@@ -1,9 +1,94 @@
-"""Hysteresis models with one memory in [-1, 1]: forward, and inverse without inversion."""
+"""Hysteresis models of one state, bounds of their parameters, and their direct inverse."""
 
-from typing import Protocol
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+SMALLEST_ALPHA = 0.2
+GREATEST_ALPHA = 3.0
+GREATEST_LAG = math.radians(120.0)
+GREATEST_INVERSE_SLOPE = 40.0
+GREATEST_OFFSET = math.radians(45.0)
+_ROUNDING = 1.0 + 1e-9
+
+
+def check_numbers(model: str, values: Mapping[str, Any]) -> None:
+    """Refuse parameters that are not finite numbers: a ValueError names model and parameter."""
+    for name, value in values.items():
+        if not math.isfinite(value):
+            raise ValueError(f'{model} parameter {name} is {value}: it must be a finite number')
+
+
+def check_range(model: str, name: str, value: float, low: float, high: float) -> None:
+    """Refuse a parameter out of ``[low, high]``: a ValueError names model, parameter and range."""
+    if not low <= value <= high:
+        raise ValueError(f'{model} parameter {name} = {value:g} must lie in [{low:g}, {high:g}]')
+
+
+def check_inverse(model: str, alpha: float, lag: float, slope: float) -> None:
+    """Refuse a model whose inverse would not be safe: a ValueError names what is out of bounds.
+
+    The inverse divides by `alpha`, the ratio of actual to driving angle. `lag` in rad is half the
+    width of a saturated loop along the actual angle, `slope` the greatest of the inverse.
+    """
+    check_range(model, 'alpha', alpha, SMALLEST_ALPHA, GREATEST_ALPHA)
+    if not -1e-12 <= lag <= GREATEST_LAG * _ROUNDING:
+        raise ValueError(
+            f'{model} lag is {math.degrees(lag):.1f} deg: it must lie in '
+            f'[0, {math.degrees(GREATEST_LAG):.0f}] deg'
+        )
+    if slope > GREATEST_INVERSE_SLOPE * _ROUNDING:
+        raise ValueError(
+            f'{model} inverse is too steep: {slope:.1f} exceeds {GREATEST_INVERSE_SLOPE:g}'
+        )
+
+
+@dataclass(frozen=True)
+class NamedNumbers:
+    """Base of parameter sets whose fields are all numbers."""
+
+    MODEL: ClassVar[str]
+    """The model's name in messages."""
+
+    def to_dict(self) -> dict[str, float]:
+        """The parameters by name."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Parameters from a mapping of exactly their names.
+
+        Raises ValueError: if a name is missing or unknown, or the parameters are unsafe.
+        """
+        wanted = {field.name for field in fields(cls)}
+        if set(values) != wanted:
+            odd = ', '.join(sorted(set(values) ^ wanted))
+            raise ValueError(
+                f'{cls.MODEL} parameters must be exactly {", ".join(sorted(wanted))}; '
+                f'wrong or missing: {odd}'
+            )
+        return cls(**{name: float(value) for name, value in values.items()})
+
+
+class _WithLag(Protocol):
+    @property
+    def lag(self) -> float: ...
+
+
+class ConstantLag:
+    """One `lag` of a `MemoryModel`: a saturated loop's half-width along the actual angle, rad."""
+
+    def lag_at(self: _WithLag, angle: float) -> float:
+        """Half-width of the loop, rad."""
+        return self.lag
+
+    def lags_at(self: _WithLag, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same for many angles (N,)."""
+        return np.full(angles.shape, self.lag)
 
 
 class MemoryModel(Protocol):

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from endoscope_core.compiled_cache import njit
-from endoscope_core.hysteresis.inverse_safety import (
+from endoscope_core.compiled import njit
+from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
     GREATEST_INVERSE_SLOPE,
     GREATEST_OFFSET,

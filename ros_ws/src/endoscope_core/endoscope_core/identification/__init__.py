@@ -7,20 +7,21 @@ from endoscope_core.identification.class_parameters import (
     load_class_parameters,
     parameters_for_class,
 )
-from endoscope_core.identification.feedforward_fit import FeedforwardFit, fit_feedforward
+from endoscope_core.identification.feedforward_fit import FeedforwardFit, Servo, fit_feedforward
 from endoscope_core.identification.hysteresis_fit import (
     IdentificationError,
     ModelFit,
     Recording,
     fit_model,
 )
-from endoscope_core.identification.parameter_blend import KINDS, LawParameters, blend
 from endoscope_core.identification.plant_fit import PlantFit, PlantFitError, fit_plant
-from endoscope_core.identification.servo_lag import Servo
 from endoscope_core.identification.updated_table import (
+    KINDS,
+    LawParameters,
     TableEntry,
     UpdatedTable,
     UpdatedTableError,
+    blend,
 )
 
 __all__ = [

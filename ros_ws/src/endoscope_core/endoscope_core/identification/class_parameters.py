@@ -10,19 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.choices import PHYSICAL
-from endoscope_core.control.physical_parameters import PhysicalParameters
+from endoscope_core.control.internal_model import PhysicalParameters
 from endoscope_core.dataset import CalibrationDataset
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.identification.feedforward_fit import FeedforwardFit, fit_feedforward
+from endoscope_core.identification.feedforward_fit import FeedforwardFit, Servo, fit_feedforward
 from endoscope_core.identification.hysteresis_fit import ModelFit, Recording, fit_model
-from endoscope_core.identification.parameter_blend import (
+from endoscope_core.identification.plant_fit import fit_plant
+from endoscope_core.identification.updated_table import (
     KINDS,
     LawParameters,
     blend_joints,
-)
-from endoscope_core.identification.plant_fit import fit_plant
-from endoscope_core.identification.servo_lag import Servo
-from endoscope_core.identification.updated_table import (
     parameters_from_dict,
     parameters_to_dict,
     shipped_table_path,

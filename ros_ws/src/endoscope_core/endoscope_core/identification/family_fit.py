@@ -1,4 +1,4 @@
-"""One rig from recordings of all its tubes: what is the rig's, and what the bend changes."""
+"""A family of tubes fitted to recordings of one instrument in several of them."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.identification.hysteresis_fit import IdentificationError
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.family import SIGNED, Readings, TubeFamily
@@ -57,6 +59,12 @@ _OFF = 0.15
 _LINES = tuple(PRIORS)[:12]
 _SIGNED = (*SIGNED, 'friction_profile', 'load_cell_offset', 'load_cell_delay', 'tracker_delay')
 _JOINT = 'bend_x'
+CYCLE_S = 2.0 * np.pi
+"""Seconds of one cycle, and its phase: the motion is a sine of 1 rad/s."""
+ROW_S = 5.0e-3
+"""Seconds between rows. The phase column counts loops and is no clock."""
+PHASE, DESIRED, ACTUAL, POSITIVE, NEGATIVE = 0, 1, 3, 4, 5
+"""Columns: phase in rad, desired and actual angle in deg, tension of both wires in N."""
 
 
 class FamilyFitError(EndoscopeError, ValueError):
@@ -272,3 +280,26 @@ def _check(recordings: Sequence[TubeRecording]) -> None:
         for values in (recording.desired, recording.angle, recording.tension):
             if not np.all(np.isfinite(values)):
                 raise FamilyFitError(f'{name}: a value is not finite')
+
+
+def tube_recordings(folder: Path) -> list[TubeRecording]:
+    """Two cycles in real time of each tube of a folder, from its `BEND.txt` (deg), by bend."""
+    found = []
+    for path in folder.glob('[0-9]*.txt'):
+        table = np.loadtxt(path, delimiter=',')
+        cycles = np.searchsorted(table[:, PHASE], (0.0, CYCLE_S, 2.0 * CYCLE_S)).tolist()
+        if table[-1, PHASE] < 2.0 * CYCLE_S or cycles[0] != 0:
+            raise IdentificationError(f'{path}: fewer than two whole cycles')
+        found.append(
+            TubeRecording(
+                float(np.deg2rad(float(path.stem))),
+                ROW_S,
+                np.deg2rad(table[:, DESIRED]),
+                np.deg2rad(table[:, ACTUAL]),
+                table[:, [POSITIVE, NEGATIVE]],
+                tuple(cycles),
+            )
+        )
+    if not found:
+        raise IdentificationError(f'{folder}: no recordings of tubes (files such as 60.txt)')
+    return sorted(found, key=lambda recording: recording.bend)

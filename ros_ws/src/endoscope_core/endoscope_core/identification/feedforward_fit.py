@@ -1,12 +1,25 @@
-"""Parameters of the feed-forward that makes an identified transmission follow."""
+"""Parameters of the inverse, chosen for the least tracking error on an identified model.
 
+The paper puts the parameters of the transmission straight into equation 5; but there `h` is driven
+by the desired angle instead of the motor's, which is further by the very dead zone that is to be
+crossed, so that the state turns too late at every reversal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
 from endoscope_core.hysteresis import (
+    AsymmetricBoucWenParameters,
+    BoucWenParameters,
+    DahlParameters,
+    PlayParameters,
     PrandtlIshlinskiiParameters,
     direct_inverse,
     forward,
@@ -14,15 +27,133 @@ from endoscope_core.hysteresis import (
     prandtl_ishlinskii_inverse,
 )
 from endoscope_core.hysteresis.inverse import HysteresisParameters
-from endoscope_core.identification.feedforward_candidates import candidates_for
-from endoscope_core.identification.servo_lag import Servo
+from endoscope_core.hysteresis.memory_model import (
+    GREATEST_ALPHA,
+    GREATEST_INVERSE_SLOPE,
+    GREATEST_LAG,
+    SMALLEST_ALPHA,
+)
+from endoscope_core.hysteresis.prandtl_ishlinskii import LONGEST_THRESHOLD, SMALLEST_FIRST_WEIGHT
+from endoscope_core.physics import JointParameters
 from endoscope_core.signals import Signal, sum_of_sines
-from endoscope_core.signals.commissioning import teleoperation_like
+from endoscope_core.signals.motions import teleoperation_like
 
+_RHO = -0.9
+# Parameters rounded for a file must still pass the limit.
+_SLOPE = 0.99 * GREATEST_INVERSE_SLOPE
+
+Bounds = list[tuple[float, float]]
 Array = NDArray[np.float64]
 
 _STEP = 0.004
 _DEG = float(np.pi / 180.0)
+
+
+@dataclass(frozen=True)
+class Servo:
+    """Bandwidth in rad/s and damping ratio of the position loop."""
+
+    bandwidth: float = JointParameters.motor_bandwidth
+    damping_ratio: float = JointParameters.motor_damping_ratio
+
+    @property
+    def lag(self) -> float:
+        """Time in s by which it follows a steady motion late."""
+        return 2.0 * self.damping_ratio / self.bandwidth
+
+    def answer(self, command: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
+        """Motor angle (N,) for a command (N,) held for `dt` s each, beginning at rest on it."""
+        # A node imports this module and never asks: scipy.signal is 26 MB of its memory.
+        from scipy.signal import lfilter
+
+        numerator, denominator = _filter(self.bandwidth, self.damping_ratio, dt)
+        start = command[0]
+        moved: NDArray[np.float64] = lfilter(numerator, denominator, command - start)
+        return start + moved
+
+
+@lru_cache
+def _filter(w: float, z: float, dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    from scipy.signal import cont2discrete
+
+    numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2.0 * z * w, w * w]), dt)
+    return numerator[0], denominator
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """A box, and the parameters that `make` makes of a point of it: safe for every point."""
+
+    bounds: Bounds
+    make: Callable[[Sequence[float]], HysteresisParameters]
+
+
+def candidates_for(model: HysteresisParameters) -> Candidates:
+    """Inverses to choose from for an identified model.
+
+    The steeper the inverse, the better it crosses the dead zone; it is therefore nearly as steep as
+    its class allows, and the travel follows from that, so that every candidate is safe by
+    construction. Gain, lag and sharpness are free; offset and skew are the model's. `rho` hardly
+    matters and is kept where the state leaves saturation gently.
+    """
+    if isinstance(model, PrandtlIshlinskiiParameters):
+        # Its inverse is exact: only the scales of its weights and thresholds are free.
+        return _play_stack(model)
+    gain_and_lag = [
+        (max(0.7 * model.alpha, SMALLEST_ALPHA), min(1.4 * model.alpha, GREATEST_ALPHA)),
+        (0.01, min(2.5 * model.lag + 0.2, GREATEST_LAG)),
+    ]
+    if isinstance(model, BoucWenParameters):
+        return Candidates([*gain_and_lag, (1.0, 4.0)], _bouc_wen)
+    if isinstance(model, DahlParameters):
+        return Candidates([*gain_and_lag, (0.6, 3.0)], lambda x: _dahl(x, model.offset))
+    if isinstance(model, PlayParameters):
+        return Candidates(gain_and_lag, lambda x: _play(x, model.offset))
+    return Candidates([*gain_and_lag, (1.0, 4.0)], lambda x: _asymmetric(x, model))
+
+
+def _bouc_wen(x: Sequence[float]) -> BoucWenParameters:
+    alpha, lag, n = x
+    return BoucWenParameters.from_shape(alpha, lag, lag / (alpha * _SLOPE - 1.0), _RHO, n)
+
+
+def _dahl(x: Sequence[float], offset: float) -> DahlParameters:
+    alpha, lag, exponent = x
+    travel = 2.0**exponent * lag / (alpha * _SLOPE - 1.0)
+    return DahlParameters(alpha, lag, travel, exponent, offset)
+
+
+def _play(x: Sequence[float], offset: float) -> PlayParameters:
+    alpha, lag = x
+    return PlayParameters(alpha, lag, lag / (alpha * _SLOPE - 1.0), offset)
+
+
+def _asymmetric(
+    x: Sequence[float], model: AsymmetricBoucWenParameters
+) -> AsymmetricBoucWenParameters:
+    alpha, lag, n = x
+    skew = min(0.45 * alpha, max(-0.45 * alpha, model.skew))
+    travel = (lag + 1.75 * abs(skew)) / (alpha * _SLOPE - 1.0 - abs(skew))
+    shape = travel, _RHO, n
+    return AsymmetricBoucWenParameters(alpha, lag, skew, model.offset, *shape, *shape)
+
+
+def _play_stack(model: PrandtlIshlinskiiParameters) -> Candidates:
+    total = sum(model.weights)
+    widest = LONGEST_THRESHOLD / max(model.thresholds[-1], 1e-9)
+
+    def make(x: Sequence[float]) -> PrandtlIshlinskiiParameters:
+        gain, width = x
+        weights = [gain * weight for weight in model.weights]
+        weights[0] = max(weights[0], SMALLEST_FIRST_WEIGHT)
+        return PrandtlIshlinskiiParameters(
+            tuple(width * threshold for threshold in model.thresholds),
+            tuple(weights),
+            model.offset,
+        )
+
+    gains = (max(0.7, 0.201 / total), max(0.8, min(1.4, 0.99 * GREATEST_ALPHA / total)))
+    return Candidates([gains, (0.7, max(0.8, min(1.4, widest)))], make)
 
 
 @dataclass(frozen=True)
@@ -111,7 +242,7 @@ class _Case:
     scored: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, signal: Signal, lead: float) -> '_Case':
+    def of(cls, signal: Signal, lead: float) -> _Case:
         time = np.arange(0.0, signal.duration, _STEP)
         angle, velocity = signal(time)
         # What happens before the first reversal depends on where the joint had come from.

@@ -20,8 +20,7 @@ from endoscope_core.identification.class_parameters import (
     load_class_parameters,
     parameters_for_class,
 )
-from endoscope_core.identification.parameter_blend import LawParameters
-from endoscope_core.identification.updated_table import UpdatedTable
+from endoscope_core.identification.updated_table import LawParameters, UpdatedTable
 
 
 class LawChoiceError(EndoscopeError, ValueError):

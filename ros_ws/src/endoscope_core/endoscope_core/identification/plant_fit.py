@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import OptimizeResult, least_squares
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.control.physical_parameters import PhysicalParameters
+from endoscope_core.control.internal_model import PhysicalParameters
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import JointParameters, PlantDescription, simulate
 from endoscope_core.physics.family import CENTRE, MOST_BENT, shipped_family

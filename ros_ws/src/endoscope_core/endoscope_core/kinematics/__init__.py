@@ -1,6 +1,9 @@
 """From bending angles to the pose of the tip, and back; from a tracker's frame to the base's."""
 
 from endoscope_core.kinematics.constant_curvature import (
+    Hinge,
+    Transform,
+    Vertebrae,
     bending_from_orientation,
     centre_line,
     tip_pose,
@@ -12,7 +15,6 @@ from endoscope_core.kinematics.straight_registration import (
     StraightRegistration,
     register_straight,
 )
-from endoscope_core.kinematics.vertebrae import Hinge, Transform, Vertebrae
 
 __all__ = [
     'Hinge',

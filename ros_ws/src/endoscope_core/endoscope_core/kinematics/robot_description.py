@@ -4,7 +4,7 @@ import math
 import xml.etree.ElementTree as ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from endoscope_core.kinematics.vertebrae import VERTEBRAE, Vertebrae
+from endoscope_core.kinematics.constant_curvature import VERTEBRAE, Vertebrae
 
 _RADIUS = 0.15
 _TUBE = 2.0

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from types import ModuleType
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.compiled_cache import SOURCES, cache_folder
+from endoscope_core.compiled import SOURCES, cache_folder
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS

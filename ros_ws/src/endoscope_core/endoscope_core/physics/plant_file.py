@@ -21,8 +21,7 @@ from endoscope_core.physics.functions import FUNCTIONS, describe_place
 from endoscope_core.physics.packing import with_nominal_in_place
 from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_core.physics.recording import recording_faults
-from endoscope_core.schema import Before, Number, blamed_on, read, within
-from endoscope_core.strict_yaml import load_yaml
+from endoscope_core.schema import Before, Number, blamed_on, load_yaml, read, within
 
 UNKNOWN_TERM = 'unknown_term'
 """Id of what is added to the plant and is no effect of the catalogue."""

@@ -10,8 +10,7 @@ import yaml
 from msgspec import Meta
 
 from endoscope_core.choices import LOAD_CELL_DEVICES, MOTOR_DEVICES, TRACKER_DEVICES
-from endoscope_core.schema import one_of, read, within
-from endoscope_core.strict_yaml import load_yaml, parse_yaml
+from endoscope_core.schema import load_yaml, one_of, parse_yaml, read, within
 
 SHIPPED = Path(__file__).with_name('rig.yaml')
 NAME = Meta(

@@ -1,6 +1,7 @@
 """What stands between a command and motion: states, sessions, gates, guards and the shaper."""
 
 from endoscope_core.safety.command_gate import CommandGate, CommandLimits, Refusal
+from endoscope_core.safety.guards import StandingStill, TensionGuard
 from endoscope_core.safety.motion_session import MotionSession
 from endoscope_core.safety.motion_shaper import MotionLimits, MotionShaper
 from endoscope_core.safety.operating_state import (
@@ -10,8 +11,6 @@ from endoscope_core.safety.operating_state import (
     StateCommand,
 )
 from endoscope_core.safety.shaft_motion import ShaftMotion
-from endoscope_core.safety.standing_still import StandingStill
-from endoscope_core.safety.tension_guard import TensionGuard
 
 __all__ = [
     'Answer',

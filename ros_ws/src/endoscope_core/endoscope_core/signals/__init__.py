@@ -1,28 +1,27 @@
 """Motions as functions of time: calibration, the papers' signals, commissioning."""
 
 from endoscope_core.choices import BRIEF, CALIBRATION_MOTIONS, SINUSOID
-from endoscope_core.signals.brief_calibration import brief_calibration
 from endoscope_core.signals.calibration_motion import (
-    CalibrationMotion,
-    UnknownCalibrationError,
-    calibration_motion,
-)
-from endoscope_core.signals.calibration_sinusoid import (
     CALIBRATION_AMPLITUDE,
     CALIBRATION_RATE,
     CALIBRATION_RECORD_DURATION,
     CALIBRATION_SAMPLES,
+    CalibrationMotion,
+    UnknownCalibrationError,
+    brief_calibration,
+    calibration_motion,
     calibration_sinusoid,
 )
-from endoscope_core.signals.catalogue import MOTIONS, both_joints, motion_by_name
-from endoscope_core.signals.commissioning import commissioning_motion
-from endoscope_core.signals.signal import Motion, Signal, hold, sequence
-from endoscope_core.signals.smooth_ramp import come_to_rest, move
-from endoscope_core.signals.tracking_signals import (
+from endoscope_core.signals.motions import (
+    MOTIONS,
+    both_joints,
+    commissioning_motion,
+    motion_by_name,
     non_periodic_signal,
     periodic_signal,
     sum_of_sines,
 )
+from endoscope_core.signals.signal import Motion, Signal, come_to_rest, hold, move, sequence
 
 __all__ = [
     'BRIEF',

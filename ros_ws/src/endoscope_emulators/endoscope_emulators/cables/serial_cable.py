@@ -4,7 +4,7 @@ import os
 import tty
 from pathlib import Path
 
-from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_emulators.cables.byte_relay import ByteRelay, Tap, faithful
 
 

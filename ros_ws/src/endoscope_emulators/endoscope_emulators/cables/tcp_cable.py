@@ -3,7 +3,7 @@
 import socket
 import threading
 
-from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_emulators.cables.byte_relay import ByteRelay, Tap, faithful
 
 

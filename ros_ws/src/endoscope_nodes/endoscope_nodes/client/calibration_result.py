@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 
 from endoscope_core.calibration import words_of
 from endoscope_core.control import PhysicalParameters, Reach, reach
-from endoscope_core.control.physical_parameters import PROFILE
+from endoscope_core.control.internal_model import PROFILE
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_nodes.names import JOINTS, WIRES
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, diagnostic_array, status

@@ -12,8 +12,8 @@ from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 from std_msgs.msg import Header, String
 
-from endoscope_core.closed_on_exit import ClosedOnExit
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_nodes.client.order_feedback import OrderFeedback, OrderState
 from endoscope_nodes.names import (
     AWAITED,

@@ -24,11 +24,11 @@ from endoscope_core.classifier.classification import (
     ClassifierError,
     UnseenTensionError,
 )
-from endoscope_core.classifier.shipped import load_classifier
+from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import PhysicalParameters
 from endoscope_core.identification.plant_fit import PlantFitError, plants_of_calibration
 from endoscope_core.safety import StateCommand, TensionGuard
-from endoscope_core.safety.standing_still import TOLD_RAD
+from endoscope_core.safety.guards import TOLD_RAD
 from endoscope_core.signals import SINUSOID, calibration_motion
 from endoscope_nodes.client.calibration_result import (
     aborted_result,

@@ -22,7 +22,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from endoscope_core.atomic_output import with_final_names
-from endoscope_core.closed_on_exit import ClosedOnExit
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.rig import Rig
 from endoscope_nodes.runtime.declared_parameters import check_overrides
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode

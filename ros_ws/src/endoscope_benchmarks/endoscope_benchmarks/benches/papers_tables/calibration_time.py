@@ -13,7 +13,7 @@ def rows(settings: PapersBench) -> list[Row]:
 
     from endoscope_benchmarks.trials.never_seen_tube import never_seen_tube
     from endoscope_core.classifier.classification import UnseenTensionError
-    from endoscope_core.classifier.shipped import load_classifier
+    from endoscope_core.classifier.weights_file import load_classifier
     from endoscope_core.dataset import record_calibration
     from endoscope_core.identification.plant_fit import plants_of_calibration
     from endoscope_core.rig import shipped_rig

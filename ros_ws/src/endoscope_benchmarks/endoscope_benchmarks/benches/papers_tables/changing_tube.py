@@ -27,7 +27,7 @@ def rows(settings: PapersBench) -> list[Row]:
         within_reach,
     )
     from endoscope_benchmarks.trials.tracking_trial import run_tracking_trial
-    from endoscope_core.classifier.shipped import load_classifier
+    from endoscope_core.classifier.weights_file import load_classifier
     from endoscope_core.control import (
         AdaptiveBacklashController,
         FeedforwardLaw,

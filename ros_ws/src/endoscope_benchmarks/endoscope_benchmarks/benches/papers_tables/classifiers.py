@@ -66,7 +66,7 @@ def rows(settings: PapersBench) -> list[Row]:
 def _ours(name: str, dataset: 'CalibrationDataset', settings: PapersBench) -> list[Row]:
     """The classifier that comes with the project, which was trained on none of the recordings."""
     from endoscope_core.classifier.cnn_classifier import course
-    from endoscope_core.classifier.shipped import load_classifier
+    from endoscope_core.classifier.weights_file import load_classifier
 
     settings.report(f'ours, {name}')
     classifier = load_classifier(motion=dataset.motion)

@@ -35,7 +35,7 @@ def rows(settings: PapersBench) -> list[Row]:
         never_seen_tube,
     )
     from endoscope_benchmarks.trials.tracking_trial import run_tracking_trial
-    from endoscope_core.classifier.shipped import load_classifier
+    from endoscope_core.classifier.weights_file import load_classifier
     from endoscope_core.control import FeedforwardLaw
     from endoscope_core.identification.law_choice import LawChoice
     from endoscope_core.signals import non_periodic_signal, periodic_signal

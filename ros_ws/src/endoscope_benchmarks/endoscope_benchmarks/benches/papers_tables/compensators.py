@@ -32,7 +32,7 @@ def rows(settings: PapersBench) -> list[Row]:
     """Both signals, both joints at once, feed-forward alone and with the 40 Hz tracker."""
     from endoscope_benchmarks.trials.never_seen_tube import calibrate, never_seen_tube, within_reach
     from endoscope_benchmarks.trials.tracking_trial import run_tracking_trial
-    from endoscope_core.classifier.shipped import load_classifier
+    from endoscope_core.classifier.weights_file import load_classifier
     from endoscope_core.control import (
         AdaptiveBacklashController,
         FeedforwardLaw,

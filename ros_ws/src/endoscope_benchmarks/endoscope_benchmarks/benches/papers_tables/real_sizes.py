@@ -40,7 +40,7 @@ def rows(settings: PapersBench) -> list[Row]:
 def _of_the_network(recordings: 'Sequence[RealRecording]') -> Row:
     """The shipped network, which knows 90 deg where these tubes were moved by 60."""
     from endoscope_core.classifier.cnn_classifier import course
-    from endoscope_core.classifier.shipped import load_classifier
+    from endoscope_core.classifier.weights_file import load_classifier
     from endoscope_core.signals import CALIBRATION_RATE, calibration_motion
 
     classifier, motion = load_classifier(), calibration_motion()

@@ -1,4 +1,4 @@
-"""Collects wire tensions by their stamps and lays them on the grid that the classifier reads."""
+"""What a calibration records: tensions on the classifier's grid, bending angles, zeros of cells."""
 
 from collections.abc import Sequence
 
@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.metrics import width_at_mid_height
+from endoscope_core.signals import calibration_sinusoid
 
 Array = NDArray[np.float64]
 
@@ -19,6 +21,9 @@ calibration_rate` measures.
 
 LONGEST_INTERVAL_NS = 12_500_000
 """Longest interval in which an instant may lie on average: 100 Hz, a quarter for lost readings."""
+WORTH_TELLING = 0.3
+"""In N: three standard deviations of the poorest zeros that the classifier was trained with."""
+_WINDOW = 50
 
 
 class TensionGapError(EndoscopeError, ValueError):
@@ -124,3 +129,78 @@ class TensionRecord:
         """Length in ns of the interval in which an instant lies on average."""
         lengths = intervals.astype(float)
         return float(np.sum(lengths**2) / np.sum(lengths))
+
+
+class BendingRecord:
+    """Collects measured bending angles and compares them with the calibration sinusoid.
+
+    Parameters
+    ----------
+    joints
+        Number of joints J.
+    """
+
+    def __init__(self, joints: int) -> None:
+        self._joints = joints
+        self._stamps: list[int] = []
+        self._angles: list[Sequence[float]] = []
+
+    def add(self, stamp_ns: int, angle: Sequence[float]) -> None:
+        """Take a reading in rad, shape (J,)."""
+        self._stamps.append(stamp_ns)
+        self._angles.append(angle)
+
+    def backlash_size(self, start_ns: int) -> float | None:
+        """Mean backlash size of the joints in the last whole period of the sinusoid.
+
+        Parameters
+        ----------
+        start_ns
+            Stamp at which the sinusoid began.
+
+        Returns
+        -------
+        float or None
+            In rad; None where the readings do not cover the period or show no loop.
+        """
+        signal = calibration_sinusoid()
+        begin, end = signal.steady
+        time = (np.array(self._stamps, dtype=np.int64) - start_ns) * 1e-9
+        inside = (time >= begin) & (time < end)
+        covered = np.concatenate(([begin], time[inside], [end]))
+        if np.max(np.diff(covered)) > 0.02 * (end - begin):
+            return None
+        desired = signal(time[inside])[0]
+        angles = np.array(self._angles)[inside]
+        try:
+            sizes = [width_at_mid_height(desired, angles[:, j]) for j in range(self._joints)]
+        except ValueError:
+            return None
+        return float(np.mean(sizes))
+
+
+def zero_errors(tension: Array) -> Array:
+    """What cells read in N where their wires hang loose, shape (W,).
+
+    At the ends of a calibration motion one wire of a joint pulls and the other is paid out until it
+    is slack, for a fifth of the time in the median of simulated tubes. The least mean over 50 ms is
+    then the zero, which noise hardly moves.
+
+    Parameters
+    ----------
+    tension : ndarray, shape (N, W)
+        N at 1 kHz, of a whole calibration.
+    """
+    sums = np.cumsum(tension, axis=0)
+    least: Array = ((sums[_WINDOW:] - sums[:-_WINDOW]) / _WINDOW).min(axis=0)
+    return least
+
+
+def words_of(errors: Array, wires: Sequence[str]) -> str:
+    """Sentence that names the cells whose zero is off by much of `errors` (N); empty if none is."""
+    told = [
+        f'{wire} by {error:+.2f} N'
+        for wire, error in zip(wires, errors.tolist(), strict=True)
+        if abs(error) > WORTH_TELLING
+    ]
+    return f'zero of a load cell is off: {", ".join(told)}; set it again' if told else ''

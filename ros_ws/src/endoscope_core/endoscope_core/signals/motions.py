@@ -1,14 +1,75 @@
-"""A motion rich enough to tell the causes of a mismatch apart."""
+"""Motions of both joints by name: those of the papers, and the one for commissioning."""
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
-from endoscope_core.signals.calibration_sinusoid import calibration_sinusoid
-from endoscope_core.signals.signal import FloatArray, Motion, Signal, hold, sequence
-from endoscope_core.signals.smooth_ramp import move, window
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.signals.calibration_motion import calibration_sinusoid
+from endoscope_core.signals.signal import FloatArray, Motion, Signal, hold, move, sequence, window
 
+RAMP_DURATION = 1.0
 CORNER = 0.1
+
+
+def sum_of_sines(
+    name: str,
+    components: Sequence[tuple[float, float]],
+    duration: float,
+    ramp: float = RAMP_DURATION,
+) -> Signal:
+    """Sum of sines whose amplitude rises from and falls to zero.
+
+    Parameters
+    ----------
+    name : str
+        Name of the signal.
+    components : sequence of (float, float)
+        Amplitude in rad and angular frequency in rad/s of each sine.
+    duration : float
+        Length in s, ramps included.
+    ramp : float
+        Length in s of the rise and of the fall.
+
+    Returns
+    -------
+    Signal
+        Its `steady` interval leaves out both ramps and the first quarter period of the slowest
+        sine, after which the hysteresis no longer remembers how the motion began.
+
+    Raises
+    ------
+    ValueError
+        If `duration` leaves no steady interval.
+    """
+    quarter = 0.5 * np.pi / min(omega for _, omega in components)
+    steady = (max(ramp, quarter), duration - ramp)
+    if steady[1] <= steady[0]:
+        raise ValueError(
+            f'{name}: {duration:g} s are too short, give more than {steady[0] + ramp:.3g} s'
+        )
+
+    def evaluate(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        gain, rate = window(time, duration, ramp, ramp)
+        sine = sum((a * np.sin(w * time) for a, w in components), np.zeros_like(time))
+        cosine = sum((a * w * np.cos(w * time) for a, w in components), np.zeros_like(time))
+        return gain * sine, gain * cosine + rate * sine
+
+    return Signal(name, duration, evaluate, steady)
+
+
+def periodic_signal(duration: float = 4.5 * np.pi) -> Signal:
+    """``60 sin(t)`` deg at 0.159 Hz (1 rad/s), the periodic signal of the first paper."""
+    return sum_of_sines('periodic', [(np.deg2rad(60.0), 1.0)], duration)
+
+
+def non_periodic_signal(duration: float = 25.0) -> Signal:
+    """``30 sin(t) + 30 sin(sqrt(3) t)`` deg, the non-periodic signal of the first paper."""
+    half = float(np.deg2rad(30.0))
+    return sum_of_sines('non_periodic', [(half, 1.0), (half, float(np.sqrt(3.0)))], duration)
 
 
 def triangle(amplitude: float, speed: float) -> Signal:
@@ -137,3 +198,37 @@ def commissioning_motion(seed: int = 1) -> Motion:
         ],
     )
     return Motion('commissioning', {'bend_x': x, 'bend_y': y})
+
+
+class UnknownMotionError(EndoscopeError, ValueError):
+    """A motion that is not in the catalogue."""
+
+
+def both_joints(signal: Signal) -> Motion:
+    """The same signal for `bend_x` and `bend_y`."""
+    return Motion(signal.name, {'bend_x': signal, 'bend_y': signal})
+
+
+MOTIONS: dict[str, Callable[[], Motion]] = {
+    'calibration': lambda: both_joints(calibration_sinusoid()),
+    'periodic': lambda: both_joints(periodic_signal()),
+    'non_periodic': lambda: both_joints(non_periodic_signal()),
+    'commissioning': commissioning_motion,
+}
+"""What makes each motion, by its name."""
+
+
+def motion_by_name(name: str) -> Motion:
+    """Motion of both joints called `name`.
+
+    Raises
+    ------
+    UnknownMotionError
+        If there is none of that name; the message names the nearest.
+    """
+    if name not in MOTIONS:
+        near = difflib.get_close_matches(name, MOTIONS, n=1, cutoff=0.0)
+        raise UnknownMotionError(
+            f'unknown motion {name!r}, nearest is {near[0]!r} (known: {", ".join(MOTIONS)})'
+        )
+    return MOTIONS[name]()

@@ -1,4 +1,7 @@
-"""The 1D-CNN of Table 2 of the first paper, as PyTorch trains it."""
+"""The 1D-CNN of Table 2 of the first paper as PyTorch trains it, and what its networks share.
+
+Only training needs PyTorch; without it, importing this module says in one line how to get it.
+"""
 
 from itertools import pairwise
 
@@ -6,8 +9,37 @@ import numpy as np
 
 from endoscope_core.classifier.classification import WIRES
 from endoscope_core.classifier.cnn_classifier import CHANNELS, STRIDE
-from endoscope_core.classifier.pytorch import Tensor, nn
-from endoscope_core.classifier.standardised_tension import StandardisedTension
+from endoscope_core.errors import EndoscopeError
+
+try:
+    import torch
+    from torch import Tensor, nn
+except ModuleNotFoundError as error:
+    raise EndoscopeError(
+        'training the networks of the first paper needs PyTorch: run `make -C ros_ws train`, '
+        'which says how large it is'
+    ) from error
+
+
+class StandardisedTension(nn.Module):
+    """A network that sees each wire by mean and spread of what it is trained on."""
+
+    offset: Tensor  # (4, 1) in N, like `scale` kept with the weights
+    scale: Tensor
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.register_buffer('offset', torch.zeros(WIRES, 1))
+        self.register_buffer('scale', torch.ones(WIRES, 1))
+
+    def standardise_by(self, tension: Tensor) -> None:
+        """Take mean and spread of each wire over recordings (R, 4, N) as the unit of the input."""
+        self.offset = tension.mean(dim=(0, 2)).unsqueeze(1)
+        self.scale = tension.std(dim=(0, 2)).unsqueeze(1)
+
+    def unitless(self, tension: Tensor) -> Tensor:
+        """Tensions (R, 4, N) in N by that unit."""
+        return (tension - self.offset) / self.scale
 
 
 class TensionCnn(StandardisedTension):

@@ -1,8 +1,12 @@
-"""What makes a motion of measured or commanded samples quiet at rest and smooth on the way."""
+"""Bounds that a compensator keeps to, and steps that keep to them smoothly."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cache
+
+from endoscope_core.rig import Rig, shipped_rig
 
 COUNT = 2.0 * math.pi / 4096.0
 """Angle in rad between two neighbouring counts of a 12-bit encoder, as handles have it."""
@@ -13,6 +17,54 @@ SHARE_OF_TRAVEL = 0.5
 Below 1, so that nothing that fades in or out, is worked off or was learnt turns the motion round
 that was asked for, and nothing moves while nothing is asked for.
 """
+
+
+@dataclass(frozen=True)
+class MotorLimits:
+    """Bounds that a compensator keeps to.
+
+    Parameters
+    ----------
+    gear : float
+        Shaft angle for one radian of desired bending.
+    travel : float
+        Largest shaft angle either way, rad.
+    speed : float
+        Largest speed of the shaft, rad/s.
+    tension : float
+        Largest tension of a wire at the motor, N.
+
+    Raises
+    ------
+    ValueError
+        If one is not positive and finite.
+    """
+
+    gear: float
+    travel: float
+    speed: float
+    tension: float
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f'{name} = {value} must be positive and finite')
+
+    @classmethod
+    def of(cls, rig: Rig) -> MotorLimits:
+        """Those of a rig; a wire may be pulled as far as a calibration pulls it."""
+        return cls(
+            gear=rig.joints.gear,
+            travel=rig.joints.drive * rig.joints.gear,
+            speed=rig.motors.speed,
+            tension=rig.tension.calibration_ceiling,
+        )
+
+
+@cache
+def shipped_limits() -> MotorLimits:
+    """Those of the rig that is shipped."""
+    return MotorLimits.of(shipped_rig())
 
 
 class Play:

@@ -1,4 +1,4 @@
-"""Size of the backlash: how wide the loop of actual against desired angle is."""
+"""Figures of merit: the size of a backlash, and how far a joint is from the desired angle."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from endoscope_core.errors import EndoscopeError
+
+__all__ = ['NoLoopError', 'tracking_rmse', 'width_at_mid_height']
 
 
 class NoLoopError(EndoscopeError, ValueError):
@@ -82,3 +84,29 @@ def _crossings(
         where = float(np.mean(u[passes] + weight * (u[passes + 1] - u[passes])))
         (rising if side[k] < 0 else falling).append(where)
     return np.array(rising), np.array(falling)
+
+
+def tracking_rmse(desired: ArrayLike, actual: ArrayLike) -> float:
+    """Root of the mean square of ``actual - desired`` over all samples, in the unit of the input.
+
+    Parameters
+    ----------
+    desired, actual : array_like, same shape
+        Angles at the same instants.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, there are no samples, or a value is not finite.
+    """
+    a, d = np.asarray(actual, dtype=float), np.asarray(desired, dtype=float)
+    if a.shape != d.shape:
+        raise ValueError(
+            f'actual has shape {a.shape}, desired has shape {d.shape}: they must be equal'
+        )
+    if a.size == 0:
+        raise ValueError('actual and desired hold no samples')
+    error = a - d
+    if not np.all(np.isfinite(error)):
+        raise ValueError('actual or desired holds values that are not finite')
+    return float(np.sqrt(np.mean(error**2)))
