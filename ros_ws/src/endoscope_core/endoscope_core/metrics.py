@@ -22,6 +22,9 @@ def width_at_mid_height(desired: ArrayLike, actual: ArrayLike) -> float:
     through it. Positive where the actual angle lags. With several loops the mean is taken; noise
     that crosses the level to and fro is averaged out because a run of crossings is weighed as one.
 
+    NoLoopError if the actual angle does not pass its middle both upwards and downwards. ValueError
+    if the shapes are wrong or a value is not finite.
+
     Parameters
     ----------
     desired, actual : array_like, shape (N,)
@@ -31,13 +34,6 @@ def width_at_mid_height(desired: ArrayLike, actual: ArrayLike) -> float:
     -------
     float
         Width in the unit of `desired`.
-
-    Raises
-    ------
-    NoLoopError
-        If the actual angle does not pass its middle both upwards and downwards.
-    ValueError
-        If the shapes are wrong or a value is not finite.
     """
     u = np.asarray(desired, dtype=float)
     q = np.asarray(actual, dtype=float)
@@ -89,15 +85,12 @@ def _crossings(
 def tracking_rmse(desired: ArrayLike, actual: ArrayLike) -> float:
     """Root of the mean square of ``actual - desired`` over all samples, in the unit of the input.
 
+    ValueError if the shapes differ, there are no samples, or a value is not finite.
+
     Parameters
     ----------
     desired, actual : array_like, same shape
         Angles at the same instants.
-
-    Raises
-    ------
-    ValueError
-        If the shapes differ, there are no samples, or a value is not finite.
     """
     a, d = np.asarray(actual, dtype=float), np.asarray(desired, dtype=float)
     if a.shape != d.shape:

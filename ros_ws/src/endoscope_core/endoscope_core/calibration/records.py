@@ -88,15 +88,12 @@ class TensionRecord:
     def resampled(self) -> Array:
         """Tensions at the instants of the grid by linear interpolation.
 
+        TensionGapError where a gap is too long, or the readings are too far apart.
+
         Returns
         -------
         ndarray, shape (N, W)
             In N.
-
-        Raises
-        ------
-        TensionGapError
-            A gap is too long, or the readings are too far apart.
         """
         since = self._stamps[: self._count] - self.start_ns
         intervals = self._intervals()

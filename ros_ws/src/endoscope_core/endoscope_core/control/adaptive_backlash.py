@@ -30,56 +30,33 @@ from endoscope_core.control.tracker_feedback import (
 
 @dataclass(frozen=True)
 class AdaptiveBacklashSettings:
-    """Gains and limits of the law; angles in rad, times in s.
+    """Gains and limits of the law; angles in rad, times in s."""
 
-    Parameters
-    ----------
-    gain_rate, backlash_rate, bound_rate : float
-        ``gamma_g`` (1/(rad^2 s)), ``gamma_D`` (1/s), ``gamma_r`` (1/s).
-    leakage, bound_leakage : float
-        ``sigma`` (1/s) and ``sigma_r`` (dimensionless).
-    integral_weight : float
-        ``lambda``, 1/s.
-    boundary_layer : float
-        ``epsilon``, rad.
-    loop_gain : float
-        Greatest ``r / epsilon``, below 1.
-    filter_time : float
-        Time constant of the robust term.
-    error_limit : float
-        An error beyond counts as this much: the transient of a reversal is not to be learnt from.
-    integral_limit : float
-        Limit of ``lambda integral(e)``.
-    gain_limit, backlash_limit, output_limit : float
-        Projection of ``g`` and ``D``, limit of the correction.
-    direction_travel : float
-        rad of desired motion over which ``s`` turns round.
-    lead : float
-        s by which the desired angle is foreseen, as in the feed-forward.
-    response_delay : float
-        s from command to answer: the estimates learn from what was desired that long before the
-        measurement.
-    dead_band : float
-        rad by which the foreseen angle may turn back without any effect, as in the feed-forward.
-    """
-
+    # ``gamma_g`` (1/(rad^2 s)), ``gamma_D`` (1/s), ``gamma_r`` (1/s).
     gain_rate: float = 1.0
     backlash_rate: float = 2.0
     bound_rate: float = 0.05
+    # ``sigma`` (1/s) and ``sigma_r`` (dimensionless).
     leakage: float = 0.005
     bound_leakage: float = 1.0
-    integral_weight: float = 0.2
-    boundary_layer: float = math.radians(6.0)
-    loop_gain: float = 0.3
-    filter_time: float = 0.3
+    integral_weight: float = 0.2  # ``lambda``, 1/s
+    boundary_layer: float = math.radians(6.0)  # ``epsilon``, rad
+    loop_gain: float = 0.3  # greatest ``r / epsilon``, below 1
+    filter_time: float = 0.3  # time constant of the robust term
+    # An error beyond counts as this much: the transient of a reversal is not to be learnt from.
     error_limit: float = math.radians(4.0)
-    integral_limit: float = math.radians(2.0)
+    integral_limit: float = math.radians(2.0)  # limit of ``lambda integral(e)``
+    # Projection of ``g`` and ``D``, limit of the correction.
     gain_limit: float = 0.5
     backlash_limit: float = math.radians(45.0)
     output_limit: float = math.radians(60.0)
+    # rad of desired motion over which ``s`` turns round.
     direction_travel: float = math.radians(1.0)
-    lead: float = 0.06
+    lead: float = 0.06  # s by which the desired angle is foreseen, as in the feed-forward
+    # s from command to answer: the estimates learn from what was desired that long before the
+    # measurement.
     response_delay: float = 0.06
+    # rad by which the foreseen angle may turn back without any effect, as in the feed-forward.
     dead_band: float = 2.0 * COUNT
 
     def __post_init__(self) -> None:

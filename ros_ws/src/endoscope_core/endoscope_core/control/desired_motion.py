@@ -87,6 +87,9 @@ class DesiredMotion:
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Angles and velocities for a message.
 
+        ValueError if an input has another size or is not finite, or `dt` is not positive; nothing
+        changes then.
+
         Parameters
         ----------
         position : sequence of float, shape (J,)
@@ -100,12 +103,6 @@ class DesiredMotion:
         -------
         angles, velocities : tuple of float, shape (J,)
             rad and rad/s.
-
-        Raises
-        ------
-        ValueError
-            If an input has another size or is not finite, or `dt` is not positive; nothing changes
-            then.
         """
         said: Sequence[float | None] = velocity if len(velocity) else [None] * self._count
         numbers = [*position, *velocity]

@@ -121,22 +121,14 @@ def parameters_of(mode: str) -> type[LawParameters]:
 class FeedforwardLaw:
     """What the compensator does with a desired angle.
 
-    Parameters
-    ----------
-    mode : str
-        One of `MODES`. 'none' passes the desired angle through, the names of hysteresis models
-        invert them, 'physical' inverts the plant and 'adaptive_physical' also learns the plant from
-        the tracker.
-    parameters : tuple
-        One for each joint, of the mode's kind; may be empty in mode 'none'.
-
-    Raises
-    ------
-    ValueError
-        If the mode is unknown, or lacks parameters of its kind: no motion is guessed.
+    ValueError if the mode is unknown, or lacks parameters of its kind: no motion is guessed.
     """
 
+    # One of `MODES`. 'none' passes the desired angle through, the names of hysteresis models
+    # invert them, 'physical' inverts the plant and 'adaptive_physical' also learns the plant from
+    # the tracker.
     mode: str = 'none'
+    # One for each joint, of the mode's kind; may be empty in mode 'none'.
     parameters: tuple[LawParameters, ...] = ()
 
     def __post_init__(self) -> None:
@@ -158,37 +150,24 @@ class FeedforwardLaw:
 
 @dataclass(frozen=True)
 class FeedforwardSettings:
-    """How the feed-forward moves in time.
+    """How the feed-forward moves in time; angles in rad, times in s."""
 
-    Parameters
-    ----------
-    lead : float
-        s by which the desired angle is foreseen, ``theta_d + lead theta_d'``: the servo's own lag,
-        so that the motor has crossed the dead zone when the joint is to turn back. 0 gives equation
-        5 as printed. The physical modes know their servo and take no notice.
-    speed_limit : float
-        Greatest speed of the command in rad/s. A reversal at high acceleration asks for more; the
-        motor could not follow it and a gate before the motor would refuse it.
-    offset_rate : float
-        Greatest speed in rad/s at which the jump left by a switch is worked off; never by more than
-        half of what the desired angle moves, so that nothing moves while it rests.
-    offset_time : float
-        Time constant in s of the last part of that.
-    resting_travel : float
-        rad over which the memory of the direction builds up in mode 'none'.
-    dead_band : float
-        rad by which the foreseen angle may turn back without any effect: two counts of an encoder.
-    limits : MotorLimits
-        That the physical modes keep to.
-    """
-
+    # s by which the desired angle is foreseen, ``theta_d + lead theta_d'``: the servo's own lag,
+    # so that the motor has crossed the dead zone when the joint is to turn back. 0 gives equation
+    # 5 as printed. The physical modes know their servo and take no notice.
     lead: float = 0.06
+    # Greatest speed of the command in rad/s. A reversal at high acceleration asks for more; the
+    # motor could not follow it and a gate before the motor would refuse it.
     speed_limit: float = 20.0
+    # Greatest speed in rad/s at which the jump left by a switch is worked off; never by more than
+    # half of what the desired angle moves, so that nothing moves while it rests.
     offset_rate: float = 0.5
-    offset_time: float = 0.3
+    offset_time: float = 0.3  # time constant in s of the last part of that
+    # rad over which the memory of the direction builds up in mode 'none'.
     resting_travel: float = math.radians(1.0)
+    # rad by which the foreseen angle may turn back without any effect: two counts of an encoder.
     dead_band: float = 2.0 * COUNT
-    limits: MotorLimits = field(default_factory=shipped_limits)
+    limits: MotorLimits = field(default_factory=shipped_limits)  # that the physical modes keep to
 
     def __post_init__(self) -> None:
         if not (0.0 <= self.lead <= 0.5):
@@ -217,17 +196,15 @@ class _Joint:
 class Feedforward:
     """Feed-forward of all joints; its law can be changed while it runs without a jump.
 
+    The difference between what the old law put out and what the new one wants becomes an offset
+    that is worked off while the desired angle moves. The command's speed is at most `speed_limit`
+    in every mode.
+
     Parameters
     ----------
     joints : int
         Number of joints.
     settings : FeedforwardSettings, optional
-
-    Notes
-    -----
-    The difference between what the old law put out and what the new one wants becomes an offset
-    that is worked off while the desired angle moves. The command's speed is at most `speed_limit`
-    in every mode.
     """
 
     def __init__(self, joints: int, settings: FeedforwardSettings | None = None) -> None:
@@ -259,10 +236,7 @@ class Feedforward:
     def select(self, law: FeedforwardLaw) -> None:
         """Put another law in force from the next step on; the command goes on from where it is.
 
-        Raises
-        ------
-        ValueError
-            If the law has parameters for another number of joints; the law in force stays.
+        ValueError if the law has parameters for another number of joints; the law in force stays.
         """
         if law.parameters and len(law.parameters) != self._count:
             raise ValueError(
@@ -278,6 +252,8 @@ class Feedforward:
     def rebase(self, command: Vector, desired: Vector | None = None) -> None:
         """Go on from this command (J,) in rad, sent by someone else meanwhile, without a jump.
 
+        ValueError if an angle has another size or is not finite.
+
         Parameters
         ----------
         command
@@ -285,11 +261,6 @@ class Feedforward:
         desired
             Desired angle in rad, shape (J,), that a new stream begins at, at rest; by default the
             stream goes on.
-
-        Raises
-        ------
-        ValueError
-            If an angle has another size or is not finite.
         """
         start = self._checked('command', command)
         if desired is not None:
@@ -309,6 +280,9 @@ class Feedforward:
     def step(self, desired: Vector, velocity: Vector, dt: float) -> NDArray[np.float64]:
         """Command for the desired angle.
 
+        ValueError if an input has another size or is not finite, or `dt` is not positive; nothing
+        changes then.
+
         Parameters
         ----------
         desired, velocity : sequence of float, shape (J,)
@@ -320,12 +294,6 @@ class Feedforward:
         -------
         ndarray, shape (J,)
             Joint-equivalent motor angle in rad, without any feedback correction.
-
-        Raises
-        ------
-        ValueError
-            If an input has another size or is not finite, or `dt` is not positive; nothing changes
-            then.
         """
         angles = self._checked('desired', desired)
         speeds = self._checked('velocity', velocity)
@@ -346,10 +314,7 @@ class Feedforward:
         A joint that has rested since the last ones learns nothing, and what another learns enters
         its command as it moves: the difference becomes an offset, as after a switch.
 
-        Raises
-        ------
-        ValueError
-            If the angles have another size or are not finite.
+        ValueError if the angles have another size or are not finite.
         """
         angles = self._checked('angle', angle)
         for joint, measured in zip(self._joints, angles, strict=False):

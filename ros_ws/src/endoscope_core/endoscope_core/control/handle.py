@@ -27,36 +27,24 @@ class HandleRefusal(StrEnum):
 
 @dataclass(frozen=True)
 class HandleSettings:
-    """How a handle is read.
+    """How a handle is read; angles in rad, times in s.
 
-    Parameters
-    ----------
-    resolution : float
-        Angle in rad of one count of its encoder. At rest a reading may dither by one count either
-        way without any motion of the slave.
-    bandwidth : float
-        Of the smoothing, in rad/s. 60 rad/s leaves half the power at 6 Hz: goal-directed motion of
-        an arm needs 5.6 Hz, that of a hand up to 9.2 Hz (Draper, IEEE Trans. Systems, Man, and
-        Cybernetics 24(6), 1994), physiological tremor lies at 8 to 12 Hz, and the servo of the
-        nominal plant is no faster either.
-    timeout : float
-        Silence in s after which the handle counts as gone.
-    top_speed : float
-        Greatest speed of a hand in rad/s. Turning it through 180 deg in 0.3 s, along the smoothest
-        path of that length, peaks at ``1.875 pi / 0.3 = 20 rad/s`` (Flash and Hogan 1985).
-    jitter : float
-        By how much, in s, a sample may be received later than its stamp lets expect.
-
-    Raises
-    ------
-    ValueError
-        If one of them is not positive and finite.
+    ValueError if one of them is not positive and finite.
     """
 
+    # Angle in rad of one count of its encoder. At rest a reading may dither by one count either
+    # way without any motion of the slave.
     resolution: float = COUNT
+    # Of the smoothing, in rad/s. 60 rad/s leaves half the power at 6 Hz: goal-directed motion of
+    # an arm needs 5.6 Hz, that of a hand up to 9.2 Hz (Draper, IEEE Trans. Systems, Man, and
+    # Cybernetics 24(6), 1994), physiological tremor lies at 8 to 12 Hz, and the servo of the
+    # nominal plant is no faster either.
     bandwidth: float = 60.0
-    timeout: float = 0.1
+    timeout: float = 0.1  # silence in s after which the handle counts as gone
+    # Greatest speed of a hand in rad/s. Turning it through 180 deg in 0.3 s, along the smoothest
+    # path of that length, peaks at ``1.875 pi / 0.3 = 20 rad/s`` (Flash and Hogan 1985).
     top_speed: float = 20.0
+    # By how much, in s, a sample may be received later than its stamp lets expect.
     jitter: float = 0.02
 
     def __post_init__(self) -> None:
@@ -220,17 +208,13 @@ class Handle:
         What the hand did within the lag before is followed, too: a hand that moves while it engages
         is not stopped short.
 
+        RuntimeError where no sample of the handle has been taken. ValueError if the pose has
+        another size or is not finite.
+
         Parameters
         ----------
         slave : sequence of float, shape (J,)
             Measured pose of the slave in rad.
-
-        Raises
-        ------
-        RuntimeError
-            No sample of the handle has been taken.
-        ValueError
-            If the pose has another size or is not finite.
         """
         if not self._smooth:
             raise RuntimeError('the handle has not been heard: nothing can be engaged')

@@ -49,14 +49,9 @@ _BEYOND = 10.0
 
 @dataclass(frozen=True)
 class PhysicalParameters:
-    """One joint behind one tube.
+    """One joint behind one tube."""
 
-    Parameters
-    ----------
-    joint : JointParameters
-        Of the nominal plant; the capstan exponent is the tube's.
-    """
-
+    # Of the nominal plant; the capstan exponent is the tube's.
     joint: JointParameters = field(default_factory=JointParameters)
 
     def to_dict(self) -> dict[str, Any]:
@@ -68,10 +63,7 @@ class PhysicalParameters:
     def from_dict(cls, values: Mapping[str, Any]) -> PhysicalParameters:
         """Parameters from a mapping of exactly their names.
 
-        Raises
-        ------
-        ValueError
-            If a name is missing or unknown, or a value is out of range.
+        ValueError if a name is missing or unknown, or a value is out of range.
         """
         names = {item.name for item in fields(JointParameters)}
         if set(values) != names:
@@ -373,10 +365,6 @@ def reach(joint: JointParameters, limits: MotorLimits | None = None) -> Reach:
         With the friction of the tube at hand.
     limits : MotorLimits, optional
         Those of the shipped rig if not given.
-
-    Returns
-    -------
-    Reach
     """
     model = InternalModel(joint, limits or shipped_limits())
     there_and_back = [_BEYOND, -_BEYOND] * 2

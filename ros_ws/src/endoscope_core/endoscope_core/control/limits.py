@@ -21,29 +21,15 @@ that was asked for, and nothing moves while nothing is asked for.
 
 @dataclass(frozen=True)
 class MotorLimits:
-    """Bounds that a compensator keeps to.
+    """Bounds in rad, rad/s and N that a compensator keeps to.
 
-    Parameters
-    ----------
-    gear : float
-        Shaft angle for one radian of desired bending.
-    travel : float
-        Largest shaft angle either way, rad.
-    speed : float
-        Largest speed of the shaft, rad/s.
-    tension : float
-        Largest tension of a wire at the motor, N.
-
-    Raises
-    ------
-    ValueError
-        If one is not positive and finite.
+    ValueError if one is not positive and finite.
     """
 
-    gear: float
-    travel: float
-    speed: float
-    tension: float
+    gear: float  # shaft angle for one radian of desired bending
+    travel: float  # largest shaft angle either way, rad
+    speed: float  # largest speed of the shaft, rad/s
+    tension: float  # largest tension of a wire at the motor, N
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -47,32 +47,18 @@ _STRAIGHTEST, _MOST_BENT = 0.02, 4.5
 
 @dataclass(frozen=True)
 class PlantLearningSettings:
-    """How fast the tube is believed to change and how far the tracker is believed.
+    """How fast the tube is believed to change, how far the tracker is believed; rad and s."""
 
-    Parameters
-    ----------
-    tracker_noise : float
-        rad, with what the model cannot explain.
-    timing : float
-        s by which model and tracker may be apart: a measurement counts little while the tip darts.
-    drift : float
-        Standard deviation of the change of ``log(capstan_exponent)`` in one second.
-    surprise : float
-        Innovation, in its standard deviations, that counts as surprising.
-    surprises : int
-        Surprising measurements in a row after which the tube is taken to have changed.
-    reset_pause : float
-        s from one such moment to the next: tubes are not bent all the time.
-    doubt_time : float
-        s over which misfit is averaged; what stays unexplained makes the tracker count for less.
-    """
-
-    tracker_noise: float = 0.01
+    tracker_noise: float = 0.01  # rad, with what the model cannot explain
+    # s by which model and tracker may be apart: a measurement counts little while the tip darts.
     timing: float = 0.02
+    # Standard deviation of the change of ``log(capstan_exponent)`` in one second.
     drift: float = 0.03
-    surprise: float = 3.5
+    surprise: float = 3.5  # innovation, in its standard deviations, that counts as surprising
+    # Surprising measurements in a row after which the tube is taken to have changed.
     surprises: int = 3
-    reset_pause: float = 12.0
+    reset_pause: float = 12.0  # s from one such moment to the next: tubes are not bent all the time
+    # s over which misfit is averaged; what stays unexplained makes the tracker count for less.
     doubt_time: float = 2.0
 
 

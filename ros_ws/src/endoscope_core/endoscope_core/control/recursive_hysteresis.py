@@ -18,41 +18,27 @@ from endoscope_core.control.tracker_feedback import (
 
 @dataclass(frozen=True)
 class RecursiveHysteresisSettings:
-    """Of the recursive least squares; angles in rad, times in s.
+    """Of the recursive least squares; angles in rad, times in s."""
 
-    Parameters
-    ----------
-    transmission_gain : float
-        ``a``, tip motion for one of the motor once the wires slide.
-    memory : float
-        Time constant of forgetting, s.
-    noise : float
-        Of the tracker and of all that the regression leaves out, rad.
-    gain_spread, backlash_spread, offset_spread : float
-        Standard deviations before anything was measured.
-    settled : float
-        The direction memory must be this far on its side: what happens while the dead zone is
-        crossed is not to be learnt from.
-    surprises : int
-        Readings beyond three standard deviations in a row that tell of another tube.
-    gain_limit, backlash_limit, offset_limit, output_limit : float
-        Limits of the estimates and of the correction.
-    direction_travel, lead, response_delay, dead_band : float
-        As in the adaptive law.
-    """
-
-    transmission_gain: float = 0.95
-    memory: float = 3.0
+    transmission_gain: float = 0.95  # ``a``, tip motion for one of the motor once the wires slide
+    memory: float = 3.0  # time constant of forgetting, s
+    # Of the tracker and of all that the regression leaves out, rad.
     noise: float = math.radians(1.0)
+    # Standard deviations before anything was measured.
     gain_spread: float = 0.1
     backlash_spread: float = math.radians(20.0)
     offset_spread: float = math.radians(3.0)
+    # The direction memory must be this far on its side: what happens while the dead zone is
+    # crossed is not to be learnt from.
     settled: float = 0.95
+    # Readings beyond three standard deviations in a row that tell of another tube.
     surprises: int = 4
+    # Limits of the estimates and of the correction.
     gain_limit: float = 0.5
     backlash_limit: float = math.radians(45.0)
     offset_limit: float = math.radians(10.0)
     output_limit: float = math.radians(60.0)
+    # As in the adaptive law.
     direction_travel: float = math.radians(1.0)
     lead: float = 0.06
     response_delay: float = 0.06

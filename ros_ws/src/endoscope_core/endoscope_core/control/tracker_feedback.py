@@ -211,6 +211,9 @@ class TrackerFeedback[Law: JointLaw]:
     ) -> NDArray[np.float64]:
         """Correction for this instant.
 
+        ValueError if time does not advance or an input has another size or is not finite; nothing
+        changes then.
+
         Parameters
         ----------
         time : float
@@ -225,12 +228,6 @@ class TrackerFeedback[Law: JointLaw]:
         -------
         ndarray, shape (J,)
             rad to be added to the joint-equivalent command; at most `output_limit`.
-
-        Raises
-        ------
-        ValueError
-            If time does not advance or an input has another size or is not finite; nothing changes
-            then.
         """
         angle = self._checked('desired', desired)
         speed = self._checked('velocity', velocity)

@@ -38,20 +38,13 @@ class CalibrationRecording:
     """What equation 2 of the first paper collects, N samples at 1 kHz, J = 2 joints.
 
     N = 9000 for the first paper's sinusoid.
-
-    Parameters
-    ----------
-    tension : ndarray, shape (N, 4)
-        N, in the order x_pos, x_neg, y_pos, y_neg.
-    desired_angle, desired_velocity : ndarray, shape (N,)
-        rad and rad/s, the same for both joints.
-    actual_angle : ndarray, shape (N, J)
-        rad; the tracker's 40 readings a second, joined by straight lines.
     """
 
-    tension: NDArray[np.float64]
+    tension: NDArray[np.float64]  # N, in the order x_pos, x_neg, y_pos, y_neg
+    # rad and rad/s, the same for both joints.
     desired_angle: NDArray[np.float64]
     desired_velocity: NDArray[np.float64]
+    # rad; the tracker's 40 readings a second, joined by straight lines.
     actual_angle: NDArray[np.float64]
 
 
@@ -93,33 +86,17 @@ class CalibrationDataset:
     """R recordings of calibrations, N samples at 1 kHz, J = 2 joints.
 
     N = 9000 for the first paper's sinusoid, less for a brief calibration.
-
-    Parameters
-    ----------
-    tension : ndarray, shape (R, N, 4), float32
-        N.
-    desired_angle, desired_velocity : ndarray, shape (N,)
-        rad and rad/s.
-    actual_angle : ndarray, shape (R, N, J), float32
-        rad, from the tracker.
-    class_deg : ndarray of int, shape (R,)
-        Class of the backlash size.
-    joint_size : ndarray, shape (R, J)
-        True backlash size in rad of each joint under the sinusoid.
-    configuration : ndarray of int, shape (R,)
-        Number of the tube configuration, by which folds are grouped.
-    manifest : dict
-        Seed, spreads, plants; see `manifest_hash`.
     """
 
-    tension: NDArray[np.float32]
+    tension: NDArray[np.float32]  # N
+    # rad and rad/s.
     desired_angle: NDArray[np.float64]
     desired_velocity: NDArray[np.float64]
-    actual_angle: NDArray[np.float32]
-    class_deg: NDArray[np.int64]
-    joint_size: NDArray[np.float64]
-    configuration: NDArray[np.int64]
-    manifest: dict[str, Any]
+    actual_angle: NDArray[np.float32]  # rad, from the tracker
+    class_deg: NDArray[np.int64]  # class of the backlash size
+    joint_size: NDArray[np.float64]  # true backlash size in rad of each joint under the sinusoid
+    configuration: NDArray[np.int64]  # number of the tube configuration, by which folds are grouped
+    manifest: dict[str, Any]  # seed, spreads, plants; see `manifest_hash`
 
     @property
     def backlash_size(self) -> NDArray[np.float64]:
@@ -149,6 +126,10 @@ def make_dataset(
 ) -> CalibrationDataset:
     """Simulate the data set; each recording is of another tube.
 
+    DatasetError if `per_class` is not positive or `seed` is negative, or the pretension is to be
+    reset of instruments of which each is another anyway. UnknownCalibrationError if there is no
+    motion of that name.
+
     Parameters
     ----------
     seed : int
@@ -164,14 +145,6 @@ def make_dataset(
         Whether all recordings are of one instrument, as mounted, rather than each of another.
     reset_pretension : bool
         Whether its pretension is set by hand before each recording.
-
-    Raises
-    ------
-    DatasetError
-        If `per_class` is not positive or `seed` is negative, or the pretension is to be reset of
-        instruments of which each is another anyway.
-    UnknownCalibrationError
-        If there is no motion of that name.
     """
     calibration = calibration_motion(motion)
     if per_class < 1 or seed < 0:
@@ -234,10 +207,7 @@ def make_dataset(
 def save_dataset(dataset: CalibrationDataset, folder: str | Path) -> None:
     """Write a data set to a new folder, whole or not at all.
 
-    Raises
-    ------
-    OutputExistsError
-        If there is something at `folder` already.
+    OutputExistsError if there is something at `folder` already.
     """
     arrays = {name: value for name, value in vars(dataset).items() if name != 'manifest'}
     with atomic_directory(folder) as partial:
@@ -254,10 +224,8 @@ def is_dataset(folder: str | Path) -> bool:
 def load_dataset(folder: str | Path) -> CalibrationDataset:
     """Read a data set.
 
-    Raises
-    ------
-    DatasetError
-        If the folder holds none, or its arrays are not those that the manifest was written for.
+    DatasetError if the folder holds none, or its arrays are not those that the manifest was written
+    for.
     """
     folder = Path(folder)
     for name in (MANIFEST_FILE, ARRAYS_FILE):

@@ -51,23 +51,13 @@ class Instrument:
 
 @dataclass(frozen=True)
 class TubeConfiguration:
-    """An instrument in a tube of a certain shape.
+    """An instrument in a tube of a certain shape; angles in rad."""
 
-    Attributes
-    ----------
-    plant : PlantDescription
-        Both joints.
-    bend : float
-        Sum of the tube's bends, rad.
-    unevenness : float
-        Where the tube is bent: what the first coefficient of the friction profile is higher by.
-    joint_sizes : tuple of float
-        Backlash size of each joint in rad under the calibration sinusoid.
-    """
-
-    plant: PlantDescription
-    bend: float
+    plant: PlantDescription  # both joints
+    bend: float  # sum of the tube's bends, rad
+    # Where the tube is bent: what the first coefficient of the friction profile is higher by.
     unevenness: float
+    # Backlash size of each joint in rad under the calibration sinusoid.
     joint_sizes: tuple[float, ...]
 
     @property

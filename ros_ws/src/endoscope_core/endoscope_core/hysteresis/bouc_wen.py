@@ -133,24 +133,9 @@ class BoucWenParameters(NamedNumbers, ConstantLag):
     ``theta_a = alpha theta + beta h`` and ``h' = A theta' - B |theta'| |h|^(n-1) h - C theta'
     |h|^n``.
 
-    Parameters
-    ----------
-    alpha : float
-        Ratio of actual to driving angle, dimensionless, in [0.2, 3]: the inverse divides by it.
-    beta : float
-        Weight of the hysteresis, dimensionless, at most 0: the actual angle lags behind.
-    A, B, C, n : float
-        Shape; ``A > 0``, ``B > 0``, ``B + C > 0``, ``1 <= n <= 5``. With `theta` in rad, `h` is in
-        rad where A is dimensionless, and B and C are in rad^-n.
+    ValueError if a parameter is not finite or out of its range, the lag ``|beta| h_max`` exceeds
+    120 deg, or the inverse would somewhere be steeper than 40.
 
-    Raises
-    ------
-    ValueError
-        If a parameter is not finite or out of its range, the lag ``|beta| h_max`` exceeds 120 deg,
-        or the inverse would somewhere be steeper than 40.
-
-    Notes
-    -----
     ``|h| <= h_max = (A / (B + C))^(1/n)`` always (invariance, Ikhouane and Rodellar 2007), so that
     ``|theta_FF| <= (|theta_d| + |beta| h_max) / alpha``, and with ``|dh/dtheta| <= A max(1, 1 +
     rho)``, ``rho = (B - C) / (B + C)``, the inverse's slope ``|d theta_FF / d theta_d| <= (1 +
@@ -162,8 +147,11 @@ class BoucWenParameters(NamedNumbers, ConstantLag):
 
     MODEL: ClassVar[str] = 'Bouc-Wen'
 
+    # Ratio of actual to driving angle, dimensionless, in [0.2, 3]: the inverse divides by it.
     alpha: float
-    beta: float
+    beta: float  # weight of the hysteresis, dimensionless, at most 0: the actual angle lags behind
+    # Shape; ``A > 0``, ``B > 0``, ``B + C > 0``, ``1 <= n <= 5``. With `theta` in rad, `h` is in
+    # rad where A is dimensionless, and B and C are in rad^-n.
     A: float
     B: float
     C: float
@@ -278,39 +266,23 @@ class AsymmetricBoucWenParameters(NamedNumbers):
     with shape parameters of its own for either direction, as in the asymmetric extensions of the
     Bouc-Wen model (Wang and Wen 1998; Zhu and Wang 2012), a loop that may be wider at one end, and
     an offset. The state stays in [-1, 1] for a step of any size because each direction's step does
-    (see `bouc_wen_normalised_step`).
+    (see `bouc_wen_normalised_step`). Angles are in rad.
 
-    Parameters
-    ----------
-    alpha : float
-        Ratio of actual to driving angle, in [0.2, 3].
-    lag : float
-        Half the width of a saturated loop at angle zero, along the actual angle, rad.
-    skew : float
-        Growth of that half-width with the angle, in [-0.5, 0.5]; beyond 1.75 rad it grows no more.
-    offset : float
-        rad.
-    travel_up, travel_down : float
-        rad over which the state builds up in either direction.
-    rho_up, rho_down : float
-        In (-1, 1]; how much faster the state leaves saturation than from rest.
-    n_up, n_down : float
-        Sharpness, in [1, 5].
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range or the inverse would be steeper than 40.
+    ValueError if a parameter is out of range or the inverse would be steeper than 40.
     """
 
     MODEL: ClassVar[str] = 'asymmetric Bouc-Wen'
 
-    alpha: float
-    lag: float
+    alpha: float  # ratio of actual to driving angle, in [0.2, 3]
+    lag: float  # half the width of a saturated loop at angle zero, along the actual angle, rad
+    # Growth of that half-width with the angle, in [-0.5, 0.5]; beyond 1.75 rad it grows no more.
     skew: float
-    offset: float
+    offset: float  # rad
+    # rad over which the state builds up in either direction.
     travel_up: float
+    # In (-1, 1]; how much faster the state leaves saturation than from rest.
     rho_up: float
+    # Sharpness, in [1, 5].
     n_up: float
     travel_down: float
     rho_down: float

@@ -90,38 +90,22 @@ def play_path(driver: NDArray[np.float64], y0: float, travel: float) -> NDArray[
 
 @dataclass(frozen=True)
 class DahlParameters(NamedNumbers, ConstantLag):
-    """``theta_a = alpha theta + offset - lag y``, `y` in [-1, 1] by the Dahl equation.
+    """``theta_a = alpha theta + offset - lag y``, `y` in [-1, 1] by the Dahl equation (rad).
 
     Second paper, section 2.3: a modification of the Dahl model with a direct inverse that needs no
     inversion of the hysteresis.
 
-    Parameters
-    ----------
-    alpha : float
-        Ratio of actual to driving angle, in [0.2, 3].
-    lag : float
-        Half the width of a saturated loop along the actual angle, rad.
-    travel : float
-        rad over which the state builds up.
-    exponent : float
-        Shape, in [0.5, 4]; 1 is Dahl's own.
-    offset : float
-        rad.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range or the inverse would be steeper than 40: with ``dg/dx = (1 -
-        g)**i <= 2**i`` its slope is at most ``(1 + 2**i lag / travel) / alpha``.
+    ValueError if a parameter is out of range or the inverse would be steeper than 40: with ``dg/dx
+    = (1 - g)**i <= 2**i`` its slope is at most ``(1 + 2**i lag / travel) / alpha``.
     """
 
     MODEL: ClassVar[str] = 'Dahl'
 
-    alpha: float
-    lag: float
-    travel: float
-    exponent: float
-    offset: float = 0.0
+    alpha: float  # ratio of actual to driving angle, in [0.2, 3]
+    lag: float  # half the width of a saturated loop along the actual angle, rad
+    travel: float  # rad over which the state builds up
+    exponent: float  # shape, in [0.5, 4]; 1 is Dahl's own
+    offset: float = 0.0  # rad
 
     def __post_init__(self) -> None:
         check_numbers(self.MODEL, asdict(self))
@@ -155,29 +139,15 @@ class PlayParameters(NamedNumbers, ConstantLag):
     in the inverse crosses the gap within that much motion of the desired angle instead, which
     bounds its slope.
 
-    Parameters
-    ----------
-    alpha : float
-        Gain, in [0.2, 3].
-    lag : float
-        Half the width of the loop along the actual angle, rad.
-    travel : float
-        rad of the driving angle from the middle of the gap to its side.
-    offset : float
-        rad.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range or the inverse would be steeper than 40.
+    ValueError if a parameter is out of range or the inverse would be steeper than 40.
     """
 
     MODEL: ClassVar[str] = 'play'
 
-    alpha: float
-    lag: float
-    travel: float
-    offset: float = 0.0
+    alpha: float  # gain, in [0.2, 3]
+    lag: float  # half the width of the loop along the actual angle, rad
+    travel: float  # rad of the driving angle from the middle of the gap to its side
+    offset: float = 0.0  # rad
 
     def __post_init__(self) -> None:
         check_numbers(self.MODEL, asdict(self))

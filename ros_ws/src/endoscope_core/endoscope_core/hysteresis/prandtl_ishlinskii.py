@@ -46,31 +46,19 @@ def play_stack_path(
 
 @dataclass(frozen=True)
 class PrandtlIshlinskiiParameters:
-    """``theta_a = offset + sum_i w_i p_i``, `p_i` the play of threshold `r_i` driven by `theta`.
+    """``theta_a = offset + sum_i w_i p_i``, `p_i` the play of threshold `r_i`, all in rad.
 
     Weights that are not negative make the model monotone, and then its inverse is of the same form
     (Krejci and Kuhnen 2001): thresholds and weights follow in closed form, nothing is iterated. The
     play of threshold zero passes its input; its weight is the least slope of the model, so that
     ``1 / w_0`` is the greatest slope of the inverse.
 
-    Parameters
-    ----------
-    thresholds : tuple of float
-        rad, increasing from 0.
-    weights : tuple of float
-        Dimensionless, not negative; the first at least 1/40.
-    offset : float
-        rad.
-
-    Raises
-    ------
-    ValueError
-        If lengths differ, thresholds do not increase from zero, or a weight is out of range.
+    ValueError if lengths differ, thresholds do not increase from zero, or a weight is out of range.
     """
 
-    thresholds: tuple[float, ...]
-    weights: tuple[float, ...]
-    offset: float = 0.0
+    thresholds: tuple[float, ...]  # rad, increasing from 0
+    weights: tuple[float, ...]  # dimensionless, not negative; the first at least 1/40
+    offset: float = 0.0  # rad
 
     def __post_init__(self) -> None:
         name = 'Prandtl-Ishlinskii'

@@ -55,6 +55,8 @@ def identify_classes(
 ) -> list[ClassIdentification]:
     """Model and feed-forward of every class, from all its recordings and both joints at once.
 
+    ClassParameterError if the model is unknown.
+
     Parameters
     ----------
     dataset : CalibrationDataset
@@ -69,11 +71,6 @@ def identify_classes(
         Called with a line for each class.
     model : str
         One of `KINDS`.
-
-    Raises
-    ------
-    ClassParameterError
-        If the model is unknown.
     """
     if model not in KINDS:
         raise ClassParameterError(f'unknown model {model!r}: choose one of {", ".join(KINDS)}')
@@ -168,17 +165,15 @@ def load_class_parameters(
 ) -> dict[int, LawParameters]:
     """Feed-forward parameters by class (backlash size in deg).
 
+    ClassParameterError if the file is missing, holds something else or another model, or unsafe
+    parameters.
+
     Parameters
     ----------
     path : path, optional
         A file of `endoscope identify DATASET`; the sets that come with this package if not given.
     model : str
         Which model's sets are wanted.
-
-    Raises
-    ------
-    ClassParameterError
-        If the file is missing, holds something else or another model, or unsafe parameters.
     """
     path = shipped_table_path(model) if path is None else Path(path)
     if not path.is_file():
@@ -220,10 +215,7 @@ class _File:
 def parameters_for_class(sets: Mapping[int, LawParameters], class_deg: int) -> LawParameters:
     """The set of a class.
 
-    Raises
-    ------
-    ClassParameterError
-        If there is none: parameters are never guessed.
+    ClassParameterError if there is none: parameters are never guessed.
     """
     if class_deg not in sets:
         known = ', '.join(str(c) for c in sorted(sets))

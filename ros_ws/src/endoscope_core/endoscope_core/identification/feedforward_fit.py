@@ -158,20 +158,11 @@ def _play_stack(model: PrandtlIshlinskiiParameters) -> Candidates:
 
 @dataclass(frozen=True)
 class FeedforwardFit:
-    """Parameters for the inverse: equation 5 of the first paper, or that of another model.
-
-    Parameters
-    ----------
-    parameters : HysteresisParameters
-    rmse : float
-        rad that the feed-forward leaves on the identified model.
-    uncompensated_rmse : float
-        rad without it.
-    """
+    """Parameters for the inverse: equation 5 of the first paper or another model's; rad."""
 
     parameters: HysteresisParameters
-    rmse: float
-    uncompensated_rmse: float
+    rmse: float  # rad that the feed-forward leaves on the identified model
+    uncompensated_rmse: float  # rad without it
 
 
 def design_motions() -> list[Signal]:

@@ -164,24 +164,12 @@ class IdentificationError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class Recording:
-    """Motor and joint of one recording, evenly sampled.
+    """Motor and joint of one recording (N,) in rad, evenly sampled."""
 
-    Parameters
-    ----------
-    driver : ndarray, shape (N,)
-        Joint-equivalent motor angle in rad.
-    actual : ndarray, shape (N,)
-        Bending angle in rad.
-    rested : bool
-        Whether it begins at rest and without memory, so that `h` begins at zero.
-    scored : ndarray of bool, shape (N,), optional
-        Samples that count; all if not given.
-    """
-
-    driver: Array
-    actual: Array
-    rested: bool = True
-    scored: NDArray[np.bool_] | None = None
+    driver: Array  # joint-equivalent motor angle in rad
+    actual: Array  # bending angle in rad
+    rested: bool = True  # whether it begins at rest and without memory, so that `h` begins at zero
+    scored: NDArray[np.bool_] | None = None  # samples that count; all if not given
 
     def centred(self, values: Array) -> Array:
         """The samples that count of values (N, ...), less their mean."""
@@ -191,26 +179,14 @@ class Recording:
 
 @dataclass(frozen=True)
 class ModelFit:
-    """A model of a transmission.
-
-    Parameters
-    ----------
-    parameters : HysteresisParameters
-    rmse : float
-        rad, of modelled less measured angle, an offset of each recording removed.
-    evaluations : int
-        Simulations that the search took.
-    model : str
-        Name of the model.
-    offset : float
-        rad, measured less modelled angle, mean of the recordings; part of the parameters where the
-        model has an offset.
-    """
+    """A model of a transmission."""
 
     parameters: HysteresisParameters
-    rmse: float
-    evaluations: int
-    model: str = 'bouc_wen'
+    rmse: float  # rad, of modelled less measured angle, an offset of each recording removed
+    evaluations: int  # simulations that the search took
+    model: str = 'bouc_wen'  # name of the model
+    # rad, measured less modelled angle, mean of the recordings; part of the parameters where the
+    # model has an offset.
     offset: float = 0.0
 
     def __str__(self) -> str:
@@ -247,6 +223,9 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
     What comes out is safe by construction: the boxes are those of the parameter classes, and where
     the inverse would be too steep the travel is lengthened.
 
+    IdentificationError if the model is unknown, there is no recording, one is empty or not finite,
+    or the motor or the joint hardly moves.
+
     Parameters
     ----------
     recordings : sequence of Recording
@@ -255,12 +234,6 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
         Of the search.
     model : str
         One of `endoscope_core.hysteresis.inverse.MODELS`.
-
-    Raises
-    ------
-    IdentificationError
-        If the model is unknown, there is no recording, one is empty or not finite, or the motor or
-        the joint hardly moves.
     """
     _check(recordings)
     if model == 'prandtl_ishlinskii':

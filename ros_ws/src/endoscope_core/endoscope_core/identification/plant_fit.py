@@ -60,23 +60,12 @@ class PlantFitError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class PlantFit:
-    """Identified parameters of one joint.
-
-    Parameters
-    ----------
-    parameters : PhysicalParameters
-    tension_rmse : float
-        N, of both wires.
-    bending_rmse : float or None
-        rad; None where no angle was given.
-    evaluations : int
-        Simulations that it took.
-    """
+    """Identified parameters of one joint, with what they leave in N and rad."""
 
     parameters: PhysicalParameters
-    tension_rmse: float
-    bending_rmse: float | None
-    evaluations: int
+    tension_rmse: float  # N, of both wires
+    bending_rmse: float | None  # rad; None where no angle was given
+    evaluations: int  # simulations that it took
 
 
 def fit_plant(
@@ -99,6 +88,9 @@ def fit_plant(
     It is deterministic; the optimum is smooth and single once the exponent is near, which a genetic
     algorithm would find a hundred times slower.
 
+    PlantFitError if shapes are wrong, a command or tension is not finite, there is less than a
+    second, or the command moves by less than 20 deg.
+
     Parameters
     ----------
     command : array_like, shape (N,)
@@ -112,12 +104,6 @@ def fit_plant(
         not given.
     gear : float
         Shaft angle for one radian at the joint.
-
-    Raises
-    ------
-    PlantFitError
-        If shapes are wrong, a command or tension is not finite, there is less than a second, or the
-        command moves by less than 20 deg.
     """
     u, wires, angle = _checked(command, tension, bending)
     if start is not None:

@@ -44,10 +44,7 @@ def blend(first: LawParameters, second: LawParameters, weight: float) -> LawPara
     the slope of the inverse, a quotient of two linear functions, then lies between those of the two
     sets. Parameters of the plant are interpolated by their logarithms.
 
-    Raises
-    ------
-    ValueError
-        If the kinds differ or the weight is out of range.
+    ValueError if the kinds differ or the weight is out of range.
     """
     if not 0.0 <= weight <= 1.0:
         raise ValueError(f'weight = {weight} must lie in [0, 1]')
@@ -164,20 +161,11 @@ class UpdatedTableError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class TableEntry:
-    """One calibrated configuration.
+    """One calibrated configuration, named by its backlash size in rad."""
 
-    Parameters
-    ----------
-    size : float
-        Backlash size in rad, which stands for the configuration.
-    parameters : LawParameters
-    source : str
-        What it was identified from, in words.
-    """
-
-    size: float
+    size: float  # backlash size in rad, which stands for the configuration
     parameters: LawParameters
-    source: str = ''
+    source: str = ''  # what it was identified from, in words
 
 
 @dataclass(frozen=True)
@@ -188,22 +176,12 @@ class UpdatedTable:
     backlash size that the calibration regressed, and between two entries the parameters are blended
     (`blend`), which keeps them safe; beyond the first and the last nothing is extrapolated.
 
-    Parameters
-    ----------
-    model : str
-        Name of the model, one of `KINDS`.
-    entries : tuple of TableEntry
-        Sorted by size.
-
-    Raises
-    ------
-    UpdatedTableError
-        If the model is unknown, an entry is of another kind, a size is not finite and positive, or
-        sizes do not increase.
+    UpdatedTableError if the model is unknown, an entry is of another kind, a size is not finite and
+    positive, or sizes do not increase.
     """
 
-    model: str
-    entries: tuple[TableEntry, ...]
+    model: str  # name of the model, one of `KINDS`
+    entries: tuple[TableEntry, ...]  # sorted by size
 
     def __post_init__(self) -> None:
         if self.model not in KINDS:
@@ -247,10 +225,8 @@ class UpdatedTable:
     def parameters_for(self, size: float) -> LawParameters:
         """Parameters for a backlash size in rad.
 
-        Raises
-        ------
-        UpdatedTableError
-            If the size is not finite or outside the table: parameters are never guessed.
+        UpdatedTableError if the size is not finite or outside the table: parameters are never
+        guessed.
         """
         sizes = self.sizes
         if not sizes[0] <= size <= sizes[-1]:
@@ -273,10 +249,7 @@ class UpdatedTable:
     def save(self, path: str | Path) -> None:
         """Write the table, whole or not at all.
 
-        Raises
-        ------
-        OSError
-            If the file cannot be written.
+        OSError if the file cannot be written.
         """
         content = {
             'schema': 1,
@@ -296,10 +269,7 @@ class UpdatedTable:
     def load(cls, path: str | Path) -> UpdatedTable:
         """Read a table.
 
-        Raises
-        ------
-        UpdatedTableError
-            If the file is missing, holds something else, or unsafe parameters.
+        UpdatedTableError if the file is missing, holds something else, or unsafe parameters.
         """
         path = Path(path)
         if not path.is_file():

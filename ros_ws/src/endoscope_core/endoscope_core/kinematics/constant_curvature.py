@@ -28,6 +28,9 @@ Quaternion = tuple[float, float, float, float]
 def tip_pose(bending: ArrayLike, length: float) -> tuple[Array, Array]:
     """Pose of the tip in the frame of the instrument's base.
 
+    ValueError where the section would bend by half a turn or more: orientation no longer tells the
+    angles.
+
     Parameters
     ----------
     bending
@@ -41,11 +44,6 @@ def tip_pose(bending: ArrayLike, length: float) -> tuple[Array, Array]:
         In m.
     orientation : ndarray, shape (4,)
         Unit quaternion x, y, z, w with w > 0.
-
-    Raises
-    ------
-    ValueError
-        The section would bend by half a turn or more: orientation no longer tells the angles.
     """
     x, y = (float(v) for v in np.asarray(bending, dtype=float))
     angle = math.hypot(x, y)
@@ -96,6 +94,8 @@ def bending_from_orientation(orientation: ArrayLike) -> Array:
     A rotation about the instrument's own axis, which bending does not cause, is removed first
     (swing-twist decomposition with the twist at the base's z axis).
 
+    ValueError where the quaternion is zero or not finite, or the tip points straight back.
+
     Parameters
     ----------
     orientation
@@ -105,11 +105,6 @@ def bending_from_orientation(orientation: ArrayLike) -> Array:
     -------
     ndarray, shape (2,)
         ``bend_x`` and ``bend_y`` in rad.
-
-    Raises
-    ------
-    ValueError
-        The quaternion is zero or not finite, or the tip points straight back.
     """
     q = np.asarray(orientation, dtype=float)
     norm = float(np.linalg.norm(q))
@@ -130,60 +125,33 @@ def bending_from_orientation(orientation: ArrayLike) -> Array:
 
 
 class Hinge(NamedTuple):
-    """What holds a link to the one before it.
+    """What holds a link to the one before it, at a height in m."""
 
-    Attributes
-    ----------
-    name
-        Of the joint.
-    parent, child
-        Names of the links, which are those of their frames.
-    axis
-        ``x`` or ``y``; empty for a link that is fixed to the one before it.
-    height
-        Where it is along the parent's z axis, in m.
-    """
-
-    name: str
+    name: str  # of the joint
+    # Names of the links, which are those of their frames.
     parent: str
     child: str
-    axis: str
-    height: float
+    axis: str  # ``x`` or ``y``; empty for a link that is fixed to the one before it
+    height: float  # where it is along the parent's z axis, in m
 
 
 class Transform(NamedTuple):
-    """Where a link is in the frame of the one before it.
+    """Where a link is in the frame of the one before it, in m."""
 
-    Attributes
-    ----------
-    parent, child
-        Names of the frames.
-    translation
-        In m, shape (3,).
-    rotation
-        Unit quaternion x, y, z, w, shape (4,).
-    """
-
+    # Names of the frames.
     parent: str
     child: str
-    translation: Vector
-    rotation: Quaternion
+    translation: Vector  # in m, shape (3,)
+    rotation: Quaternion  # unit quaternion x, y, z, w, shape (4,)
 
 
 @dataclass(frozen=True)
 class Vertebrae:
-    """A bending section of vertebrae.
+    """A bending section of vertebrae."""
 
-    Attributes
-    ----------
-    length
-        Of the bending section in m.
-    base_frame
-        Where it begins, z along the straight instrument.  The other frames are named after it:
-        ``endoscope_vertebra_01`` to ``endoscope_tip`` for ``endoscope_base``.
-    """
-
-    length: float
+    length: float  # of the bending section in m
+    # Where it begins, z along the straight instrument.  The other frames are named after it:
+    # ``endoscope_vertebra_01`` to ``endoscope_tip`` for ``endoscope_base``.
     base_frame: str
 
     @property
@@ -224,6 +192,8 @@ class Vertebrae:
     def joint_angles(self, bending: Sequence[float]) -> tuple[float, ...]:
         """Angles of all joints at a bending.
 
+        ValueError where the section would bend by half a turn or more.
+
         Parameters
         ----------
         bending
@@ -233,11 +203,6 @@ class Vertebrae:
         -------
         tuple of float
             In rad, shape (J,), in the order of `joint_names`.
-
-        Raises
-        ------
-        ValueError
-            The section would bend by half a turn or more.
         """
         # Real bending sections are rows of vertebrae with crossed hinges, and so is this one: each
         # turns about its x axis and its y axis, every second one the other way round. All x hinges

@@ -24,39 +24,23 @@ class RegistrationError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class StillnessLimits:
-    """How still the tip must be while it is registered.
+    """How still the tip must be while it is registered, in rad and m."""
 
-    Attributes
-    ----------
-    readings
-        Fewest readings.
-    angle, distance
-        Largest root mean square deviation of orientation in rad and of position in m.
-    drift_angle, drift_distance
-        Largest difference between the means of the first and of the second half.
-    """
-
-    readings: int = 30
+    readings: int = 30  # fewest readings
+    # Largest root mean square deviation of orientation in rad and of position in m.
     angle: float = 0.015
     distance: float = 0.001
+    # Largest difference between the means of the first and of the second half.
     drift_angle: float = 0.005
     drift_distance: float = 0.0005
 
 
 @dataclass(frozen=True)
 class StraightRegistration:
-    """Pose of the sensor in the tracker's frame while the instrument was straight.
+    """Pose (m) of the sensor in the tracker's frame while the instrument was straight."""
 
-    Attributes
-    ----------
-    position
-        In m, shape (3,).
-    orientation
-        Unit quaternion x, y, z, w, shape (4,).
-    """
-
-    position: tuple[float, ...]
-    orientation: tuple[float, ...]
+    position: tuple[float, ...]  # in m, shape (3,)
+    orientation: tuple[float, ...]  # unit quaternion x, y, z, w, shape (4,)
 
     def in_base(
         self, position: ArrayLike, orientation: ArrayLike, *, roll: float, length: float
@@ -93,6 +77,8 @@ def register_straight(
 ) -> StraightRegistration:
     """Average readings of the straight instrument, unless it moved.
 
+    RegistrationError if there are too few readings, or the tip was not still.
+
     Parameters
     ----------
     positions
@@ -101,15 +87,6 @@ def register_straight(
         N unit quaternions x, y, z, w, each of shape (4,).
     limits
         What counts as still.
-
-    Returns
-    -------
-    StraightRegistration
-
-    Raises
-    ------
-    RegistrationError
-        Too few readings, or the tip was not still.
     """
     limits = limits or StillnessLimits()
     count = len(positions)

@@ -20,79 +20,48 @@ NAME = Meta(
 
 @dataclass(frozen=True)
 class JointFacts:
-    """What is the same for every joint of the bending section.
+    """What is the same for every joint of the bending section; SI units."""
 
-    Attributes
-    ----------
-    gear
-        Shaft angle for one radian at the joint.
-    reach
-        Largest desired bending in rad, either way.
-    drive
-        Largest joint-equivalent motor angle in rad, either way; what compensation adds to the
-        desired bending has its place between the two.
-    correction
-        Largest correction by feedback in rad, either way.
-    speed, acceleration
-        Largest of a desired angle, in rad/s and rad/s^2.
-    hand_speed
-        Largest speed in rad/s of a joint that follows the handle.
-    entry_step
-        Largest distance in rad from the measured pose to the first command of a stream.
-    """
-
-    gear: Annotated[float, within(0.01, 100.0)]
-    reach: Annotated[float, within(0.1, 3.1)]
+    gear: Annotated[float, within(0.01, 100.0)]  # shaft angle for one radian at the joint
+    reach: Annotated[float, within(0.1, 3.1)]  # largest desired bending in rad, either way
+    # Largest joint-equivalent motor angle in rad, either way; what compensation adds to the
+    # desired bending has its place between the two.
     drive: Annotated[float, within(0.1, 10.0)]
+    # Largest correction by feedback in rad, either way.
     correction: Annotated[float, within(0.0, 3.1)]
+    # Largest of a desired angle, in rad/s and rad/s^2.
     speed: Annotated[float, within(0.01, 100.0)]
     acceleration: Annotated[float, within(0.1, 1e4)]
+    # Largest speed in rad/s of a joint that follows the handle.
     hand_speed: Annotated[float, within(0.01, 20.0)]
+    # Largest distance in rad from the measured pose to the first command of a stream.
     entry_step: Annotated[float, within(0.001, 1.0)]
 
 
 @dataclass(frozen=True)
 class MotorFacts:
-    """What is the same for every motor shaft.
+    """What is the same for every motor shaft; SI units."""
 
-    Attributes
-    ----------
-    reach
-        Largest shaft angle in rad, either way.
-    speed, acceleration
-        Largest of a shaft, in rad/s and rad/s^2.
-    step
-        Largest distance in rad of two goals that follow each other.
-    entry_step
-        Largest distance in rad from the measured position to the first command of a stream.
-    resolution
-        One count of their encoders in rad.
-    """
-
-    reach: Annotated[float, within(0.01, 20.0)]
+    reach: Annotated[float, within(0.01, 20.0)]  # largest shaft angle in rad, either way
+    # Largest of a shaft, in rad/s and rad/s^2.
     speed: Annotated[float, within(0.01, 100.0)]
     acceleration: Annotated[float, within(0.1, 1e5)]
+    # Largest distance in rad of two goals that follow each other.
     step: Annotated[float, within(1e-4, 1.0)]
+    # Largest distance in rad from the measured position to the first command of a stream.
     entry_step: Annotated[float, within(0.001, 1.0)]
-    resolution: Annotated[float, within(0.0, 0.1)]
+    resolution: Annotated[float, within(0.0, 0.1)]  # one count of their encoders in rad
 
 
 @dataclass(frozen=True)
 class Timeouts:
-    """How long something may be silent, in s.
+    """How long something may be silent, in s."""
 
-    Attributes
-    ----------
-    command
-        A command older than this is not obeyed, and a stream that pauses longer has ended.
-    stream
-        Silence of motors or load cells at which the slave goes to FAULT.
-    handle
-        Silence of the handle after which it counts as released.
-    """
-
+    # A command older than this is not obeyed, and a stream that pauses longer has ended.
     command: Annotated[float, within(0.001, 1.0)]
+    # Silence of motors or load cells at which the slave goes to FAULT.
     stream: Annotated[float, within(0.005, 10.0)]
+    # Silence of the handle after which it counts as released.
     handle: Annotated[float, within(0.01, 1.0)]
 
     @cached_property
@@ -121,43 +90,25 @@ class TensionFacts:
 
 @dataclass(frozen=True)
 class HandleFacts:
-    """The console's handle.
+    """The console's handle, in rad."""
 
-    Attributes
-    ----------
-    resolution
-        One count of its encoders in rad.
-    """
-
-    resolution: Annotated[float, within(0.0, 0.1)]
+    resolution: Annotated[float, within(0.0, 0.1)]  # one count of its encoders in rad
 
 
 @dataclass(frozen=True)
 class InstrumentFacts:
-    """The instrument's end.
+    """The instrument's end, in m."""
 
-    Attributes
-    ----------
-    section_length
-        Length of the bending section in m.
-    base_frame
-        Frame of its beginning, z along the straight instrument: that of all poses.
-    """
-
-    section_length: Annotated[float, within(0.001, 0.5)]
+    section_length: Annotated[float, within(0.001, 0.5)]  # length of the bending section in m
+    # Frame of its beginning, z along the straight instrument: that of all poses.
     base_frame: Annotated[str, NAME]
 
 
 @dataclass(frozen=True)
 class DeviceFacts:
-    """What stands on the table and what is simulated.
+    """What stands on the table and what is simulated."""
 
-    Attributes
-    ----------
-    motors, load_cells, tracker
-        One of `MOTOR_DEVICES`, `LOAD_CELL_DEVICES` and `TRACKER_DEVICES`.
-    """
-
+    # One of `MOTOR_DEVICES`, `LOAD_CELL_DEVICES` and `TRACKER_DEVICES`.
     motors: Annotated[str, one_of(MOTOR_DEVICES)]
     load_cells: Annotated[str, one_of(LOAD_CELL_DEVICES)]
     tracker: Annotated[str, one_of(TRACKER_DEVICES)]
@@ -165,44 +116,27 @@ class DeviceFacts:
 
 @dataclass(frozen=True)
 class RecordingFacts:
-    """When a recording ends that nobody asked for.
+    """When a recording ends that nobody asked for, in s and MB."""
 
-    Attributes
-    ----------
-    rest
-        How long in s the slave has not been enabled by then; its next session begins another one.
-    room
-        MB of all such recordings in one run of the graph, after which there are no more; 0: none.
-    """
-
+    # How long in s the slave has not been enabled by then; its next session begins another one.
     rest: Annotated[float, within(1.0, 1e6)]
+    # MB of all such recordings in one run of the graph, after which there are no more; 0: none.
     room: Annotated[float, within(0.0, 1e6)]
 
 
 @dataclass(frozen=True)
 class SimulationFacts:
-    """The simulated slave.
+    """The simulated slave."""
 
-    Attributes
-    ----------
-    plant
-        Path of its plant.yaml; empty for the nominal plant.
-    seed
-        Of the noise of its sensors.
-    """
-
-    plant: str
-    seed: Annotated[int, within(0)]
+    plant: str  # path of its plant.yaml; empty for the nominal plant
+    seed: Annotated[int, within(0)]  # of the noise of its sensors
 
 
 @dataclass(frozen=True)
 class Rig:
     """A rig; see the classes of its parts.
 
-    Raises
-    ------
-    ValueError
-        If `drive` times gear is beyond the reach of a shaft.
+    ValueError if `drive` times gear is beyond the reach of a shaft.
     """
 
     joints: JointFacts
@@ -227,15 +161,12 @@ class Rig:
 def load_rig(path: str | Path | None = None) -> Rig:
     """Read a rig.yaml; what it does not say is as in the one that is shipped.
 
+    FileError where it cannot be read, has an unknown key, or a value out of range.
+
     Parameters
     ----------
     path
         The file; the shipped one by default.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, has an unknown key, or a value out of range.
     """
     if path is None or not str(path):
         return _rig({}, 'the shipped rig')
@@ -254,17 +185,14 @@ def rig_as_text(rig: Rig) -> str:
 def rig_from_text(text: str, name: str) -> Rig:
     """Read what `rig_as_text` wrote.
 
+    FileError where it has an unknown key, or a value out of range.
+
     Parameters
     ----------
     text : str
         YAML.
     name : str
         Where it stands, for messages.
-
-    Raises
-    ------
-    FileError
-        It has an unknown key, or a value out of range.
     """
     return _rig(parse_yaml(text, name), name)
 

@@ -35,23 +35,13 @@ class Refusal(StrEnum):
 
 @dataclass(frozen=True)
 class CommandLimits:
-    """What a command may ask of J joints.
+    """What a command may ask of J joints, in rad and s."""
 
-    Attributes
-    ----------
-    reach
-        Largest position in rad, either way.
-    max_speed
-        Largest speed in rad/s.
-    max_step
-        Largest distance in rad between the measured position and the first command of a stream.
-    max_age_ns
-        A command that reached us later than this is refused; a stream that pauses longer has ended.
-    """
-
-    reach: float
-    max_speed: float
+    reach: float  # largest position in rad, either way
+    max_speed: float  # largest speed in rad/s
+    # Largest distance in rad between the measured position and the first command of a stream.
     max_step: float
+    # A command that reached us later than this is refused; a stream that pauses longer has ended.
     max_age_ns: int = 100_000_000
 
 

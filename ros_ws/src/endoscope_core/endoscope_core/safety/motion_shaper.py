@@ -22,30 +22,17 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """What a motion of J joints keeps to.
+    """What a motion of J joints keeps to, in rad and s.
 
-    Attributes
-    ----------
-    low, high
-        Range of positions in rad, shape (J,).
-    speed
-        rad/s.
-    acceleration
-        rad/s^2: the speed changes by no more than this times the period.
-    step
-        Greatest change of position from one call to the next, in rad.
-
-    Raises
-    ------
-    ValueError
-        If a range is empty or a bound is not positive and finite.
+    ValueError if a range is empty or a bound is not positive and finite.
     """
 
+    # Range of positions in rad, shape (J,).
     low: tuple[float, ...]
     high: tuple[float, ...]
-    speed: float
-    acceleration: float
-    step: float
+    speed: float  # rad/s
+    acceleration: float  # rad/s^2: the speed changes by no more than this times the period
+    step: float  # greatest change of position from one call to the next, in rad
 
     def __post_init__(self) -> None:
         for low, high in zip(self.low, self.high, strict=True):
@@ -112,10 +99,7 @@ class MotionShaper:
 
         A start beyond the range is taken as it is; from there the motion only leads back.
 
-        Raises
-        ------
-        ValueError
-            If the position has another size or is not finite; nothing changes then.
+        ValueError if the position has another size or is not finite; nothing changes then.
         """
         self._position = self._checked('position', position)
         self._velocity = (0.0,) * len(self._position)
@@ -123,6 +107,9 @@ class MotionShaper:
 
     def shape(self, target: Sequence[float], period: float) -> tuple[float, ...]:
         """Next position on the way to a target.
+
+        RuntimeError where there was no :meth:`restart`. ValueError if the target has another size
+        or is not finite, or the period is not positive; nothing changes then.
 
         Parameters
         ----------
@@ -135,14 +122,6 @@ class MotionShaper:
         -------
         tuple of float, shape (J,)
             rad.
-
-        Raises
-        ------
-        RuntimeError
-            There was no :meth:`restart`.
-        ValueError
-            If the target has another size or is not finite, or the period is not positive; nothing
-            changes then.
         """
         goals = self._checked('target', target)
         dt = self._begin_period(period)

@@ -33,18 +33,11 @@ class StateCommand(StrEnum):
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of a state command.
+    """What became of a state command."""
 
-    Attributes
-    ----------
-    accepted
-        Whether it was carried out.
-    reason, code
-        Why not, in words and as `UNKNOWN_COMMAND`, `WRONG_STATE` or `CAUSES_PRESENT`; empty when
-        accepted.
-    """
-
-    accepted: bool
+    accepted: bool  # whether it was carried out
+    # Why not, in words and as `UNKNOWN_COMMAND`, `WRONG_STATE` or `CAUSES_PRESENT`; empty when
+    # accepted.
     reason: str = ''
     code: str = ''
 

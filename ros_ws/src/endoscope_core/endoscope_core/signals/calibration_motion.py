@@ -116,20 +116,11 @@ class UnknownCalibrationError(EndoscopeError, ValueError):
 
 @dataclass(frozen=True)
 class CalibrationMotion:
-    """What a calibration commands, and how much of it is recorded.
-
-    Parameters
-    ----------
-    name : str
-    signal : Signal
-        Of every joint; it ends at rest at zero, after the record.
-    samples : int
-        Samples of the record at 1 kHz, from the start of the signal.
-    """
+    """What a calibration commands, and how much of it is recorded."""
 
     name: str
-    signal: Signal
-    samples: int
+    signal: Signal  # of every joint; it ends at rest at zero, after the record
+    samples: int  # samples of the record at 1 kHz, from the start of the signal
 
     @property
     def settled(self) -> int:
@@ -146,10 +137,7 @@ _MOTIONS: dict[str, tuple[Callable[[], Signal], float]] = {
 def calibration_motion(name: str = SINUSOID) -> CalibrationMotion:
     """Calibration motion of a name, one of `CALIBRATION_MOTIONS`.
 
-    Raises
-    ------
-    UnknownCalibrationError
-        If there is none of that name; the message names the nearest.
+    UnknownCalibrationError if there is none of that name; the message names the nearest.
     """
     if name not in _MOTIONS:
         near = difflib.get_close_matches(name, _MOTIONS, n=1, cutoff=0.0)

@@ -23,6 +23,8 @@ def sum_of_sines(
 ) -> Signal:
     """Sum of sines whose amplitude rises from and falls to zero.
 
+    ValueError if `duration` leaves no steady interval.
+
     Parameters
     ----------
     name : str
@@ -39,11 +41,6 @@ def sum_of_sines(
     Signal
         Its `steady` interval leaves out both ramps and the first quarter period of the slowest
         sine, after which the hysteresis no longer remembers how the motion began.
-
-    Raises
-    ------
-    ValueError
-        If `duration` leaves no steady interval.
     """
     quarter = 0.5 * np.pi / min(omega for _, omega in components)
     steady = (max(ramp, quarter), duration - ramp)
@@ -221,10 +218,7 @@ MOTIONS: dict[str, Callable[[], Motion]] = {
 def motion_by_name(name: str) -> Motion:
     """Motion of both joints called `name`.
 
-    Raises
-    ------
-    UnknownMotionError
-        If there is none of that name; the message names the nearest.
+    UnknownMotionError if there is none of that name; the message names the nearest.
     """
     if name not in MOTIONS:
         near = difflib.get_close_matches(name, MOTIONS, n=1, cutoff=0.0)

@@ -14,25 +14,16 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Signal:
-    """Angle and velocity of one joint as functions of time; starts and ends at rest.
+    """Angle (rad) and velocity of one joint over time (s); starts and ends at rest."""
 
-    Parameters
-    ----------
-    name : str
-        What the signal is called on the command line and in reports.
-    duration : float
-        Length in s. Before 0 and after `duration` the first and the last angle are held.
-    evaluate : callable
-        ``evaluate(time (N,)) -> (angle (N,), velocity (N,))`` in rad and rad/s for ``0 <= time <=
-        duration``.
-    steady : tuple of float
-        ``(start, end)`` in s: where the signal has its nominal form, without ramps; figures are
-        taken there.
-    """
-
-    name: str
+    name: str  # what the signal is called on the command line and in reports
+    # Length in s. Before 0 and after `duration` the first and the last angle are held.
     duration: float
+    # ``evaluate(time (N,)) -> (angle (N,), velocity (N,))`` in rad and rad/s for ``0 <= time <=
+    # duration``.
     evaluate: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    # ``(start, end)`` in s: where the signal has its nominal form, without ramps; figures are
+    # taken there.
     steady: tuple[float, float]
 
     def __call__(self, time: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -60,17 +51,10 @@ class Signal:
 
 @dataclass(frozen=True)
 class Motion:
-    """A signal for each joint, all starting together.
+    """A signal for each joint, all starting together."""
 
-    Parameters
-    ----------
-    name : str
-        What the motion is called.
-    joints : mapping of str to Signal
-        Signal of each joint, in the order of the columns that :meth:`sample` returns.
-    """
-
-    name: str
+    name: str  # what the motion is called
+    # Signal of each joint, in the order of the columns that :meth:`sample` returns.
     joints: Mapping[str, Signal]
 
     @property
@@ -117,6 +101,8 @@ def hold(duration: float, angle: float = 0.0) -> Signal:
 def sequence(name: str, parts: Sequence[Signal]) -> Signal:
     """Play signals one after the other.
 
+    ValueError if two neighbours do not meet: a jump would be commanded.
+
     Parameters
     ----------
     name : str
@@ -128,11 +114,6 @@ def sequence(name: str, parts: Sequence[Signal]) -> Signal:
     -------
     Signal
         Its `steady` interval is the whole.
-
-    Raises
-    ------
-    ValueError
-        If two neighbours do not meet: a jump would be commanded.
     """
     starts = np.concatenate(([0.0], np.cumsum([part.duration for part in parts])))
     for before, after in pairwise(parts):
